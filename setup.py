@@ -132,6 +132,7 @@ setup(
             'stewart_capability = stewart_dynamics.datasheet:main',
             'stewart_describe = stewart_dynamics.description:main',
             'stewart_dynamics = stewart_dynamics.ros.console_scripts:dynamics',
+            'stewart_export = stewart_dynamics.export:main',
             'stewart_identify = stewart_dynamics.identification:main',
             'stewart_replay = stewart_dynamics.replay:main',
             'stewart_simulator = stewart_dynamics.ros.console_scripts:simulator',

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 import errno
 import json
@@ -68,6 +68,26 @@ def read_text(path: str | Path, largest: int, error: type[StewartError]) -> str:
 def _without_waiting(path: str, flags: int) -> int:
     """Open a file; a pipe without waiting for its writer."""
     return os.open(path, flags | os.O_NONBLOCK)
+
+
+def write_new(folder: Path, files: Mapping[str, str | bytes], replace: bool) -> list[Path]:
+    """
+    Write files into a folder, which is made if it is missing, as ``write_files`` does.
+
+    Returns their paths; StewartError if a file exists that may not be replaced.
+    """
+    paths = {folder / name: content for name, content in files.items()}
+    check_new(paths, replace)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_files(paths)
+    return list(paths)
+
+
+def check_new(paths: Iterable[Path], replace: bool) -> None:
+    """Raise StewartError where a file exists that may not be replaced."""
+    for path in paths:
+        if path.exists() and not replace:
+            raise StewartError(f'{path}: exists; --force replaces it')
 
 
 def write_files(files: Mapping[Path, str | bytes]) -> None:

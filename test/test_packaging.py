@@ -33,8 +33,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'stewart_dynamics'
-EXECUTABLES = ('stewart_capability', 'stewart_dynamics', 'stewart_describe', 'stewart_identify',
-               'stewart_replay', 'stewart_simulator', 'stewart_trajectory')
+EXECUTABLES = ('stewart_capability', 'stewart_dynamics', 'stewart_describe', 'stewart_export',
+               'stewart_identify', 'stewart_replay', 'stewart_simulator', 'stewart_trajectory')
 PACKAGED = ('bags', 'config', 'examples', 'launch', 'resource', 'security', NAME, 'LICENSE',
             'package.xml', 'pyproject.toml', 'setup.cfg', 'setup.py')
 SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', NAME)

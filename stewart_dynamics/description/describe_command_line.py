@@ -18,13 +18,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.program import DONE, Program
-from stewart_dynamics.whole_file import write_files
+from stewart_dynamics.whole_file import check_new, write_new
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -101,8 +101,10 @@ def _write(given: argparse.Namespace) -> int:
     control = None
     if given.ros2_control is not None:
         control = Ros2Control(given.ros2_control, given.hardware)
-    _put(given, {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
-                 f'{name}.xml': mjcf(hexapod, name)})
+    texts = {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
+             f'{name}.xml': mjcf(hexapod, name)}
+    for path in write_new(given.output, texts, given.force):
+        print(path)
     return _judge(parameters, given)
 
 
@@ -113,7 +115,8 @@ def _read(given: argparse.Namespace) -> int:
         raise StewartError('--ros2-control: not with --from')
     found = read_hexapod(given.source)
     path = given.output / f'{given.name or given.source.stem}.yaml'
-    _check_new([path], given)
+    check_new([path], given.force)
+    given.output.mkdir(parents=True, exist_ok=True)
     found.parameters.to_yaml(path)
     print(path)
     for remark in found.remarks:
@@ -129,20 +132,3 @@ def _judge(parameters: Parameters, given: argparse.Namespace) -> int:
     for mistake in mistakes:
         _PROGRAM.complain(f'warning: {mistake}')
     return LIKELY_MISTAKE if mistakes and given.strict else DONE
-
-
-def _check_new(paths: Iterable[Path], given: argparse.Namespace) -> None:
-    """Make the folder; StewartError where a file exists that may not be replaced."""
-    for path in paths:
-        if path.exists() and not given.force:
-            raise StewartError(f'{path}: exists; --force replaces it')
-    given.output.mkdir(parents=True, exist_ok=True)
-
-
-def _put(given: argparse.Namespace, files: dict[str, str]) -> None:
-    """Write all files, or none if one exists or cannot be written."""
-    paths = {given.output / name: text for name, text in files.items()}
-    _check_new(paths, given)
-    write_files(paths)
-    for path in paths:
-        print(path)

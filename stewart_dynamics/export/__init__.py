@@ -13,3 +13,13 @@
 # limitations under the License.
 
 """The same computation as C99 source, for real-time computers; needs no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program stewart_export."""
+    from stewart_dynamics.export.export_command_line import main as program
+    return program(arguments)

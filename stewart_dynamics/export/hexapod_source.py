@@ -111,12 +111,12 @@ def _field(name: str, value: Any, indent: str) -> str:
     return f'{indent}{text},  /* {name}: {decimal}{unit and f" {unit}"} */'
 
 
+def hexadecimal(number: float) -> str:
+    """Return a number as a constant of C with all its bits."""
+    if math.isinf(number):
+        return 'HUGE_VAL' if number > 0.0 else '-HUGE_VAL'
+    return str(number) if isinstance(number, int) else number.hex()
+
+
 def _numbers(value: Any) -> Iterator[str]:
-    """Yield the numbers of a value as C constants with all their bits."""
-    for number in np.ravel(value).tolist():
-        if isinstance(number, int):
-            yield str(number)
-        elif math.isinf(number):
-            yield 'HUGE_VAL' if number > 0.0 else '-HUGE_VAL'
-        else:
-            yield number.hex()
+    return map(hexadecimal, np.ravel(value).tolist())

@@ -1,0 +1,70 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line of stewart_export."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from stewart_dynamics.program import DONE, Program
+from stewart_dynamics.whole_file import write_new
+
+_PROGRAM = Program('stewart_export')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    given = _arguments().parse_args(arguments)
+    return _PROGRAM.exit_code(lambda: _export(given))
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Write the computation of the node for one hexapod as C99 source, for '
+                    'real-time computers.',
+        epilog='DIR gets stewart_dynamics.h and .c, the same for every hexapod; NAME.h and .c, '
+               'this hexapod;\ngolden.csv and test_golden.c, results to compare with; and '
+               'CMakeLists.txt.\n\n'
+               'exit codes: 0 done; 2 bad arguments or parameters, or files that exist or cannot '
+               'be written;\n130 interrupted')
+    parser.add_argument('--params', type=Path, required=True, metavar='FILE',
+                        help='parameters of the hexapod, the file that the node takes')
+    parser.add_argument('--output', type=Path, required=True, metavar='DIR',
+                        help='folder of the files')
+    parser.add_argument('--name', default='hexapod', metavar='NAME',
+                        help='name of the hexapod in C (default: hexapod)')
+    parser.add_argument('--node', default='', metavar='NAME',
+                        help='name of the node whose parameters are read (default: '
+                             'stewart_dynamics)')
+    parser.add_argument('--force', action='store_true', help='replace files that exist')
+    return parser
+
+
+def _export(given: argparse.Namespace) -> int:
+    # Imported here, so that --help is fast.
+    from stewart_dynamics.export.c_project import c_project, check_name
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.parameters.table import Parameters
+
+    name = check_name(given.name)
+    parameters = Parameters.from_yaml(given.params, given.node)
+    for path in write_new(given.output, c_project(parameters, name), given.force):
+        _PROGRAM.say(str(path))
+    for mistake in likely_mistakes(parameters):
+        _PROGRAM.complain(f'warning: {mistake}')
+    return DONE

@@ -1,0 +1,139 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Golden vectors: a motion of a hexapod, and the results of the node's step for it.
+
+The motion begins at the home pose, or where it is likely to be, and swings farther and faster in
+all six directions until limits are exceeded; parts of it are on a moving base and under a wrench.
+The results are those of the library, not of the C source.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
+from stewart_dynamics.mechanics.kinematics.home_pose import homes
+from stewart_dynamics.mechanics.limits import JUMP, LIMITS
+from stewart_dynamics.mechanics.rows import BASE, MOTION, POSE, WRENCH
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.step import Output, Setpoint, Step
+
+# Return codes of the C source.
+OK, SINGULAR, SUPPRESSED, NO_POSE = 0, 6, 7, 8
+_CODES = {forward_kinematics.FOUND: OK, forward_kinematics.NO_POSE: NO_POSE,
+          forward_kinematics.SINGULAR: SINGULAR}
+# Bits of stewart_output.exceeded, from the lowest one.
+_BITS = (*LIMITS, JUMP)
+
+_COUNT = 40
+_PERIOD = 20_000_000  # of the setpoints [ns]
+
+_XYZ = 'x', 'y', 'z'
+_TWIST = [f'{part}_{axis}' for part in ('v', 'w', 'dv', 'dw') for axis in _XYZ]
+_POSE = [*_XYZ, *(f'r{row}{column}' for row in _XYZ for column in _XYZ)]
+
+
+def _legs(name: str) -> list[str]:
+    return [f'{name}_{leg}' for leg in range(1, 7)]
+
+
+# The columns of a vector, in parts: first what is given, then the results.
+PARTS: dict[str, list[str]] = {
+    'STAMP': ['stamp'],
+    'HAS_BASE': ['has_base'],
+    'MOTION': [*_POSE, *_TWIST],
+    'WRENCH': ['fx', 'fy', 'fz', 'mx', 'my', 'mz'],
+    'BASE': [f'base_{part}_{axis}' for part in ('g', 'dv', 'w', 'dw') for axis in _XYZ],
+    'CODE': ['code'],
+    'RESULT': [*_legs('length'), *_legs('rate'), *_legs('demanded_force'), 'determinant',
+               'determinant_rate', 'condition_number', *_legs('unit_load_force')],
+    'FORCES': _legs('force'),
+    'EXCEEDED': _legs('exceeded'),
+    'WARNING': ['warning', 'stopped', 'crossings'],
+    'FOUND_CODE': ['found_code'],
+    'FOUND': [f'found_{name}' for name in _POSE],
+}
+"""
+Names of the columns: stamp [ns], SI units otherwise, base axes; ``found`` is the pose that the
+forward kinematics find for the lengths, from the last pose that it found.
+"""
+COLUMNS = [name for names in PARTS.values() for name in names]
+
+
+def golden_vectors(parameters: Parameters) -> Array:
+    """Return the vectors (N, len(COLUMNS)); samples whose numbers overflow are left out."""
+    step, constants = Step(parameters), hexapod_constants(parameters)
+    motions = _motions(parameters)
+    weight = parameters['platform.mass'] * 10.0 + 1.0
+    phases = np.arange(_COUNT)[:, None] + np.arange(WRENCH + BASE)
+    wrenches = weight * np.sin(phases[:, :WRENCH]) * (np.arange(_COUNT) % 4 > 0)[:, None]
+    bases = np.sin(phases[:, WRENCH:])
+    bases[:, :3] += parameters['gravity']
+    guess = np.zeros((1, MOTION))
+    guess[0, :POSE.stop] = motions[0, :POSE.stop]
+    rows, state = [], None
+    for n in range(_COUNT):
+        stamp, moving = n * _PERIOD, n % 3 == 2
+        a, b, c, d, e, f = wrenches[n].tolist()
+        output = step(Setpoint(
+            stamp, tuple(motions[n].tolist()), (a, b, c, d, e, f),
+            base=tuple(bases[n].tolist()) if moving else None), state)
+        if output is None:
+            continue
+        state = output.state
+        code, steps, residual = np.empty(1, dtype=int), np.empty(1, dtype=int), np.empty(1)
+        forward_kinematics.poses(
+            constants, np.array([output.lengths]), guess, code, steps, residual)
+        rows.append([
+            stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(output),
+            _CODES[int(code[0])], *guess[0, :POSE.stop]])
+    return np.array(rows, dtype=float).reshape(-1, len(COLUMNS))
+
+
+def _motions(parameters: Parameters) -> Array:
+    """Return rows of motion (_COUNT, MOTION)."""
+    positions, rotations = homes(parameters)
+    size = parameters['singularity.characteristic_length']
+    times = 1e-9 * _PERIOD * np.arange(_COUNT)[:, None]
+    omega = 2.0 * math.pi * np.array([0.9, 1.1, 1.3, 1.5, 1.7, 1.9])
+    growth = times / times[-1]
+    sine, cosine = np.sin(omega * times), np.cos(omega * times)
+    swing = 0.5 * np.array([size, size, size, 1.0, 1.0, 1.0])
+    q = swing * growth * sine
+    rate = swing * (sine / times[-1] + growth * omega * cosine)
+    acceleration = swing * (2.0 * omega * cosine / times[-1] - growth * omega ** 2 * sine)
+    turning = Motion.from_euler(
+        q[:, :3], q[:, 3:], rate[:, :3], rate[:, 3:], acceleration[:, :3], acceleration[:, 3:])
+    return Motion(positions[0] + turning.position, turning.rotation @ rotations[0],
+                  turning.linear_velocity, turning.angular_velocity,
+                  turning.linear_acceleration, turning.angular_acceleration).rows
+
+
+def _results(output: Output) -> list[float]:
+    """Return the columns from CODE to WARNING."""
+    code = SINGULAR if not output.solvable else OK if output.forces else SUPPRESSED
+    exceeded = [sum(1 << _BITS.index(each.limit) for each in output.exceedances
+                    if each.leg == leg) for leg in range(6)]
+    state = output.singularity
+    return [code, *output.lengths, *output.rates, *(output.demanded_forces or (0.0,) * 6),
+            output.determinant, output.determinant_rate, output.condition,
+            *output.unit_load_forces, *(output.forces or (0.0,) * 6), *exceeded,
+            state.cause, state.stopped, state.crossings]
