@@ -1,0 +1,144 @@
+// Copyright 2026 The stewart_dynamics developers
+//
+// Licensed under the Apache License, Version 2.0 (the "License");
+// you may not use this file except in compliance with the License.
+// You may obtain a copy of the License at
+//
+//     http://www.apache.org/licenses/LICENSE-2.0
+//
+// Unless required by applicable law or agreed to in writing, software
+// distributed under the License is distributed on an "AS IS" BASIS,
+// WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+// See the License for the specific language governing permissions and
+// limitations under the License.
+
+/* One instance of the hexapod as an FMU: fmu.h. */
+
+#include "fmu.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+fmu_instance * fmu_create(const char * token)
+{
+  fmu_instance * instance = NULL;
+  if (token != NULL && strcmp(token, fmu_token) == 0) {
+    instance = calloc(1, sizeof *instance);
+  }
+  if (instance != NULL) {
+    fmu_reset(instance);
+  }
+  return instance;
+}
+
+void fmu_reset(fmu_instance * instance)
+{
+  memset(&instance->memory, 0, sizeof instance->memory);
+  memcpy(instance->memory.values, fmu_start, sizeof fmu_start);
+}
+
+double * fmu_value(fmu_instance * instance, uint32_t reference, fmu_type type, int settable)
+{
+  fmu_type actual = FMU_REAL;
+  if (reference >= FMU_VALUES || (settable && reference >= FMU_LENGTHS)) {
+    return NULL;
+  }
+  if (reference >= FMU_EXCEEDED && reference <= FMU_STATUS) {
+    actual = FMU_INTEGER;
+  } else if (reference == FMU_WARNING || reference == FMU_SUPPRESS_NEAR_SINGULARITY ||
+    reference == FMU_SUPPRESS_AT_LIMITS)
+  {
+    actual = FMU_BOOLEAN;
+  }
+  return type == actual ? &instance->memory.values[reference] : NULL;
+}
+
+/* Put the parameters of the instance into a hexapod; return whether they keep their rules. */
+static int put_parameters(const double * values, stewart_platform * platform)
+{
+  const double * i = values + FMU_INERTIA;  /* xx xy xz yy yz zz */
+  double minor = i[0] * i[3] - i[1] * i[1];
+  double determinant = minor * i[5] - i[0] * i[4] * i[4] - i[2] * i[2] * i[3] +
+    2.0 * i[1] * i[2] * i[4];
+  int n;
+  for (n = FMU_MASS; n < FMU_LENGTHS; n++) {
+    if (!isfinite(values[n])) {
+      return 0;
+    }
+  }
+  platform->mass = values[FMU_MASS];
+  memcpy(platform->center_of_mass, values + FMU_CENTER_OF_MASS, 3 * sizeof *values);
+  memcpy(platform->inertia, i, 6 * sizeof *values);
+  platform->warn_condition = values[FMU_WARN_CONDITION];
+  platform->stop_condition = values[FMU_STOP_CONDITION];
+  platform->warn_time = values[FMU_WARN_TIME];
+  platform->suppress_near_singularity = values[FMU_SUPPRESS_NEAR_SINGULARITY] != 0.0;
+  platform->suppress_at_limits = values[FMU_SUPPRESS_AT_LIMITS] != 0.0;
+  return platform->mass > 0.0 && i[0] > 0.0 && minor > 0.0 && determinant > 0.0 &&
+    platform->warn_condition >= 1.0 && platform->stop_condition >= platform->warn_condition &&
+    platform->warn_time >= 0.0;
+}
+
+/* The inputs in the order of the variables: the structures are arrays of doubles. */
+static void put_motion(const double * values, stewart_motion * motion, stewart_base * base)
+{
+  memcpy(motion->position, values + FMU_POSITION, sizeof motion->position);
+  memcpy(motion->linear_velocity, values + FMU_LINEAR_VELOCITY, 3 * sizeof *values);
+  memcpy(motion->angular_velocity, values + FMU_ANGULAR_VELOCITY, 3 * sizeof *values);
+  memcpy(motion->linear_acceleration, values + FMU_LINEAR_ACCELERATION, 3 * sizeof *values);
+  memcpy(motion->angular_acceleration, values + FMU_ANGULAR_ACCELERATION, 3 * sizeof *values);
+  memcpy(base->gravity, values + FMU_BASE_GRAVITY, 3 * sizeof *values);
+  memcpy(base->linear_acceleration, values + FMU_BASE_LINEAR_ACCELERATION, 3 * sizeof *values);
+  memcpy(base->angular_velocity, values + FMU_BASE_ANGULAR_VELOCITY, 3 * sizeof *values);
+  memcpy(base->angular_acceleration, values + FMU_BASE_ANGULAR_ACCELERATION, 3 * sizeof *values);
+}
+
+int fmu_step(fmu_instance * instance, double time)
+{
+  double * values = instance->memory.values;
+  stewart_platform platform = *fmu_platform;
+  stewart_motion motion;
+  stewart_base base;
+  stewart_output output;
+  int code, n;
+  put_motion(values, &motion, &base);
+  code = stewart_rotation(values + FMU_ORIENTATION, motion.rotation);
+  if (!put_parameters(values, &platform) || !(fabs(time) < 2e9)) {
+    code = STEWART_OUT_OF_RANGE;
+  }
+  if (code == STEWART_OK) {
+    code = stewart_step(
+      &platform, &motion, values + FMU_WRENCH, &base, (int64_t)floor(time * 1e9 + 0.5),
+      &instance->memory.state, &output);
+  }
+  if (code == STEWART_OK || code == STEWART_SUPPRESSED || code == STEWART_SINGULAR) {
+    memcpy(values + FMU_LENGTHS, output.result.lengths, 6 * sizeof *values);
+    memcpy(values + FMU_RATES, output.result.rates, 6 * sizeof *values);
+    values[FMU_DETERMINANT] = output.result.determinant;
+    values[FMU_DETERMINANT_RATE] = output.result.determinant_rate;
+    values[FMU_CONDITION_NUMBER] = output.result.condition_number;
+    values[FMU_WARNING] = instance->memory.state.warning != STEWART_NO_WARNING;
+    for (n = 0; n < 6; n++) {
+      values[FMU_EXCEEDED + n] = output.exceeded[n];
+    }
+  }
+  for (n = 0; n < 6; n++) {
+    values[FMU_FORCES + n] = code == STEWART_OK ? output.forces[n] : 0.0;
+  }
+  values[FMU_STATUS] = code;
+  values[FMU_TIME] = time;
+  return code;
+}
+
+const char * fmu_text(int code)
+{
+  switch (code) {
+    case STEWART_OK: return "forces are computed";
+    case STEWART_NOT_FINITE: return "forces are zero: an input is NaN or infinite";
+    case STEWART_NOT_UNIT: return "forces are zero: orientation is not a unit quaternion";
+    case STEWART_SINGULAR: return "forces are zero: det(J) is zero";
+    case STEWART_SUPPRESSED: return "forces are zero: singularity.action or limits.action";
+    default: return "forces are zero: an input, a parameter or the time is out of range";
+  }
+}

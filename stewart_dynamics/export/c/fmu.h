@@ -1,0 +1,109 @@
+// Copyright 2026 The stewart_dynamics developers
+//
+// Licensed under the Apache License, Version 2.0 (the "License");
+// you may not use this file except in compliance with the License.
+// You may obtain a copy of the License at
+//
+//     http://www.apache.org/licenses/LICENSE-2.0
+//
+// Unless required by applicable law or agreed to in writing, software
+// distributed under the License is distributed on an "AS IS" BASIS,
+// WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+// See the License for the specific language governing permissions and
+// limitations under the License.
+
+/*
+ * A hexapod as a Functional Mock-up Unit (FMU) for co-simulation: its variables, one instance and
+ * one step. fmi2.c and fmi3.c are the functions of FMI 2.0 and 3.0 around it. Instances share
+ * nothing; a step allocates nothing.
+ */
+
+#ifndef STEWART_FMU_H
+#define STEWART_FMU_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "stewart_dynamics.h"
+
+#if defined(_WIN32)
+#define FMU_EXPORT __declspec(dllexport)
+#elif defined(__GNUC__)
+#define FMU_EXPORT __attribute__((visibility("default")))
+#else
+#define FMU_EXPORT
+#endif
+
+/* Value references of the variables: their places in fmu_instance.values. The names, units and
+   descriptions in modelDescription.xml are in the same order. */
+enum {
+  FMU_POSITION = 0,
+  FMU_ORIENTATION = 3,  /* quaternion x y z w */
+  FMU_LINEAR_VELOCITY = 7,
+  FMU_ANGULAR_VELOCITY = 10,
+  FMU_LINEAR_ACCELERATION = 13,
+  FMU_ANGULAR_ACCELERATION = 16,
+  FMU_WRENCH = 19,
+  FMU_BASE_GRAVITY = 25,
+  FMU_BASE_LINEAR_ACCELERATION = 28,
+  FMU_BASE_ANGULAR_VELOCITY = 31,
+  FMU_BASE_ANGULAR_ACCELERATION = 34,
+  FMU_MASS = 37,  /* the first parameter */
+  FMU_CENTER_OF_MASS = 38,
+  FMU_INERTIA = 41,
+  FMU_WARN_CONDITION = 47,
+  FMU_STOP_CONDITION = 48,
+  FMU_WARN_TIME = 49,
+  FMU_SUPPRESS_NEAR_SINGULARITY = 50,
+  FMU_SUPPRESS_AT_LIMITS = 51,
+  FMU_LENGTHS = 52,  /* the first output */
+  FMU_RATES = 58,
+  FMU_FORCES = 64,
+  FMU_DETERMINANT = 70,
+  FMU_DETERMINANT_RATE = 71,
+  FMU_CONDITION_NUMBER = 72,
+  FMU_WARNING = 73,
+  FMU_EXCEEDED = 74,
+  FMU_STATUS = 80,
+  FMU_TIME = 81,
+  FMU_VALUES = 82
+};
+
+typedef enum {FMU_REAL, FMU_INTEGER, FMU_BOOLEAN, FMU_OTHER} fmu_type;
+
+typedef struct {
+  double values[FMU_VALUES];  /* of all types: integers and booleans are exact */
+  stewart_state state;
+  int initializing;           /* outputs are computed when they are read */
+} fmu_memory;
+
+typedef struct {
+  fmu_memory memory;  /* all that changes: what Get and SetFMUState copy */
+  void * environment;
+  void (* log)(void);  /* of the importer; its type depends on the version of FMI */
+  char name[64];       /* FMI 2.0 only */
+} fmu_instance;
+
+/* Of this hexapod, in model.c, which stewart_export writes. */
+extern const stewart_platform * const fmu_platform;
+extern const double fmu_start[FMU_LENGTHS];  /* inputs at the home pose, and parameters */
+extern const char * const fmu_token;         /* instantiationToken or guid */
+
+/* Return a new instance, or NULL where the token is another hexapod's or memory is lacking. */
+fmu_instance * fmu_create(const char * token);
+
+/* Put start values, as before the first step. */
+void fmu_reset(fmu_instance * instance);
+
+/* Return the place of a variable's value, or NULL where it has another type; settable: where it
+   is not an input or parameter. */
+double * fmu_value(fmu_instance * instance, uint32_t reference, fmu_type type, int settable);
+
+/* Compute the outputs of the inputs at a time [s]; return the code of stewart_dynamics.h, which
+   the variable status is, too. With a code that is not STEWART_OK the forces are zero. */
+int fmu_step(fmu_instance * instance, double time);
+
+/* Return a code as text. */
+const char * fmu_text(int code);
+
+#endif /* STEWART_FMU_H */

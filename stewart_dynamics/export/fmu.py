@@ -1,0 +1,307 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A hexapod as a Functional Mock-up Unit (FMI 3.0 or 2.0), with its sources."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from importlib.resources import files
+import io
+import os
+from pathlib import Path
+import platform
+import shlex
+import shutil
+import subprocess
+import tempfile
+from typing import NamedTuple
+import uuid
+from xml.etree import ElementTree as ET
+import zipfile
+
+import numpy as np
+
+from stewart_dynamics import __version__
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.export.hexapod_source import digest, platform_source
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters.table import Parameters
+
+FMI_VERSIONS = ('3', '2')
+_C_SOURCES = ('fmu.h', 'stewart_dynamics.h', 'fmu.c', 'stewart_dynamics.c')
+# SI base units of each unit, by their exponents in FMI.
+_UNITS = {'m': {'m': 1}, 'm/s': {'m': 1, 's': -1}, 'm/s2': {'m': 1, 's': -2}, 'm3': {'m': 3},
+          'm3/s': {'m': 3, 's': -1}, 'rad/s': {'rad': 1, 's': -1},
+          'rad/s2': {'rad': 1, 's': -2}, 'N': {'kg': 1, 'm': 1, 's': -2},
+          'N.m': {'kg': 1, 'm': 2, 's': -2}, 'kg': {'kg': 1}, 'kg.m2': {'kg': 1, 'm': 2},
+          's': {'s': 1}}
+# Where an FMU has its binary: by version, system and processor.
+_FOLDERS = {('3', 'Linux', 'x86_64'): 'x86_64-linux', ('3', 'Linux', 'aarch64'): 'aarch64-linux',
+            ('3', 'Darwin', 'x86_64'): 'x86_64-darwin', ('3', 'Darwin', 'arm64'): 'aarch64-darwin',
+            ('2', 'Linux', 'x86_64'): 'linux64', ('2', 'Darwin', 'x86_64'): 'darwin64'}
+_COMPILERS = ('cc', 'gcc', 'clang')
+_KINDS_OF_2 = {'Float64': 'Real', 'Int32': 'Integer', 'Boolean': 'Boolean'}
+
+
+class Variable(NamedTuple):
+    """A variable of the FMU; its value reference is its place in the list."""
+
+    name: str
+    causality: str
+    description: str
+    unit: str = ''
+    kind: str = 'Float64'
+    """Type in FMI 3.0."""
+    start: float | None = None
+    """None for outputs."""
+
+    @property
+    def variability(self) -> str:
+        """Return when the value may change."""
+        if self.causality == 'parameter':
+            return 'tunable'
+        return 'continuous' if self.kind == 'Float64' else 'discrete'
+
+    @property
+    def start_text(self) -> str:
+        """Return the start value with all its digits."""
+        return repr(self.start) if self.kind != 'Boolean' else 'true' if self.start else 'false'
+
+
+def variables(parameters: Parameters) -> list[Variable]:
+    """
+    Return the variables in the order of ``fmu.h``; they start at rest at the home pose.
+
+    Raises
+    ------
+    ParameterError
+        The parameters do not give the height of the platform at the home pose.
+
+    """
+    home = StewartPlatform(parameters).home_pose()
+    start = [*home.position, *to_quaternion(home.rotation), *np.zeros(18), *parameters['gravity'],
+             *np.zeros(9), parameters['platform.mass'], *parameters['platform.center_of_mass'],
+             *parameters['platform.inertia'], parameters['singularity.warn_condition'],
+             parameters['singularity.stop_condition'], parameters['singularity.warn_time'],
+             parameters['singularity.action'] == 'suppress_forces',
+             parameters['limits.action'] == 'suppress_forces']
+    given = [*_inputs(), *_tunable()]
+    return [*(each._replace(start=float(value))
+              for each, value in zip(given, start, strict=True)), *_outputs()]
+
+
+def _inputs() -> Iterator[Variable]:
+    for name, unit, axes, text in (
+            ('position', 'm', 'xyz', "position of the platform's origin, base frame"),
+            ('orientation', '', 'xyzw', 'unit quaternion that turns platform axes to base axes'),
+            ('linear_velocity', 'm/s', 'xyz', "velocity of the platform's origin, base axes"),
+            ('angular_velocity', 'rad/s', 'xyz', 'angular velocity of the platform, base axes'),
+            ('linear_acceleration', 'm/s2', 'xyz', 'derivative of linear_velocity'),
+            ('angular_acceleration', 'rad/s2', 'xyz', 'derivative of angular_velocity'),
+            ('wrench.force', 'N', 'xyz', 'external force on the platform, base axes'),
+            ('wrench.moment', 'N.m', 'xyz', "external moment about the platform's origin"),
+            ('base.gravity', 'm/s2', 'xyz', 'acceleration of free fall, base axes'),
+            ('base.linear_acceleration', 'm/s2', 'xyz', "of the base's origin, base axes"),
+            ('base.angular_velocity', 'rad/s', 'xyz', 'of the base, base axes'),
+            ('base.angular_acceleration', 'rad/s2', 'xyz', 'of the base, base axes')):
+        for axis in axes:
+            yield Variable(f'{name}.{axis}', 'input', text, unit)
+
+
+def _tunable() -> Iterator[Variable]:
+    yield Variable('platform.mass', 'parameter', 'mass with payload', 'kg')
+    for axis in 'xyz':
+        yield Variable(f'platform.center_of_mass.{axis}', 'parameter',
+                       'center of mass with payload, platform frame', 'm')
+    for moment in ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'):
+        yield Variable(f'platform.inertia.{moment}', 'parameter',
+                       'inertia with payload about the center of mass, platform axes', 'kg.m2')
+    yield Variable('singularity.warn_condition', 'parameter', 'condition number of the warning')
+    yield Variable('singularity.stop_condition', 'parameter',
+                   'condition number at which singularity.suppress_forces begins')
+    yield Variable('singularity.warn_time', 'parameter',
+                   'warn when a crossing of det(J) = 0 is predicted sooner than this', 's')
+    yield Variable('singularity.suppress_forces', 'parameter',
+                   'forces are zero above stop_condition', '', 'Boolean')
+    yield Variable('limits.suppress_forces', 'parameter',
+                   'forces are zero while a limit is exceeded', '', 'Boolean')
+
+
+def _outputs() -> Iterator[Variable]:
+    for name, unit, text in (
+            ('lengths', 'm', 'length'), ('rates', 'm/s', 'rate of the length'),
+            ('forces', 'N', 'force to command, positive pushes; zero unless status is 0')):
+        for leg in range(1, 7):
+            yield Variable(f'{name}[{leg}]', 'output', f'{text} of leg {leg}', unit)
+    yield Variable('determinant', 'output', 'det(J), zero at a singularity', 'm3')
+    yield Variable('determinant_rate', 'output', 'its time derivative', 'm3/s')
+    yield Variable('condition_number', 'output',
+                   'of J_inv, moments divided by the characteristic length')
+    yield Variable('warning', 'output', 'singularity warning', '', 'Boolean')
+    for leg in range(1, 7):
+        yield Variable(f'exceeded[{leg}]', 'output', f'limits that leg {leg} exceeds: bits '
+                       'STEWART_LENGTH_MIN, ... of stewart_dynamics.h', '', 'Int32')
+    yield Variable('status', 'output', '0: forces are valid; else a code of stewart_dynamics.h',
+                   '', 'Int32')
+    yield Variable('time', 'independent', 'time of the last step', 's')
+
+
+def fmu(parameters: Parameters, name: str, version: str = '3',
+        compiler: list[str] | None = None) -> bytes:
+    """
+    Return the FMU as the bytes of its file, the same for the same parameters and compiler.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        The hexapod.
+    name : str
+        Its model identifier, a name in C.
+    version : str
+        Version of FMI, one of FMI_VERSIONS.
+    compiler : list of str, optional
+        Words of the command of a C compiler, for the binary of this computer; None: no binary.
+
+    Raises
+    ------
+    StewartError
+        The compiler fails, or the parameters give no home pose.
+
+    """
+    listed = variables(parameters)
+    token = f'{{{uuid.UUID(bytes=bytes.fromhex(digest(parameters))[:16])}}}'
+    folder = files('stewart_dynamics.export') / 'c'
+    sources = {each: (folder / each).read_text() for each in (*_C_SOURCES, f'fmi{version}.c')}
+    sources['model.c'] = _model_source(parameters, listed, name, token)
+    compiled = [each for each in sources if each.endswith('.c')]
+    content: dict[str, str | bytes] = {
+        'modelDescription.xml': _description(listed, name, token, version, compiled)}
+    content |= {f'sources/{each}': text for each, text in sources.items()}
+    if version == '3':
+        content['sources/buildDescription.xml'] = _build_description(name, compiled)
+    if compiler is not None:
+        path, binary = _binary(sources, name, version, compiler)
+        content[path] = binary
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, 'w', zipfile.ZIP_DEFLATED) as archive:
+        for path, data in content.items():
+            archive.writestr(zipfile.ZipInfo(path), data, zipfile.ZIP_DEFLATED)
+    return file.getvalue()
+
+
+def find_compiler() -> list[str] | None:
+    """Return the words of the command in $CC, or of a C compiler on the PATH; None: not found."""
+    for each in (os.environ.get('CC', ''), *_COMPILERS):
+        words = shlex.split(each)
+        if words and shutil.which(words[0]):
+            return words
+    return None
+
+
+def has_binaries(version: str) -> bool:
+    """Return whether FMUs of a version of FMI have a folder for binaries of this computer."""
+    return (version, platform.system(), platform.machine()) in _FOLDERS
+
+
+def _model_source(parameters: Parameters, listed: list[Variable], name: str, token: str) -> str:
+    start = [each for each in listed if each.start is not None]
+    return '\n'.join((
+        '#include "fmu.h"', '', '#include <math.h>', '',
+        'static ' + platform_source(parameters, 'hexapod'),
+        'const stewart_platform * const fmu_platform = &hexapod;', '',
+        'const double fmu_start[FMU_LENGTHS] = {',
+        *(f'  {(each.start or 0.0).hex()},  /* {each.name}: {each.start:.9g} */'
+          for each in start), '};', '', f'const char * const fmu_token = "{token}";', ''))
+
+
+def _binary(sources: Mapping[str, str], name: str, version: str, compiler: list[str],
+            ) -> tuple[str, bytes]:
+    """Return path and content of the shared library of this computer."""
+    system = platform.system()
+    where = _FOLDERS[version, system, platform.machine()]
+    with tempfile.TemporaryDirectory() as folder:
+        for each, text in sources.items():
+            Path(folder, each).write_text(text)
+        library = f'{name}.{"dylib" if system == "Darwin" else "so"}'
+        # -ffp-contract=off: the bits of the node.
+        command = [*compiler, '-std=c99', '-O2', '-ffp-contract=off', '-fPIC', '-shared',
+                   '-fvisibility=hidden', '-o', library,
+                   *(each for each in sources if each.endswith('.c')), '-lm']
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        if done.returncode:
+            raise StewartError(f'{shlex.join(compiler)}: cannot compile the FMU: '
+                               f'{done.stderr.strip().splitlines()[-1:] or done.returncode}')
+        return f'binaries/{where}/{library}', Path(folder, library).read_bytes()
+
+
+def _description(listed: list[Variable], name: str, token: str, version: str,
+                 compiled: list[str]) -> str:
+    """Return modelDescription.xml."""
+    new = version == '3'
+    root = ET.Element('fmiModelDescription', {
+        'fmiVersion': f'{version}.0', 'modelName': name,
+        'instantiationToken' if new else 'guid': token,
+        'description': 'Leg lengths and forces of a Gough-Stewart platform',
+        'license': 'Apache-2.0', 'generationTool': f'stewart_export {__version__}',
+        'variableNamingConvention': 'structured'})
+    interface = ET.SubElement(root, 'CoSimulation', {
+        'modelIdentifier': name, 'canHandleVariableCommunicationStepSize': 'true',
+        'canGetAndSetFMUState' if new else 'canGetAndSetFMUstate': 'true'})
+    if not new:
+        sources = ET.SubElement(interface, 'SourceFiles')
+        for file in compiled:
+            ET.SubElement(sources, 'File', name=file)
+    units = ET.SubElement(root, 'UnitDefinitions')
+    for unit, exponents in _UNITS.items():
+        ET.SubElement(ET.SubElement(units, 'Unit', name=unit), 'BaseUnit', {
+            base: str(exponent) for base, exponent in exponents.items()})
+    ET.SubElement(root, 'DefaultExperiment', startTime='0', stepSize='0.001')
+    model = ET.SubElement(root, 'ModelVariables')
+    for reference, each in enumerate(listed):
+        general = {'name': each.name, 'valueReference': str(reference),
+                   'causality': each.causality, 'variability': each.variability,
+                   'description': each.description}
+        of_type = {'unit': each.unit} if each.unit else {}
+        if each.start is not None:
+            of_type['start'] = each.start_text
+        if new:
+            ET.SubElement(model, each.kind, general | of_type)
+        else:
+            ET.SubElement(ET.SubElement(model, 'ScalarVariable', general),
+                          _KINDS_OF_2[each.kind], of_type)
+    structure = ET.SubElement(root, 'ModelStructure')
+    for tag in ('Output', 'InitialUnknown'):
+        group = structure if new else ET.SubElement(structure, f'{tag}s')
+        for reference, each in enumerate(listed):
+            if each.causality == 'output' and new:
+                ET.SubElement(group, tag, valueReference=str(reference))
+            elif each.causality == 'output':
+                ET.SubElement(group, 'Unknown', index=str(reference + 1))
+    return _text(root)
+
+
+def _build_description(name: str, compiled: list[str]) -> str:
+    root = ET.Element('fmiBuildDescription', fmiVersion='3.0')
+    configuration = ET.SubElement(root, 'BuildConfiguration', modelIdentifier=name)
+    group = ET.SubElement(configuration, 'SourceFileSet', language='C99')
+    for each in compiled:
+        ET.SubElement(group, 'SourceFile', name=each)
+    return _text(root)
+
+
+def _text(root: ET.Element) -> str:
+    ET.indent(root, '  ')
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'

@@ -1,0 +1,329 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The FMU: valid for FMPy, the bits of the step, figure 18, inputs that are not valid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+import math
+from pathlib import Path
+import shutil
+import subprocess
+from typing import Any
+import zipfile
+
+import numpy as np
+import pytest
+from referees import random_base_motion, random_motion, random_wrench, rng
+from rosbags.highlevel import AnyReader
+from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatform
+from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.export.fmu import find_compiler, fmu, variables
+from stewart_dynamics.mechanics.frames.rotation import (
+    from_quaternion, quaternion_length, to_quaternion)
+from stewart_dynamics.setpoints.joining import Setpoints
+from stewart_dynamics.setpoints.step import Batch, Step
+
+fmpy = pytest.importorskip('fmpy', reason='needs fmpy (requirements-fmi.txt)')
+validate_fmu = pytest.importorskip('fmpy.validation').validate_fmu
+COMPILER = find_compiler()
+pytestmark = pytest.mark.skipif(COMPILER is None, reason='needs a C compiler')
+
+ROOT = Path(__file__).resolve().parent.parent
+PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+VARIABLES = variables(PARAMETERS)
+REFERENCES = {each.name: n for n, each in enumerate(VARIABLES)}
+FORCES = [REFERENCES[f'forces[{leg}]'] for leg in range(1, 7)]
+LENGTHS = [REFERENCES[f'lengths[{leg}]'] for leg in range(1, 7)]
+STATUS = [REFERENCES['status']]
+HOME = [each.start for each in VARIABLES[:37]]
+NOT_FINITE, NOT_UNIT, OUT_OF_RANGE, SINGULAR, SUPPRESSED = 2, 4, 5, 6, 7
+
+
+class Unit:
+    """One instance of an FMU, driven without FMPy's interpolation of inputs."""
+
+    def __init__(self, path: Path, version: str, folder: Path, token: str | None = None) -> None:
+        self._is_3 = version == '3'
+        described = fmpy.read_model_description(path)
+        self.said: list[str] = []
+        kind = fmpy.fmi3.FMU3Slave if self._is_3 else fmpy.fmi2.FMU2Slave
+        self.fmu = kind(guid=token or described.guid, unzipDirectory=fmpy.extract(path, folder),
+                        modelIdentifier=described.coSimulation.modelIdentifier,
+                        instanceName='one')
+        self.fmu.instantiate()
+        self.time = 0.0
+        if not self._is_3:
+            self.fmu.setupExperiment()
+        self.fmu.enterInitializationMode()
+
+    def put(self, first: int, values: Sequence[float]) -> None:
+        """Set variables that follow each other."""
+        references = list(range(first, first + len(values)))
+        (self.fmu.setFloat64 if self._is_3 else self.fmu.setReal)(
+            references, [float(each) for each in values])
+
+    def put_flag(self, name: str, value: bool) -> None:
+        """Set a variable of type Boolean."""
+        self.fmu.setBoolean([REFERENCES[name]], [value])
+
+    def get(self, references: list[int]) -> list[float]:
+        """Return variables of type Float64."""
+        return list((self.fmu.getFloat64 if self._is_3 else self.fmu.getReal)(references))
+
+    @property
+    def status(self) -> int:
+        """Return the code of the last step."""
+        return int((self.fmu.getInt32 if self._is_3 else self.fmu.getInteger)(STATUS)[0])
+
+    @property
+    def warning(self) -> bool:
+        """Return whether the singularity warning is on."""
+        return bool(self.fmu.getBoolean([REFERENCES['warning']])[0])
+
+    def step(self, size: float = 0.001) -> list[float]:
+        """Return the forces of the inputs that were set."""
+        self.fmu.doStep(currentCommunicationPoint=self.time, communicationStepSize=size)
+        self.time += size
+        return self.get(FORCES)
+
+    def close(self) -> None:
+        """End the instance."""
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+@pytest.fixture(scope='module', params=['3', '2'])
+def version(request: pytest.FixtureRequest) -> str:
+    """Return a version of FMI."""
+    return str(request.param)
+
+
+@pytest.fixture(scope='module')
+def path(version: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the FMU of config/platform.yaml."""
+    path = tmp_path_factory.mktemp('fmu') / f'hexapod{version}.fmu'
+    path.write_bytes(fmu(PARAMETERS, 'hexapod', version, COMPILER))
+    return path
+
+
+@pytest.fixture
+def unit(path: Path, version: str, tmp_path: Path) -> Iterator[Unit]:
+    """Return an instance in its initialization mode."""
+    unit = Unit(path, version, tmp_path)
+    yield unit
+    unit.close()
+
+
+def at_home(parameters: Parameters) -> InverseDynamics:
+    """Return the inverse dynamics at rest at the home pose."""
+    platform = StewartPlatform(parameters)
+    home = platform.home_pose()
+    return platform.inverse_dynamics(Motion(home.position, home.rotation))
+
+
+def test_valid_and_at_home_without_inputs(path: Path) -> None:
+    """No problem for FMPy; without inputs the FMU simulates the home pose at rest."""
+    assert not validate_fmu(str(path))
+    done = fmpy.simulate_fmu(str(path), stop_time=0.01, output_interval=0.001)
+    home = at_home(PARAMETERS)
+    assert len(done) == 11
+    for leg in range(6):
+        assert set(done[f'forces[{leg + 1}]']) == {home.forces[leg]}
+        assert set(done[f'lengths[{leg + 1}]']) == {home.lengths[leg]}
+    assert set(done['status']) == {0}
+
+
+def test_figure_18(unit: Unit) -> None:
+    """The paper's motion through a singularity: figure 18 with the bits of the node."""
+    bag = ROOT / 'bags' / 'singular'
+    setpoints = Setpoints(PARAMETERS, lambda rejection, details: None, print)
+    with closing(Recording(bag)) as recording:
+        parts = [setpoints.take_many(messages) for messages, _ in recording.messages(
+            {f'/stewart_dynamics/{topic}': topic for topic in setpoints.topics})]
+    expected = Step(PARAMETERS).many(Batch._make(
+        None if part[0] is None else np.concatenate(part)
+        for part in zip(*parts, strict=True)), None)
+    unit.fmu.exitInitializationMode()
+    rows = _recorded_inputs(bag)
+    for n, row in enumerate(rows):
+        unit.put(0, row)
+        assert unit.step(0.01) == expected.forces[n].tolist(), n
+        assert unit.get(LENGTHS) == expected.lengths[n].tolist()
+        assert unit.warning == expected.warnings[n]
+    assert len(rows) == len(expected.stamps) == 1001
+    assert np.sign(expected.determinants).min() < 0.0 < expected.determinants.max()
+
+
+def test_random_motions_on_a_moving_base(unit: Unit) -> None:
+    """Random motions, wrenches and motions of the base: the bits of the library."""
+    random, platform = rng(), StewartPlatform(PARAMETERS)
+    motions = random_motion(PARAMETERS, random, 200).rows
+    wrenches = random_wrench(PARAMETERS, random, 200)
+    bases = random_base_motion(PARAMETERS, random, 200).rows
+    unit.fmu.exitInitializationMode()
+    for motion, wrench, base in zip(motions, wrenches, bases, strict=True):
+        quaternion = to_quaternion(motion[3:12].reshape(3, 3)).tolist()
+        unit.put(0, [*motion[:3], *quaternion, *motion[12:], *wrench, *base])
+        forces = unit.step()
+        length = quaternion_length(*quaternion)
+        motion[3:12] = from_quaternion(*(each / length for each in quaternion))
+        result = platform.solve(motion[None], wrench[None], base[None])[0]
+        assert unit.get(LENGTHS) == result[:6].tolist()
+        most = PARAMETERS['limits.force_max']
+        assert forces == np.clip(result[12:18], -most, most).tolist()
+        assert unit.status == 0
+
+
+@pytest.mark.parametrize(('first', 'values', 'status'), [
+    (0, [math.nan], NOT_FINITE), (7, [math.inf], NOT_FINITE), (19, [math.nan], NOT_FINITE),
+    (25, [math.nan], NOT_FINITE), (3, [0.0, 0.0, 0.0, 1.002], NOT_UNIT),
+    (3, [0.0, 0.0, 0.0, 0.0], NOT_UNIT), (0, [1e200], OUT_OF_RANGE), (37, [-1.0], OUT_OF_RANGE),
+    (37, [math.nan], OUT_OF_RANGE), (41, [0.0], OUT_OF_RANGE), (47, [0.5], OUT_OF_RANGE),
+    (48, [2.0], OUT_OF_RANGE), (2, [0.0], SINGULAR)])
+def test_bad_input(unit: Unit, first: int, values: list[float], status: int) -> None:
+    """Forces are zero and the status says why; the next valid input is answered."""
+    start = [each.start for each in VARIABLES[:50]]
+    unit.fmu.exitInitializationMode()
+    good = unit.step()
+    unit.put(first, values)
+    assert unit.step() == [0.0] * 6
+    assert unit.status == status
+    assert np.isfinite(unit.get([*LENGTHS, *FORCES])).all()
+    unit.put(0, start)
+    assert unit.step() == good
+    assert unit.status == 0
+
+
+def test_parameters_are_tunable(unit: Unit) -> None:
+    """A payload changes the forces as it changes those of the library."""
+    unit.fmu.exitInitializationMode()
+    unit.put(REFERENCES['platform.mass'], [250.0])
+    heavy = PARAMETERS.replaced({'platform.mass': 250.0})
+    assert unit.step() == at_home(heavy).forces.tolist()
+
+
+def test_suppressed(unit: Unit) -> None:
+    """Above stop_condition forces are zero if singularity.suppress_forces is set."""
+    unit.fmu.exitInitializationMode()
+    assert not unit.warning
+    unit.put(REFERENCES['singularity.warn_condition'], [1.0, 1.0])
+    assert unit.step() != [0.0] * 6
+    assert unit.warning
+    unit.put_flag('singularity.suppress_forces', True)
+    assert unit.step() == [0.0] * 6
+    assert unit.status == SUPPRESSED
+
+
+def test_instances_share_nothing(unit: Unit, path: Path, version: str, tmp_path: Path) -> None:
+    """Two instances in one process; a state that is put back; a reset."""
+    other = Unit(path, version, tmp_path / 'other')
+    for each in (unit, other):
+        each.fmu.exitInitializationMode()
+    home = unit.step()
+    other.put(2, [HOME[2] - 0.1])
+    low = other.step()
+    assert low != home
+    assert unit.step() == home
+    state = (other.fmu.getFMUState if version == '3' else other.fmu.getFMUstate)()
+    other.put(2, [HOME[2]])
+    assert other.step() == home
+    (other.fmu.setFMUState if version == '3' else other.fmu.setFMUstate)(state)
+    assert other.step() == low
+    (other.fmu.freeFMUState if version == '3' else other.fmu.freeFMUstate)(state)
+    other.fmu.reset()
+    if version == '2':
+        other.fmu.setupExperiment()
+    other.fmu.enterInitializationMode()
+    assert other.get(FORCES) == home  # computed while it is initialized
+    other.fmu.exitInitializationMode()
+    other.close()
+
+
+def test_variables_of_other_types(unit: Unit, version: str) -> None:
+    """A reference of another type, an output that is set, and one that does not exist fail."""
+    for references in ([REFERENCES['forces[1]']], [REFERENCES['status']], [10_000]):
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            unit.put(references[0], [0.0])
+    for references in ([REFERENCES['warning']], [10_000]):
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            unit.get(references)
+    unit.fmu.exitInitializationMode()
+
+
+def test_token_of_another_hexapod(path: Path, version: str, tmp_path: Path) -> None:
+    """An instance is not made for the description of another hexapod."""
+    other = PARAMETERS.replaced({'platform.mass': 151.0})
+    changed = tmp_path / 'other.fmu'
+    changed.write_bytes(fmu(other, 'hexapod', version))
+    token = fmpy.read_model_description(str(changed)).guid
+    assert token != fmpy.read_model_description(str(path)).guid
+    with pytest.raises(Exception, match='instantiate'):
+        Unit(path, version, tmp_path, token)
+
+
+@pytest.mark.parametrize('compiler', ['gcc', 'clang'])
+def test_sources_conform_to_the_standard(path: Path, version: str, compiler: str,
+                                         tmp_path: Path) -> None:
+    """The sources in the FMU compile without a warning, also with the standard's headers."""
+    if shutil.which(compiler) is None:
+        pytest.skip(f'needs {compiler}')
+    sources = Path(fmpy.extract(str(path), str(tmp_path))) / 'sources'
+    headers = Path(fmpy.__file__).parent / 'c-code'
+    strict = [compiler, '-std=c99', '-Wall', '-Wextra', '-Wpedantic', '-Wconversion',
+              '-Wdouble-promotion', '-Werror', '-fsyntax-only']
+    subprocess.run([*strict, *sorted(sources.glob('*.c'))], check=True)
+    subprocess.run([*strict, '-Wno-pedantic', f'-I{headers}', '-include',
+                    f'fmi{version}Functions.h', sources / f'fmi{version}.c'], check=True)
+
+
+def test_without_a_compiler(version: str, tmp_path: Path) -> None:
+    """Without a compiler the FMU has its sources alone, and is the same each time."""
+    once, again = (fmu(PARAMETERS, 'hexapod', version) for _ in range(2))
+    assert once == again
+    path = tmp_path / 'sources.fmu'
+    path.write_bytes(once)
+    names = zipfile.ZipFile(path).namelist()
+    assert 'modelDescription.xml' in names
+    assert not [name for name in names if name.startswith('binaries')]
+    assert (version == '3') == ('sources/buildDescription.xml' in names)
+
+
+def test_errors() -> None:
+    """A compiler that fails and a hexapod without a home pose are errors in one line."""
+    with pytest.raises(StewartError, match='cannot compile the FMU'):
+        fmu(PARAMETERS, 'hexapod', '3', ['false'])
+
+
+def _recorded_inputs(bag: Path) -> list[list[float]]:
+    """Return the inputs up to angular_acceleration of the setpoints of a bag, by their stamps."""
+    setpoints: dict[int, list[float]] = {}
+    with AnyReader([bag]) as reader:
+        for connection, _, data in sorted(
+                reader.messages(), key=lambda each: 'pose twist accel'.index(
+                    each[0].topic.rsplit('/', 1)[1])):
+            message: Any = reader.deserialize(data, connection.msgtype)
+            stamp = message.header.stamp.sec * 10 ** 9 + message.header.stamp.nanosec
+            row = setpoints.setdefault(stamp, [])
+            if connection.topic.endswith('pose'):
+                p, q = message.pose.position, message.pose.orientation
+                row += [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+            else:
+                of = message.twist if connection.topic.endswith('twist') else message.accel
+                for each in (of.linear, of.angular):
+                    row += [each.x, each.y, each.z]
+    return [row for _, row in sorted(setpoints.items())]
