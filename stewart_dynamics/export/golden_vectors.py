@@ -27,17 +27,18 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.limits import JUMP, LIMITS
-from stewart_dynamics.mechanics.rows import BASE, MOTION, POSE, WRENCH
+from stewart_dynamics.mechanics.rows import BASE, FORCES, MOTION, POSE, RESULT, WRENCH
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 
 # Return codes of the C source.
-OK, SINGULAR, SUPPRESSED, NO_POSE = 0, 6, 7, 8
+OK, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = 0, 6, 7, 8, 9
 _CODES = {forward_kinematics.FOUND: OK, forward_kinematics.NO_POSE: NO_POSE,
           forward_kinematics.SINGULAR: SINGULAR}
 # Bits of stewart_output.exceeded, from the lowest one.
@@ -68,12 +69,15 @@ PARTS: dict[str, list[str]] = {
     'FORCES': _legs('force'),
     'EXCEEDED': _legs('exceeded'),
     'WARNING': ['warning', 'stopped', 'crossings'],
+    'MOTOR_CODE': ['motor_code'],
+    'MOTORS': [*_legs('motor_angle'), *_legs('motor_speed'), *_legs('motor_acceleration'),
+               *_legs('motor_torque')],
     'FOUND_CODE': ['found_code'],
     'FOUND': [f'found_{name}' for name in _POSE],
 }
 """
-Names of the columns: stamp [ns], SI units otherwise, base axes; ``found`` is the pose that the
-forward kinematics find for the lengths, from the last pose that it found.
+Names of the columns: stamp [ns], SI units otherwise, base axes; torques are those of the demanded
+forces; ``found`` is the pose that the forward kinematics find for the lengths, from the last one.
 """
 COLUMNS = [name for names in PARTS.values() for name in names]
 
@@ -81,6 +85,7 @@ COLUMNS = [name for names in PARTS.values() for name in names]
 def golden_vectors(parameters: Parameters) -> Array:
     """Return the vectors (N, len(COLUMNS)); samples whose numbers overflow are left out."""
     step, constants = Step(parameters), hexapod_constants(parameters)
+    drives = None if parameters['actuator.screw_lead'] is None else Drives(parameters)
     motions = _motions(parameters)
     weight = parameters['platform.mass'] * 10.0 + 1.0
     phases = np.arange(_COUNT)[:, None] + np.arange(WRENCH + BASE)
@@ -104,7 +109,7 @@ def golden_vectors(parameters: Parameters) -> Array:
             constants, np.array([output.lengths]), guess, code, steps, residual)
         rows.append([
             stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(output),
-            _CODES[int(code[0])], *guess[0, :POSE.stop]])
+            *_motors(drives, motions[n], output), _CODES[int(code[0])], *guess[0, :POSE.stop]])
     return np.array(rows, dtype=float).reshape(-1, len(COLUMNS))
 
 
@@ -137,3 +142,12 @@ def _results(output: Output) -> list[float]:
             output.determinant, output.determinant_rate, output.condition,
             *output.unit_load_forces, *(output.forces or (0.0,) * 6), *exceeded,
             state.cause, state.stopped, state.crossings]
+
+
+def _motors(drives: Drives | None, motion: Array, output: Output) -> list[float]:
+    """Return the columns MOTOR_CODE and MOTORS, for the demanded forces."""
+    if drives is None:
+        return [NO_MOTORS, *np.zeros(len(PARTS['MOTORS']))]
+    results = np.zeros((1, RESULT))
+    results[0, FORCES] = output.demanded_forces or 0.0
+    return [OK, *drives(motion[None], results)[0, MECHANICAL]]

@@ -23,6 +23,8 @@ from typing import Any
 
 import numpy as np
 
+from stewart_dynamics.mechanics.drives.motors import (
+    BASE_AXIS, drive_constants, PLATFORM_AXIS, TWIST)
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.parameters.table import LEG_SHAPE, PARAMETERS, Parameters
@@ -35,7 +37,10 @@ LEG_FIELDS = (
     'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction',
     'actuator.coulomb_velocity', 'limits.length_min', 'limits.length_max', 'limits.velocity_max',
     'limits.force_max', 'geometry.base_joint_axes', 'limits.base_joint_angle_max',
-    'geometry.platform_joint_axes', 'limits.platform_joint_angle_max', *LEG_SHAPE)
+    'geometry.platform_joint_axes', 'limits.platform_joint_angle_max', *LEG_SHAPE,
+    'actuator.screw_lead', 'drive.gear_ratio', 'drive.efficiency',
+    'drive.back_driving_efficiency', 'drive.screw_rotation', 'drive.base_universal_axes',
+    'drive.platform_universal_axes')
 FIELDS_BEFORE_LEGS = (
     'gravity', 'platform.mass', 'platform.center_of_mass', 'platform.inertia')
 FIELDS_AFTER_LEGS = (
@@ -50,12 +55,13 @@ def field_values(parameters: Parameters) -> dict[str, Any]:
     Return the value of each field under the name of its parameter.
 
     An array for the fields of the legs, (6,) or (6, 3); a limit that is not set is infinite, a
-    length or radius that is not set zero. Joint axes are unit vectors, zero if not needed.
+    length or radius that is not set zero. Axes are unit vectors, zero if not needed;
+    ``drive.screw_rotation`` is the turn of the motor for a turn of its leg.
 
     Raises
     ------
     ParameterError
-        A limit of joint angles is set, its axes are not, and there is no home pose.
+        Axes that are needed are not given, and there is no home pose.
 
     """
     values: dict[str, Any] = {}
@@ -68,6 +74,10 @@ def field_values(parameters: Parameters) -> dict[str, Any]:
     axes = np.zeros((12, 3)) if angles is None else np.nan_to_num(angles.axes)
     values['geometry.base_joint_axes'] = axes[:6]
     values['geometry.platform_joint_axes'] = axes[6:]
+    drives = drive_constants(parameters)
+    values['drive.screw_rotation'] = drives[:, TWIST]
+    values['drive.base_universal_axes'] = drives[:, BASE_AXIS:BASE_AXIS + 3]
+    values['drive.platform_universal_axes'] = drives[:, PLATFORM_AXIS:PLATFORM_AXIS + 3]
     for name in LEG_FIELDS:
         if np.ndim(values[name]) < 1:
             values[name] = np.full(6, values[name])

@@ -11,15 +11,14 @@
 #include <math.h>
 #include <stddef.h>
 
-#if defined(__FAST_MATH__)
+#ifdef __FAST_MATH__
 #error "compile without -ffast-math: results would differ, and NaN would pass the checks"
 #endif
-#if defined(__clang__)
+#ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
-#elif defined(_MSC_VER)
-#pragma fp_contract(off)
 #endif
 
+#define PI 3.14159265358979323846
 #define SMALLEST_PIVOT 1e-32       /* smaller ones are taken as this: the inverse is finite */
 #define UNSOLVABLE_CONDITION 1e12  /* fewer than four valid digits of sixteen remain */
 #define ORTHOGONALITY 1e-6         /* of R^T R from the identity */
@@ -69,16 +68,14 @@ static void put_matrix(double to[9], vector row0, vector row1, vector row2)
 {put3(to, row0), put3(to + 3, row1), put3(to + 6, row2);}
 
 /* Whether all doubles of an array, or of a structure of doubles, are finite. */
-static int finite(const void * doubles, size_t size)
-{
+static int finite(const void * doubles, size_t size) {
   const double * numbers = (const double *)doubles;
   size_t n = 0;
   while (n < size / sizeof(double) && isfinite(numbers[n])) {n++;}
   return n == size / sizeof(double);
 }
 
-static int check_rotation(const double r[9])
-{
+static int check_rotation(const double r[9]) {
   vector x = column(r, 0), y = column(r, 1), z = column(r, 2);
   double xx = fabs(dot(x, x) - 1.0), yy = fabs(dot(y, y) - 1.0), zz = fabs(dot(z, z) - 1.0);
   double xy = fabs(dot(x, y)), xz = fabs(dot(x, z)), yz = fabs(dot(y, z));
@@ -86,17 +83,15 @@ static int check_rotation(const double r[9])
   return error <= ORTHOGONALITY && dot(cross(x, y), z) > 0.0 ? STEWART_OK : STEWART_NOT_A_ROTATION;
 }
 
-int stewart_rotation(const double quaternion[4], double rotation[9])
-{
-  if (quaternion == NULL || rotation == NULL) {return STEWART_NULL;}
+int stewart_rotation(const double quaternion[4], double rotation[9]) {
+  if (!quaternion || !rotation) {return STEWART_NULL;}
   if (!finite(quaternion, 4 * sizeof(double))) {return STEWART_NOT_FINITE;}
   double x = quaternion[0], y = quaternion[1], z = quaternion[2], w = quaternion[3];
   double length = sqrt(x * x + y * y + z * z + w * w);
   if (!(fabs(length - 1.0) <= QUATERNION_TOLERANCE)) {return STEWART_NOT_UNIT;}
   x /= length, y /= length, z /= length, w /= length;
   put_matrix(
-    rotation,
-    make(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+    rotation, make(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
     make(2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
     make(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)));
   return STEWART_OK;
@@ -112,8 +107,7 @@ typedef struct {
   double gravity_mass;        /* m_ge [kg] */
 } leg_pose;
 
-static leg_pose pose_of(const stewart_leg * leg, const double position[3], const double r[9])
-{
+static leg_pose pose_of(const stewart_leg * leg, const double position[3], const double r[9]) {
   leg_pose at;
   double center = leg->cylinder_center_of_mass;
   double inertia =
@@ -132,26 +126,23 @@ static leg_pose pose_of(const stewart_leg * leg, const double position[3], const
 
 typedef struct { vector force, moment; } load;  /* moment about the platform's origin */
 
-typedef struct {
-  double length, rate, actuator;  /* actuator: force of its reflected mass and friction [N] */
-  load on_leg;                    /* at its platform joint, to move the leg */
-  double row[6], row_rate[6];     /* of J_inv, right half by the characteristic length; its rate */
-} leg_dynamics;
-
-static leg_dynamics move_leg(
-  const stewart_leg * leg, const stewart_motion * motion, vector gravity, double inverse_size)
-{
-  leg_dynamics moved;
+/* Return the load that moves leg i; write its length, its rate, the force that moves its actuator,
+   and its row of J_inv, moments divided by the characteristic length, with the row's rate. */
+static load move_leg(
+  const stewart_platform * platform, int i, const stewart_motion * motion, double * length,
+  double * rate, double * actuator, double row[6], double row_rate[6]) {
+  const stewart_leg * leg = &platform->legs[i];
+  load moved;
   vector omega = read3(motion->angular_velocity);
   leg_pose at = pose_of(leg, motion->position, motion->rotation);
-  double per_length = at.per_length;
-  vector a = at.arm, s = at.direction;
+  double per_length = at.per_length, inverse_size = 1.0 / platform->characteristic_length;
+  vector a = at.arm, s = at.direction, gravity = read3(platform->gravity);
 
   /* the platform joint's velocity and acceleration (x_i', x_i''), along and across the leg */
   vector a_rate = cross(omega, a);
   vector x_rate = add(read3(motion->linear_velocity), a_rate);
-  double rate = dot(s, x_rate);
-  vector across = subtract(x_rate, scale(rate, s));
+  *length = at.length, *rate = dot(s, x_rate);
+  vector across = subtract(x_rate, scale(*rate, s));
   double across_squared = dot(across, across);
   vector turning = cross(read3(motion->angular_acceleration), a);
   vector x_acc = add(add(read3(motion->linear_acceleration), turning), cross(omega, a_rate));
@@ -164,27 +155,24 @@ static leg_dynamics move_leg(
   double coriolis_mass = at.piston_moment * per_length - at.across_mass;
   double along = leg->piston_mass * (along_acc - along_gravity + leg->piston_center_of_mass *
     per_length * per_length * across_squared);
-  vector force = scale(at.across_mass, across_acc);
-  force = subtract(force, scale(at.gravity_mass, across_gravity));
-  force = add(force, scale(2.0 * coriolis_mass * rate * per_length, across));
-  force = add(force, scale(along, s));
+  moved.force = scale(at.across_mass, across_acc);
+  moved.force = subtract(moved.force, scale(at.gravity_mass, across_gravity));
+  moved.force = add(moved.force, scale(2.0 * coriolis_mass * *rate * per_length, across));
+  moved.force = add(moved.force, scale(along, s));
+  moved.moment = cross(a, moved.force);
 
-  double slip = rate / leg->coulomb_velocity;
+  double slip = *rate / leg->coulomb_velocity;
   slip = slip < -1.0 ? -1.0 : slip > 1.0 ? 1.0 : slip;
+  *actuator = leg->reflected_mass * (along_acc + across_squared * per_length) +
+    leg->viscous_friction * *rate + leg->coulomb_friction * slip;
+
   vector s_rate = scale(per_length, across);
-  moved.length = at.length, moved.rate = rate;
-  moved.on_leg.force = force, moved.on_leg.moment = cross(a, force);
-  moved.actuator = leg->reflected_mass * (along_acc + across_squared * per_length) +
-    leg->viscous_friction * rate + leg->coulomb_friction * slip;
-  put3(moved.row, s);
-  put3(moved.row + 3, scale(inverse_size, cross(a, s)));
-  put3(moved.row_rate, s_rate);
-  put3(moved.row_rate + 3, scale(inverse_size, add(cross(a_rate, s), cross(a, s_rate))));
+  put3(row, s), put3(row + 3, scale(inverse_size, cross(a, s))), put3(row_rate, s_rate);
+  put3(row_rate + 3, scale(inverse_size, add(cross(a_rate, s), cross(a, s_rate))));
   return moved;
 }
 
-static load move_platform(const stewart_platform * platform, const stewart_motion * motion)
-{
+static load move_platform(const stewart_platform * platform, const stewart_motion * motion) {
   load moved;
   const double * r = motion->rotation, * inertia = platform->inertia;
   vector omega = read3(motion->angular_velocity), alpha = read3(motion->angular_acceleration);
@@ -206,12 +194,11 @@ typedef struct {
   double carrying[9];      /* maps r to W' x r + W x (W x r) */
 } moving_base;
 
-static moving_base base_of(const stewart_platform * platform, const stewart_base * base)
-{
+static moving_base base_of(const stewart_platform * platform, const stewart_base * base) {
   moving_base b;
   vector w = read3(base->angular_velocity), d = read3(base->angular_acceleration);
-  b.felt = subtract(read3(base->linear_acceleration),
-                    subtract(read3(base->gravity), read3(platform->gravity)));
+  b.felt = subtract(read3(base->gravity), read3(platform->gravity));
+  b.felt = subtract(read3(base->linear_acceleration), b.felt);
   b.spin = w, b.spin_rate = d;
   put_matrix(
     b.carrying, make(-(w.y * w.y + w.z * w.z), w.x * w.y - d.z, w.x * w.z + d.y),
@@ -221,8 +208,7 @@ static moving_base base_of(const stewart_platform * platform, const stewart_base
 }
 
 static load carry_leg(
-  const stewart_leg * leg, const stewart_motion * motion, const moving_base * base)
-{
+  const stewart_leg * leg, const stewart_motion * motion, const moving_base * base) {
   load carried;
   leg_pose at = pose_of(leg, motion->position, motion->rotation);
   vector s = at.direction, omega = read3(motion->angular_velocity);
@@ -243,8 +229,7 @@ static load carry_leg(
 }
 
 static load carry_platform(
-  const stewart_platform * platform, const stewart_motion * motion, const moving_base * base)
-{
+  const stewart_platform * platform, const stewart_motion * motion, const moving_base * base) {
   load carried;
   const double * r = motion->rotation, * inertia = platform->inertia;
   vector omega = read3(motion->angular_velocity);
@@ -268,8 +253,7 @@ static load carry_platform(
 static void exchange(double * a, double * b) {double old = *a; *a = *b; *b = old;}
 
 /* Replace a by its inverse (Gauss-Jordan, partial pivoting); return det(a). Rows are near 1. */
-static double invert(double a[6][6])
-{
+static double invert(double a[6][6]) {
   int swapped[6][6];
   double determinant = 1.0;
   for (int n = 0; n < 6; n++) {
@@ -302,25 +286,20 @@ static double invert(double a[6][6])
 typedef struct { double diagonal[6], squares[5]; } tridiagonal;  /* squares: off-diagonal */
 
 /* Householder's tridiagonal matrix of g (lower triangle, overwritten), eigenvalues times k. */
-static tridiagonal tridiagonalize(double g[6][6], double k)
-{
+static tridiagonal tridiagonalize(double g[6][6], double k) {
   tridiagonal t;
   double kk = k * k;
   t.diagonal[0] = k * g[0][0];
   for (int n = 0; n < 4; n++) {
-    double v[6], w[6], square = 0.0, wv = 0.0;
-    for (int i = n + 1; i < 6; i++) {
-      v[i] = g[i][n];
-      square += v[i] * v[i];
-    }
+    double v[6] = {0.0}, w[6] = {0.0}, square = 0.0, wv = 0.0;
+    for (int i = n + 1; i < 6; i++) {v[i] = g[i][n], square += v[i] * v[i];}
     double length = sqrt(square), half = square + length * fabs(v[n + 1]);
     double b = half > 0.0 ? 1.0 / half : 0.0;
     v[n + 1] += copysign(length, v[n + 1]);
     for (int i = n + 1; i < 6; i++) {
       double sum = g[i][n + 1] * v[n + 1];
       for (int j = n + 2; j < 6; j++) {sum += (i < j ? g[j][i] : g[i][j]) * v[j];}
-      w[i] = b * sum;
-      wv += w[i] * v[i];
+      w[i] = b * sum, wv += w[i] * v[i];
     }
     double c = 0.5 * b * wv;
     for (int i = n + 1; i < 6; i++) {
@@ -337,8 +316,7 @@ static tridiagonal tridiagonalize(double g[6][6], double k)
 }
 
 /* Return x one step nearer the largest eigenvalue of t, from above, or x where it is there. */
-static double laguerre_step(double x, const tridiagonal * t)
-{
+static double laguerre_step(double x, const tridiagonal * t) {
   double p = x - t->diagonal[0], dp = 1.0, ddp = 0.0;  /* the leading minor, its derivatives */
   double q = 1.0, dq = 0.0, ddq = 0.0;                 /* the minor before */
   for (int n = 1; n < 6; n++) {
@@ -355,14 +333,12 @@ static double laguerre_step(double x, const tridiagonal * t)
 }
 
 /* Write diagonal and trace of a a^T; return the square root of its largest eigenvalue / trace. */
-static double largest_singular_value(double a[6][6], double diagonal[6], double * trace)
-{
+static double largest_singular_value(double a[6][6], double diagonal[6], double * trace) {
   double g[6][6], x = 1.0 + 1e-14;  /* no eigenvalue is larger than the trace but for rounding */
   *trace = 0.0;
   for (int i = 0; i < 6; i++) {
     for (int j = 0; j <= i; j++) {g[i][j] = dot6(a[i], a[j]);}
-    diagonal[i] = g[i][i];
-    *trace += g[i][i];
+    diagonal[i] = g[i][i], *trace += g[i][i];
   }
   tridiagonal t = tridiagonalize(g, *trace > 0.0 ? 1.0 / *trace : 0.0);
   for (int n = 0; n < LAGUERRE_STEPS; n++) {
@@ -378,33 +354,24 @@ static double largest_singular_value(double a[6][6], double diagonal[6], double 
 /* Write the result of a motion under a wrench, unchecked. */
 static void solve(
   const stewart_platform * platform, const stewart_motion * motion, load wrench,
-  stewart_result * result)
-{
+  stewart_result * result) {
   double rows[6][6], row_rates[6][6], inverse[6][6], actuators[6], balanced[6];
-  double size = platform->characteristic_length, inverse_size = 1.0 / size;
+  double size = platform->characteristic_length;
   load moved = move_platform(platform, motion);
   moved.force = subtract(moved.force, wrench.force);
   moved.moment = subtract(moved.moment, wrench.moment);
   for (int i = 0; i < 6; i++) {
-    leg_dynamics leg = move_leg(
-      &platform->legs[i], motion, read3(platform->gravity), inverse_size);
-    result->lengths[i] = leg.length;
-    result->rates[i] = leg.rate;
-    actuators[i] = leg.actuator;
-    moved.force = add(moved.force, leg.on_leg.force);
-    moved.moment = add(moved.moment, leg.on_leg.moment);
-    for (int j = 0; j < 6; j++) {
-      rows[i][j] = inverse[j][i] = leg.row[j];
-      row_rates[i][j] = leg.row_rate[j];
-    }
+    load leg = move_leg(platform, i, motion, &result->lengths[i], &result->rates[i],
+                        &actuators[i], rows[i], row_rates[i]);
+    moved.force = add(moved.force, leg.force), moved.moment = add(moved.moment, leg.moment);
+    for (int j = 0; j < 6; j++) {inverse[j][i] = rows[i][j];}
   }
 
   /* With J the scaled J_inv, row n of (J^T)^-1 maps the wrench to the force of leg n, its length
      is the largest force of that leg under a unit load, and d(det)/dt = det tr(J^-1 J') is the
      sum of its products with the rows of J'. */
   double determinant = invert(inverse), change = 0.0;
-  put3(balanced, moved.force);
-  put3(balanced + 3, scale(inverse_size, moved.moment));
+  put3(balanced, moved.force), put3(balanced + 3, scale(1.0 / size, moved.moment));
   for (int i = 0; i < 6; i++) {
     result->forces[i] = dot6(inverse[i], balanced) + actuators[i];
     change += dot6(inverse[i], row_rates[i]);
@@ -421,22 +388,17 @@ static void solve(
 
 int stewart_inverse_dynamics(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
-  const stewart_base * base, stewart_result * result)
-{
+  const stewart_base * base, stewart_result * result) {
   stewart_result found;
   load external = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  if (platform == NULL || motion == NULL || result == NULL) {return STEWART_NULL;}
-  if (!finite(motion, sizeof *motion) || (base != NULL && !finite(base, sizeof *base)) ||
-    (wrench != NULL && !finite(wrench, 6 * sizeof(double))))
-  {
-    return STEWART_NOT_FINITE;
-  }
+  if (!platform || !motion || !result) {return STEWART_NULL;}
+  if (!finite(motion, sizeof *motion)) {return STEWART_NOT_FINITE;}
+  if (wrench && !finite(wrench, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
+  if (base && !finite(base, sizeof *base)) {return STEWART_NOT_FINITE;}
   int code = check_rotation(motion->rotation);
   if (code != STEWART_OK) {return code;}
-  if (wrench != NULL) {
-    external.force = read3(wrench), external.moment = read3(wrench + 3);
-  }
-  if (base != NULL) {
+  if (wrench) {external.force = read3(wrench), external.moment = read3(wrench + 3);}
+  if (base) {
     moving_base moving = base_of(platform, base);
     load carried = carry_platform(platform, motion, &moving);
     for (int i = 0; i < 6; i++) {
@@ -458,15 +420,13 @@ int stewart_inverse_dynamics(
 /* ---- kinematics/joint_angles, kinematics/leg_clearance -------------------------------------- */
 
 /* Angle between a joint's axis and its leg [rad]. */
-static double joint_angle(const double axis[3], vector direction)
-{
+static double joint_angle(const double axis[3], vector direction) {
   vector sine = cross(read3(axis), direction);
   return atan2(sqrt(dot(sine, sine)), dot(read3(axis), direction));
 }
 
 /* Least |gap + u s - v t| for 0 <= u <= u_end, 0 <= v <= v_end; u is that of the two lines. */
-static double distance_of(vector gap, vector s, vector t, double u, double u_end, double v_end)
-{
+static double distance_of(vector gap, vector s, vector t, double u, double u_end, double v_end) {
   double cosine = dot(s, t);
   u = least(largest(u, 0.0), u_end);
   double v = least(largest(cosine * u + dot(gap, t), 0.0), v_end);
@@ -477,8 +437,7 @@ static double distance_of(vector gap, vector s, vector t, double u, double u_end
 
 /* Distance between the surfaces of two legs [m], a cylinder and a thinner piston each. */
 static double clearance_of(
-  const stewart_leg * a, const stewart_leg * b, const leg_pose * p, const leg_pose * q)
-{
+  const stewart_leg * a, const stewart_leg * b, const leg_pose * p, const leg_pose * q) {
   vector s = p->direction, t = q->direction, normal = cross(s, t);
   vector gap = subtract(read3(a->base_joint), read3(b->base_joint));
   double square = dot(normal, normal), clearance = HUGE_VAL;
@@ -497,13 +456,12 @@ static double clearance_of(
 
 /* Write for each leg which limits of its joints and of clearance a motion exceeds. */
 static void check_joints(
-  const stewart_platform * platform, const stewart_motion * motion, unsigned exceeded[6])
-{
-  leg_pose lines[6];
+  const stewart_platform * platform, const stewart_motion * motion, unsigned exceeded[6]) {
+  leg_pose at[6];
   for (int i = 0; i < 6; i++) {
     const stewart_leg * leg = &platform->legs[i];
-    lines[i] = pose_of(leg, motion->position, motion->rotation);
-    vector s = lines[i].direction, s_p = rotate_back(motion->rotation, s);
+    at[i] = pose_of(leg, motion->position, motion->rotation);
+    vector s = at[i].direction, s_p = rotate_back(motion->rotation, s);
     double base_max = leg->base_joint_angle_max * (1.0 + LIMIT_TOLERANCE);
     double platform_max = leg->platform_joint_angle_max * (1.0 + LIMIT_TOLERANCE);
     exceeded[i] = 0;
@@ -518,7 +476,7 @@ static void check_joints(
   for (int i = 0; isfinite(clearance_min) && i < 6; i++) {
     for (int j = i + 1; j < 6; j++) {
       const stewart_leg * legs = platform->legs;
-      if (clearance_of(&legs[i], &legs[j], &lines[i], &lines[j]) < clearance_min) {
+      if (clearance_of(&legs[i], &legs[j], &at[i], &at[j]) < clearance_min) {
         exceeded[i] |= STEWART_LEG_CLEARANCE_MIN, exceeded[j] |= STEWART_LEG_CLEARANCE_MIN;
       }
     }
@@ -528,8 +486,7 @@ static void check_joints(
 /* ---- singularity_warning, limits; setpoints/result_checks ----------------------------------- */
 
 static void advance_warning(
-  const stewart_platform * platform, const stewart_result * result, stewart_state * state)
-{
+  const stewart_platform * platform, const stewart_result * result, stewart_state * state) {
   double det = result->determinant, rate = result->determinant_rate;
   double hysteresis = state->warning != STEWART_NO_WARNING ? HYSTERESIS : 1.0;
   double time = rate != 0.0 ? -det / rate : HUGE_VAL;
@@ -549,8 +506,7 @@ static void advance_warning(
 
 /* Return which limits of length, rate, force and jump a leg exceeds. */
 static unsigned check_leg(
-  const stewart_leg * leg, double length, double rate, double force, double jump, double elapsed)
-{
+  const stewart_leg * leg, double length, double rate, double force, double jump, double elapsed) {
   double velocity_max = leg->velocity_max * (1.0 + LIMIT_TOLERANCE);
   unsigned exceeded = 0;
   if (length < leg->length_min * (1.0 - LIMIT_TOLERANCE)) {exceeded |= STEWART_LENGTH_MIN;}
@@ -563,11 +519,10 @@ static unsigned check_leg(
 
 int stewart_step(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
-  const stewart_base * base, int64_t stamp, stewart_state * state, stewart_output * output)
-{
+  const stewart_base * base, int64_t stamp, stewart_state * state, stewart_output * output) {
   stewart_output found;
   unsigned any = 0;
-  if (state == NULL || output == NULL) {return STEWART_NULL;}
+  if (!state || !output) {return STEWART_NULL;}
   if (stamp < -STAMPS_END || stamp >= STAMPS_END) {return STEWART_OUT_OF_RANGE;}
   int code = stewart_inverse_dynamics(platform, motion, wrench, base, &found.result);
   if (code != STEWART_OK && code != STEWART_SINGULAR) {return code;}
@@ -579,35 +534,88 @@ int stewart_step(
   }
   for (int i = 0; i < 6; i++) {
     double jump = state->followed ? found.result.lengths[i] - state->lengths[i] : 0.0;
-    found.exceeded[i] |= check_leg(
-      &platform->legs[i], found.result.lengths[i], found.result.rates[i],
-      found.result.forces[i], jump, elapsed);
+    found.exceeded[i] |= check_leg(&platform->legs[i], found.result.lengths[i],
+      found.result.rates[i], found.result.forces[i], jump, elapsed);
     any |= found.exceeded[i];
   }
   if (!(any & STEWART_JUMP)) {
     state->followed = 1, state->stamp = stamp;
     for (int i = 0; i < 6; i++) {state->lengths[i] = found.result.lengths[i];}
   }
-  int exceeding = (any & ~(unsigned)STEWART_FORCE_MAX) != 0;
-  if (code == STEWART_OK && ((state->stopped && platform->suppress_near_singularity) ||
-    (exceeding && platform->suppress_at_limits)))
-  {
-    code = STEWART_SUPPRESSED;
-  }
+  int suppressed = (state->stopped && platform->suppress_near_singularity) ||
+    ((any & ~(unsigned)STEWART_FORCE_MAX) && platform->suppress_at_limits);
+  code = code == STEWART_OK && suppressed ? STEWART_SUPPRESSED : code;
   for (int i = 0; i < 6; i++) {
-    double most = platform->legs[i].force_max;
-    found.forces[i] = code == STEWART_OK ?
-      least(largest(found.result.forces[i], -most), most) : 0.0;
+    double force = found.result.forces[i], most = platform->legs[i].force_max;
+    found.forces[i] = code == STEWART_OK ? least(largest(force, -most), most) : 0.0;
   }
   *output = found;
   return code;
 }
 
+/* ---- drives/motors, drives/leg_twist -------------------------------------------------------- */
+
+/* Write the first and return the second derivative of a vector that turns with the platform. */
+static vector turned(vector a, const stewart_motion * motion, vector * rate) {
+  vector omega = read3(motion->angular_velocity);
+  *rate = cross(omega, a);
+  return add(cross(read3(motion->angular_acceleration), a), cross(omega, *rate));
+}
+
+int stewart_motor_torques(
+  const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
+  stewart_motors * motors) {
+  stewart_motors found;
+  if (!platform || !motion || !forces || !motors) {return STEWART_NULL;}
+  if (!(platform->legs[0].screw_lead > 0.0)) {return STEWART_NO_MOTORS;}
+  for (int i = 0; i < 6; i++) {
+    const stewart_leg * leg = &platform->legs[i];
+    leg_pose at = pose_of(leg, motion->position, motion->rotation);
+    vector s = at.direction, a_rate, a_acc = turned(at.arm, motion, &a_rate);
+    vector x_rate = add(read3(motion->linear_velocity), a_rate);
+    vector x_acc = add(read3(motion->linear_acceleration), a_acc);
+    double rate = dot(s, x_rate), ratio = 2.0 * PI * leg->gear_ratio / leg->screw_lead;
+    vector s_rate = scale(at.per_length, subtract(x_rate, scale(rate, s)));
+    double acc = dot(s, x_acc) + at.length * dot(s_rate, s_rate);
+    double twist = 0.0, twist_rate = 0.0, twist_acc = 0.0;  /* of the leg, turned back */
+    if (leg->twist_ratio != 0.0) {
+      vector s_acc = subtract(subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate));
+      s_acc = scale(at.per_length, s_acc);
+      vector u = read3(leg->base_universal_axis), w_rate;
+      vector w = rotate(motion->rotation, read3(leg->platform_universal_axis));
+      vector w_acc = turned(w, motion, &w_rate);
+      double us = dot(u, s), us_rate = dot(u, s_rate), us_acc = dot(u, s_acc);
+      double ws = dot(w, s), ws_rate = dot(w_rate, s) + dot(w, s_rate);
+      double ws_acc = dot(w_acc, s) + 2.0 * dot(w_rate, s_rate) + dot(w, s_acc);
+      vector n = cross(u, w), n_rate = cross(u, w_rate), n_acc = cross(u, w_acc);
+      double y = dot(s, n), y_rate = dot(s_rate, n) + dot(s, n_rate);
+      double y_acc = dot(s_acc, n) + 2.0 * dot(s_rate, n_rate) + dot(s, n_acc);
+      double x = dot(u, w) - us * ws, x_turn = dot(u, w_rate) - us_rate * ws - us * ws_rate;
+      double x_turn_rate = dot(u, w_acc) - us_acc * ws - 2.0 * us_rate * ws_rate - us * ws_acc;
+      double inverse = 1.0 / (x * x + y * y);
+      twist = atan2(y, x);
+      twist_rate = (x * y_rate - y * x_turn) * inverse;
+      twist_acc = (x * y_acc - y * x_turn_rate -
+        2.0 * (x * x_turn + y * y_rate) * twist_rate) * inverse;
+    }
+    found.angles[i] = ratio * (at.length - leg->zero_length) + leg->twist_ratio * twist;
+    found.speeds[i] = ratio * rate + leg->twist_ratio * twist_rate;
+    found.accelerations[i] = ratio * acc + leg->twist_ratio * twist_acc;
+    double through = forces[i] - leg->reflected_mass * acc;  /* the screw */
+    double slip = fabs(rate) / leg->coulomb_velocity;
+    double loss = through * rate > 0.0 ? 1.0 / leg->efficiency : leg->back_driving_efficiency;
+    found.torques[i] = leg->reflected_mass / ratio / ratio * found.accelerations[i] +
+      through / ratio * (1.0 + (loss - 1.0) * (slip > 1.0 ? 1.0 : slip));
+  }
+  if (!finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
+  *motors = found;
+  return STEWART_OK;
+}
+
 /* ---- kinematics/forward_kinematics ---------------------------------------------------------- */
 
 /* The rotation nearest to a matrix close to one: R (3 - R^T R) / 2, a step of Newton's. */
-static void orthonormalize(double r[9])
-{
+static void orthonormalize(double r[9]) {
   vector a = column(r, 0), b = column(r, 1), c = column(r, 2);
   double u = 1.5 - 0.5 * dot(a, a), v = 1.5 - 0.5 * dot(b, b), w = 1.5 - 0.5 * dot(c, c);
   double xy = 0.5 * dot(a, b), xz = 0.5 * dot(a, c), yz = 0.5 * dot(b, c);
@@ -618,8 +626,7 @@ static void orthonormalize(double r[9])
 }
 
 /* Turn r about a vector by 2 atan(|vector| / 2): Cayley's map, a rotation exactly. */
-static void turn_by(vector turn, const double r[9], double turned[9])
-{
+static void turn_by(vector turn, const double r[9], double turned[9]) {
   vector h = scale(0.5, turn);
   double k = 2.0 / (1.0 + h.x * h.x + h.y * h.y + h.z * h.z);
   double c = 1.0 - k * dot(h, h), m[9];
@@ -634,8 +641,7 @@ static void turn_by(vector turn, const double r[9], double turned[9])
 
 /* Newton's method from a pose, which becomes the one found; adds its steps to the count. */
 static int newton(
-  const stewart_platform * platform, const double lengths[6], stewart_pose * pose, int * count)
-{
+  const stewart_platform * platform, const double lengths[6], stewart_pose * pose, int * count) {
   double per_size = 1.0 / platform->characteristic_length;
   stewart_pose from = *pose, at = *pose;  /* the last pose accepted, and the one tried */
   double before = HUGE_VAL, residual = HUGE_VAL, side = 0.0, part = 1.0;
@@ -670,23 +676,18 @@ static int newton(
     /* If the residual is small enough this is the last step, to within rounding. */
     put3(at.position, add(read3(from.position), scale(part, read3(step))));
     turn_by(scale(part, scale(per_size, read3(step + 3))), from.rotation, at.rotation);
-    if (residual <= RESIDUAL) {
-      *pose = at;
-      return STEWART_OK;
-    }
+    if (residual <= RESIDUAL) {*pose = at; return STEWART_OK;}
   }
   return STEWART_NO_POSE;
 }
 
 int stewart_forward_kinematics(
-  const stewart_platform * platform, const double lengths[6], stewart_pose * pose)
-{
+  const stewart_platform * platform, const double lengths[6], stewart_pose * pose) {
   double squares[6], done = 0.0, way = 0.25;
   int steps = 0;
-  if (platform == NULL || lengths == NULL || pose == NULL) {return STEWART_NULL;}
-  if (!finite(lengths, 6 * sizeof(double)) || !finite(pose, sizeof *pose)) {
-    return STEWART_NOT_FINITE;
-  }
+  if (!platform || !lengths || !pose) {return STEWART_NULL;}
+  if (!finite(lengths, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
+  if (!finite(pose, sizeof *pose)) {return STEWART_NOT_FINITE;}
   int code = check_rotation(pose->rotation);
   if (code != STEWART_OK) {return code;}
   stewart_pose found = *pose;
@@ -706,13 +707,10 @@ int stewart_forward_kinematics(
       between[i] = reached == 1.0 ? lengths[i] :
         sqrt(squares[i] + reached * (lengths[i] * lengths[i] - squares[i]));
     }
-    if (newton(platform, between, &found, &steps) != STEWART_OK) {
-      way *= 0.5;
-    } else if (reached == 1.0) {
-      code = STEWART_OK;
-    } else {
-      done = reached, way *= 2.0;
-    }
+    int reaches = newton(platform, between, &found, &steps) == STEWART_OK;
+    done = reaches ? reached : done;
+    way *= reaches ? 2.0 : 0.5;
+    code = done == 1.0 ? STEWART_OK : code;
   }
   if (code == STEWART_OK) {*pose = found;}
   return code;

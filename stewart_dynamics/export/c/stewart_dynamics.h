@@ -35,7 +35,8 @@ enum {
   STEWART_OUT_OF_RANGE = 5,   /* numbers overflow, or a stamp is not within +-2^31 s */
   STEWART_SINGULAR = 6,       /* J_inv cannot be solved: forces are zero */
   STEWART_SUPPRESSED = 7,     /* by singularity.action or limits.action: forces are zero */
-  STEWART_NO_POSE = 8         /* no pose with these lengths found from this guess */
+  STEWART_NO_POSE = 8,        /* no pose with these lengths found from this guess */
+  STEWART_NO_MOTORS = 9       /* actuator.screw_lead is not in the parameters */
 };
 
 /* Why the singularity warning is on: stewart_state.warning. */
@@ -70,6 +71,10 @@ typedef struct {
   double base_joint_axis[3], base_joint_angle_max; /* unit vector, base axes; [rad] or infinite */
   double platform_joint_axis[3], platform_joint_angle_max;  /* platform axes */
   double cylinder_radius, cylinder_length, piston_radius;   /* for leg_clearance_min [m] */
+  double screw_lead, gear_ratio;                            /* lead 0 if not set [m/turn] */
+  double efficiency, back_driving_efficiency;
+  double twist_ratio; /* turns of the motor by turn of the leg, 0 where the screw is guided */
+  double base_universal_axis[3], platform_universal_axis[3];
 } stewart_leg;
 
 /* A hexapod, constant while it is used. stewart_export writes one from a parameter file. */
@@ -130,34 +135,39 @@ typedef struct {
   unsigned exceeded[6]; /* limits that each leg exceeds: bits STEWART_LENGTH_MIN to _JUMP */
 } stewart_output;
 
-/*
- * Inverse dynamics: lengths, rates and forces of the legs, and how near a singularity it is.
+/* Motors: zero where the published leg position is zero, + extends; [rad], ..., [N m]. */
+typedef struct { double angles[6], speeds[6], accelerations[6], torques[6]; } stewart_motors;
+
+/* Inverse dynamics: lengths, rates and forces of the legs, and how near a singularity it is.
  *
  * wrench: force [N] and moment [N m] on the platform at its origin; NULL: none.
- * base: NULL: still, gravity as in the platform.
- * The result is written with STEWART_OK and STEWART_SINGULAR alone.
- */
+ * base: NULL: still, with the platform's gravity.
+ * The result is written with STEWART_OK and STEWART_SINGULAR alone. */
 int stewart_inverse_dynamics(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
   const stewart_base * base, stewart_result * result);
 
-/*
- * The node's step: inverse dynamics, then singularity warning with its hysteresis and limits;
+/* The node's step: inverse dynamics, then singularity warning with its hysteresis and limits;
  * forces are clipped to limits.force_max, and suppressed where the parameters say so.
  *
  * stamp: time of the setpoint, of any clock that rises [ns]; between stamps velocity_max holds.
- * State and output are written with STEWART_OK, _SUPPRESSED and _SINGULAR alone.
- */
+ * State and output are written with STEWART_OK, _SUPPRESSED and _SINGULAR alone. */
 int stewart_step(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
   const stewart_base * base, int64_t stamp, stewart_state * state, stewart_output * output);
 
-/*
- * Forward kinematics: the pose of six lengths [m], on the guess's side of singularities.
+/* The motors' angles, and torques that give leg forces, with drive.* in the parameters.
+ *
+ * motion: one that stewart_step has accepted. forces: of the result or of the output [N].
+ * Motors are written with STEWART_OK alone. Torques are not limited; at rest without losses. */
+int stewart_motor_torques(
+  const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
+  stewart_motors * motors);
+
+/* Forward kinematics: the pose of six lengths [m], on the guess's side of singularities.
  *
  * pose: the guess (the last pose, or the one commanded), then the answer, with STEWART_OK alone;
- * its lengths are within 1e-12 m of those given.
- */
+ * its lengths are within 1e-12 m of those given. */
 int stewart_forward_kinematics(
   const stewart_platform * platform, const double lengths[6], stewart_pose * pose);
 

@@ -69,9 +69,9 @@ MOTORS = 54
 MECHANICAL = slice(ANGLES.start, TORQUES.stop)
 
 # Constants of one drive.
-(_RATIO, _ZERO, _MASS, _DRIVING, _DRIVEN, _SLOW, _TORQUE_CONSTANT, _RESISTANCE, _TWIST,
- _BASE_AXIS) = range(10)
-_PLATFORM_AXIS = 12
+(_RATIO, _ZERO, _MASS, _DRIVING, _DRIVEN, _SLOW, _TORQUE_CONSTANT, _RESISTANCE, TWIST,
+ BASE_AXIS) = range(10)
+PLATFORM_AXIS = 12
 _DRIVE = 15
 
 # Sine of the angle between a leg and the fixed axis of its universal joint.
@@ -193,16 +193,16 @@ def motor_rows(constants: Array, drives: Array, torque_max: Array, curve: Array,
             acc = dot(s, x_acc) + length * dot(s_rate, s_rate)
             ratio = drive[_RATIO]
             angle, speed, speed_rate = ratio * (length - drive[_ZERO]), ratio * rate, ratio * acc
-            if drive[_TWIST] != 0.0:
+            if drive[TWIST] != 0.0:
                 s_acc = scale(inverse_length, subtract(
                     subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate)))
-                w = rotate(rotation, read3(drive, _PLATFORM_AXIS))
+                w = rotate(rotation, read3(drive, PLATFORM_AXIS))
                 w_rate, w_acc = turned(w, omega, alpha)
                 twist, twist_rate, twist_acc = leg_twist(
-                    read3(drive, _BASE_AXIS), w, w_rate, w_acc, s, s_rate, s_acc)
-                angle += drive[_TWIST] * twist
-                speed += drive[_TWIST] * twist_rate
-                speed_rate += drive[_TWIST] * twist_acc
+                    read3(drive, BASE_AXIS), w, w_rate, w_acc, s, s_rate, s_acc)
+                angle += drive[TWIST] * twist
+                speed += drive[TWIST] * twist_rate
+                speed_rate += drive[TWIST] * twist_acc
             load = results[n, FORCES.start + leg] - drive[_MASS] * acc
             ideal = load / ratio
             own = drive[_MASS] / ratio / ratio * speed_rate
