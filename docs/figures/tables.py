@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Write the generated tables of README.md and docs/, and the topics of security/policy.xml.
+Write the generated tables, the topics of security/policy.xml, the controller's parameters.
 
     python docs/figures/tables.py
 
@@ -32,6 +32,8 @@ from pathlib import Path
 import re
 from typing import Any
 
+from stewart_dynamics.export.hexapod_source import (
+    FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
 from stewart_dynamics.node.node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
@@ -39,10 +41,30 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.sample_joining import WAITING
 from stewart_dynamics.simulator.parameters import SimulatorParameters
+import yaml
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+CONTROLLER_PARAMETERS = (ROOT / 'ros2_control' / 'stewart_dynamics_controller' / 'src'
+                         / 'stewart_dynamics_controller_parameters.yaml')
 HEAD = '| name | type | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n'
+
+# Parameters of the controller that the node does not have.
+CONTROLLER = (
+    Parameter('reference', 'string', 'reference interfaces: motion of the platform, or of the '
+              'legs', '', 'legs', choices=('legs', 'platform')),
+    Parameter('command_interfaces', 'string', 'interfaces of each joint that are commanded; '
+              'effort must be one of them', default=('effort',), sizes=(1, 2, 3),
+              choices=('position', 'velocity', 'effort')),
+    Parameter('initial_pose', 'double', 'x y z alpha beta gamma near which the platform is when '
+              'the controller starts; required where reference is legs', 'm, rad', (),
+              sizes=(6,)))
+
+# Those of the node that the controller reads: it commands forces of legs, not torques of motors.
+CONTROLLER_NAMES = ('joints', 'base_frame', 'setpoint.timeout', *(
+    name for name in (*FIELDS_BEFORE_LEGS, *LEG_FIELDS, *FIELDS_AFTER_LEGS)
+    if not name.startswith('drive.')
+    and name not in ('actuator.screw_lead', 'setpoint.sync_tolerance')))
 
 # The ten in the README; legs.* stands for the two parts of a leg.
 FIRST = ('joints', 'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',
@@ -102,6 +124,53 @@ def granted() -> str:
                       *(f'            <topic>{topic.ros_name}</topic>' for topic in together),
                       '          </topics>']
     return '\n'.join(lines)
+
+
+def controller_parameters() -> str:
+    """
+    Return the declaration of the controller's parameters for generate_parameter_library.
+
+    Those of the hexapod are declared as in the node. An array of one value per leg has 1 or 6
+    entries there, never a single value: the library knows one type for each parameter.
+    """
+    document: dict[str, Any] = {}
+    own = {parameter.name: parameter for parameter in CONTROLLER}
+    for name in (*CONTROLLER_NAMES, *own):
+        parameter = own.get(name) or Parameters.table[name]
+        section = document
+        *sections, last = name.split('.')
+        for each in sections:
+            section = section.setdefault(each, {})
+        section[last] = _declaration(parameter)
+    header = Path(__file__).read_text(encoding='utf-8').partition('"""')[0]
+    return f'{header}# Written by docs/figures/tables.py (make docs).\n' + yaml.safe_dump(
+        {'stewart_dynamics_controller': document}, sort_keys=False, width=99)
+
+
+def _declaration(parameter: Parameter) -> dict[str, Any]:
+    """Return the fields of a parameter in generate_parameter_library."""
+    unit = f' [{parameter.unit}]' if parameter.unit else ''
+    array = bool(parameter.sizes)
+    fields: dict[str, Any] = {
+        'type': parameter.kind + '_array' * array, 'description': f'{parameter.text}{unit}'}
+    if parameter.default is not None:
+        fields['default_value'] = list(parameter.default) if array else parameter.default
+    elif not parameter.required:
+        fields['default_value'] = math.nan  # not set
+    if not parameter.while_active:
+        fields['read_only'] = True
+    rules: dict[str, Any] = {}
+    if len(parameter.sizes) == 1 and (parameter.required or parameter.default):
+        rules['fixed_size<>'] = [parameter.sizes[0]]
+    if parameter.choices:
+        rules['subset_of<>' if array else 'one_of<>'] = [list(parameter.choices)]
+    if parameter.minimum > -math.inf and parameter.default is not None or parameter.required and (
+            parameter.minimum > -math.inf):
+        rules['lower_element_bounds<>' if array else 'gt<>' if parameter.above else 'gt_eq<>'] = [
+            parameter.minimum]
+    if rules:
+        fields['validation'] = rules
+    return fields
 
 
 def _default(parameter: Parameter) -> str:
@@ -264,6 +333,8 @@ def main() -> None:
     for page, tables in pages().items():
         page.write_text(generated(page.read_text(encoding='utf-8'), tables), encoding='utf-8')
         print(f'{page.relative_to(ROOT)}: {", ".join(tables)}')
+    CONTROLLER_PARAMETERS.write_text(controller_parameters(), encoding='utf-8')
+    print(CONTROLLER_PARAMETERS.relative_to(ROOT))
 
 
 if __name__ == '__main__':

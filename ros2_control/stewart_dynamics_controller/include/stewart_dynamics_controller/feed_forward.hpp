@@ -1,0 +1,109 @@
+// Copyright 2026 The stewart_dynamics developers
+//
+// Licensed under the Apache License, Version 2.0 (the "License");
+// you may not use this file except in compliance with the License.
+// You may obtain a copy of the License at
+//
+//     http://www.apache.org/licenses/LICENSE-2.0
+//
+// Unless required by applicable law or agreed to in writing, software
+// distributed under the License is distributed on an "AS IS" BASIS,
+// WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+// See the License for the specific language governing permissions and
+// limitations under the License.
+
+/*
+ * The feed-forward of the controller, without ROS: references in, leg forces out. No function
+ * allocates memory or throws.
+ */
+
+#ifndef STEWART_DYNAMICS_CONTROLLER__FEED_FORWARD_HPP_
+#define STEWART_DYNAMICS_CONTROLLER__FEED_FORWARD_HPP_
+
+#include <array>
+#include <cstdint>
+
+#include "stewart_dynamics.h"
+
+namespace stewart_dynamics_controller
+{
+
+using Six = std::array<double, 6>;
+
+/// Where the platform shall be, and how it moves; base axes.
+struct PlatformReference
+{
+  std::array<double, 3> position;     // of its origin, base frame [m]
+  std::array<double, 4> orientation;  // unit quaternion x y z w
+  std::array<double, 3> linear_velocity, angular_velocity;
+  std::array<double, 3> linear_acceleration, angular_acceleration;
+};
+
+/// Where the legs shall be: positions are length - zero_length [m].
+struct LegReference
+{
+  Six positions, velocities, accelerations;
+};
+
+/// Commands of a cycle; valid for a return code of STEWART_OK.
+struct Command
+{
+  Six positions, velocities;  // of the legs; valid with STEWART_SUPPRESSED and _SINGULAR, too
+  Six efforts;                // [N]
+};
+
+/// Return the row-by-row rotation Rz(gamma) Ry(beta) Rx(alpha).
+std::array<double, 9> rotation_of_euler(double alpha, double beta, double gamma);
+
+class FeedForward
+{
+public:
+  /// hexapod: checked parameters; guess: the pose near which the legs' first reference is;
+  /// timeout: [ns].
+  FeedForward(
+    const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout);
+
+  /// Forget earlier references: the singularity warning and the last pose.
+  void start();
+
+  /// Use other parameters from now on; the state of the singularity warning is kept.
+  void change(const stewart_platform & hexapod) {hexapod_ = hexapod;}
+
+  /// Compute the command of a reference at a time [ns], which rises from call to call.
+  /// feedback: efforts that are added, before the limit force_max.
+  /// Return a code of stewart_dynamics.h.
+  int update(
+    const PlatformReference & reference, const Six & wrench, const Six & feedback,
+    std::int64_t now, Command & command);
+  int update(
+    const LegReference & reference, const Six & wrench, const Six & feedback,
+    std::int64_t now, Command & command);
+
+  /// Return whether a cycle had forces since start.
+  bool started() const {return started_;}
+
+  /// Return whether the timeout has passed since a time, or since the last cycle with forces.
+  bool timed_out(std::int64_t since, std::int64_t now) const {return now - since > timeout_;}
+  bool timed_out(std::int64_t now) const {return started_ && timed_out(last_forces_, now);}
+
+  /// Return the result of the last cycle with valid input.
+  const stewart_result & result() const {return output_.result;}
+  bool warning() const {return state_.warning != STEWART_NO_WARNING;}
+
+private:
+  int step(
+    const stewart_motion & motion, const Six & wrench, const Six & feedback, std::int64_t now,
+    Command & command);
+  int motion_of(const LegReference & reference, stewart_motion & motion) const;
+
+  stewart_platform hexapod_;
+  stewart_pose guess_, pose_;
+  std::int64_t timeout_, last_forces_ = 0;
+  bool started_ = false;
+  stewart_state state_{};
+  stewart_output output_{};
+};
+
+}  // namespace stewart_dynamics_controller
+
+#endif  // STEWART_DYNAMICS_CONTROLLER__FEED_FORWARD_HPP_

@@ -1,0 +1,83 @@
+// Copyright 2026 The stewart_dynamics developers
+//
+// Licensed under the Apache License, Version 2.0 (the "License");
+// you may not use this file except in compliance with the License.
+// You may obtain a copy of the License at
+//
+//     http://www.apache.org/licenses/LICENSE-2.0
+//
+// Unless required by applicable law or agreed to in writing, software
+// distributed under the License is distributed on an "AS IS" BASIS,
+// WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+// See the License for the specific language governing permissions and
+// limitations under the License.
+
+#ifndef STEWART_DYNAMICS_CONTROLLER__STEWART_DYNAMICS_CONTROLLER_HPP_
+#define STEWART_DYNAMICS_CONTROLLER__STEWART_DYNAMICS_CONTROLLER_HPP_
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller_interface/chainable_controller_interface.hpp"
+#include "rclcpp/rclcpp.hpp"
+#include "realtime_tools/realtime_thread_safe_box.hpp"
+#include "trajectory_msgs/msg/multi_dof_joint_trajectory.hpp"
+
+#include "stewart_dynamics_controller/feed_forward.hpp"
+#include "stewart_dynamics_controller/stewart_dynamics_controller_parameters.hpp"
+
+namespace stewart_dynamics_controller
+{
+
+/// Feed-forward of a hexapod: references of the platform or of its legs in, efforts of the legs
+/// out, in the same cycle. README.md says what its interfaces mean.
+class StewartDynamicsController : public controller_interface::ChainableControllerInterface
+{
+public:
+  controller_interface::CallbackReturn on_init() override;
+  controller_interface::CallbackReturn on_configure(const rclcpp_lifecycle::State &) override;
+  controller_interface::CallbackReturn on_activate(const rclcpp_lifecycle::State &) override;
+  controller_interface::CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) override;
+  controller_interface::InterfaceConfiguration command_interface_configuration() const override;
+  controller_interface::InterfaceConfiguration state_interface_configuration() const override;
+
+protected:
+  std::vector<hardware_interface::CommandInterface::SharedPtr>
+  on_export_reference_interfaces_list() override;
+  std::vector<hardware_interface::StateInterface::SharedPtr>
+  on_export_state_interfaces_list() override;
+  controller_interface::return_type update_reference_from_subscribers(
+    const rclcpp::Time & time, const rclcpp::Duration & period) override;
+  controller_interface::return_type update_and_write_commands(
+    const rclcpp::Time & time, const rclcpp::Duration & period) override;
+
+private:
+  using Setpoint = trajectory_msgs::msg::MultiDOFJointTrajectory;
+  /// The numbers of a PlatformReference in its order.
+  using PlatformNumbers = std::array<double, 19>;
+
+  bool of_platform() const {return parameters_.reference == "platform";}
+  /// Number of reference interfaces of the motion; those of wrench and effort follow.
+  std::size_t motion_size() const {return of_platform() ? 19 : 18;}
+  void on_setpoint(const Setpoint & message);
+  Six read(std::size_t first) const;
+  int compute(std::int64_t now, Command & command);
+  bool write(const std::string & interface, const Six & values);
+
+  std::shared_ptr<ParamListener> parameter_listener_;
+  Params parameters_;
+  std::optional<FeedForward> feed_forward_;
+  rclcpp::Subscription<Setpoint>::SharedPtr subscription_;
+  /// The setpoint that the topic has brought since the last cycle.
+  realtime_tools::RealtimeThreadSafeBox<std::optional<PlatformNumbers>> received_;
+  std::int64_t received_at_ = -1;  // time of the cycle that took the last setpoint [ns]; none: -1
+  int last_code_ = STEWART_OK;
+};
+
+}  // namespace stewart_dynamics_controller
+
+#endif  // STEWART_DYNAMICS_CONTROLLER__STEWART_DYNAMICS_CONTROLLER_HPP_

@@ -1,0 +1,224 @@
+// Copyright 2026 The stewart_dynamics developers
+//
+// Licensed under the Apache License, Version 2.0 (the "License");
+// you may not use this file except in compliance with the License.
+// You may obtain a copy of the License at
+//
+//     http://www.apache.org/licenses/LICENSE-2.0
+//
+// Unless required by applicable law or agreed to in writing, software
+// distributed under the License is distributed on an "AS IS" BASIS,
+// WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+// See the License for the specific language governing permissions and
+// limitations under the License.
+
+#include "stewart_dynamics_controller/feed_forward.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+namespace stewart_dynamics_controller
+{
+
+namespace
+{
+
+using Three = std::array<double, 3>;
+
+double dot(const Three & a, const Three & b) {return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];}
+
+Three cross(const Three & a, const Three & b)
+{
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+/// A leg at a pose: its platform joint from the platform's origin, its direction, its length.
+struct Leg
+{
+  Three arm, direction;
+  double length;
+};
+
+Leg leg_at(const stewart_leg & leg, const stewart_pose & pose)
+{
+  Leg at;
+  for (std::size_t n = 0; n < 3; ++n) {
+    at.arm[n] = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      at.arm[n] += pose.rotation[3 * n + k] * leg.platform_joint[k];
+    }
+    at.direction[n] = pose.position[n] + at.arm[n] - leg.base_joint[n];
+  }
+  at.length = std::sqrt(dot(at.direction, at.direction));
+  for (double & each : at.direction) {
+    each /= at.length;
+  }
+  return at;
+}
+
+using Matrix = std::array<Six, 6>;
+
+/// Return x of a x = b, by Gauss's elimination with partial pivoting; not finite if singular.
+Six solve(Matrix a, Six b)
+{
+  for (std::size_t n = 0; n < 6; ++n) {
+    std::size_t best = n;
+    for (std::size_t i = n + 1; i < 6; ++i) {
+      best = std::fabs(a[i][n]) > std::fabs(a[best][n]) ? i : best;
+    }
+    std::swap(a[n], a[best]);
+    std::swap(b[n], b[best]);
+    for (std::size_t i = n + 1; i < 6; ++i) {
+      const double k = a[i][n] / a[n][n];
+      for (std::size_t j = n; j < 6; ++j) {
+        a[i][j] -= k * a[n][j];
+      }
+      b[i] -= k * b[n];
+    }
+  }
+  for (std::size_t n = 6; n-- > 0; ) {
+    for (std::size_t j = n + 1; j < 6; ++j) {
+      b[n] -= a[n][j] * b[j];
+    }
+    b[n] /= a[n][n];
+  }
+  return b;
+}
+
+bool finite(const Six & numbers)
+{
+  return std::all_of(numbers.begin(), numbers.end(), [](double each) {return std::isfinite(each);});
+}
+
+}  // namespace
+
+std::array<double, 9> rotation_of_euler(double alpha, double beta, double gamma)
+{
+  const double ca = std::cos(alpha), sa = std::sin(alpha), cb = std::cos(beta);
+  const double sb = std::sin(beta), cg = std::cos(gamma), sg = std::sin(gamma);
+  return {cg * cb, cg * sb * sa - sg * ca, cg * sb * ca + sg * sa,
+    sg * cb, sg * sb * sa + cg * ca, sg * sb * ca - cg * sa, -sb, cb * sa, cb * ca};
+}
+
+FeedForward::FeedForward(
+  const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout)
+: hexapod_(hexapod), guess_(guess), pose_(guess), timeout_(timeout)
+{
+}
+
+void FeedForward::start()
+{
+  pose_ = guess_;
+  started_ = false;
+  state_ = stewart_state{};
+  output_ = stewart_output{};
+}
+
+int FeedForward::update(
+  const PlatformReference & reference, const Six & wrench, const Six & feedback,
+  std::int64_t now, Command & command)
+{
+  stewart_motion motion;
+  const int code = stewart_rotation(reference.orientation.data(), motion.rotation);
+  if (code != STEWART_OK) {
+    return code;
+  }
+  std::copy_n(reference.position.begin(), 3, motion.position);
+  std::copy_n(reference.linear_velocity.begin(), 3, motion.linear_velocity);
+  std::copy_n(reference.angular_velocity.begin(), 3, motion.angular_velocity);
+  std::copy_n(reference.linear_acceleration.begin(), 3, motion.linear_acceleration);
+  std::copy_n(reference.angular_acceleration.begin(), 3, motion.angular_acceleration);
+  return step(motion, wrench, feedback, now, command);
+}
+
+int FeedForward::update(
+  const LegReference & reference, const Six & wrench, const Six & feedback,
+  std::int64_t now, Command & command)
+{
+  stewart_motion motion;
+  int code = motion_of(reference, motion);
+  if (code != STEWART_OK) {
+    return code;
+  }
+  code = step(motion, wrench, feedback, now, command);
+  if (code == STEWART_OK || code == STEWART_SUPPRESSED) {
+    std::copy_n(motion.position, 3, pose_.position);
+    std::copy_n(motion.rotation, 9, pose_.rotation);
+  }
+  return code;
+}
+
+/// The pose by forward kinematics from the last one; then J_inv X' = L' and
+/// J_inv X'' = L'' - s' . x' - s . (w x (w x a)), with s' . x' = |x' across the leg|^2 / L.
+int FeedForward::motion_of(const LegReference & reference, stewart_motion & motion) const
+{
+  Six lengths;
+  for (std::size_t n = 0; n < 6; ++n) {
+    lengths[n] = reference.positions[n] + hexapod_.legs[n].zero_length;
+  }
+  stewart_pose pose = pose_;
+  const int code = stewart_forward_kinematics(&hexapod_, lengths.data(), &pose);
+  if (code != STEWART_OK) {
+    return code;
+  }
+  std::array<Leg, 6> legs;
+  Matrix inverse_jacobian;
+  for (std::size_t n = 0; n < 6; ++n) {
+    const Leg & leg = legs[n] = leg_at(hexapod_.legs[n], pose);
+    const Three moment = cross(leg.arm, leg.direction);
+    std::copy_n(leg.direction.begin(), 3, inverse_jacobian[n].begin());
+    std::copy_n(moment.begin(), 3, inverse_jacobian[n].begin() + 3);
+  }
+  const Six twist = solve(inverse_jacobian, reference.velocities);
+  const Three omega = {twist[3], twist[4], twist[5]};
+  Six accelerations = reference.accelerations;
+  for (std::size_t n = 0; n < 6; ++n) {
+    const Leg & leg = legs[n];
+    Three joint_rate = cross(omega, leg.arm);
+    const Three centripetal = cross(omega, joint_rate);
+    for (std::size_t k = 0; k < 3; ++k) {
+      joint_rate[k] += twist[k];
+    }
+    const double along = dot(leg.direction, joint_rate);
+    accelerations[n] -= (dot(joint_rate, joint_rate) - along * along) / leg.length +
+      dot(leg.direction, centripetal);
+  }
+  const Six acceleration = solve(inverse_jacobian, accelerations);
+  std::copy_n(pose.position, 3, motion.position);
+  std::copy_n(pose.rotation, 9, motion.rotation);
+  std::copy_n(twist.begin(), 3, motion.linear_velocity);
+  std::copy_n(twist.begin() + 3, 3, motion.angular_velocity);
+  std::copy_n(acceleration.begin(), 3, motion.linear_acceleration);
+  std::copy_n(acceleration.begin() + 3, 3, motion.angular_acceleration);
+  return STEWART_OK;
+}
+
+int FeedForward::step(
+  const stewart_motion & motion, const Six & wrench, const Six & feedback, std::int64_t now,
+  Command & command)
+{
+  if (!finite(feedback)) {
+    return STEWART_NOT_FINITE;
+  }
+  const int code = stewart_step(
+    &hexapod_, &motion, wrench.data(), nullptr, now, &state_, &output_);
+  if (code != STEWART_OK && code != STEWART_SUPPRESSED && code != STEWART_SINGULAR) {
+    return code;
+  }
+  for (std::size_t n = 0; n < 6; ++n) {
+    const stewart_leg & leg = hexapod_.legs[n];
+    command.positions[n] = output_.result.lengths[n] - leg.zero_length;
+    command.velocities[n] = output_.result.rates[n];
+    command.efforts[n] =
+      std::clamp(output_.forces[n] + feedback[n], -leg.force_max, leg.force_max);
+  }
+  if (code == STEWART_OK) {
+    last_forces_ = now;
+    started_ = true;
+  }
+  return code;
+}
+
+}  // namespace stewart_dynamics_controller

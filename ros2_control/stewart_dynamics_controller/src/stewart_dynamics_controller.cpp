@@ -1,0 +1,309 @@
+// Copyright 2026 The stewart_dynamics developers
+//
+// Licensed under the Apache License, Version 2.0 (the "License");
+// you may not use this file except in compliance with the License.
+// You may obtain a copy of the License at
+//
+//     http://www.apache.org/licenses/LICENSE-2.0
+//
+// Unless required by applicable law or agreed to in writing, software
+// distributed under the License is distributed on an "AS IS" BASIS,
+// WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+// See the License for the specific language governing permissions and
+// limitations under the License.
+
+#include "stewart_dynamics_controller/stewart_dynamics_controller.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <limits>
+#include <utility>
+
+#include "pluginlib/class_list_macros.hpp"
+#include "stewart_dynamics_controller/hexapod.hpp"
+
+namespace stewart_dynamics_controller
+{
+
+using controller_interface::CallbackReturn;
+using controller_interface::return_type;
+
+namespace
+{
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kPose = 7;  // numbers of a pose among the references of the platform
+const char * const kState[] = {"determinant", "condition_number", "warning", "status"};
+
+const char * text_of(int code)
+{
+  switch (code) {
+    case STEWART_NOT_FINITE: return "a reference is NaN or infinite";
+    case STEWART_NOT_UNIT: return "the orientation is not a unit quaternion";
+    case STEWART_SINGULAR: return "det(J) is zero";
+    case STEWART_SUPPRESSED: return "suppressed by singularity.action or limits.action";
+    case STEWART_NO_POSE: return "the legs' positions belong to no pose near the last one";
+    default: return "a reference is out of range";
+  }
+}
+
+}  // namespace
+
+CallbackReturn StewartDynamicsController::on_init()
+{
+  try {
+    parameter_listener_ = std::make_shared<ParamListener>(get_node());
+    parameters_ = parameter_listener_->get_params();
+  } catch (const std::exception & error) {
+    RCLCPP_ERROR(get_node()->get_logger(), "%s", error.what());
+    return CallbackReturn::ERROR;
+  }
+  return CallbackReturn::SUCCESS;
+}
+
+CallbackReturn StewartDynamicsController::on_configure(const rclcpp_lifecycle::State &)
+{
+  parameters_ = parameter_listener_->get_params();
+  const auto & commanded = parameters_.command_interfaces;
+  if (std::find(commanded.begin(), commanded.end(), "effort") == commanded.end()) {
+    RCLCPP_ERROR(get_node()->get_logger(), "command_interfaces: effort must be one of them");
+    return CallbackReturn::ERROR;
+  }
+  try {
+    stewart_pose guess{};
+    if (!of_platform()) {
+      guess = initial_pose_of(parameters_);
+    }
+    feed_forward_.emplace(
+      hexapod_of(parameters_), guess, static_cast<std::int64_t>(parameters_.setpoint.timeout * 1e9));
+  } catch (const std::exception & error) {
+    RCLCPP_ERROR(get_node()->get_logger(), "%s", error.what());
+    return CallbackReturn::ERROR;
+  }
+  subscription_.reset();
+  if (of_platform()) {
+    subscription_ = get_node()->create_subscription<Setpoint>(
+      "~/setpoint/combined", rclcpp::SystemDefaultsQoS(),
+      [this](const Setpoint & message) {on_setpoint(message);});
+  }
+  return CallbackReturn::SUCCESS;
+}
+
+CallbackReturn StewartDynamicsController::on_activate(const rclcpp_lifecycle::State &)
+{
+  const std::size_t not_set = of_platform() ? kPose : 6;
+  for (std::size_t n = 0; n < ordered_exported_reference_interfaces_.size(); ++n) {
+    (void)ordered_exported_reference_interfaces_[n]->set_value(n < not_set ? kNaN : 0.0);
+  }
+  received_.set(std::nullopt);
+  received_at_ = -1;
+  last_code_ = STEWART_OK;
+  feed_forward_->start();
+  return CallbackReturn::SUCCESS;
+}
+
+CallbackReturn StewartDynamicsController::on_deactivate(const rclcpp_lifecycle::State &)
+{
+  return write("effort", Six{}) ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
+}
+
+controller_interface::InterfaceConfiguration
+StewartDynamicsController::command_interface_configuration() const
+{
+  std::vector<std::string> names;
+  for (const auto & interface : parameters_.command_interfaces) {
+    for (const auto & joint : parameters_.joints) {
+      names.push_back(joint + "/" + interface);
+    }
+  }
+  return {controller_interface::interface_configuration_type::INDIVIDUAL, names};
+}
+
+controller_interface::InterfaceConfiguration
+StewartDynamicsController::state_interface_configuration() const
+{
+  return {controller_interface::interface_configuration_type::NONE, {}};
+}
+
+std::vector<hardware_interface::CommandInterface::SharedPtr>
+StewartDynamicsController::on_export_reference_interfaces_list()
+{
+  std::vector<hardware_interface::CommandInterface::SharedPtr> references;
+  const auto add = [&](const std::string & group, const std::string & interface) {
+      references.push_back(
+        std::make_shared<hardware_interface::CommandInterface>(
+          std::string(get_node()->get_name()) + "/" + group, interface));
+    };
+  const auto add_axes =
+    [&](const std::string & group, const std::string & quantity, const std::string & axes) {
+      for (const char axis : axes) {
+        add(group, quantity + "." + axis);
+      }
+    };
+  if (of_platform()) {
+    add_axes("platform", "position", "xyz");
+    add_axes("platform", "orientation", "xyzw");
+    for (const char * quantity : {"linear_velocity", "angular_velocity", "linear_acceleration",
+        "angular_acceleration"})
+    {
+      add_axes("platform", quantity, "xyz");
+    }
+  } else {
+    for (const char * quantity : {"position", "velocity", "acceleration"}) {
+      for (const auto & joint : parameters_.joints) {
+        add(joint, quantity);
+      }
+    }
+  }
+  add_axes("wrench", "force", "xyz");
+  add_axes("wrench", "torque", "xyz");
+  for (const auto & joint : parameters_.joints) {
+    add(joint, "effort");
+  }
+  return references;
+}
+
+std::vector<hardware_interface::StateInterface::SharedPtr>
+StewartDynamicsController::on_export_state_interfaces_list()
+{
+  std::vector<hardware_interface::StateInterface::SharedPtr> states;
+  for (const char * name : kState) {
+    states.push_back(
+      std::make_shared<hardware_interface::StateInterface>(get_node()->get_name(), name));
+  }
+  return states;
+}
+
+void StewartDynamicsController::on_setpoint(const Setpoint & message)
+{
+  const auto & frame = message.header.frame_id;
+  if (!frame.empty() && frame != parameters_.base_frame) {
+    RCLCPP_WARN_THROTTLE(
+      get_node()->get_logger(), *get_node()->get_clock(), 1000,
+      "setpoint rejected: frame_id %s, must be %s", frame.c_str(), parameters_.base_frame.c_str());
+    return;
+  }
+  if (message.points.size() != 1 || message.points[0].transforms.size() != 1 ||
+    message.points[0].velocities.size() != 1 || message.points[0].accelerations.size() != 1)
+  {
+    RCLCPP_WARN_THROTTLE(
+      get_node()->get_logger(), *get_node()->get_clock(), 1000,
+      "setpoint rejected: must have one point with one transform, velocity and acceleration");
+    return;
+  }
+  const auto & p = message.points[0].transforms[0].translation;
+  const auto & q = message.points[0].transforms[0].rotation;
+  const auto & v = message.points[0].velocities[0];
+  const auto & a = message.points[0].accelerations[0];
+  received_.set(
+    PlatformNumbers{
+      p.x, p.y, p.z, q.x, q.y, q.z, q.w, v.linear.x, v.linear.y, v.linear.z, v.angular.x,
+      v.angular.y, v.angular.z, a.linear.x, a.linear.y, a.linear.z, a.angular.x, a.angular.y,
+      a.angular.z});
+}
+
+return_type StewartDynamicsController::update_reference_from_subscribers(
+  const rclcpp::Time & time, const rclcpp::Duration &)
+{
+  std::optional<PlatformNumbers> setpoint;
+  received_.try_get([&](const auto & received) {setpoint = received;});
+  if (setpoint) {
+    received_.try_set([](auto & received) {received.reset();});
+    received_at_ = time.nanoseconds();
+    for (std::size_t n = 0; n < setpoint->size(); ++n) {
+      (void)ordered_exported_reference_interfaces_[n]->set_value((*setpoint)[n]);
+    }
+  } else if (received_at_ >= 0 && feed_forward_->timed_out(received_at_, time.nanoseconds())) {
+    RCLCPP_ERROR(get_node()->get_logger(), "no setpoint for setpoint.timeout");
+    return return_type::ERROR;
+  }
+  return return_type::OK;
+}
+
+return_type StewartDynamicsController::update_and_write_commands(
+  const rclcpp::Time & time, const rclcpp::Duration &)
+{
+  if (parameter_listener_->try_update_params(parameters_)) {
+    try {
+      feed_forward_->change(hexapod_of(parameters_));
+    } catch (const std::exception & error) {
+      RCLCPP_ERROR(get_node()->get_logger(), "parameters are not used: %s", error.what());
+    }
+  }
+  Command command;
+  const int code = compute(time.nanoseconds(), command);
+  bool written = true;
+  if (code == STEWART_OK || code == STEWART_SUPPRESSED || code == STEWART_SINGULAR) {
+    written = write("position", command.positions) && write("velocity", command.velocities);
+  }
+  if (code == STEWART_OK) {
+    written = write("effort", command.efforts) && written;
+  }
+  const stewart_result & result = feed_forward_->result();
+  const double states[] = {result.determinant, result.condition_number,
+    feed_forward_->warning() ? 1.0 : 0.0, static_cast<double>(code)};
+  for (std::size_t n = 0; n < std::size(states); ++n) {
+    (void)ordered_exported_state_interfaces_[n]->set_value(states[n]);
+  }
+  if (code != last_code_ && code != STEWART_OK && feed_forward_->started()) {
+    RCLCPP_WARN(get_node()->get_logger(), "no forces: %s", text_of(code));
+  }
+  last_code_ = code;
+  if (feed_forward_->timed_out(time.nanoseconds())) {
+    RCLCPP_ERROR(
+      get_node()->get_logger(), "no forces for setpoint.timeout: %s", text_of(code));
+    return return_type::ERROR;
+  }
+  return written ? return_type::OK : return_type::ERROR;
+}
+
+Six StewartDynamicsController::read(std::size_t first) const
+{
+  Six values;
+  for (std::size_t n = 0; n < 6; ++n) {
+    values[n] =
+      ordered_exported_reference_interfaces_[first + n]->get_optional<double>().value_or(kNaN);
+  }
+  return values;
+}
+
+int StewartDynamicsController::compute(std::int64_t now, Command & command)
+{
+  const Six wrench = read(motion_size()), feedback = read(motion_size() + 6);
+  if (!of_platform()) {
+    return feed_forward_->update(
+      LegReference{read(0), read(6), read(12)}, wrench, feedback, now, command);
+  }
+  PlatformReference reference;
+  auto at = ordered_exported_reference_interfaces_.begin();
+  const auto take = [&](auto & numbers) {
+      for (double & each : numbers) {
+        each = (*at++)->template get_optional<double>().value_or(kNaN);
+      }
+    };
+  take(reference.position);
+  take(reference.orientation);
+  take(reference.linear_velocity);
+  take(reference.angular_velocity);
+  take(reference.linear_acceleration);
+  take(reference.angular_acceleration);
+  return feed_forward_->update(reference, wrench, feedback, now, command);
+}
+
+/// Write the values of an interface, if it is commanded.
+bool StewartDynamicsController::write(const std::string & interface, const Six & values)
+{
+  bool written = true;
+  for (std::size_t group = 0; group < parameters_.command_interfaces.size(); ++group) {
+    for (std::size_t n = 0; parameters_.command_interfaces[group] == interface && n < 6; ++n) {
+      written = command_interfaces_[6 * group + n].set_value(values[n]) && written;
+    }
+  }
+  return written;
+}
+
+}  // namespace stewart_dynamics_controller
+
+PLUGINLIB_EXPORT_CLASS(
+  stewart_dynamics_controller::StewartDynamicsController,
+  controller_interface::ChainableControllerInterface)

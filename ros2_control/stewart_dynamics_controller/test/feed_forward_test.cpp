@@ -1,0 +1,303 @@
+// Copyright 2026 The stewart_dynamics developers
+//
+// Licensed under the Apache License, Version 2.0 (the "License");
+// you may not use this file except in compliance with the License.
+// You may obtain a copy of the License at
+//
+//     http://www.apache.org/licenses/LICENSE-2.0
+//
+// Unless required by applicable law or agreed to in writing, software
+// distributed under the License is distributed on an "AS IS" BASIS,
+// WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+// See the License for the specific language governing permissions and
+// limitations under the License.
+
+// Test of the feed-forward without ROS and without a test library: ends with 1 at the first
+// check that fails.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+
+#include "stewart_dynamics_controller/feed_forward.hpp"
+
+using stewart_dynamics_controller::Command;
+using stewart_dynamics_controller::FeedForward;
+using stewart_dynamics_controller::LegReference;
+using stewart_dynamics_controller::PlatformReference;
+using stewart_dynamics_controller::rotation_of_euler;
+using stewart_dynamics_controller::Six;
+
+#define CHECK(condition) \
+  do { \
+    if (!(condition)) { \
+      std::printf("%s:%d: failed: %s\n", __FILE__, __LINE__, #condition); \
+      std::exit(1); \
+    } \
+  } while (false)
+
+namespace
+{
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kDegree = 0.017453292519943295;
+constexpr std::int64_t kCycle = 1000000, kTimeout = 100 * kCycle;  // [ns]
+
+/// The hexapod of config/platform.yaml, rounded.
+stewart_platform hexapod()
+{
+  const double base[] = {12, 108, 132, 228, 252, 348}, top[] = {48, 72, 168, 192, 288, 312};
+  stewart_platform p{};
+  p.gravity[2] = -9.80665;
+  p.mass = 150.0;
+  p.center_of_mass[2] = 0.12;
+  p.inertia[0] = 13.0;
+  p.inertia[3] = 14.0;
+  p.inertia[5] = 22.0;
+  for (int n = 0; n < 6; ++n) {
+    stewart_leg & leg = p.legs[n];
+    leg.base_joint[0] = 0.9 * std::cos(base[n] * kDegree);
+    leg.base_joint[1] = 0.9 * std::sin(base[n] * kDegree);
+    leg.platform_joint[0] = 0.6 * std::cos(top[n] * kDegree);
+    leg.platform_joint[1] = 0.6 * std::sin(top[n] * kDegree);
+    leg.zero_length = 0.95;
+    leg.cylinder_mass = 12.0;
+    leg.cylinder_center_of_mass = 0.35;
+    leg.cylinder_inertia = 0.65;
+    leg.piston_mass = 6.0;
+    leg.piston_center_of_mass = 0.4;
+    leg.piston_inertia = 0.32;
+    leg.reflected_mass = 80.0;
+    leg.viscous_friction = 200.0;
+    leg.coulomb_friction = 60.0;
+    leg.coulomb_velocity = 1e-3;
+    leg.length_max = leg.velocity_max = kInfinite;
+    leg.force_max = 5000.0;
+    leg.base_joint_angle_max = leg.platform_joint_angle_max = kInfinite;
+  }
+  p.leg_clearance_min = -kInfinite;
+  p.characteristic_length = 0.6;
+  p.warn_condition = 20.0;
+  p.stop_condition = 100.0;
+  p.warn_time = 0.5;
+  return p;
+}
+
+PlatformReference home()
+{
+  PlatformReference reference{};
+  reference.position = {0.0, 0.0, 1.1};
+  reference.orientation = {0.0, 0.0, 0.0, 1.0};
+  return reference;
+}
+
+stewart_pose guess()
+{
+  return {{0.0, 0.0, 1.1}, {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
+}
+
+/// A motion in all six directions at a time [s], with rotations of constant axis: exact
+/// derivatives.
+PlatformReference swing(double time)
+{
+  const double w = 5.0, axis[] = {0.48, -0.6, 0.64};
+  const double s = std::sin(w * time), c = std::cos(w * time);
+  PlatformReference at = home();
+  at.orientation[3] = std::cos(0.1 * s);
+  for (std::size_t n = 0; n < 3; ++n) {
+    const double size = 0.05 + 0.01 * static_cast<double>(n);
+    at.position[n] += size * s;
+    at.linear_velocity[n] = size * w * c;
+    at.linear_acceleration[n] = -size * w * w * s;
+    at.orientation[n] = axis[n] * std::sin(0.1 * s);
+    at.angular_velocity[n] = axis[n] * 0.2 * w * c;
+    at.angular_acceleration[n] = -axis[n] * 0.2 * w * w * s;
+  }
+  return at;
+}
+
+bool close(const Six & a, const Six & b, double tolerance)
+{
+  for (std::size_t n = 0; n < 6; ++n) {
+    if (!(std::fabs(a[n] - b[n]) <= tolerance)) {
+      std::printf("leg %zu: %.17g is not %.17g\n", n + 1, a[n], b[n]);
+      return false;
+    }
+  }
+  return true;
+}
+
+/// References of the platform give what stewart_step gives, with effort added and clipped.
+void test_platform()
+{
+  const stewart_platform p = hexapod();
+  FeedForward feed_forward(p, guess(), kTimeout);
+  const Six wrench = {10.0, -20.0, 30.0, 1.0, 2.0, -3.0}, feedback = {1.0, 2.0, 3.0, 4.0, 5.0, 1e6};
+  stewart_state state{};
+  feed_forward.start();
+  for (int n = 0; n < 1000; ++n) {
+    const PlatformReference reference = swing(1e-3 * n);
+    Command command;
+    CHECK(feed_forward.update(reference, wrench, feedback, n * kCycle, command) == STEWART_OK);
+    stewart_motion motion;
+    stewart_output expected;
+    CHECK(stewart_rotation(reference.orientation.data(), motion.rotation) == STEWART_OK);
+    std::copy_n(reference.position.begin(), 3, motion.position);
+    std::copy_n(reference.linear_velocity.begin(), 3, motion.linear_velocity);
+    std::copy_n(reference.angular_velocity.begin(), 3, motion.angular_velocity);
+    std::copy_n(reference.linear_acceleration.begin(), 3, motion.linear_acceleration);
+    std::copy_n(reference.angular_acceleration.begin(), 3, motion.angular_acceleration);
+    CHECK(
+      stewart_step(&p, &motion, wrench.data(), nullptr, n * kCycle, &state, &expected) ==
+      STEWART_OK);
+    for (std::size_t leg = 0; leg < 6; ++leg) {
+      CHECK(command.positions[leg] == expected.result.lengths[leg] - 0.95);
+      CHECK(command.velocities[leg] == expected.result.rates[leg]);
+      CHECK(
+        command.efforts[leg] == std::min(expected.forces[leg] + feedback[leg], 5000.0));
+    }
+  }
+}
+
+/// References of the legs, from the motion of the platform, give the efforts of that motion.
+void test_legs()
+{
+  FeedForward of_platform(hexapod(), guess(), kTimeout), of_legs(hexapod(), guess(), kTimeout);
+  const double h = 1e-4;
+  Six largest{};
+  of_platform.start();
+  of_legs.start();
+  for (int n = 0; n < 1000; ++n) {
+    const double time = 2e-3 * n;
+    Command at, before, after, computed;
+    FeedForward scratch(hexapod(), guess(), kTimeout);
+    CHECK(scratch.update(swing(time - h), {}, {}, 0, before) == STEWART_OK);
+    CHECK(scratch.update(swing(time + h), {}, {}, 1, after) == STEWART_OK);
+    CHECK(of_platform.update(swing(time), {}, {}, n * kCycle, at) == STEWART_OK);
+    LegReference legs{at.positions, at.velocities, {}};
+    for (std::size_t leg = 0; leg < 6; ++leg) {  // accelerations: by central differences
+      legs.accelerations[leg] = (after.velocities[leg] - before.velocities[leg]) / (2.0 * h);
+      largest[leg] = std::max(largest[leg], std::fabs(at.efforts[leg]));
+    }
+    CHECK(of_legs.update(legs, {}, {}, n * kCycle, computed) == STEWART_OK);
+    CHECK(close(computed.positions, at.positions, 1e-12));
+    CHECK(close(computed.velocities, at.velocities, 1e-11));
+    CHECK(close(computed.efforts, at.efforts, 1e-3));
+  }
+  CHECK(*std::min_element(largest.begin(), largest.end()) > 100.0);
+}
+
+/// What is not valid has a code and changes nothing; the next valid reference is answered.
+void test_bad_input()
+{
+  FeedForward feed_forward(hexapod(), guess(), kTimeout);
+  const Six none{};
+  Command good, command;
+  CHECK(!feed_forward.timed_out(1000 * kTimeout));  // nothing is commanded before the start
+  feed_forward.start();
+  CHECK(feed_forward.update(home(), none, none, 0, good) == STEWART_OK);
+  PlatformReference bad = home();
+  bad.position[1] = kNaN;
+  CHECK(feed_forward.update(bad, none, none, 1, command) == STEWART_NOT_FINITE);
+  bad = home();
+  bad.linear_acceleration[2] = kInfinite;
+  CHECK(feed_forward.update(bad, none, none, 2, command) == STEWART_NOT_FINITE);
+  bad = home();
+  bad.orientation[3] = 1.002;
+  CHECK(feed_forward.update(bad, none, none, 3, command) == STEWART_NOT_UNIT);
+  bad.orientation[3] = kNaN;
+  CHECK(feed_forward.update(bad, none, none, 4, command) == STEWART_NOT_FINITE);
+  bad = home();
+  bad.position[0] = 1e200;
+  CHECK(feed_forward.update(bad, none, none, 5, command) == STEWART_OUT_OF_RANGE);
+  CHECK(
+    feed_forward.update(home(), {kNaN, 0.0, 0.0, 0.0, 0.0, 0.0}, none, 6, command) ==
+    STEWART_NOT_FINITE);
+  CHECK(
+    feed_forward.update(home(), none, {0.0, kNaN, 0.0, 0.0, 0.0, 0.0}, 7, command) ==
+    STEWART_NOT_FINITE);
+  bad = home();
+  bad.position[2] = 0.0;  // legs and platform in one plane
+  CHECK(feed_forward.update(bad, none, none, 8, command) == STEWART_SINGULAR);
+  CHECK(!feed_forward.timed_out(kTimeout));
+  CHECK(feed_forward.timed_out(kTimeout + 1));
+  CHECK(feed_forward.update(home(), none, none, kTimeout, command) == STEWART_OK);
+  CHECK(close(command.efforts, good.efforts, 0.0));
+  CHECK(!feed_forward.timed_out(2 * kTimeout));
+}
+
+/// Legs' references without a pose, and NaN, keep the pose from which the next one is found.
+void test_bad_legs()
+{
+  FeedForward of_platform(hexapod(), guess(), kTimeout), feed_forward(hexapod(), guess(), kTimeout);
+  const Six none{};
+  Command at, command;
+  of_platform.start();
+  feed_forward.start();
+  CHECK(of_platform.update(home(), none, none, 0, at) == STEWART_OK);
+  LegReference bad{};
+  bad.positions.fill(kNaN);  // not yet given
+  CHECK(feed_forward.update(bad, none, none, 1, command) == STEWART_NOT_FINITE);
+  bad.positions = at.positions;
+  bad.positions[0] += 5.0;
+  CHECK(feed_forward.update(bad, none, none, 2, command) != STEWART_OK);
+  bad.positions = at.positions;
+  bad.velocities[3] = kNaN;
+  CHECK(feed_forward.update(bad, none, none, 3, command) == STEWART_NOT_FINITE);
+  bad.velocities[3] = 0.0;
+  bad.accelerations[3] = kInfinite;
+  CHECK(feed_forward.update(bad, none, none, 4, command) == STEWART_NOT_FINITE);
+  bad.accelerations[3] = 0.0;
+  CHECK(feed_forward.update(bad, none, none, 5, command) == STEWART_OK);
+  CHECK(close(command.efforts, at.efforts, 1e-8));
+}
+
+/// Suppressed: lengths without efforts; other parameters while it runs.
+void test_parameters()
+{
+  stewart_platform p = hexapod();
+  FeedForward feed_forward(p, guess(), kTimeout);
+  Command light, heavy, command;
+  feed_forward.start();
+  CHECK(feed_forward.update(home(), {}, {}, 0, light) == STEWART_OK);
+  CHECK(!feed_forward.warning());
+  p.mass += 100.0;
+  feed_forward.change(p);
+  CHECK(feed_forward.update(home(), {}, {}, 1, heavy) == STEWART_OK);
+  CHECK(heavy.efforts[0] > light.efforts[0] + 100.0);
+  p.warn_condition = p.stop_condition = 1.0;
+  p.suppress_near_singularity = 1;
+  feed_forward.change(p);
+  CHECK(feed_forward.update(home(), {}, {}, 2, command) == STEWART_SUPPRESSED);
+  CHECK(feed_forward.warning());
+  CHECK(close(command.positions, heavy.positions, 0.0));
+}
+
+/// Rz(gamma) Ry(beta) Rx(alpha): the columns of a turn about each axis.
+void test_rotation()
+{
+  const double quarter = 90.0 * kDegree;
+  const auto of_x = rotation_of_euler(quarter, 0.0, 0.0);
+  const auto of_z = rotation_of_euler(0.0, 0.0, quarter);
+  const auto both = rotation_of_euler(quarter, 0.0, quarter);
+  CHECK(std::fabs(of_x[7] - 1.0) < 1e-15 && std::fabs(of_x[5] + 1.0) < 1e-15);
+  CHECK(std::fabs(of_z[3] - 1.0) < 1e-15 && std::fabs(of_z[1] + 1.0) < 1e-15);
+  CHECK(std::fabs(both[3] - 1.0) < 1e-15 && std::fabs(both[7] - 1.0) < 1e-15);
+}
+
+}  // namespace
+
+int main()
+{
+  test_platform();
+  test_legs();
+  test_bad_input();
+  test_bad_legs();
+  test_parameters();
+  test_rotation();
+  std::printf("all checks passed\n");
+  return 0;
+}
