@@ -31,7 +31,7 @@ from referees import random_base_motion, random_motion, random_wrench, rng
 from rosbags.highlevel import AnyReader
 from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatform
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.errors import StewartError
+from stewart_dynamics.export import main
 from stewart_dynamics.export.fmu import find_compiler, fmu, variables
 from stewart_dynamics.mechanics.frames.rotation import (
     from_quaternion, quaternion_length, to_quaternion)
@@ -303,10 +303,28 @@ def test_without_a_compiler(version: str, tmp_path: Path) -> None:
     assert (version == '3') == ('sources/buildDescription.xml' in names)
 
 
-def test_errors() -> None:
-    """A compiler that fails and a hexapod without a home pose are errors in one line."""
-    with pytest.raises(StewartError, match='cannot compile the FMU'):
-        fmu(PARAMETERS, 'hexapod', '3', ['false'])
+def test_program(version: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                 capsys: pytest.CaptureFixture[str]) -> None:
+    """The FMU stands beside the C files; without a compiler one line says so."""
+    params = str(ROOT / 'config' / 'platform.yaml')
+    written = tmp_path / 'with'
+    option = ['--fmu'] if version == '3' else ['--fmu', '2']
+    assert main(['--params', params, '--output', str(written), '--name', 'arm', *option]) == 0
+    assert 'no binary' not in capsys.readouterr().err
+    described = fmpy.read_model_description(str(written / 'arm.fmu'))
+    assert described.fmiVersion == f'{version}.0'
+    assert described.coSimulation.modelIdentifier == 'arm'
+    names = zipfile.ZipFile(written / 'arm.fmu').namelist()
+    assert [Path(name).stem for name in names if name.startswith('binaries/')] == ['arm']
+    monkeypatch.setenv('PATH', str(tmp_path))
+    monkeypatch.delenv('CC', raising=False)
+    assert main(['--params', params, '--output', str(tmp_path), *option]) == 0
+    assert 'hexapod.fmu has no binary: no C compiler' in capsys.readouterr().err
+    monkeypatch.setenv('CC', shutil.which('false', path='/bin:/usr/bin') or 'false')
+    failed = tmp_path / 'failed'
+    assert main(['--params', params, '--output', str(failed), *option]) == 2
+    assert 'cannot compile the FMU' in capsys.readouterr().err
+    assert not failed.exists()
 
 
 def _recorded_inputs(bag: Path) -> list[list[float]]:

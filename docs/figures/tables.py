@@ -60,7 +60,7 @@ CONTROLLER = (
               'the controller starts; required where reference is legs', 'm, rad', (),
               sizes=(6,)))
 
-# Those of the node that the controller reads: it commands forces of legs, not torques of motors.
+# Parameters of the node that the controller reads: it commands forces, not motor torques.
 CONTROLLER_NAMES = ('joints', 'base_frame', 'setpoint.timeout', *(
     name for name in (*FIELDS_BEFORE_LEGS, *LEG_FIELDS, *FIELDS_AFTER_LEGS)
     if not name.startswith('drive.')
@@ -130,7 +130,7 @@ def controller_parameters() -> str:
     """
     Return the declaration of the controller's parameters for generate_parameter_library.
 
-    Those of the hexapod are declared as in the node. An array of one value per leg has 1 or 6
+    The hexapod's parameters are declared as in the node. An array of one value per leg has 1 or 6
     entries there, never a single value: the library knows one type for each parameter.
     """
     document: dict[str, Any] = {}

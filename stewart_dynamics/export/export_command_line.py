@@ -35,17 +35,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Write the computation of the node for one hexapod as C99 source, for '
-                    'real-time computers.',
+        description='Write the computation of the node for one hexapod as C99 source and as an '
+                    'FMU, for real-time\ncomputers.',
         epilog='DIR gets stewart_dynamics.h and .c, the same for every hexapod; NAME.h and .c, '
                'this hexapod;\ngolden.csv and test_golden.c, results to compare with; and '
-               'CMakeLists.txt.\n\n'
+               'CMakeLists.txt; with --fmu NAME.fmu, which has its sources inside, and a binary '
+               'for this computer\nwhere a C compiler is found ($CC, cc, gcc or clang).\n\n'
                'exit codes: 0 done; 2 bad arguments or parameters, or files that exist or cannot '
                'be written;\n130 interrupted')
     parser.add_argument('--params', type=Path, required=True, metavar='FILE',
                         help='parameters of the hexapod, the file that the node takes')
     parser.add_argument('--output', type=Path, required=True, metavar='DIR',
                         help='folder of the files')
+    parser.add_argument('--fmu', nargs='?', const='3', choices=('3', '2'), metavar='VERSION',
+                        help='write an FMU for co-simulation, too, of FMI 3.0 (3, the default) or '
+                             'FMI 2.0 (2)')
     parser.add_argument('--name', default='hexapod', metavar='NAME',
                         help='name of the hexapod in C (default: hexapod)')
     parser.add_argument('--node', default='', metavar='NAME',
@@ -58,12 +62,20 @@ def _arguments() -> argparse.ArgumentParser:
 def _export(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.export.c_project import c_project, check_name
+    from stewart_dynamics.export.fmu import find_compiler, fmu, has_binaries
     from stewart_dynamics.mechanics.plausibility import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
     name = check_name(given.name)
     parameters = Parameters.from_yaml(given.params, given.node)
-    for path in write_new(given.output, c_project(parameters, name), given.force):
+    files: dict[str, str | bytes] = {**c_project(parameters, name)}
+    if given.fmu:
+        compiler = find_compiler() if has_binaries(given.fmu) else None
+        files[f'{name}.fmu'] = fmu(parameters, name, given.fmu, compiler)
+        if compiler is None:
+            _PROGRAM.complain(f'warning: {name}.fmu has no binary: no C compiler for this '
+                              'computer is found ($CC, cc, gcc, clang)')
+    for path in write_new(given.output, files, given.force):
         _PROGRAM.say(str(path))
     for mistake in likely_mistakes(parameters):
         _PROGRAM.complain(f'warning: {mistake}')

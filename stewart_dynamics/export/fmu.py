@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from importlib.resources import files
 import io
 import os
 from pathlib import Path
@@ -35,13 +34,12 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.export.hexapod_source import digest, platform_source
+from stewart_dynamics.export.c_project import source, SOURCES
+from stewart_dynamics.export.hexapod_source import digest, hexadecimal, platform_source
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 
-FMI_VERSIONS = ('3', '2')
-_C_SOURCES = ('fmu.h', 'stewart_dynamics.h', 'fmu.c', 'stewart_dynamics.c')
 # SI base units of each unit, by their exponents in FMI.
 _UNITS = {'m': {'m': 1}, 'm/s': {'m': 1, 's': -1}, 'm/s2': {'m': 1, 's': -2}, 'm3': {'m': 3},
           'm3/s': {'m': 3, 's': -1}, 'rad/s': {'rad': 1, 's': -1},
@@ -171,7 +169,7 @@ def fmu(parameters: Parameters, name: str, version: str = '3',
     name : str
         Its model identifier, a name in C.
     version : str
-        Version of FMI, one of FMI_VERSIONS.
+        Version of FMI, 3 or 2.
     compiler : list of str, optional
         Words of the command of a C compiler, for the binary of this computer; None: no binary.
 
@@ -183,9 +181,9 @@ def fmu(parameters: Parameters, name: str, version: str = '3',
     """
     listed = variables(parameters)
     token = f'{{{uuid.UUID(bytes=bytes.fromhex(digest(parameters))[:16])}}}'
-    folder = files('stewart_dynamics.export') / 'c'
-    sources = {each: (folder / each).read_text() for each in (*_C_SOURCES, f'fmi{version}.c')}
-    sources['model.c'] = _model_source(parameters, listed, name, token)
+    sources = {each: source(each)
+               for each in (*SOURCES, 'fmu.h', 'fmu.c', f'fmi{version}.c')}
+    sources['model.c'] = _model_source(parameters, listed, token)
     compiled = [each for each in sources if each.endswith('.c')]
     content: dict[str, str | bytes] = {
         'modelDescription.xml': _description(listed, name, token, version, compiled)}
@@ -216,14 +214,16 @@ def has_binaries(version: str) -> bool:
     return (version, platform.system(), platform.machine()) in _FOLDERS
 
 
-def _model_source(parameters: Parameters, listed: list[Variable], name: str, token: str) -> str:
+def _model_source(parameters: Parameters, listed: list[Variable], token: str) -> str:
     start = [each for each in listed if each.start is not None]
     return '\n'.join((
+        f'/* A hexapod, written by stewart_export {__version__}.',
+        f' * SHA-256 of its parameters: {digest(parameters)} */', '',
         '#include "fmu.h"', '', '#include <math.h>', '',
         'static ' + platform_source(parameters, 'hexapod'),
         'const stewart_platform * const fmu_platform = &hexapod;', '',
         'const double fmu_start[FMU_LENGTHS] = {',
-        *(f'  {(each.start or 0.0).hex()},  /* {each.name}: {each.start:.9g} */'
+        *(f'  {hexadecimal(each.start or 0.0)},  /* {each.name}: {each.start:.9g} */'
           for each in start), '};', '', f'const char * const fmu_token = "{token}";', ''))
 
 
