@@ -68,7 +68,7 @@ static void put_matrix(double to[9], vector row0, vector row1, vector row2)
 {put3(to, row0), put3(to + 3, row1), put3(to + 6, row2);}
 
 /* Whether all doubles of an array, or of a structure of doubles, are finite. */
-static int finite(const void * doubles, size_t size) {
+static int all_finite(const void * doubles, size_t size) {
   const double * numbers = (const double *)doubles;
   size_t n = 0;
   while (n < size / sizeof(double) && isfinite(numbers[n])) {n++;}
@@ -85,7 +85,7 @@ static int check_rotation(const double r[9]) {
 
 int stewart_rotation(const double quaternion[4], double rotation[9]) {
   if (!quaternion || !rotation) {return STEWART_NULL;}
-  if (!finite(quaternion, 4 * sizeof(double))) {return STEWART_NOT_FINITE;}
+  if (!all_finite(quaternion, 4 * sizeof(double))) {return STEWART_NOT_FINITE;}
   double x = quaternion[0], y = quaternion[1], z = quaternion[2], w = quaternion[3];
   double length = sqrt(x * x + y * y + z * z + w * w);
   if (!(fabs(length - 1.0) <= QUATERNION_TOLERANCE)) {return STEWART_NOT_UNIT;}
@@ -392,9 +392,9 @@ int stewart_inverse_dynamics(
   stewart_result found;
   load external = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   if (!platform || !motion || !result) {return STEWART_NULL;}
-  if (!finite(motion, sizeof *motion)) {return STEWART_NOT_FINITE;}
-  if (wrench && !finite(wrench, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
-  if (base && !finite(base, sizeof *base)) {return STEWART_NOT_FINITE;}
+  if (!all_finite(motion, sizeof *motion)) {return STEWART_NOT_FINITE;}
+  if (wrench && !all_finite(wrench, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
+  if (base && !all_finite(base, sizeof *base)) {return STEWART_NOT_FINITE;}
   int code = check_rotation(motion->rotation);
   if (code != STEWART_OK) {return code;}
   if (wrench) {external.force = read3(wrench), external.moment = read3(wrench + 3);}
@@ -410,7 +410,7 @@ int stewart_inverse_dynamics(
     external.moment = subtract(external.moment, carried.moment);
   }
   solve(platform, motion, external, &found);
-  if (!finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
+  if (!all_finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
   *result = found;
   if (found.condition_number < UNSOLVABLE_CONDITION) {return STEWART_OK;}
   for (int i = 0; i < 6; i++) {result->forces[i] = 0.0;}
@@ -607,7 +607,7 @@ int stewart_motor_torques(
     found.torques[i] = leg->reflected_mass / ratio / ratio * found.accelerations[i] +
       through / ratio * (1.0 + (loss - 1.0) * (slip > 1.0 ? 1.0 : slip));
   }
-  if (!finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
+  if (!all_finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
   *motors = found;
   return STEWART_OK;
 }
@@ -686,7 +686,7 @@ int stewart_forward_kinematics(
   double squares[6], done = 0.0, way = 0.25;
   int steps = 0;
   if (!platform || !lengths || !pose) {return STEWART_NULL;}
-  if (!finite(lengths, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
+  if (!all_finite(lengths, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
   if (!finite(pose, sizeof *pose)) {return STEWART_NOT_FINITE;}
   int code = check_rotation(pose->rotation);
   if (code != STEWART_OK) {return code;}
