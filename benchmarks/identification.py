@@ -191,7 +191,7 @@ def states(result: Mapping[str, Any], state: str) -> str:
         else f'`{kind}` {" ".join(ends)}' for kind, ends in kinds.items()) or '-'
 
 
-def not_told(folder: Path) -> list[str]:
+def not_identifiable(folder: Path) -> list[str]:
     """Return the lines on identifiable parameters of bags at rest and about one axis."""
     lines = []
     for name, motion in (('at rest', at_rest), ('about x', about([1.0, 0.0, 0.0])),
@@ -203,7 +203,7 @@ def not_told(folder: Path) -> list[str]:
         sums = '; '.join(f'`{each["words"]}`' for each in found['combinations'])
         lines.append(f'- {name}, 20 s: identified are {states(found, "identified")}'
                      + (f'; in combinations {sums}' if sums else '')
-                     + f'; not identifiable are {states(found, "not_told")}.')
+                     + f'; not identifiable are {states(found, "not_identifiable")}.')
     return lines
 
 
@@ -289,7 +289,7 @@ def main() -> None:
         folder = Path(name)
         times = np.arange(round(SECONDS * RATE)) / RATE
         forces = pinocchio_forces(TRUE, fourier(SEED)(times - NOISE.delay))
-        for part in (accuracy(folder), coverage(forces, options.seeds), not_told(folder),
+        for part in (accuracy(folder), coverage(forces, options.seeds), not_identifiable(folder),
                      five_masses(folder), volume(folder)):
             print('\n'.join(part), flush=True)
             lines += [*part, '']

@@ -129,7 +129,7 @@ def test_at_rest_only_the_weight_is_identifiable(identified: Callable[..., Any],
     states = values_of(result, 'state')
     told = {name for name, state in states.items() if state == 'identified'}
     assert told == {'platform.mass', 'platform.center_of_mass.x', 'platform.center_of_mass.y'}
-    assert set(states.values()) == {'identified', 'not_told'}
+    assert set(states.values()) == {'identified', 'not_identifiable'}
     assert values_of(result)['platform.mass'] == pytest.approx(180.0, rel=0.002)
     assert values_of(result)['platform.center_of_mass.x'] == pytest.approx(0.03, abs=1e-3)
     assert result['bags'][0]['delay_s'] is None
@@ -146,7 +146,7 @@ def test_rotation_about_one_axis_identifies_the_inertia_about_it(
     # I n for n = (1, 1, 0) is identifiable: each of its components is a sum of two elements of I.
     _, result, out, _ = identified('diagonal', '--no-report')
     states = values_of(result, 'state')
-    assert states['platform.inertia.zz'] == 'not_told'
+    assert states['platform.inertia.zz'] == 'not_identifiable'
     assert {name for name, state in states.items() if state == 'in_combination'} == {
         f'platform.inertia.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz')}
     sums = {frozenset(each['parameters']): each for each in result['combinations']}
@@ -223,7 +223,7 @@ def test_at_rest_the_tilt_is_identifiable_unless_efforts_have_offsets(
     _, result, _, _ = identified('tilted at rest', *WITH_TILT, '--no-report')
     assert _degrees_between(_turned(result), TILTED['gravity']) < 0.02
     states = values_of(result, 'state')
-    assert states['platform.center_of_mass.z'] == 'not_told'
+    assert states['platform.center_of_mass.z'] == 'not_identifiable'
     moments = [np.cross(p['platform.center_of_mass'], p['gravity'])
                for p in (Parameters(result['identified']), TILTED)]
     np.testing.assert_allclose(*moments, atol=5e-3)

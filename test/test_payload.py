@@ -310,7 +310,7 @@ def test_forces_of_the_wrong_sign_are_named() -> None:
 @pytest.mark.parametrize(('factor', 'said'), [
     (1e-3, 'the measured forces are 0.001'), (1e200, 'the measured forces are 1.'),
     (1e304, 'numbers overflow'),
-    (5.0, 'the measured forces do not tell the mass: what no body explains is '),
+    (5.0, 'the mass is not identifiable from the measured forces: residual '),
 ])
 def test_forces_of_another_size_are_named(factor: float, said: str) -> None:
     history, wrong = recorded(excited, seconds=4.0, rate=200.0), LegHistory(10.0)

@@ -306,7 +306,7 @@ def _outcome(payload: Payload) -> PayloadOutcome:
     if not mass > 0.0:
         return PayloadOutcome(f'the mass that fits best is {mass:.6g} kg: must be more than 0')
     if not fitted.known[0]:
-        return PayloadOutcome('the measured forces do not tell the mass: what no body explains is '
+        return PayloadOutcome('the mass is not identifiable from the measured forces: residual '
                               f'{fitted.residual:.3g} N (RMS)')
     return PayloadOutcome(_words(payload), payload)
 

@@ -106,7 +106,7 @@ def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None, prior: float
 
     """
     found = _fit(sums, unknowns, unknowns.scales, noise, prior, cutoffs, largest_error)
-    unknown = found.identifiability.told < LEAST_SHARE
+    unknown = found.identifiability.known_shares < LEAST_SHARE
     if not unknown.any():
         return found
     # Weakly identifiable parameters keep the value from the file.

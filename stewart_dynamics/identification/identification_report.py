@@ -96,7 +96,7 @@ class IdentificationReport:
             _FOLDER, 'identification', [script], document=True, r=result, parameters=parameters,
             identified=of_state[IDENTIFIED],
             combined=grouped([each['name'] for each in of_state[IN_COMBINATION]]),
-            not_told=grouped([each['name'] for each in of_state[NOT_IDENTIFIABLE]]),
+            not_identifiable=grouped([each['name'] for each in of_state[NOT_IDENTIFIABLE]]),
             name=Path(result['bags'][0]['bag']).name or result['bags'][0]['bag'],
             combinations=[each | {'half': TWO_SIDED * each['standard_error'],
                                   'digits': decimals(each['standard_error'])}

@@ -39,13 +39,13 @@ from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.least_squares import (
     Information, information, no_information, solve)
-from stewart_dynamics.parameters.table import AUTO, Parameters
+from stewart_dynamics.parameters.table import AUTO, Parameters, STANDARD_GRAVITY
 
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
 _NEAR = 1.35
 # A scale that differs from 1 by a larger ratio is a mistake.
 _FAR = 2.0
-_FACTORS = ((1e-3, 'kN in place of N'), (1.0 / 9.80665, 'kgf in place of N'),
+_FACTORS = ((1e-3, 'kN in place of N'), (-1.0 / STANDARD_GRAVITY[2], 'kgf in place of N'),
             (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
 # A residual above this fraction of the efforts starts the search for swapped legs.
 _SUSPICIOUS = 0.03

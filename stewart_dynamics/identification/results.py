@@ -35,7 +35,7 @@ from stewart_dynamics.replay.fingerprint import plain_parameters, software
 # Version of identification.json; increased when the meaning of a key changes.
 VERSION = 1
 
-IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE = 'identified', 'in_combination', 'not_told'
+IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE = 'identified', 'in_combination', 'not_identifiable'
 
 
 def document(found: Identified, options: IdentificationOptions) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def _cause(each: Found) -> dict[str, Any]:
 def _states(found: Identified) -> list[str]:
     what = found.fit.identifiability
     return [IDENTIFIED if known else IN_COMBINATION if part >= LEAST_SHARE else NOT_IDENTIFIABLE
-            for known, part in zip(what.identifiable, what.told, strict=True)]
+            for known, part in zip(what.identifiable, what.known_shares, strict=True)]
 
 
 def _errors(found: Identified) -> Array:

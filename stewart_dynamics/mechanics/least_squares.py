@@ -114,10 +114,10 @@ class Identifiability(NamedTuple):
         return self.shares <= LARGEST_SHARE
 
     @property
-    def told(self) -> Array:
+    def known_shares(self) -> Array:
         """Return the share (n,) of the known directions in each parameter, 0 to 1."""
-        told: Array = np.sqrt(np.sum(self.directions[:, :self.rank] ** 2, axis=1))
-        return told
+        shares: Array = np.sqrt(np.sum(self.directions[:, :self.rank] ** 2, axis=1))
+        return shares
 
     @property
     def known(self) -> Array:
@@ -206,8 +206,8 @@ def identifiability(matrix: Array, scales: Array, noise: Array | None = None,
         Largest standard error of a known direction, by the scales.
 
     """
-    told = matrix if noise is None else matrix - TIMES_NOISE * noise
-    values, directions = np.linalg.eigh(scales[:, None] * told * scales)
+    signal = matrix if noise is None else matrix - TIMES_NOISE * noise
+    values, directions = np.linalg.eigh(scales[:, None] * signal * scales)
     values, directions = values[::-1], directions[:, ::-1]
     singular = np.sqrt(np.maximum(values, 0.0))
     known = singular > max(1.0 / largest_error, ROUNDING * float(singular[0]))

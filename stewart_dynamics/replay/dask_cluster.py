@@ -68,8 +68,7 @@ def replay_on_cluster(tasks: Sequence[Task], address: str, at: At) -> Results:
             # Dask also blames bags that only waited for a worker that died: each is replayed
             # alone now.
             for task in suspects:
-                future = submit(task, 2)
-                pending[future] = task
+                pending = {(future := submit(task, 2)): task}
                 try:
                     ended = _result(dask, future, task)
                 except dask.KilledWorker as exc:
@@ -77,7 +76,6 @@ def replay_on_cluster(tasks: Sequence[Task], address: str, at: At) -> Results:
                         task, 'the worker that replayed it died '
                         f'{2 * (exc.allowed_failures + 1)} times, the last one at '
                         f'{exc.last_worker.address} (out of memory?)')
-                del pending[future]
                 yield task.number, ended
         except BaseException:
             client.cancel(list(pending))

@@ -22,43 +22,26 @@ that a lack of memory caused by others cannot end it a second time.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 import multiprocessing
-from multiprocessing import forkserver, resource_tracker
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
-from queue import SimpleQueue
+from multiprocessing import forkserver, parent_process, resource_tracker
+import os
 import signal
-from threading import Event, Thread
+from threading import local, Lock, Thread
+from typing import Any
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.replay.bag_task import (
-    At, Cancelled, counted, Ended, failed, finished, LOCAL_INTERVAL, replay_task, Results, Task)
+    At, Cancelled, Ended, failed, finished, LOCAL_INTERVAL, replay_task, Results, Task)
 
-# Forked by a process that has imported the replay once and has no threads of ours: a fork of this
-# process, which may have some, is not safe.
 _CONTEXT = multiprocessing.get_context('forkserver')
 _CONTEXT.set_forkserver_preload(['stewart_dynamics.replay.one_bag'])
 
 
 def replay_in_processes(tasks: Sequence[Task], jobs: int, at: At) -> Results:
-    """
-    Yield the outcome of each bag, as they end.
-
-    Parameters
-    ----------
-    tasks : sequence of Task
-        In the order in which they are started.
-    jobs : int
-        Number of processes.
-    at : callable
-        Called with the progress.
-
-    Raises StewartError if processes cannot start.
-
-    """
+    """Yield the outcome of each bag, as they end; StewartError if processes cannot start."""
     # The processes inherit the mask of the server: Ctrl-C ends this process, which ends them.
     # Starting the resource tracker later would lift the mask.
     resource_tracker.ensure_running()
@@ -67,101 +50,108 @@ def replay_in_processes(tasks: Sequence[Task], jobs: int, at: At) -> Results:
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    died: list[Task] = []
-    yield from _side_by_side(tasks, jobs, at, died)
-    for task in tuple(died):
-        died.clear()
-        yield from _side_by_side([task], 1, at, died)
-        if died:
-            yield task.number, finished(task) or failed(
+    processes = _Processes(tasks)
+    try:
+        died = []
+        for task, ended in processes.replayed(tasks, jobs, at):
+            if ended is None:
+                died.append(task)
+            else:
+                yield task.number, ended
+        for task, ended in processes.replayed(died, 1, at):
+            yield task.number, ended or finished(task) or failed(
                 task, 'the process that replayed it was killed twice (out of memory?)')
-
-
-def _side_by_side(tasks: Sequence[Task], jobs: int, at: At, died: list[Task]) -> Results:
-    """Yield the outcome of each bag; append those whose process has died to ``died``."""
-    waiting, idle = deque(tasks), list[Connection]()
-    working: dict[Connection, Task] = {}
-    processes: dict[Connection, BaseProcess] = {}
-    try:
-        while waiting or working:
-            while waiting and len(working) < jobs:
-                worker = idle.pop() if idle else _started(processes)
-                working[worker] = waiting.popleft()
-                with suppress(BrokenPipeError):  # it has died: found by the next call
-                    worker.send(working[worker])
-            for worker in set(working).intersection(wait(list(working))):
-                task = working[worker]
-                try:
-                    message = worker.recv()
-                except (EOFError, OSError):
-                    died.append(working.pop(worker))
-                    at(task.number, 0, 0)
-                else:
-                    if isinstance(message, Ended):
-                        idle.append(worker)
-                        yield working.pop(worker).number, message
-                    else:
-                        at(task.number, *message)
     finally:
-        _end(processes)
+        processes.close()
 
 
-def _started(processes: dict[Connection, BaseProcess]) -> Connection:
-    """Start a process, and return the connection to it."""
-    ours, its = _CONTEXT.Pipe()
-    process = _CONTEXT.Process(target=_work, args=(its,))
-    processes[ours] = process  # now, since an interrupt may come at any time
-    try:
-        process.start()
-    finally:
-        its.close()
-    try:
-        ours.recv()
-    except (EOFError, OSError):
-        raise StewartError('the processes to replay bags could not start') from None
-    return ours
+class _Processes:
+    """
+    Pools of one process each, so that the death of one does not break the others.
+
+    The progress is in shared memory without a lock, which a process could take with it.
+    """
+
+    def __init__(self, tasks: Sequence[Task]) -> None:
+        self._places = {task.number: 2 * n for n, task in enumerate(tasks)}
+        self._counts: Any = _CONTEXT.RawArray('q', 2 * len(tasks))
+        self._stopped: Any = _CONTEXT.RawValue('b')
+        self._pools: list[ProcessPoolExecutor] = []
+        self._of_thread = local()
+
+    def replayed(self, tasks: Sequence[Task], jobs: int, at: At,
+                 ) -> Iterator[tuple[Task, Ended | None]]:
+        """Yield the outcome of each bag; None if its process has died."""
+        with ThreadPoolExecutor(jobs) as threads:
+            try:
+                pending = {threads.submit(self._replay, task): task for task in tasks}
+                while pending:
+                    done, _ = wait(pending, LOCAL_INTERVAL, FIRST_COMPLETED)
+                    for future, task in pending.items():
+                        if future.running():
+                            place = self._places[task.number]
+                            at(task.number, *self._counts[place:place + 2])
+                    for future in done:
+                        yield pending.pop(future), future.result()
+            except BaseException:
+                self._stopped.value = 1
+                threads.shutdown(cancel_futures=True)
+                raise
+
+    def _replay(self, task: Task) -> Ended | None:
+        """Replay a bag in the process of this thread."""
+        if not hasattr(self._of_thread, 'pool'):
+            pool = ProcessPoolExecutor(1, _CONTEXT, _begin, (self._stopped, self._counts))
+            self._pools.append(pool)
+            try:
+                pool.submit(os.getpid).result()
+            except BrokenProcessPool:
+                raise StewartError('the processes to replay bags could not start') from None
+            self._of_thread.pool = pool
+        place = self._places[task.number]
+        self._counts[place:place + 2] = 0, 0
+        try:
+            ended: Ended = self._of_thread.pool.submit(_work, task, place).result()
+        except BrokenProcessPool:
+            del self._of_thread.pool
+            return None
+        return ended
+
+    def close(self) -> None:
+        """Stop the processes, and wait until they have removed their partial results."""
+        self._stopped.value = 1
+        for pool in self._pools:
+            pool.shutdown()
 
 
-def _end(processes: dict[Connection, BaseProcess]) -> None:
-    """Stop the processes, and wait until they have removed their partial results."""
-    for connection in processes:
-        with suppress(OSError):
-            connection.send(None)
-    for connection, process in processes.items():
-        with suppress(EOFError, OSError):
-            while True:
-                connection.recv()
-        connection.close()
-        if process.pid is not None:
-            process.join()
+# -- in a process ---------------------------------------------------------------------------------
+
+_working = Lock()
+_shared: list[Any] = []
 
 
-# In the processes
+def _begin(*shared: Any) -> None:
+    """Keep the memory shared with the other process; end when that process has died."""
+    def watch() -> None:
+        parent = parent_process()
+        assert parent is not None
+        parent.join()
+        _shared[0].value = 1
+        with _working:
+            os._exit(1)
 
-def _work(connection: Connection) -> None:
-    """Replay bags until the other process sends None or has died."""
-    tasks: SimpleQueue[Task | None] = SimpleQueue()
-    stopped = Event()
+    _shared[:] = shared
+    Thread(target=watch, daemon=True).start()
 
-    def receive() -> None:
-        with suppress(EOFError, OSError):
-            while (task := connection.recv()) is not None:
-                tasks.put(task)
-        stopped.set()
-        tasks.put(None)
 
-    def replayed(task: Task) -> Ended:
-        report = counted(lambda *how_far: connection.send(how_far), LOCAL_INTERVAL)
+def _work(task: Task, place: int) -> Ended:
+    stopped, counts = _shared
 
-        def progress(read: int, setpoints: int) -> None:
-            if stopped.is_set():
-                raise Cancelled
-            report(read, setpoints)
+    def progress(read: int, setpoints: int) -> None:
+        if stopped.value:
+            raise Cancelled
+        counts[place] += read
+        counts[place + 1] += setpoints
 
+    with _working:
         return replay_task(task, progress)
-
-    Thread(target=receive, daemon=True).start()
-    with suppress(BrokenPipeError):
-        connection.send('ready')
-        while (task := tasks.get()) is not None:
-            connection.send(replayed(task))

@@ -184,17 +184,8 @@ class _ProgressBar:
     """
     A line on stderr: bags, setpoints, their rate and the time left.
 
-    The time left is estimated from bytes, since bags differ in size.
-
-    Parameters
-    ----------
-    sizes : sequence of int
-        Size of each bag [bytes]; zero if it need not be replayed.
-    show : bool, optional
-        None: only if stderr is a terminal.
-    ended : int
-        Number of bags that are done already.
-
+    The time left is estimated from bytes, since bags differ in size; a bag that need not be
+    replayed has none.
     """
 
     def __init__(self, sizes: Sequence[int], show: bool | None, ended: int) -> None:

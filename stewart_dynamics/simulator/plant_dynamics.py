@@ -36,7 +36,8 @@ from stewart_dynamics.mechanics.dynamics.forward_dynamics import acceleration
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, BASE, consecutive, MOTION, POSITION, ROTATION, TWIST)
-from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, read3, scale, Vector3
+from stewart_dynamics.mechanics.vectors import (
+    add, cross, dot, Matrix3, norm, read3, scale, Vector3)
 from stewart_dynamics.simulator.end_stops import stop_force
 
 # The state: position, quaternion x y z w, linear and angular velocity, base axes.
@@ -131,11 +132,11 @@ def _write_legs(constants: Array, state: Array, result: Array) -> float:
     """
     position, rotation = read3(state, STATE_POSITION.start), _rotation(state)
     velocity, omega = _twist(state)
-    fastest = math.sqrt(dot(omega, omega))
+    fastest = norm(omega)
     for leg in range(6):
         a, length, inverse_length, s = leg_line(constants, leg, position, rotation)
         joint_velocity = add(velocity, cross(omega, a))
-        moving = inverse_length * math.sqrt(dot(joint_velocity, joint_velocity))
+        moving = inverse_length * norm(joint_velocity)
         result[RESULT_LENGTHS.start + leg] = length
         result[RESULT_RATES.start + leg] = dot(s, joint_velocity)
         fastest = max(fastest, moving) if 0.0 < length < math.inf else math.inf

@@ -21,7 +21,6 @@ paper's equations.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from stewart_dynamics.arrays import Array
@@ -30,7 +29,8 @@ from stewart_dynamics.mechanics.dynamics.friction import with_friction
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
     characteristic_length_of, gravity_of, joints_of, Leg, leg_of, platform_of)
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, Matrix3, rotate, rotate_back, scale, subtract, symmetric, Vector3, Vector6)
+    add, cross, dot, Matrix3, norm, rotate, rotate_back, scale, subtract, symmetric, Vector3,
+    Vector6)
 
 
 class LegDynamics(NamedTuple):
@@ -64,7 +64,7 @@ def leg_line(
     base_joint, platform_joint = joints_of(constants, leg)
     a = rotate(rotation, platform_joint)
     leg_vector = subtract(add(position, a), base_joint)
-    length = math.sqrt(dot(leg_vector, leg_vector))
+    length = norm(leg_vector)
     inverse_length = 1.0 / length if length > 0.0 else 0.0
     return a, length, inverse_length, scale(inverse_length, leg_vector)
 

@@ -47,14 +47,14 @@ from stewart_dynamics.mechanics.rows import (
     ANGULAR_VELOCITY, BASE_JOINT_ANGLES, JOINT_ANGLES, LINEAR_VELOCITY, PLATFORM_JOINT_ANGLES,
     POSITION, ROTATION)
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, read3, read9, rotate_back, scale, subtract, Vector3)
+    add, cross, dot, norm, read3, read9, rotate_back, scale, subtract, Vector3)
 from stewart_dynamics.parameters.table import Parameters
 
 
 @inlined
 def _angle(axis: Vector3, direction: Vector3) -> float:
     sine = cross(axis, direction)
-    return math.atan2(math.sqrt(dot(sine, sine)), dot(axis, direction))
+    return math.atan2(norm(sine), dot(axis, direction))
 
 
 @entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')

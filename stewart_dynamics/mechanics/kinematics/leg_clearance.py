@@ -49,7 +49,7 @@ from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_consta
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.mechanics.vectors import (
-    cross, dot, read3, read9, scale, subtract, Vector3)
+    cross, dot, norm, read3, read9, scale, subtract, Vector3)
 from stewart_dynamics.parameters.table import LEG_SHAPE, Parameters
 
 # The axis of a leg in scratch memory: base joint, direction, length, length of the cylinder.
@@ -73,8 +73,7 @@ def _shortest(gap: Vector3, s: Vector3, t: Vector3, cosine: float, along_s: floa
 def _distance(gap: Vector3, s: Vector3, t: Vector3, cosine: float, along_s: float,
               along_t: float, u: float, u_end: float, v_end: float) -> float:
     """Return the least ``|gap + u s - v t|`` for 0 <= u <= u_end and 0 <= v <= v_end."""
-    x, y, z = _shortest(gap, s, t, cosine, along_s, along_t, u, u_end, v_end)
-    return math.sqrt(x * x + y * y + z * z)
+    return norm(_shortest(gap, s, t, cosine, along_s, along_t, u, u_end, v_end))
 
 
 @inlined
@@ -146,7 +145,7 @@ def pair_room(shapes: Array, axes: Array, i: int, j: int, moved: float, other_mo
         radii = (shapes[i, 0] if cylinder else shapes[i, 2]) + (
             shapes[j, 0] if other_cylinder else shapes[j, 2])
         x = _shortest(gap, s, t, cosine, along_s, along_t, u, u_end, v_end)
-        distance = math.sqrt(dot(x, x))
+        distance = norm(x)
         n = scale(1.0 / distance if distance > 0.0 else 0.0, x)
         at_bases = dot(n, gap) - radii
         clearance = min(clearance, distance - radii)
