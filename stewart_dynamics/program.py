@@ -17,15 +17,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 import io
 import os
 from pathlib import Path
 import re
 import signal
 import sys
+from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import one_line, StewartError
+
+if TYPE_CHECKING:
+    from stewart_dynamics.compilation.functions import EntryPoint
 
 DONE, BAD_INPUT, PARTLY_READ, INTERRUPTED = 0, 2, 3, 130
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -44,6 +48,22 @@ class Program:
 
     def __init__(self, name: str) -> None:
         self.name = name
+
+    def parser(self, description: str, epilog: str) -> argparse.ArgumentParser:
+        """Return a parser of arguments; the lines of the epilog stay."""
+        return argparse.ArgumentParser(prog=self.name, description=description, epilog=epilog,
+                                       formatter_class=argparse.RawDescriptionHelpFormatter)
+
+    def prepare(self, functions: Iterable[EntryPoint], mistakes: Iterable[str]) -> None:
+        """Compile functions side by side; print why that is not possible, and likely mistakes."""
+        from stewart_dynamics.compilation.functions import prepare  # late, so that --help is fast
+        from stewart_dynamics.compilation.machine_code import HINT
+
+        if HINT:
+            self.complain(HINT)
+        prepare(functions)
+        for mistake in mistakes:
+            self.complain(f'warning: {mistake}')
 
     def exit_code(self, run: Callable[[], int]) -> int:
         """Run and return the exit code; errors of any kind end it with one line on stderr."""
@@ -128,6 +148,14 @@ def node_name(text: str) -> str:
     if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', name):
         raise argparse.ArgumentTypeError(f'{text!r}: not a valid node name')
     return name
+
+
+def add_results(parser: argparse.ArgumentParser, folder: str, strict: str) -> None:
+    """Add the options of the results: their folder, and when ``--strict`` gives exit code 1."""
+    parser.add_argument('--output', type=Path, default=Path(folder), metavar='DIR',
+                        help=f'folder of the results (default: {folder})')
+    parser.add_argument('--force', action='store_true', help='replace results that exist')
+    parser.add_argument('--strict', action='store_true', help=f'exit code 1 when {strict}')
 
 
 def frequency(text: str) -> float:

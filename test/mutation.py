@@ -241,8 +241,8 @@ def fate(mutant: Mutant, suite: Suite, modules: list[str], seconds: float) -> st
 def main() -> None:
     """Draw a sample, run it, and print what survives."""
     parser = argparse.ArgumentParser(description=(__doc__ or '').split('\n\n')[0])
-    parser.add_argument('modules', nargs='*', default=['mechanics', 'runtime'],
-                        help='modules or folders of the package (default: mechanics runtime)')
+    parser.add_argument('modules', nargs='*', default=['mechanics', 'setpoints'],
+                        help='modules or folders of the package (default: mechanics setpoints)')
     parser.add_argument('--sample', type=int, default=200, help='mutants (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=1, help='of the sample (default: %(default)s)')
     parser.add_argument('--seconds', type=float, default=300.0,

@@ -24,7 +24,7 @@ import sys
 from typing import Any
 
 from stewart_dynamics.program import (
-    DONE, frequency, interrupt_on_signals, node_name, PARTLY_READ, Program)
+    add_results, DONE, frequency, interrupt_on_signals, node_name, PARTLY_READ, Program)
 from stewart_dynamics.replay.replay_options import NODE, Options
 
 NOT_POSSIBLE = 1
@@ -38,8 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _arguments() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = _PROGRAM.parser(
         description='Write the datasheet of a hexapod: what it can reach, carry and follow, and '
                     'what limits it.',
         epilog='DIR/ gets datasheet.html, datasheet.json and workspace.csv.\n\n'
@@ -64,11 +63,7 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--box', type=Path, metavar='FILE',
                         help='YAML file of a claimed set of ranges, x y z [m] rx ry rz [rad] from '
                              'the pose: is all of it reachable?')
-    parser.add_argument('--output', type=Path, default=Path('datasheet'), metavar='DIR',
-                        help='folder of the results (default: datasheet)')
-    parser.add_argument('--force', action='store_true', help='replace results that exist')
-    parser.add_argument('--strict', action='store_true',
-                        help='exit code 1 when the motion or the box is not possible')
+    add_results(parser, 'datasheet', 'the motion or the box is not possible')
     parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
                         help='node whose parameters are read, and name before the usual topics '
                              f'(default: {NODE})')
@@ -99,8 +94,6 @@ def _run(given: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from stewart_dynamics.bags.find import bytes_of
-    from stewart_dynamics.compilation.functions import prepare
-    from stewart_dynamics.compilation.machine_code import HINT
     from stewart_dynamics.datasheet.claimed_box import read_box
     from stewart_dynamics.datasheet.datasheet import (
         check_order, FUNCTIONS, is_possible, Order, Progress, STAGES, write_datasheet)
@@ -128,11 +121,7 @@ def _run(given: argparse.Namespace) -> int:
     check_order(order)
     check_free(given.output, options, DATASHEET)
     remove_abandoned([given.output])
-    if HINT:
-        _PROGRAM.complain(HINT)
-    prepare(FUNCTIONS)  # side by side
-    for mistake in likely_mistakes(parameters):
-        _PROGRAM.complain(f'warning: {mistake}')
+    _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))
     size = 0 if given.motion is None else bytes_of(given.motion)
     # Each stage counts as a part of the bag, whose reading is the longest where it is large.
     part = max(size // len(STAGES), 1)

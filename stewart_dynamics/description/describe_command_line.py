@@ -41,8 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _arguments() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = _PROGRAM.parser(
         description='Write a hexapod as URDF, SDFormat and MJCF, or read one from these formats '
                     'into a parameter file.',
         epilog='DIR gets NAME.urdf, NAME.sdf and NAME.xml (MJCF), or with --from NAME.yaml.\n\n'

@@ -24,7 +24,8 @@ from stewart_dynamics.identification import design_command
 from stewart_dynamics.identification.identification_options import (
     CUTOFF, HOLD_OUT, IdentificationOptions)
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
-from stewart_dynamics.program import DONE, interrupt_on_signals, node_name, PARTLY_READ, Program
+from stewart_dynamics.program import (
+    add_results, DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
 from stewart_dynamics.replay.replay_options import NODE
 
 NOT_ALL_IDENTIFIED = 1
@@ -42,8 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _arguments() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = _PROGRAM.parser(
         description='Identify mass, center of mass, inertia and friction of a hexapod from the '
                     'measured legs of recorded motions.',
         epilog='DIR/ gets identified.yaml (the whole parameter file, for the node), '
@@ -57,11 +57,8 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--params', required=True, type=Path, metavar='FILE',
                         help='parameters of the hexapod as far as they are known, the file that '
                              'the node takes')
-    parser.add_argument('--output', type=Path, metavar='DIR',
-                        help='folder of the results (default: identified)')
-    parser.add_argument('--force', action='store_true', help='replace results that exist')
-    parser.add_argument('--strict', action='store_true',
-                        help='exit code 1 when a requested parameter is not identifiable')
+    add_results(parser, 'identified', 'a requested parameter is not identifiable')
+    parser.set_defaults(output=None)  # --design has another one
     parser.add_argument('--no-report', action='store_true', help='write no report.html')
     topics = parser.add_argument_group('topics')
     topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
@@ -95,8 +92,6 @@ def _arguments() -> argparse.ArgumentParser:
 def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import find_bags
-    from stewart_dynamics.compilation.functions import prepare
-    from stewart_dynamics.compilation.machine_code import HINT
     from stewart_dynamics.identification.one_run import FUNCTIONS, run
     from stewart_dynamics.identification.text import result_text
     from stewart_dynamics.mechanics.plausibility import likely_mistakes
@@ -113,11 +108,7 @@ def _run(given: argparse.Namespace) -> int:
         return DONE
     output = given.output or Path('identified')
     bags = [bag for path in given.bags for bag in find_bags(path, output)]
-    if HINT:
-        _PROGRAM.complain(HINT)
-    prepare(FUNCTIONS)
-    for mistake in likely_mistakes(parameters):
-        _PROGRAM.complain(f'warning: {mistake}')
+    _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))
     result = run(bags, parameters, output, options, _PROGRAM.complain)
     _PROGRAM.say(result_text(result))
     _PROGRAM.say(f'results: {output}')

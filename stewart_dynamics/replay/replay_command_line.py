@@ -22,7 +22,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stewart_dynamics.program import DONE, frequency, interrupt_on_signals, node_name, Program
+from stewart_dynamics.program import (
+    add_results, DONE, frequency, interrupt_on_signals, node_name, Program)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE, Options
 
 if TYPE_CHECKING:
@@ -50,8 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _arguments() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = _PROGRAM.parser(
         description='Compute leg lengths, forces and singularity warnings of recorded setpoints, '
                     'as the node does, bit for bit.',
         epilog='For every bag, DIR/<name of the bag>/ gets bag/ (MCAP, the topics of the node), '
@@ -65,11 +65,7 @@ def _arguments() -> argparse.ArgumentParser:
                              'with bags in it')
     parser.add_argument('--params', required=True, type=Path, metavar='FILE',
                         help='parameters of the hexapod, the file that the node takes')
-    parser.add_argument('--output', type=Path, default=Path('replayed'), metavar='DIR',
-                        help='folder of the results (default: replayed)')
-    parser.add_argument('--force', action='store_true', help='replace results that exist')
-    parser.add_argument('--strict', action='store_true',
-                        help='exit code 1 when a limit or singularity warning was met')
+    add_results(parser, 'replayed', 'a limit or singularity warning was met')
     topics = parser.add_argument_group(
         'topics', 'Inputs are looked for under the usual names, then by their type.')
     topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
@@ -113,8 +109,6 @@ def _options(given: argparse.Namespace) -> Options:
 def _run(given: argparse.Namespace, options: Options) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import FLEET_PAGE, folders_of_results
-    from stewart_dynamics.compilation.functions import prepare
-    from stewart_dynamics.compilation.machine_code import HINT
     from stewart_dynamics.mechanics.plausibility import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.replay.bag_report import share_plotly
@@ -126,11 +120,7 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     bags = folders_of_results(given.bags, given.output)
     if options.report and given.plotly == 'shared':
         options = options._replace(plotly=share_plotly(given.output))
-    if HINT:
-        _PROGRAM.complain(HINT)
-    prepare(FUNCTIONS)  # now, side by side, and not in each process
-    for mistake in likely_mistakes(parameters):
-        _PROGRAM.complain(f'warning: {mistake}')
+    _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))  # now, not in each process
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
         return _one(*bags[0], parameters, options, given.strict)
     fleet = replay_fleet(
