@@ -639,50 +639,20 @@ def rejected(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     return printed.err
 
 
-def test_a_missing_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = rejected(capsys, tmp_path / 'none', '--params', PARAMS, '--output', tmp_path / 'out')
-    assert str(tmp_path / 'none') in text
-    assert not (tmp_path / 'out').exists()
-
-
-@pytest.mark.parametrize(('content', 'suffix'), [
-    (b'', '.mcap'), (b'no bag', '.db3'), (b'\x89MCAP0\r\n', '.txt'),
-    (bytes(range(256)) * 20, '.bag')])
-def test_a_file_that_is_not_a_bag(
-        content: bytes, suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / f'file{suffix}'
-    file.write_bytes(content)
-    assert str(file) in rejected(
-        capsys, file, '--params', PARAMS, '--output', tmp_path / 'out')
-    assert list(tmp_path.iterdir()) == [file]
-
-
-def test_a_folder_that_is_not_a_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert 'metadata' in rejected(
-        capsys, tmp_path, '--params', PARAMS, '--output', tmp_path / 'out')
-
-
-@pytest.mark.parametrize(('text', 'words'), [
-    ('/**: [', 'not YAML'), ('a: b', "no parameters under '/**:'"),
-    (PARAMS.read_text(encoding='utf-8').replace('mass: 150.0', 'mass: -1.0'),
-     'platform.mass: -1.0 kg: must be more than 0'),
-    ('/**: {ros__parameters: {platform: {mas: 1.0}}}', 'platform.mass'),
-    ('/**: {ros__parameters: {autostart: true}}', 'missing')],
-    ids=['no YAML', 'no parameters', 'a rule broken', 'unknown', 'missing'])
-def test_bad_parameters(text: str, words: str, tmp_path: Path,
-                        capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / 'hexapod.yaml'
-    file.write_text(text, encoding='utf-8')
-    text = rejected(capsys, ROOT / 'bags' / 'clear', '--params', file, '--output',
-                    tmp_path / 'out')
-    assert str(file) in text
-    assert words in text
-    assert not (tmp_path / 'out').exists()
-
-
-def test_missing_parameters(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert 'none.yaml: cannot be read' in rejected(
-        capsys, ROOT / 'bags' / 'clear', '--params', tmp_path / 'none.yaml')
+def test_bad_bags_and_parameters_are_rejected_before_anything_is_written(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of each kind one; all of them are tests of the modules that read bags and parameters."""
+    clear, file, out = ROOT / 'bags' / 'clear', tmp_path / 'file.mcap', tmp_path / 'out'
+    bad, none, empty = tmp_path / 'bad.yaml', tmp_path / 'none', tmp_path / 'empty'
+    empty.mkdir()
+    file.write_bytes(b'no bag')
+    bad.write_text(PARAMS.read_text(encoding='utf-8').replace('mass: 150.0', 'mass: -1.0'))
+    for bag, params, text in (
+            (none, PARAMS, f'{none}'), (file, PARAMS, f'{file}'), (empty, PARAMS, f'{empty}'),
+            (clear, bad, f'{bad}: platform.mass: -1.0 kg: must be more than 0'),
+            (clear, none, f'{none}: cannot be read')):
+        assert text in rejected(capsys, bag, '--params', params, '--output', out)
+    assert not out.exists()
 
 
 def test_a_missing_topic_lists_the_topics_of_the_bag(
@@ -727,12 +697,6 @@ def test_an_existing_output_folder_is_not_changed(
     assert [path.name for path in (tmp_path / 'out').iterdir()] == ['clear']
 
 
-def test_an_output_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / 'out').write_text('a file')
-    assert str(tmp_path / 'out') in rejected(
-        capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path / 'out')
-
-
 def test_a_bag_of_ros_1_gives_the_same(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     of = motion(30)
@@ -771,6 +735,7 @@ def test_where_results_cannot_be_written_the_folder_is_named(
     file.touch()
     text = rejected(capsys, bag, '--params', PARAMS, '--output', file / 'out')
     assert text == f'stewart_replay: {file / "out"}: cannot be written: Not a directory\n'
+    assert f'{file}' in rejected(capsys, bag, '--params', PARAMS, '--output', file)
 
 
 # Several bags

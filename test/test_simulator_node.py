@@ -491,13 +491,6 @@ def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
         'platform.mass: only read when the node starts: restart it')
 
 
-def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:
-    program = Program([executable('stewart_simulator'), '--help'], domain, tmp_path)
-    assert program.wait() == 0
-    for name in ('initial_pose', 'end_stops.frequency', 'noise.force', 'platform.mass'):
-        assert f'  {name} (double' in program.stdout
-
-
 def test_topics_and_messages_have_the_same_types() -> None:
     for types, named in ((TYPES, OUTPUT_TYPES), (OF_BASE, {**BASE_TYPES, IMU: IMU_TYPE})):
         assert {topic: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'

@@ -68,16 +68,19 @@ class Report:
         Parameters of the hexapod.
     measured : bool
         There are measured forces: ``add_measured`` will be called.
+    folder : Path, optional
+        Contains a file until the end, which has no name there.
 
     """
 
-    def __init__(self, parameters: Parameters, measured: bool = False) -> None:
+    def __init__(self, parameters: Parameters, measured: bool = False,
+                 folder: Path | None = None) -> None:
         self._parameters = parameters
         self._legs: tuple[str, ...] = parameters['joints']
         timeout = parameters['setpoint.timeout']
         self._channels = channels.channels_of(parameters)
         self._curves = Curves(self._channels, timeout)
-        self._spectrum = Spectrum(6, timeout)
+        self._spectrum = Spectrum(6, timeout, folder)
         self._frames = Frames(_FRAME)
         self._compared = Curves(channels.COMPARED, timeout) if measured else None
         self._angles: Array = np.zeros((1, 3))

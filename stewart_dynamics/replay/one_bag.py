@@ -182,7 +182,7 @@ class _Run:
         self.report: Report | None = None
         self._breakdown: ForceBreakdownRows | None = None
         if options.report:
-            self.report = Report(parameters, measured=options.measured is not None)
+            self.report = Report(parameters, options.measured is not None, folder)
             self._breakdown = ForceBreakdownRows(parameters)
         self._bag = OutputBag(
             folder / 'bag', options.node, OutputMessages(parameters),

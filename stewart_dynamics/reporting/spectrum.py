@@ -17,11 +17,9 @@ Amplitude spectral densities of channels up to the Nyquist rate, in bounded memo
 
 By Welch's method (The use of fast Fourier transform for the estimation of power spectra, IEEE
 Trans. Audio Electroacoust. 15, 1967, doi:10.1109/TAU.1967.1161901): segments that overlap by half,
-the mean of each removed, Hann windows, the mean of their power spectra.
-
-The length of a bag is not known before its end, and a short one needs short segments. So the first
-samples are kept: as many as make ENOUGH of the longest segments. At their end, or at the end of
-the bag, the segments get the greatest length, a power of two, of which there are enough.
+the mean of each removed, Hann windows, the mean of their power spectra. A short bag needs short
+segments: their length is the greatest power of two of which there are enough. Samples wait for
+this in a file.
 
 ``scipy.signal.welch`` gives the same numbers (see the tests) for samples that are all in memory.
 Its import takes longer than the spectra of a million samples, and only
@@ -31,6 +29,8 @@ Its import takes longer than the spectra of a million samples, and only
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryFile
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +42,6 @@ from stewart_dynamics.reporting.block_statistics import FIRST, longest_step
 SHORTEST, LONGEST = 2 ** 6, 2 ** 15
 # Number of segments that make a spectrum; one of the shortest is enough.
 ENOUGH = 4
-_KEPT = (ENOUGH + 1) * LONGEST // 2
 # A step in time that differs by less than this part from a multiple of the usual one is even.
 _EVEN = 0.01
 # Intervals on the logarithmic axis of which the lowest and the highest line are drawn.
@@ -79,25 +78,15 @@ class Spectrum:
         Number of channels.
     timeout : float
         A step in time up to this long is never a gap [s].
+    folder : Path, optional
+        Contains the file of the samples, which has no name there.
 
     """
 
-    def __init__(self, channels: int, timeout: float) -> None:
-        self._channels = channels
+    def __init__(self, channels: int, timeout: float, folder: Path | None = None) -> None:
         self._timeout = timeout
-        self._held: list[tuple[Array, Array]] = []
-        self._usual = self._gap = 0.0
-        self._time: float | None = None
-        # of the last sample: its place among the even samples, and its values; None: it does not
-        # go on from there
-        self._last: tuple[float, Array] | None = None
-        # even samples without a gap between them: those before, while they are kept, and the last
-        self._runs: list[Array] = []
-        self._run: Array = np.empty((channels, 0))
-        self._length = 0  # not yet known
-        self._segments = 0
-        self._powers: Array = np.empty((channels, 0))
-        self._steps = self._uneven = 0
+        self._columns = 1 + channels
+        self._file = TemporaryFile(dir=folder)
 
     def add(self, seconds: Array, values: Array) -> None:
         """
@@ -111,111 +100,51 @@ class Spectrum:
             Values of every channel.
 
         """
-        if not len(seconds):
-            return
-        if self._usual:
-            self._add(seconds, values)
-            return
-        # until the usual step is known
-        self._held.append((seconds, np.array(values)))
-        if sum(len(each) for each, _ in self._held) >= FIRST:
-            self._release()
+        self._file.write(np.column_stack((seconds, values.T)).tobytes())
 
     def density(self) -> Density | None:
         """Return the spectra so far; None if there are too few samples."""
-        self._release()
-        runs = [*self._runs, self._run]
-        length = self._length or _length_for([each.shape[1] for each in runs])
-        if not length:
+        if not self._file.tell():
             return None
-        powers, segments = self._powers, self._segments
-        if not self._length:
-            powers = np.sum([_powers(each, length) for each in runs], axis=0)
-            segments = sum(_segments(each.shape[1], length) for each in runs)
-        # of both signs of the frequency, except at the Nyquist rate
-        scale = 2.0 * self._usual / (segments * float(np.sum(_window(length) ** 2)))
-        density: Array = scale * powers[:, 1:]
-        density[:, -1] *= 0.5
-        frequencies = np.arange(1, length // 2 + 1) / (length * self._usual)
-        return Density(frequencies, np.sqrt(density), segments, length * self._usual,
-                       self._uneven / max(self._steps, 1))
-
-    def _release(self) -> None:
-        held, self._held = self._held, []
-        if not held:
-            return
-        steps = np.diff(np.concatenate([seconds for seconds, _ in held])[:FIRST])
-        forward = steps[steps > 0.0]
-        if not len(forward):
-            return
-        self._usual = float(np.median(forward))
-        self._gap = longest_step(steps, self._timeout)
-        for seconds, values in held:
-            self._add(seconds, values)
-
-    def _add(self, seconds: Array, values: Array) -> None:
-        finite: Flags = np.all(np.isfinite(values), axis=0)
-        steps = np.diff(seconds, prepend=seconds[0] if self._time is None else self._time)
-        gaps: Flags = (steps <= 0.0) | (steps > self._gap)
-        places = steps / self._usual
+        self._file.flush()
+        rows = np.memmap(self._file, np.float64, 'r').reshape(-1, self._columns)
+        steps = np.diff(rows[:, 0], prepend=rows[0, 0])
+        first = steps[1:FIRST]
+        if not np.any(first > 0.0):
+            return None
+        usual = float(np.median(first[first > 0.0]))
+        # Places of the samples, in units of the usual step.
+        places = steps / usual
         multiples = np.maximum(np.round(places), 1.0)
         even = np.abs(places - multiples) <= _EVEN
-        places = np.where(even, multiples, places)
-        self._steps += int(np.count_nonzero(~gaps))
-        self._uneven += int(np.count_nonzero(~even & ~gaps))
-        begins: Flags = gaps | ~finite
+        places[even] = multiples[even]
+        gaps: Flags = (steps <= 0.0) | (steps > longest_step(first, self._timeout))
+        finite: Flags = np.all(np.isfinite(rows[:, 1:]), axis=1)
+        begins = gaps | ~finite
         begins[1:] |= ~finite[:-1]
-        at = [0, *np.flatnonzero(begins).tolist(), len(seconds)]
+        at = np.append(np.flatnonzero(begins), len(rows))
+        runs = []
         for begin, end in zip(at[:-1], at[1:], strict=True):
-            if begin == end:
-                continue
-            if begins[begin]:
-                self._end_run()
             if finite[begin]:
-                self._add_run(places[begin:end], values[:, begin:end])
-        self._time = float(seconds[-1])
+                places[begin] = 0.0
+                np.cumsum(places[begin:end], out=places[begin:end])
+                runs.append((places[begin:end], rows[begin:end, 1:]))
+        length = _length_for([_even_samples(run) for run, _ in runs])
+        if not length:
+            return None
+        powers = np.sum([_powers(run, values, length) for run, values in runs], axis=0)
+        segments = sum(_segments(_even_samples(run), length) for run, _ in runs)
+        # of both signs of the frequency, except at the Nyquist rate
+        density: Array = 2.0 * usual / (segments * np.sum(_window(length) ** 2)) * powers[:, 1:]
+        density[:, -1] *= 0.5
+        return Density(
+            np.arange(1, length // 2 + 1) / (length * usual), np.sqrt(density), segments,
+            length * usual, np.count_nonzero(~even & ~gaps) / max(np.count_nonzero(~gaps), 1))
 
-    def _end_run(self) -> None:
-        if not self._length and self._run.shape[1] >= SHORTEST:
-            self._runs.append(self._run)
-        self._run = np.empty((self._channels, 0))
-        self._last = None
 
-    def _add_run(self, steps: Array, values: Array) -> None:
-        """Add samples that continue the present run, or begin one."""
-        places = np.cumsum(steps)
-        if self._last is None:
-            places -= places[0]
-            whole = np.arange(np.floor(places[-1]) + 1.0)
-        else:
-            places += self._last[0]
-            whole = np.arange(1.0, np.floor(places[-1]) + 1.0)
-        even = values
-        if not np.array_equal(whole, places):
-            if self._last is not None:
-                places = np.append(self._last[0], places)
-                values = np.concatenate((self._last[1][:, None], values), axis=1)
-            even = np.array([np.interp(whole, places, each) for each in values])
-        # counted from the last whole place, so that whole places stay exact
-        self._last = float(places[-1] % 1.0), values[:, -1].copy()
-        self._take(even)
-
-    def _take(self, even: Array) -> None:
-        self._run = np.concatenate((self._run, even), axis=1)
-        runs = [*self._runs, self._run]
-        if not self._length:
-            ends = np.cumsum([each.shape[1] for each in runs])
-            if ends[-1] < _KEPT:
-                return
-            # by no more samples than these: it must not depend on the blocks
-            self._length = _length_for(np.diff(np.minimum(ends, _KEPT), prepend=0).tolist())
-            self._powers = np.zeros((self._channels, self._length // 2 + 1))
-            self._runs = []
-        for run in runs:
-            self._powers += _powers(run, self._length)
-            self._segments += _segments(run.shape[1], self._length)
-        used = _segments(self._run.shape[1], self._length) * (self._length // 2)
-        self._run = self._run[:, used:].copy()
+def _even_samples(places: Array) -> int:
+    """Return the number of samples at whole places in a run."""
+    return int(places[-1]) + 1
 
 
 def _segments(samples: int, length: int) -> int:
@@ -236,15 +165,31 @@ def _window(length: int) -> Array:
     return window
 
 
-def _powers(samples: Array, length: int) -> Array:
-    """Return the sums of the squares of the spectra of all segments (C, length / 2 + 1)."""
-    powers = np.zeros((len(samples), length // 2 + 1))
-    many = _segments(samples.shape[1], length)
-    window = _window(length) if many else np.empty(0)
+def _powers(places: Array, values: Array, length: int) -> Array:
+    """
+    Return the sums of the squares of the spectra of all segments of a run (C, length / 2 + 1).
+
+    Parameters
+    ----------
+    places : (N,)
+        Where its samples are, in units of the usual step; the first is at 0.
+    values : (N, C)
+        The samples.
+    length : int
+        Number of even samples in a segment.
+
+    """
+    powers = np.zeros((values.shape[1], length // 2 + 1))
+    window = _window(length)
     # One after the other: they fit into the processor's cache.
-    for n in range(many):
-        begin = n * (length // 2)
-        for channel, power in zip(samples[:, begin:begin + length], powers, strict=True):
+    for n in range(_segments(_even_samples(places), length)):
+        whole = np.arange(n * (length // 2), n * (length // 2) + length, dtype=float)
+        first, last = np.searchsorted(places, whole[[0, -1]])
+        is_even = np.array_equal(places[first:last + 1], whole)
+        part = slice(first if is_even else max(first - 1, 0), last + 1)
+        for channel, power in zip(np.array(values[part].T), powers, strict=True):
+            if not is_even:
+                channel = np.interp(whole, places[part], channel)
             spectrum = np.fft.rfft((channel - channel.mean()) * window)
             power += spectrum.real ** 2 + spectrum.imag ** 2
     return powers
