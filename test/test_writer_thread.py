@@ -67,8 +67,8 @@ def test_abandoned_calls_are_not_made() -> None:
     thread.call(done.append, 1)
     leaver = Thread(target=thread.abandon)
     leaver.start()
-    while not thread._abandoned:
-        time.sleep(0.001)
+    leaver.join(0.05)
+    assert leaver.is_alive()
     go.set()
     leaver.join()
     assert not done

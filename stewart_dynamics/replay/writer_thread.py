@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
-from queue import SimpleQueue
-from threading import Semaphore, Thread
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 # Maximum number of calls that wait: blocks of some megabytes each.
@@ -29,40 +29,29 @@ class WriterThread:
     """Makes calls in a thread of its own, in their order, until one of them raises an error."""
 
     def __init__(self) -> None:
-        self._calls: SimpleQueue[Callable[[], object] | None] = SimpleQueue()
-        self._free = Semaphore(_WAITING)
-        self._error: BaseException | None = None
-        self._abandoned = False
-        self._thread = Thread(target=self._work, daemon=True)
-        self._thread.start()
+        self._thread = ThreadPoolExecutor(1)
+        self._calls: deque[Future[None]] = deque()
 
     def call(self, function: Callable[..., object], *arguments: Any) -> None:
         """Call a function as soon as earlier calls are done; raise the error of one of these."""
-        self._free.acquire()
-        self._raise()
-        self._calls.put(lambda: function(*arguments))
+        if len(self._calls) == _WAITING:
+            self._calls.popleft().result()
+        before = self._calls[-1] if self._calls else None
+        self._calls.append(self._thread.submit(_make, before, function, arguments))
 
     def finish(self) -> None:
         """Wait until all calls are done, and end the thread; raise the error of a call."""
-        self._calls.put(None)
-        self._thread.join()
-        self._raise()
+        for call in self._calls:
+            call.result()
+        self._thread.shutdown()
 
     def abandon(self) -> None:
         """End the thread after the present call."""
-        self._abandoned = True
-        self._calls.put(None)
-        self._thread.join()
+        self._thread.shutdown(cancel_futures=True)
 
-    def _work(self) -> None:
-        while (call := self._calls.get()) is not None:
-            if self._error is None and not self._abandoned:
-                try:
-                    call()
-                except BaseException as exc:
-                    self._error = exc
-            self._free.release()
 
-    def _raise(self) -> None:
-        if self._error is not None:
-            raise self._error
+def _make(before: Future[None] | None, function: Callable[..., object],
+          arguments: tuple[Any, ...]) -> None:
+    if before is not None:
+        before.result()  # its error ends the work
+    function(*arguments)
