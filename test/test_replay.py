@@ -641,7 +641,7 @@ def rejected(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
 
 def test_bad_bags_and_parameters_are_rejected_before_anything_is_written(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of each kind one; all of them are tests of the modules that read bags and parameters."""
+    """One of each kind; the modules that read bags and parameters test all of them."""
     clear, file, out = ROOT / 'bags' / 'clear', tmp_path / 'file.mcap', tmp_path / 'out'
     bad, none, empty = tmp_path / 'bad.yaml', tmp_path / 'none', tmp_path / 'empty'
     empty.mkdir()

@@ -184,8 +184,8 @@ class _ProgressBar:
     """
     A line on stderr: bags, setpoints, their rate and the time left.
 
-    The time left is estimated from bytes, since bags differ in size; a bag that need not be
-    replayed has none.
+    The time left is estimated from the sizes of the bags, zero for those that need not be
+    replayed.
     """
 
     def __init__(self, sizes: Sequence[int], show: bool | None, ended: int) -> None:
