@@ -687,7 +687,7 @@ int stewart_forward_kinematics(
   int steps = 0;
   if (!platform || !lengths || !pose) {return STEWART_NULL;}
   if (!all_finite(lengths, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
-  if (!finite(pose, sizeof *pose)) {return STEWART_NOT_FINITE;}
+  if (!all_finite(pose, sizeof *pose)) {return STEWART_NOT_FINITE;}
   int code = check_rotation(pose->rotation);
   if (code != STEWART_OK) {return code;}
   stewart_pose found = *pose;
