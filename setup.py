@@ -65,6 +65,7 @@ extras_require = {
         'ros-rclpy[fastrtps]~=9.1.2',
     ],
     'test': [
+        'cmake',
         'colcon-common-extensions',
         'dask',
         'distributed',

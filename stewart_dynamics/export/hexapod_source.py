@@ -107,10 +107,9 @@ def platform_source(parameters: Parameters, name: str) -> str:
 
 
 def in_comment(text: str) -> str:
-    """Return any text as it may stand in a comment of C: ASCII, no begin or end of a comment."""
+    """Return a printable text as it may stand in a comment of C."""
     plain = text.encode('ascii', 'backslashreplace').decode()
-    return ''.join(each if each.isprintable() else ' ' for each in plain).replace(
-        '*/', '* /').replace('/*', '/ *')
+    return plain.replace('*', ' ').replace('??', '? ?')
 
 
 def _field(name: str, value: Any, indent: str) -> str:

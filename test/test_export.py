@@ -1,0 +1,578 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""stewart_export and its C source: the bits of the library, compilers, golden vectors, files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import csv
+import ctypes
+import math
+import os
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import (
+    Array, random_base_motion, random_motion, random_parameters, random_wrench, rng,
+    symmetric_parameters)
+from stewart_dynamics import Motion, Parameters
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.export import main
+from stewart_dynamics.export.c_project import c_project, check_name, SOURCES
+from stewart_dynamics.export.hexapod_source import (
+    digest, field_values, FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
+from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS, hexapod_constants
+from stewart_dynamics.mechanics.frames.rotation import (
+    from_euler, from_quaternion, quaternion_length)
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
+from stewart_dynamics.mechanics.limits import JUMP, LIMITS
+from stewart_dynamics.mechanics.rows import (
+    BASE, CONDITION, DETERMINANT, FORCES, LENGTHS, MOTION, NO_BASE, RESULT, UNIT_LOAD_FORCES,
+    WRENCH)
+from stewart_dynamics.setpoints.step import Setpoint, Step
+from test_drives import driven
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / 'stewart_dynamics' / 'export' / 'c'
+PLATFORM_FILE = ROOT / 'config' / 'platform.yaml'
+COMPILERS = [name for name in ('gcc', 'clang', 'cc') if shutil.which(name)][:2]
+WARNINGS = ['-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wdouble-promotion', '-Wshadow',
+            '-Werror']
+needs_compiler = pytest.mark.skipif(not COMPILERS, reason='needs a C compiler')
+
+SAMPLES = 100_000
+HAS_WRENCH, HAS_BASE = 1, 2
+OK, OUT_OF_RANGE, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = 0, 5, 6, 7, 8, 9
+
+# The structures of the C source.
+LEG = np.dtype([(name, 'f8', (3,) if name.endswith(('joints', 'axes')) else ())
+                for name in LEG_FIELDS])
+_SIZES: Mapping[str, Any] = {
+    'gravity': (3,), 'platform.center_of_mass': (3,), 'platform.inertia': (6,)}
+HEXAPOD = np.dtype([
+    *((name, 'f8', _SIZES.get(name, ())) for name in FIELDS_BEFORE_LEGS), ('legs', LEG, (6,)),
+    *((name, 'i4' if name.endswith('action') else 'f8') for name in FIELDS_AFTER_LEGS)],
+    align=True)
+RESULTS = np.dtype([('moving', 'f8', 12), ('forces', 'f8', 6), ('scalars', 'f8', 3),
+                    ('unit_load_forces', 'f8', 6)])
+STATE = np.dtype([
+    ('warning', 'i4'), ('stopped', 'i4'), ('crossings', 'u4'), ('determinant', 'f8'),
+    ('time_to_crossing', 'f8'), ('followed', 'i4'), ('stamp', 'i8'), ('lengths', 'f8', 6)],
+    align=True)
+OUTPUT = np.dtype([('result', RESULTS), ('forces', 'f8', 6), ('exceeded', 'u4', 6)], align=True)
+MOTORS = np.dtype([('all', 'f8', 24)])
+
+
+def compile_c(folder: Path, *arguments: str | Path, compiler: str | None = None) -> Path:
+    """Compile and link; return the program or library."""
+    made = folder / 'made'
+    done = subprocess.run(
+        [compiler or COMPILERS[0], '-ffp-contract=off', *map(str, arguments), '-o', made, '-lm'],
+        capture_output=True, text=True)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+    return made
+
+
+@pytest.fixture(scope='module')
+def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    """Return the C source, called over arrays by test/export_calls.c."""
+    if not COMPILERS:
+        pytest.skip('needs a C compiler')
+    made = compile_c(
+        tmp_path_factory.mktemp('library'), '-std=c99', '-O2', '-shared', '-fPIC', f'-I{FOLDER}',
+        ROOT / 'test' / 'export_calls.c', FOLDER / 'stewart_dynamics.c')
+    loaded = ctypes.CDLL(str(made))
+    sizes = (ctypes.c_size_t * 7).in_dll(loaded, 'sizes')
+    assert list(sizes) == [HEXAPOD.itemsize, 8 * MOTION, 8 * BASE, RESULTS.itemsize,
+                           STATE.itemsize, OUTPUT.itemsize, MOTORS.itemsize]
+    return loaded
+
+
+def call(function: Any, count: int, *arguments: Any) -> None:
+    """Call a C function with a count, and with arrays, numbers."""
+    function(ctypes.c_size_t(count), *(
+        ctypes.c_size_t(each) if isinstance(each, int) else ctypes.c_void_p(each.ctypes.data)
+        for each in arguments))
+
+
+def structure(parameters: Parameters) -> Any:
+    """Return a hexapod (1,) as the C source takes it."""
+    hexapod = np.zeros(1, HEXAPOD)
+    for name, value in field_values(parameters).items():
+        (hexapod['legs'] if name in LEG_FIELDS else hexapod)[name] = value
+    return hexapod
+
+
+def random_hexapods(random: np.random.Generator) -> Any:
+    """
+    Return hexapods (SAMPLES,) with any numbers.
+
+    Three tenths have the joints of the example, whose symmetry makes pivots equal.
+    """
+    hexapods = np.zeros(SAMPLES, HEXAPOD)
+    for name in FIELDS_BEFORE_LEGS:
+        hexapods[name] = random.normal(0.0, 5.0, hexapods[name].shape)
+    legs = hexapods['legs']
+    for name in LEG_FIELDS:
+        legs[name] = random.normal(0.3, 10.0 ** random.uniform(-2, 1), legs[name].shape)
+    legs['actuator.coulomb_velocity'] = 10.0 ** random.uniform(-4.0, 0.0, (SAMPLES, 6))
+    legs['geometry.base_joints'] = random.normal(0.0, 1.0, (SAMPLES, 6, 3))
+    legs['geometry.platform_joints'] = random.normal(0.0, 0.6, (SAMPLES, 6, 3))
+    example = Parameters.from_yaml(PLATFORM_FILE)
+    for name in ('geometry.base_joints', 'geometry.platform_joints'):
+        legs[name][random.random(SAMPLES) < 0.3] = example[name]
+    hexapods['singularity.characteristic_length'] = random.uniform(0.1, 3.0, SAMPLES)
+    return hexapods
+
+
+@pytest.fixture(scope='module')
+def samples(library: ctypes.CDLL) -> dict[str, Any]:
+    """Return SAMPLES random hexapods, each in a random motion, and the results in C."""
+    random = rng()
+    motions = np.zeros((SAMPLES, MOTION))
+    motions[:, :3] = random.normal([0.0, 0.0, 1.2], 0.4, (SAMPLES, 3))
+    motions[:, 3:12] = from_euler(random.normal(0.0, 0.5, (SAMPLES, 3))).reshape(SAMPLES, 9)
+    motions[:, 12:] = random.normal(0.0, 2.0, (SAMPLES, 12))
+    at_home = random.random(SAMPLES) < 0.1  # symmetric, at rest: with many zeros
+    motions[at_home] = [0.0, 0.0, 1.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, *[0.0] * 12]
+    made = {'hexapods': random_hexapods(random), 'motions': motions,
+            'wrenches': random.normal(0.0, 500.0, (SAMPLES, WRENCH)),
+            'bases': random.normal(0.0, 3.0, (SAMPLES, BASE)),
+            'given': random.integers(0, 4, SAMPLES, dtype=np.int32),
+            'results': np.zeros(SAMPLES, RESULTS), 'codes': np.zeros(SAMPLES, np.int32)}
+    call(library.inverse_dynamics, SAMPLES, made['hexapods'], 1, made['motions'],
+         made['wrenches'], made['bases'], made['given'], made['results'], made['codes'])
+    made['constants'] = constants = np.empty((SAMPLES, CONSTANTS))
+    for n, hexapod in enumerate(made['hexapods']):
+        legs = hexapod['legs']
+        constants[n] = hexapod_constants({  # type: ignore[arg-type]
+            **{name: legs[name] for name in LEG_FIELDS}, **{
+                name: hexapod[name] for name in (*FIELDS_BEFORE_LEGS, *FIELDS_AFTER_LEGS)}})
+    return made
+
+
+def test_inverse_dynamics_have_the_bits_of_the_library(samples: dict[str, Any]) -> None:
+    constants, motion, wrench = np.empty(CONSTANTS), np.empty((1, MOTION)), np.empty((1, WRENCH))
+    base, result, sound = np.empty((1, BASE)), np.empty((1, RESULT)), np.empty(1, dtype=bool)
+    solve = inverse_dynamics.solve.bound(
+        constants, motion, wrench, base, result, sound, np.empty(inverse_dynamics.TILE))
+    expected, given = np.empty((SAMPLES, RESULT)), samples['given']
+    for n in range(SAMPLES):
+        constants[:], motion[0] = samples['constants'][n], samples['motions'][n]
+        wrench[0] = samples['wrenches'][n] if given[n] & HAS_WRENCH else 0.0
+        base[0] = samples['bases'][n] if given[n] & HAS_BASE else NO_BASE
+        solve()
+        expected[n] = result[0]
+    check_results(samples['results'], expected, samples['codes'])
+    assert np.bincount(samples['codes']).tolist() == [SAMPLES]
+
+
+def check_results(found: Any, expected: Array, codes: Any) -> None:
+    """Check that results have the same numbers as rows (N, RESULT), 0 ulp apart."""
+    forces = np.where((codes == SINGULAR)[:, None], 0.0, expected[:, FORCES])
+    for name, columns in (('moving', expected[:, :FORCES.start]), ('forces', forces),
+                          ('scalars', expected[:, DETERMINANT:]),
+                          ('unit_load_forces', expected[:, UNIT_LOAD_FORCES])):
+        np.testing.assert_array_equal(found[name], columns, err_msg=name)
+    assert np.array_equal(codes == SINGULAR, expected[:, CONDITION] >= 1e12)
+
+
+def test_forward_kinematics_have_the_bits_of_the_library(
+        library: ctypes.CDLL, samples: dict[str, Any]) -> None:
+    random = rng(1)
+    guesses = samples['motions'].copy()
+    guesses[:, :3] += random.normal(0.0, 0.12, (SAMPLES, 3))
+    turns = from_euler(random.normal(0.0, 0.25, (SAMPLES, 3)))
+    guesses[:, 3:12] = (turns @ guesses[:, 3:12].reshape(-1, 3, 3)).reshape(SAMPLES, 9)
+    lengths = np.ascontiguousarray(samples['results']['moving'][:, LENGTHS])
+    poses, codes = np.ascontiguousarray(guesses[:, :12]), np.zeros(SAMPLES, np.int32)
+    call(library.forward_kinematics, SAMPLES, samples['hexapods'], lengths, poses, codes)
+
+    constants, wanted, motion = np.empty(CONSTANTS), np.empty((1, 6)), np.empty((1, MOTION))
+    code, steps, residual = np.empty(1, dtype=int), np.empty(1, dtype=int), np.empty(1)
+    find = forward_kinematics.poses.bound(constants, wanted, motion, code, steps, residual)
+    expected, outcomes = np.empty((SAMPLES, 12)), np.empty(SAMPLES, dtype=int)
+    for n in range(SAMPLES):
+        constants[:], wanted[0], motion[0] = samples['constants'][n], lengths[n], guesses[n]
+        find()
+        expected[n], outcomes[n] = motion[0, :12], code[0]
+    np.testing.assert_array_equal(poses, expected)
+    of_c = {forward_kinematics.FOUND: OK, forward_kinematics.NO_POSE: NO_POSE,
+            forward_kinematics.SINGULAR: SINGULAR}
+    assert [of_c[each] for each in outcomes.tolist()] == codes.tolist()
+    assert set(codes.tolist()) >= {OK, NO_POSE}
+
+
+def limited(random: np.random.Generator) -> Parameters:
+    """Return a random hexapod that can become singular, some with limits, drives or actions."""
+    p = symmetric_parameters() if random.random() < 0.5 else random_parameters(random)
+    given: dict[str, Any] = {}
+    if random.random() < 0.6:
+        given |= {
+            'limits.length_min': 0.7 * random.uniform(0.5, 1.2),
+            'limits.length_max': random.uniform(1.2, 2.0, 6),
+            'limits.velocity_max': random.uniform(0.3, 3.0, 6),
+            'limits.force_max': random.uniform(300.0, 3000.0, 6)}
+    if random.random() < 0.4:
+        axes = random.normal([0.0, 0.0, 2.0], 0.3, (12, 3))
+        given |= {
+            'geometry.base_joint_axes': axes[:6].ravel(),
+            'geometry.platform_joint_axes': axes[6:].ravel(),
+            'limits.base_joint_angle_max': random.uniform(0.4, 1.5, 6),
+            'limits.platform_joint_angle_max': random.uniform(0.4, 1.5, 6),
+            'legs.cylinder.radius': 0.08, 'legs.cylinder.length': 0.5, 'legs.piston.radius': 0.05,
+            'limits.leg_clearance_min': random.uniform(0.0, 0.2)}
+    given |= {
+        'singularity.action': str(random.choice(['warn', 'suppress_forces'])),
+        'limits.action': str(random.choice(['warn', 'suppress_forces'])),
+        'singularity.stop_condition': 40.0, 'setpoint.sync_tolerance': random.uniform(0.0, 0.01)}
+    p = p.replaced(given)
+    if random.random() < 0.5:
+        p = driven(p, random, **{
+            'drive.screw_rotation': str(random.choice(['guided', 'universal'])),
+            'drive.screw_hand': str(random.choice(['left', 'right']))})
+    return p
+
+
+@pytest.mark.slow
+def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
+    """Warning with hysteresis, limits, jumps, clipped and suppressed forces, and motors."""
+    random, seen = rng(2), set()
+    for _ in range(40):
+        p, count = limited(random), 150
+        times = np.linspace(0.0, 1.0, count)[:, None]
+        motion = random_motion(p, random, 2)
+        # Turned about z by more than 90 degrees, through the singularity of symmetric hexapods.
+        angles = random.uniform([-0.2, -0.2, -1.0], [0.2, 0.2, 2.5], 3) * times
+        rates = random.normal(0.0, 1.0, 3) * (random.random(3) < 0.7)
+        motions = Motion.from_euler(
+            motion.position[:1] + times * (motion.position[1:] - motion.position[:1]), angles,
+            np.broadcast_to(motion.linear_velocity[0], (count, 3)), rates + 0.0 * times).rows
+        wrenches = random_wrench(p, random, count)
+        bases = np.ascontiguousarray(random_base_motion(p, random, count).rows)
+        given = random.integers(0, 4, count, dtype=np.int32)
+        # Backward in time, too: then no jump is checked.
+        stamps = np.cumsum(random.choice([10_000_000, 2_000_000, -5_000_000], count))
+        states, outputs = np.zeros(count, STATE), np.zeros(count, OUTPUT)
+        motors, codes = np.zeros(count, MOTORS), np.zeros((2, count), np.int32)
+        call(library.steps, count, structure(p), motions, wrenches, bases, given, stamps, states,
+             outputs, codes[0], motors, codes[1])
+
+        step, state, drives = Step(p), None, Drives(p)
+        results = np.zeros((count, RESULT))
+        for n in range(count):
+            a, b, c, d, e, f = wrenches[n].tolist() if given[n] & HAS_WRENCH else (0.0,) * 6
+            output = step(Setpoint(
+                int(stamps[n]), tuple(motions[n].tolist()), (a, b, c, d, e, f),
+                base=tuple(bases[n].tolist()) if given[n] & HAS_BASE else None), state)
+            assert output is not None
+            state = output.state
+            results[n] = [*output.lengths, *output.rates, *(output.demanded_forces or [0.0] * 6),
+                          *output.unit_load_forces, output.determinant, output.determinant_rate,
+                          output.condition]
+            code = SINGULAR if not output.solvable else OK if output.forces else SUPPRESSED
+            warned = output.singularity
+            exceeded = [0] * 6
+            for each in output.exceedances:
+                exceeded[each.leg] |= 1 << (*LIMITS, JUMP).index(each.limit)
+            found = states[n]
+            assert codes[0, n] == code
+            assert outputs['forces'][n].tolist() == list(output.forces or [0.0] * 6)
+            assert outputs['exceeded'][n].tolist() == exceeded
+            assert (found['warning'], found['stopped'], found['crossings'], found['determinant'],
+                    found['time_to_crossing'], found['stamp'], *found['lengths']) == (
+                *warned[:2], warned.crossings, warned.determinant, warned.time_to_crossing,
+                state.stamp, *(state.lengths or ()))
+            seen |= {('code', code), ('warning', int(warned.cause)), *(
+                ('limit', each.limit) for each in output.exceedances)}
+        check_results(outputs['result'], results, codes[0])
+        if p['actuator.screw_lead'] is None:
+            assert (codes[1] == NO_MOTORS).all()
+        else:
+            np.testing.assert_array_equal(motors['all'], drives(motions, results)[:, MECHANICAL])
+    assert seen >= {*(('code', code) for code in (OK, SUPPRESSED)), *(
+        ('warning', cause) for cause in range(4)), *(
+        ('limit', limit) for limit in (*LIMITS, JUMP))}, seen
+
+
+def test_rotations_of_quaternions_are_those_of_the_node(library: ctypes.CDLL) -> None:
+    quaternions = rng().normal(size=(1000, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    quaternions *= rng(1).uniform(0.99901, 1.00099, (1000, 1))
+    found, codes = np.empty((1000, 9)), np.empty(1000, np.int32)
+    call(library.rotations, 1000, quaternions, found, codes)
+    length = quaternion_length(*quaternions.T)
+    assert not codes.any()
+    np.testing.assert_array_equal(found, np.stack(from_quaternion(*quaternions.T / length), 1))
+
+
+@pytest.fixture(scope='module')
+def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the files of the example hexapod."""
+    folder = tmp_path_factory.mktemp('exported')
+    assert main(['--params', str(PLATFORM_FILE), '--output', str(folder)]) == 0
+    return folder
+
+
+@needs_compiler
+@pytest.mark.parametrize('language', [['-std=c99'], ['-xc++', '-std=c++17']], ids=['C', 'C++'])
+@pytest.mark.parametrize('compiler', COMPILERS)
+def test_golden_vectors_are_met_and_nothing_warns(
+        exported: Path, tmp_path: Path, compiler: str, language: list[str]) -> None:
+    made = compile_c(tmp_path, *language, '-O2', *WARNINGS, *exported.glob('*.c'), '-x', 'none',
+                     compiler=compiler)
+    done = subprocess.run([made], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, 'hexapod: 40 golden vectors, 0 differences\n')
+
+
+@needs_compiler
+def test_golden_vectors_are_not_met_by_another_hexapod(exported: Path, tmp_path: Path) -> None:
+    shutil.copytree(exported, tmp_path / 'changed')
+    source = tmp_path / 'changed' / 'hexapod.c'
+    text = source.read_text()
+    mass = float.hex(150.0)
+    assert text.count(f'  {mass},  /* platform.mass: 150 kg */') == 1
+    source.write_text(text.replace(mass, float.hex(math.nextafter(150.0, 200.0))))
+    made = compile_c(tmp_path, '-std=c99', *source.parent.glob('*.c'))
+    done = subprocess.run([made], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert 'vector 0: demanded_force[0] is ' in done.stdout
+
+
+@needs_compiler
+def test_golden_vectors_and_bad_inputs_are_clean_under_sanitizers(
+        exported: Path, tmp_path: Path) -> None:
+    options: list[str | Path] = [
+        '-std=c99', '-g', '-fsanitize=address,undefined', '-fno-sanitize-recover=all',
+        f'-I{exported}', exported / 'hexapod.c', exported / 'stewart_dynamics.c']
+    probe = subprocess.run(
+        [COMPILERS[0], '-fsanitize=address,undefined', '-xc', '-', '-o', tmp_path / 'probe'],
+        input='int main(void) {return 0;}', text=True, capture_output=True)
+    if probe.returncode:
+        pytest.skip('the compiler has no sanitizers')
+    for program in exported / 'test_golden.c', ROOT / 'test' / 'export_bad_inputs.c':
+        done = subprocess.run([compile_c(tmp_path, *options, program)], capture_output=True,
+                              text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+@needs_compiler
+def test_32_bit_targets_compile(exported: Path, tmp_path: Path) -> None:
+    """The syntax alone is checked: a library for 32 bits is not needed."""
+    includes = subprocess.run([COMPILERS[0], '-print-multiarch'], capture_output=True,
+                              text=True).stdout.strip()
+    (tmp_path / 'gnu').mkdir()
+    (tmp_path / 'gnu' / 'stubs-32.h').touch()  # of glibc for 32 bits
+    options = ['-m32', '-fsyntax-only', f'-I{tmp_path}', '-isystem', f'/usr/include/{includes}']
+    probe = subprocess.run([COMPILERS[0], *options, '-xc', '-'], input='#include <math.h>',
+                           text=True, capture_output=True)
+    if probe.returncode:
+        pytest.skip('the compiler has no 32-bit target')
+    done = subprocess.run(
+        [COMPILERS[0], *options, '-std=c99', *WARNINGS, *map(str, exported.glob('*.c'))],
+        capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, '')
+
+
+@pytest.mark.skipif('gcc' not in COMPILERS, reason='needs gcc')
+@pytest.mark.parametrize('level', ['-O0', '-O2', '-O3'])
+def test_stack_is_bounded_and_nothing_recurses(tmp_path: Path, level: str) -> None:
+    """The deepest chain of calls, by gcc's call graph; it needs no globals and no allocation."""
+    made = tmp_path / 'source.o'
+    done = subprocess.run(
+        ['gcc', '-std=c99', level, '-fcallgraph-info=su', '-c', FOLDER / 'stewart_dynamics.c',
+         '-o', made], capture_output=True, text=True)
+    if done.returncode:
+        pytest.skip(f'gcc: {done.stderr.strip()}')
+    graph = made.with_suffix('.ci').read_text()
+    stack = {name: int(size) for name, size in re.findall(
+        r'node: \{ title: "([^"]+)" label: "[^"]*\\n(\d+) bytes \((?:static|dynamic,bounded)\)',
+        graph)}
+    assert 'stewart_step' in ' '.join(stack) and 'dynamic)' not in graph
+    calls = re.findall(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', graph)
+
+    def deepest(name: str, above: tuple[str, ...]) -> int:
+        assert name not in above, 'recursion'
+        return stack.get(name, 0) + 8 + max(
+            (deepest(to, (*above, name)) for source, to in calls if source == name), default=0)
+
+    assert max(deepest(name, ()) for name in stack) < 8192
+    needed = {to for _, to in calls} - set(stack)
+    assert needed <= {'sqrt', 'atan2', 'copysign', 'fabs', 'memcpy', 'memset', '__indirect_call'}
+    symbols = subprocess.run(['nm', made], capture_output=True, text=True).stdout
+    assert not re.findall(r' [BbCDdGgSs] ', symbols), symbols
+
+
+@pytest.mark.skipif(not shutil.which('cppcheck'), reason='needs cppcheck')
+def test_cppcheck_finds_nothing(exported: Path) -> None:
+    done = subprocess.run(
+        ['cppcheck', '--quiet', '--std=c99', '--inconclusive', '--error-exitcode=1',
+         '--enable=warning,style,performance,portability', *map(str, exported.glob('*.c'))],
+        capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, '')
+
+
+def test_the_source_is_short_and_needs_math_alone() -> None:
+    texts = [(FOLDER / name).read_text() for name in SOURCES]
+    assert sum(text.count('\n') for text in texts) < 900
+    assert all(len(line) < 100 for text in texts for line in text.splitlines())
+    assert set(re.findall('#include <(.*)>', ''.join(texts))) == {'math.h', 'stddef.h', 'stdint.h'}
+
+
+@needs_compiler
+def test_cmake_builds_tests_and_installs(exported: Path, tmp_path: Path) -> None:
+    cmake = shutil.which('cmake', path=os.pathsep.join(
+        [str(Path(sys.executable).parent), os.environ['PATH']]))
+    if cmake is None:
+        pytest.skip('needs cmake')
+
+    def run(*arguments: str | Path) -> None:
+        done = subprocess.run([str(each) for each in arguments], capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+    run(cmake, '-S', exported, '-B', tmp_path / 'build',
+        f'-DCMAKE_INSTALL_PREFIX={tmp_path / "installed"}')
+    run(cmake, '--build', tmp_path / 'build')
+    run(Path(cmake).with_name('ctest'), '--test-dir', tmp_path / 'build')
+    run(cmake, '--install', tmp_path / 'build')
+
+    user = tmp_path / 'user'
+    user.mkdir()
+    (user / 'main.cpp').write_text(
+        '#include <hexapod.h>\nint main() {return hexapod.mass == 150.0 ? 0 : 1;}\n')
+    (user / 'CMakeLists.txt').write_text(
+        'cmake_minimum_required(VERSION 3.15)\nproject(user CXX)\nfind_package(hexapod REQUIRED)\n'
+        'add_executable(user main.cpp)\ntarget_link_libraries(user hexapod::hexapod)\n')
+    run(cmake, '-S', user, '-B', user, f'-DCMAKE_PREFIX_PATH={tmp_path / "installed"}')
+    run(cmake, '--build', user)
+    run(user / 'user')
+
+
+def test_golden_csv_is_read_as_it_was_computed(exported: Path) -> None:
+    """Inputs read from it give the library the results in it."""
+    with (exported / 'golden.csv').open() as file:
+        rows = [{name: float(text) for name, text in row.items()}
+                for row in csv.DictReader(file)]
+    names = list(rows[0])
+    step, state = Step(Parameters.from_yaml(PLATFORM_FILE)), None
+    for row in rows:
+        numbers = [row[name] for name in names]
+        motion, wrench, base = numbers[2:26], numbers[26:32], numbers[32:44]
+        a, b, c, d, e, f = wrench
+        output = step(Setpoint(int(row['stamp']), tuple(motion), (a, b, c, d, e, f),
+                               base=tuple(base) if row['has_base'] else None), state)
+        assert output is not None and output.forces is not None
+        state = output.state
+        assert [row[f'force_{leg}'] for leg in range(1, 7)] == list(output.forces)
+        assert row['determinant'] == output.determinant
+    assert {row['has_base'] for row in rows} == {0.0, 1.0}
+    assert any(row['exceeded_1'] for row in rows) and not rows[0]['exceeded_1']
+
+
+# Files and command line
+
+def run(*arguments: object) -> int:
+    """Return the exit code for these arguments."""
+    return main([str(each) for each in arguments])
+
+
+def test_files_are_the_same_in_every_run(
+        exported: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run('--params', PLATFORM_FILE, '--output', tmp_path / 'new') == 0
+    names = ['stewart_dynamics.h', 'stewart_dynamics.c', 'hexapod.h', 'hexapod.c', 'golden.csv',
+             'test_golden.c', 'CMakeLists.txt']
+    printed = capsys.readouterr()
+    assert printed.out.split() == [str(tmp_path / 'new' / name) for name in names]
+    assert printed.err == ''
+    for name in names:
+        assert (tmp_path / 'new' / name).read_bytes() == (exported / name).read_bytes()
+    for name in SOURCES:
+        assert (exported / name).read_bytes() == (FOLDER / name).read_bytes()
+    text = (exported / 'hexapod.c').read_text()
+    assert digest(Parameters.from_yaml(PLATFORM_FILE)) in text
+    assert '  {0x0.0p+0, 0x0.0p+0, -0x1.39d013a92a305p+3},  /* gravity: 0, 0, -9.80665' in text
+
+
+def test_existing_files_are_kept_unless_replacement_is_requested(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'rig.c').write_text('mine')
+    given = '--params', PLATFORM_FILE, '--output', tmp_path, '--name', 'rig'
+    assert run(*given) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ['rig.c']
+    assert capsys.readouterr().err == (
+        f'stewart_export: {tmp_path / "rig.c"}: exists; --force replaces it\n')
+    assert run(*given, '--force') == 0
+    assert 'const stewart_platform rig = {' in (tmp_path / 'rig.c').read_text()
+
+
+@pytest.mark.parametrize('name', [
+    '', '2nd', 'a b', '_reserved', 'int', 'class', 'sqrt', 'stewart_dynamics', 'Stewart_Export',
+    'test_golden', 'all', 'größe', '../hexapod', 'a' * 64])
+def test_names_that_c_cannot_have(
+        name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run('--params', PLATFORM_FILE, '--output', tmp_path, '--name', name) == 2
+    error = capsys.readouterr().err
+    assert error.count('\n') == 1 and name[:30] in error
+    assert 'must be a C identifier' in error or 'a word of C, C++ or CMake' in error
+    assert not list(tmp_path.iterdir())
+
+
+def test_bad_parameters_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for path in tmp_path / 'missing.yaml', ROOT / 'README.md', ROOT / 'config' / 'stacked.yaml':
+        assert run('--params', path, '--output', tmp_path / 'out') == 2
+        error = capsys.readouterr().err
+        assert error.count('\n') == 1 and str(path) in error
+    assert not (tmp_path / 'out').exists()
+    assert run('--params', ROOT / 'config' / 'stacked.yaml', '--node', 'upper_hexapod',
+               '--output', tmp_path / 'out') == 0
+
+
+def test_an_output_that_is_a_file_is_one_line(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'file').touch()
+    assert run('--params', PLATFORM_FILE, '--output', tmp_path / 'file') == 2
+    assert capsys.readouterr().err.count('\n') == 1
+
+
+@needs_compiler
+def test_names_of_legs_stay_in_their_comments(tmp_path: Path) -> None:
+    p = Parameters.from_yaml(PLATFORM_FILE).replaced({
+        'joints': ('*/ #error', '/* a', 'b\\', '*//*/', 'Bein ü', '??/')})
+    for name, text in c_project(p, 'rig').items():
+        (tmp_path / name).write_text(text)
+    compile_c(tmp_path, '-std=c99', *WARNINGS, *tmp_path.glob('*.c'))
+
+
+def test_the_digest_is_that_of_the_numbers() -> None:
+    p = Parameters.from_yaml(PLATFORM_FILE)
+    assert digest(p) == digest(p.replaced({'base_frame': 'floor', 'visualization_rate': 5.0}))
+    heavier = p.replaced({'platform.mass': math.nextafter(150.0, 200.0)})
+    assert digest(p) != digest(heavier)
+
+
+def test_hexapods_without_a_home_pose_are_exported_unless_axes_need_one() -> None:
+    p = random_parameters(rng())
+    assert 'golden.csv' in c_project(p, 'rig')
+    with pytest.raises(StewartError, match='home pose'):
+        c_project(p.replaced({'limits.base_joint_angle_max': 0.5}), 'rig')
+    assert check_name('rig_2') == 'rig_2'
