@@ -44,6 +44,7 @@ install_requires = [
     'zstandard>=0.21',
 ]
 extras_require = {
+    'calibrate': ['scipy>=1.10'],
     'cluster': ['distributed>=2024.1'],
     'differentiate': ['scipy>=1.10'],
     'docs': [
@@ -106,7 +107,8 @@ setup(
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.datasheet': ['templates/*'],
+    package_data={package_name: ['py.typed'], f'{package_name}.calibration': ['templates/*'],
+                  f'{package_name}.datasheet': ['templates/*'],
                   f'{package_name}.export': ['c/*'],
                   f'{package_name}.identification': ['templates/*'],
                   f'{package_name}.replay': ['templates/*'],
@@ -130,6 +132,7 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
+            'stewart_calibrate = stewart_dynamics.calibration:main',
             'stewart_capability = stewart_dynamics.datasheet:main',
             'stewart_describe = stewart_dynamics.description:main',
             'stewart_dynamics = stewart_dynamics.ros.console_scripts:dynamics',

@@ -22,6 +22,7 @@ from importlib import import_module
 from typing import Any, TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from stewart_dynamics.calibration.calibrate import calibrate, Calibration
     from stewart_dynamics.capability.capability import Capability, Extent
     from stewart_dynamics.capability.reachable import Reachable
     from stewart_dynamics.errors import (
@@ -40,13 +41,14 @@ if TYPE_CHECKING:
 __version__ = '0.1.0'
 
 __all__ = [
-    'BagError', 'BaseMotion', 'Capability', 'Extent', 'ForceBreakdown', 'InverseDynamics',
-    'Motion', 'MotionError', 'Motors', 'NaturalModes', 'ParameterError', 'Parameters',
-    'PlannedTrajectory', 'Pose', 'PoseError', 'Reachable', 'SingularityError', 'StewartError',
-    'StewartPlatform', 'TimedMotion', '__version__', 'approach', 'check_planned_trajectory',
-    'rest_to_rest']
+    'BagError', 'BaseMotion', 'Calibration', 'Capability', 'Extent', 'ForceBreakdown',
+    'InverseDynamics', 'Motion', 'MotionError', 'Motors', 'NaturalModes', 'ParameterError',
+    'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'Reachable', 'SingularityError',
+    'StewartError', 'StewartPlatform', 'TimedMotion', '__version__', 'approach', 'calibrate',
+    'check_planned_trajectory', 'rest_to_rest']
 
 _MODULES = {
+    'calibration.calibrate': ('Calibration', 'calibrate'),
     'capability.capability': ('Capability', 'Extent'),
     'capability.reachable': ('Reachable',),
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',

@@ -166,6 +166,31 @@ def frequency(text: str) -> float:
     return value
 
 
+def between(least: float, most: float) -> Callable[[str], float]:
+    """Return the type of an option that is a number within bounds."""
+    def read(text: str) -> float:
+        value = float(text)
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(
+                f'{text}: must be at least {least:g}, at most {most:g}')
+        return value
+
+    read.__name__ = 'number'
+    return read
+
+
+def whole(least: int, most: int) -> Callable[[str], int]:
+    """Return the type of an option that is a whole number within bounds."""
+    def read(text: str) -> int:
+        value = int(text)
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f'{text}: must be at least {least}, at most {most}')
+        return value
+
+    read.__name__ = 'whole number'
+    return read
+
+
 def _printable(text: str) -> str:
     """Return text in which control characters, as names in bags may hold, are escaped."""
     return re.sub(r'[\x00-\x09\x0b-\x1f\x7f-\x9f]', lambda found: repr(found[0])[1:-1], text)

@@ -33,8 +33,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'stewart_dynamics'
-EXECUTABLES = ('stewart_capability', 'stewart_dynamics', 'stewart_describe', 'stewart_export',
-               'stewart_identify', 'stewart_replay', 'stewart_simulator', 'stewart_trajectory')
+EXECUTABLES = ('stewart_calibrate', 'stewart_capability', 'stewart_dynamics', 'stewart_describe',
+               'stewart_export', 'stewart_identify', 'stewart_replay', 'stewart_simulator',
+               'stewart_trajectory')
 PACKAGED = ('bags', 'config', 'examples', 'launch', 'resource', 'security', NAME, 'LICENSE',
             'package.xml', 'pyproject.toml', 'setup.cfg', 'setup.py')
 SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', NAME)
@@ -252,7 +253,8 @@ def test_no_module_has_the_name_of_one_of_python() -> None:
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_entry_point_loads(distribution: importlib.metadata.Distribution, name: str) -> None:
     """The function behind each executable exists."""
-    if name not in ('stewart_capability', 'stewart_describe', 'stewart_export', 'stewart_replay'):
+    if name not in ('stewart_calibrate', 'stewart_capability', 'stewart_describe', 'stewart_export',
+                    'stewart_replay'):
         pytest.importorskip('rclpy')
     point, = distribution.entry_points.select(name=name)
     assert callable(point.load())

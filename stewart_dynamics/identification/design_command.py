@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 import sys
 import time
@@ -27,6 +27,7 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification.identification_options import (
     DesignOptions, IdentificationOptions)
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.program import between, whole
 
 if TYPE_CHECKING:
     from stewart_dynamics.identification.design import Design
@@ -43,28 +44,28 @@ def add_options(parser: argparse.ArgumentParser) -> None:
                             f'--identify are identifiable: DIR/{TRAJECTORY} (default DIR: '
                             'designed), for stewart_trajectory, within the limits of the '
                             'parameter file')
-    group.add_argument('--duration', type=_between(2.0, 3600.0), default=default.duration,
+    group.add_argument('--duration', type=between(2.0, 3600.0), default=default.duration,
                        metavar='S', help='of the motion (default: %(default)g)')
-    group.add_argument('--highest-frequency', type=_between(0.01, 100.0),
+    group.add_argument('--highest-frequency', type=between(0.01, 100.0),
                        default=default.frequency, metavar='HZ',
                        help='of the motion, below --cutoff (default: %(default)g)')
-    group.add_argument('--harmonics', type=_whole(1, 50), default=default.harmonics, metavar='N',
+    group.add_argument('--harmonics', type=whole(1, 50), default=default.harmonics, metavar='N',
                        help='of the Fourier series (default: %(default)s)')
-    group.add_argument('--amplitude', type=_between(1e-6, 1e3), metavar='M',
+    group.add_argument('--amplitude', type=between(1e-6, 1e3), metavar='M',
                        help='displacement of the platform at most, and of its joints by turns; '
                             'instead of limits that the parameter file lacks')
-    group.add_argument('--center', type=_between(-1e3, 1e3), nargs=6,
+    group.add_argument('--center', type=between(-1e3, 1e3), nargs=6,
                        metavar=('X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA'),
                        help='pose about which it moves, where it begins and ends [m, rad] '
                             '(default: home)')
-    group.add_argument('--noise', type=_between(1e-9, 1e9), default=default.noise, metavar='N',
+    group.add_argument('--noise', type=between(1e-9, 1e9), default=default.noise, metavar='N',
                        help='standard deviation of the measured efforts, for the predicted '
                             'intervals (default: %(default)g)')
-    group.add_argument('--rate', type=_between(1.0, 1e4), default=default.rate, metavar='HZ',
+    group.add_argument('--rate', type=between(1.0, 1e4), default=default.rate, metavar='HZ',
                        help='of setpoints and measured efforts (default: %(default)g)')
-    group.add_argument('--generations', type=_whole(1, 100000), default=default.generations,
+    group.add_argument('--generations', type=whole(1, 100000), default=default.generations,
                        metavar='N', help='of the search; more take longer (default: %(default)s)')
-    group.add_argument('--seed', type=_whole(0, 2 ** 32 - 1), default=default.seed, metavar='N',
+    group.add_argument('--seed', type=whole(0, 2 ** 32 - 1), default=default.seed, metavar='N',
                        help='equal seeds give equal motions (default: %(default)s)')
 
 
@@ -140,28 +141,3 @@ def _lines(designed: Design, asked: DesignOptions) -> Iterator[str]:
         yield f'  {name:32} +- {half:<10.2g} {unit}'
     used = ', '.join(f'{part:.0%} of {name}' for name, part in designed.use.items())
     yield f'uses, of what is free between home and the limits less their margins: {used}'
-
-
-def _between(least: float, most: float) -> Callable[[str], float]:
-    """Return the type of an option that is a number within bounds."""
-    def read(text: str) -> float:
-        value = float(text)
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(
-                f'{text}: must be at least {least:g}, at most {most:g}')
-        return value
-
-    read.__name__ = 'number'
-    return read
-
-
-def _whole(least: int, most: int) -> Callable[[str], int]:
-    """Return the type of an option that is a whole number within bounds."""
-    def read(text: str) -> int:
-        value = int(text)
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f'{text}: must be at least {least}, at most {most}')
-        return value
-
-    read.__name__ = 'whole number'
-    return read

@@ -32,7 +32,7 @@ from stewart_dynamics.identification.physical import consistent
 from stewart_dynamics.identification.sums import delayed_by, residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import (
-    Identifiability, Information, LARGEST_ERROR, no_information, solve)
+    Identifiability, Information, LARGEST_ERROR, LEAST_SHARE, no_information, solve)
 
 _STEPS = 30
 _DONE = 1e-10
@@ -41,8 +41,6 @@ _LONGEST_DELAY = 0.2
 # A delay is identifiable if the squared derivative of the efforts exceeds that of noise by this
 # factor.
 _TIMES_NOISE = 10.0
-# Unknowns whose identifiable share is smaller are reported as not identifiable.
-LEAST_SHARE = 0.1
 _HELD = 1e-6
 # Lower bound of the residuals' deviation, reached with exact efforts, relative to the efforts.
 _SMALLEST_DEVIATION = 1e-8

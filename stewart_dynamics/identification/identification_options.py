@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 from stewart_dynamics.identification.unknowns import DEFAULT
 from stewart_dynamics.replay.replay_options import NODE
+from stewart_dynamics.reporting.estimates import HOLD_OUT
 
 CUTOFF = 10.0
-HOLD_OUT = 0.2
 
 
 class IdentificationOptions(NamedTuple):

@@ -29,11 +29,10 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.identify import Identification, Identified
-from stewart_dynamics.identification.results import IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE
 from stewart_dynamics.identification.sums import residual_of
-from stewart_dynamics.identification.text import decimals, grouped
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.reporting.colors import LEG_COLORS
+from stewart_dynamics.reporting.estimates import page_values
 from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.whole_file import write_files
@@ -85,22 +84,10 @@ class IdentificationReport:
     def write(self, path: Path, result: Mapping[str, Any]) -> None:
         """Write the page, with the content of identification.json."""
         script = plotly_script()
-        parameters = [each | {
-            'half': None if each['standard_error'] is None else (
-                TWO_SIDED * each['standard_error']),
-            'digits': decimals(each['standard_error']) if each['standard_error'] else 4,
-        } for each in result['parameters']]
-        of_state = {state: [each for each in parameters if each['state'] == state]
-                    for state in (IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE)}
         text = page(
-            _FOLDER, 'identification', [script], document=True, r=result, parameters=parameters,
-            identified=of_state[IDENTIFIED],
-            combined=grouped([each['name'] for each in of_state[IN_COMBINATION]]),
-            not_identifiable=grouped([each['name'] for each in of_state[NOT_IDENTIFIABLE]]),
+            _FOLDER, 'identification', [script], document=True, r=result,
             name=Path(result['bags'][0]['bag']).name or result['bags'][0]['bag'],
-            combinations=[each | {'half': TWO_SIDED * each['standard_error'],
-                                  'digits': decimals(each['standard_error'])}
-                          for each in result['combinations']],
+            **page_values(result),
             legs=list(self._found.parameters['joints']), plotly=script, data=self._data(),
             two_sided=TWO_SIDED, samples=len(self._curves), most=_MOST)
         write_files({path: text})

@@ -40,7 +40,7 @@ from stewart_dynamics.identification.intervals import Errors, errors_of
 from stewart_dynamics.identification.kinematics import pose_near
 from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (
-    LikelyMistake, LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
+    LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs, Topics
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
@@ -49,6 +49,7 @@ from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import NEGATIVE, Parameters
+from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
 _FEWEST_SAMPLES = 10.0

@@ -22,11 +22,12 @@ from pathlib import Path
 
 from stewart_dynamics.identification import design_command
 from stewart_dynamics.identification.identification_options import (
-    CUTOFF, HOLD_OUT, IdentificationOptions)
+    CUTOFF, IdentificationOptions)
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
 from stewart_dynamics.program import (
-    add_results, DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
+    add_results, between, DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
 from stewart_dynamics.replay.replay_options import NODE
+from stewart_dynamics.reporting.estimates import HOLD_OUT
 
 NOT_ALL_IDENTIFIED = 1
 _PROGRAM = Program('stewart_identify')
@@ -73,12 +74,12 @@ def _arguments() -> argparse.ArgumentParser:
                            'tilt is the direction of gravity, for a base that is not level')
     what.add_argument('--motor-torque', action='store_true',
                       help='efforts are torques of the motors [N m]; needs actuator.screw_lead')
-    what.add_argument('--cutoff', type=_frequency, default=CUTOFF, metavar='HZ',
+    what.add_argument('--cutoff', type=between(0.1, 1000.0), default=CUTOFF, metavar='HZ',
                       help='cut-off frequency of the filter on both sides of the regression '
                            f'(default: {CUTOFF:g}): above the frequencies of the motion')
-    what.add_argument('--prior', type=_part, metavar='PART',
+    what.add_argument('--prior', type=between(1e-6, 1e3), metavar='PART',
                       help="the file's values count, as if known to this part of their size")
-    what.add_argument('--hold-out', type=_held, default=HOLD_OUT, metavar='PART',
+    what.add_argument('--hold-out', type=between(0.0, 0.9), default=HOLD_OUT, metavar='PART',
                       help='end of each bag that validates a fit to the rest; 0: none '
                            f'(default: {HOLD_OUT:g})')
     what.add_argument('--no-delay', action='store_true',
@@ -133,22 +134,3 @@ def _kinds(text: str) -> tuple[str, ...]:
     if not kinds:
         raise argparse.ArgumentTypeError('names nothing')
     return kinds
-
-
-def _frequency(text: str) -> float:
-    return _between(text, 0.1, 1000.0)
-
-
-def _part(text: str) -> float:
-    return _between(text, 1e-6, 1e3)
-
-
-def _held(text: str) -> float:
-    return _between(text, 0.0, 0.9)
-
-
-def _between(text: str, least: float, most: float) -> float:
-    value = float(text)
-    if not least <= value <= most:
-        raise argparse.ArgumentTypeError(f'{text}: must be at least {least:g}, at most {most:g}')
-    return value

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +39,7 @@ from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.least_squares import (
     Information, information, no_information, solve)
 from stewart_dynamics.parameters.table import AUTO, Parameters, STANDARD_GRAVITY
+from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
 _NEAR = 1.35
@@ -62,15 +62,6 @@ _PIECE = 50.0
 LONGEST_LAG = 0.1
 # Tolerance of limits of length, relative to them.
 _TOLERANCE = 1e-3
-
-
-class LikelyMistake(NamedTuple):
-    """A likely mistake."""
-
-    what: str
-    """Keyword for programs: sign, unit, torque, scale, swapped, zero_length, tilt or misfit."""
-    text: str
-    """Description in one line."""
 
 
 def of_no_pose(p: Parameters, positions: Array) -> str:

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-import math
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +32,7 @@ from stewart_dynamics.identification.results import comments, document
 from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics, regressor
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reporting.estimates import justified
 from stewart_dynamics.reporting.results_folder import (
     check_free, IDENTIFICATION, remove_abandoned, whole_folder)
 from stewart_dynamics.whole_file import write_json
@@ -95,12 +95,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
 def _rounded(found: Identified) -> Parameters:
     """Return the parameters rounded to the digits that the intervals justify."""
     errors = np.sqrt(np.maximum(np.diag(found.errors.covariance), 0.0))
-    values = found.fit.values.copy()
-    for n, (value, error) in enumerate(zip(values, errors, strict=True)):
-        if error > 0.0 and math.isfinite(error):
-            # to a hundredth of the standard error
-            values[n] = round(value, max(0, 2 - math.floor(math.log10(error))))
     try:
-        return found.unknowns.parameters(values)
+        return found.unknowns.parameters(justified(found.fit.values, errors))
     except StewartError:  # a body at its bound may not be rounded
         return found.parameters

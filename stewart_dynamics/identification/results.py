@@ -24,35 +24,29 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.identification.fit import LEAST_SHARE
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import Identified
 from stewart_dynamics.identification.lack_of_fit import Found
 from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.mechanics.least_squares import combinations, TWO_SIDED
+from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.replay.fingerprint import plain_parameters, software
+from stewart_dynamics.reporting.estimates import (
+    combined, estimate, IDENTIFIED, NOT_IDENTIFIABLE, states_of)
 
 # Version of identification.json; increased when the meaning of a key changes.
 VERSION = 1
-
-IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE = 'identified', 'in_combination', 'not_identifiable'
 
 
 def document(found: Identified, options: IdentificationOptions) -> dict[str, Any]:
     """Return the content of identification.json."""
     what = found.fit.identifiability
-    states = _states(found)
-    errors = _errors(found)
     u, lack = found.unknowns, found.lack_of_fit
     sure = lack is None or not lack.unexplained
-    parameters = [{
-        'name': name, 'unit': unit, 'file': float(start), 'value': float(value),
-        'state': state, 'standard_error': _plain(error) if state != NOT_IDENTIFIABLE else None,
-        'interval': ([float(value - TWO_SIDED * error), float(value + TWO_SIDED * error)]
-                     if state == IDENTIFIED and sure else None),
-        'unknown_share': float(share), 'at_bound': name in found.fit.at_bound,
-    } for name, unit, start, value, state, error, share in zip(
-        u.names, u.units, u.start, found.fit.values, states, errors, what.shares, strict=True)]
+    parameters = [
+        estimate(name, unit, start, value, state, error, share, name in found.fit.at_bound, sure)
+        for name, unit, start, value, state, error, share in zip(
+            u.names, u.units, u.start, found.fit.values, states_of(what), _errors(found),
+            what.shares, strict=True)]
     return {
         'version': VERSION, 'software': software(),
         'date': datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ'),
@@ -76,7 +70,8 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
         'samples': found.samples, 'efforts_left_out': found.unsound,
         'efforts_outliers': found.outliers,
         'parameters': parameters,
-        'combinations': _combinations(found),
+        'combinations': combined(
+            what, u.names, u.units, found.fit.values, found.errors.covariance),
         'rank': what.rank, 'unknowns': len(u.names),
         'singular_values': what.singular_values.tolist(),
         'residuals': _residuals(found.parameters['joints'], found.before, found.after,
@@ -100,12 +95,6 @@ def _cause(each: Found) -> dict[str, Any]:
             'columns': each.columns, 'deviations': each.deviations}
 
 
-def _states(found: Identified) -> list[str]:
-    what = found.fit.identifiability
-    return [IDENTIFIED if known else IN_COMBINATION if part >= LEAST_SHARE else NOT_IDENTIFIABLE
-            for known, part in zip(what.identifiable, what.known_shares, strict=True)]
-
-
 def _errors(found: Identified) -> Array:
     """Return standard errors (k,), including unidentifiable directions and lack of fit."""
     what = found.fit.identifiability
@@ -113,31 +102,6 @@ def _errors(found: Identified) -> Array:
     errors: Array = np.sqrt(own + (what.shares * what.scales) ** 2)
     return errors if found.lack_of_fit is None else (
         errors + found.lack_of_fit.shifts / TWO_SIDED)
-
-
-def _combinations(found: Identified) -> list[dict[str, Any]]:
-    u, values = found.unknowns, found.fit.values
-    result = []
-    for each in combinations(found.fit.identifiability):
-        places = list(each.parameters)
-        c = each.coefficients
-        variance = float(c @ found.errors.covariance[np.ix_(places, places)] @ c)
-        result.append({
-            'parameters': [u.names[n] for n in places], 'coefficients': c.tolist(),
-            'unit': u.units[places[0]], 'value': float(c @ values[places]),
-            'standard_error': math.sqrt(max(variance, 0.0)),
-            'words': in_words(c, [u.names[n] for n in places])})
-    return result
-
-
-def in_words(coefficients: Array, names: Sequence[str]) -> str:
-    """Return a combination of parameters as a sum in text form."""
-    text = ''
-    for c, name in zip(coefficients, names, strict=True):
-        sign = ' - ' if c < 0.0 else ' + '
-        size = f'{abs(c):.3g} '
-        text += (sign if text else '-' if c < 0.0 else '') + ('' if size == '1 ' else size) + name
-    return text
 
 
 def _residuals(joints: Sequence[str], before: Array, after: Array, measured: Array,

@@ -46,6 +46,8 @@ TIMES_NOISE = 10.0
 ROUNDING = 1e-6
 # A parameter is identifiable if unknown directions have at most this share in it.
 LARGEST_SHARE = 0.05
+# Parameters of which a smaller share is known are not identifiable, not even in a combination.
+LEAST_SHARE = 0.1
 # A smaller coefficient of a combination, by its largest one and the scales, is left out.
 SMALLEST_COEFFICIENT = 0.02
 

@@ -41,9 +41,11 @@ IDENTIFICATION = 'identification.json'
 """The same of an identification."""
 DATASHEET = 'datasheet.json'
 """The same of a datasheet."""
+CALIBRATION = 'calibration.json'
+"""The same of a calibration."""
 
 _KINDS = {RESULT: 'replay results', IDENTIFICATION: 'results of an identification',
-          DATASHEET: 'a datasheet'}
+          DATASHEET: 'a datasheet', CALIBRATION: 'results of a calibration'}
 
 _REPLACED = '.replaced'
 _PARTIAL = re.compile(

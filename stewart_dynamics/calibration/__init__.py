@@ -1,0 +1,33 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Calibration of a hexapod's geometry from measured poses; needs no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from stewart_dynamics.program import run_program
+
+__all__ = ['main']
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program stewart_calibrate; report a missing library in one line."""
+    def program(given: Sequence[str] | None) -> int:
+        from stewart_dynamics.calibration.calibrate_command_line import main as run
+
+        return run(given)
+
+    return run_program('stewart_calibrate', program, arguments)

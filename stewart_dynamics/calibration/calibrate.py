@@ -1,0 +1,258 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Calibration of a hexapod's geometry from measured poses; computes the result, writes no files.
+
+Outliers are found with equal weights, leg by leg; the rest is fitted with the noise given or
+estimated (``fit``). A fit without the held-out poses predicts these by forward kinematics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.calibration.equations import (
+    chosen, Equations, Frames, GEOMETRY, names_of, SAME, values_of, with_geometry)
+from stewart_dynamics.calibration.fit import Fit, fit, minimum, outliers, Unknowns
+from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
+from stewart_dynamics.calibration.likely_mistakes import (
+    lack_of_fit, mistakes_of_input, mistakes_of_result, not_identified)
+from stewart_dynamics.calibration.noise import Noise
+from stewart_dynamics.errors import MotionError, ParameterError, StewartError
+from stewart_dynamics.mechanics.arguments import as_array, wrong_type
+from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.least_squares import Identifiability, LARGEST_SHARE
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reporting.estimates import (
+    FIXED, HOLD_OUT, IDENTIFIED, justified, LikelyMistake, states_of)
+
+# Poses for each of the 7 unknowns of a leg, of which one is left for the noise.
+FEWEST = 8
+# Held-out poses are the middle ones of equal groups; below this number of others, no pose is.
+_FEWEST_OTHERS = 12
+# Errors of held-out poses may grow by this factor: a good file, and few poses.
+_WORSE = 1.2
+# Numbers of the file are rounded to a hundredth of this part of their standard errors.
+_DIGITS = 0.01
+
+
+class Outlier(NamedTuple):
+    """A pose that was left out."""
+
+    pose: int
+    legs: tuple[int, ...]
+    """Legs whose positions are outliers; nearly all: the pose is."""
+    residual: float
+    """The largest of them [m]."""
+
+
+class Validation(NamedTuple):
+    """Errors of held-out poses by the file's geometry, and by a fit to the others."""
+
+    before: PoseErrors
+    after: PoseErrors
+
+
+class Calibration(NamedTuple):
+    """A calibrated geometry: 42 numbers, base joints, platform joints, zero lengths."""
+
+    parameters: Parameters
+    """The file's parameters with the calibrated geometry."""
+    names: tuple[str, ...]
+    start: Array
+    """(42,) values of the file [m]."""
+    values: Array
+    """(42,) calibrated [m]."""
+    covariance: Array
+    """(42, 42) [m^2]"""
+    errors: Array
+    """(42,) standard errors, with what the poses cannot identify [m]."""
+    states: tuple[str, ...]
+    identifiability: Identifiability
+    not_identified: str | None
+    """Which numbers the poses cannot distinguish, and why; None: all are identified."""
+    noise: Noise
+    noise_given: bool
+    frames: Frames | None
+    """Of the device, if they were unknown."""
+    poses: int
+    """Number of poses that were used."""
+    before: Array
+    """(6,) RMS residuals of the legs by the file [m]."""
+    after: Array
+    outliers: tuple[Outlier, ...]
+    validation: Validation | None
+    lack_of_fit: tuple[LikelyMistake, ...]
+    likely: tuple[LikelyMistake, ...]
+    """Mistakes that were accepted."""
+
+
+def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion, *,
+              fixed: Sequence[str] = (), frames: str = 'known',
+              noise: tuple[float, float, float] | None = None,
+              hold_out: float = HOLD_OUT,
+              angles: Array | None = None, degrees: bool = False,
+              accept_mistakes: bool = False) -> Calibration:
+    """
+    Return the geometry that explains measured poses.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        The hexapod as it is drawn.
+    lengths : (N, 6)
+        Measured leg positions, or commanded ones: as ``~/leg_states`` has them [m].
+    poses : Pose of shape (N,)
+        Measured poses.
+    fixed : sequence of str
+        Parts of the geometry that keep the file's values: ``zero_length``,
+        ``base_joints.leg_1``, ``platform_joints.leg_3.z``.
+    frames : 'known' or 'unknown'
+        Whether the poses are those of the platform frame in the base frame, or of a target on the
+        platform in the frame of a device.
+    noise : three floats, optional
+        Standard deviations of lengths [m], of each coordinate of the positions [m], and of the
+        rotations about each axis [rad]; estimated by default.
+    hold_out : float
+        Share of the poses that validates a fit to the others; 0: none.
+    angles : (N, 3), optional
+        The angles of which the poses were made, to find angles in another unit.
+    degrees : bool
+        They were read as degrees.
+    accept_mistakes : bool
+        Return a result although a mistake is likely or held-out poses are predicted worse.
+
+    Raises
+    ------
+    StewartError
+        The poses do not support a calibration, or a mistake is likely.
+
+    """
+    p = platform.parameters
+    measured = _checked(platform, lengths, poses)
+    if frames not in ('known', 'unknown'):
+        raise ParameterError(f"frames: {frames!r}: must be 'known' or 'unknown'")
+    unknown = frames == 'unknown'
+    held: Flags = np.zeros(GEOMETRY, dtype=bool)
+    for name in fixed:
+        held[chosen(p, name)] = True
+    if held.all() and not unknown:
+        raise ParameterError('fixed: nothing is left to be calibrated')
+    likely = list(mistakes_of_input(p, measured, unknown, angles, degrees))
+    _refuse(likely, accept_mistakes)
+    known = find_frames(p, measured) if unknown else SAME
+    measured = measured._replace(frames=known)
+    size = p['singularity.characteristic_length']
+    unknowns = Unknowns.of(values_of(p, known), size, held, unknown)
+    first = outliers(measured, unknowns)
+    sound: Flags = ~np.any(first.outlying, axis=1)
+    used = measured.part(sound)
+    if len(used.lengths) * 6 <= unknowns.basis.shape[1]:
+        raise StewartError(f'{len(used.lengths)} poses are left of {len(sound)} after outliers: '
+                           f'at least {unknowns.basis.shape[1] // 6 + 1} are needed')
+    found = fit(used, unknowns, None if noise is None else Noise(*noise))
+    what = found.identifiability
+    what = what._replace(scales=what.scales[:GEOMETRY], shares=what.shares[:GEOMETRY],
+                         directions=what.directions[:GEOMETRY])
+    states = tuple(FIXED if each else state for each, state in zip(
+        held, states_of(what), strict=True))
+    missing = not_identified(p['joints'], what.shares, LARGEST_SHARE, used, size)
+    if IDENTIFIED not in states and not accept_mistakes:
+        raise StewartError(f'no number is identifiable by itself: {missing}; nothing is '
+                           'calibrated (--accept-mistakes does)')
+    far = list(mistakes_of_result(p, found.values, found.lin.residuals, size))
+    _refuse(far, accept_mistakes)
+    validation = _validated(p, used, unknowns, found, hold_out)
+    if validation is not None:
+        before, after = (math.hypot(each.rms[0], size * each.rms[1]) for each in validation)
+        if not after < _WORSE * before and not accept_mistakes:
+            raise StewartError(
+                f'held-out poses are {_shown(validation.before)} off by the file, but '
+                f'{_shown(validation.after)} by a fit to the others: the poses do not support a '
+                'better geometry; nothing is calibrated (--accept-mistakes does)')
+    covariance = found.covariance[:GEOMETRY, :GEOMETRY]
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + (what.shares * what.scales) ** 2)
+    # Errors of neighbors are correlated: poses are known better than each number of the geometry.
+    rounded = justified(found.values[:GEOMETRY], _DIGITS * np.sqrt(np.diag(covariance)))
+    return Calibration(
+        with_geometry(p, rounded), names_of(p), unknowns.start[:GEOMETRY],
+        found.values[:GEOMETRY], covariance, errors, states, what, missing, found.noise,
+        noise is not None, used.frames_at(found.values) if unknown else None,
+        len(used.lengths), _rms(used.at(_with_frames(used, unknowns, unknown)).residuals),
+        _rms(found.lin.residuals),
+        tuple(Outlier(int(n), tuple(map(int, np.flatnonzero(first.outlying[n]))),
+                      float(np.abs(first.residuals[n]).max())) for n in np.flatnonzero(~sound)),
+        validation, lack_of_fit(
+            p, used, first, found.whitened if noise else None, what.rank, held),
+        tuple(likely + far))
+
+
+def _checked(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion) -> Equations:
+    if not isinstance(poses, (Pose, Motion)):
+        raise wrong_type('poses', poses, 'a Pose')
+    given = as_array('lengths', lengths, (6,))
+    pose = poses.pose if isinstance(poses, Motion) else poses
+    if given.ndim != 2 or pose.shape != given.shape[:1]:
+        raise MotionError(f'lengths {given.shape}, poses {pose.shape}: must be (N, 6) and (N,)')
+    if len(given) < FEWEST:
+        raise StewartError(f'{len(given)} poses: at least {FEWEST} are needed, each leg has 7 '
+                           'unknowns; 30 or more are advisable')
+    return Equations(given, pose)
+
+
+def _refuse(likely: Sequence[LikelyMistake], accepted: bool) -> None:
+    if likely and not accepted:
+        raise StewartError(f'{likely[0].text}; nothing is calibrated (--accept-mistakes does)')
+
+
+def _with_frames(equations: Equations, unknowns: Unknowns, unknown: bool) -> Array:
+    """Return the file's values, with the frames that fit them best."""
+    if not unknown:
+        return unknowns.start
+    only = unknowns.frames_only()
+    return minimum(equations, only.start, only.scales[:, None] * only.basis, 1.0)
+
+
+def _validated(parameters: Parameters, equations: Equations, unknowns: Unknowns, found: Fit,
+               hold_out: float) -> Validation | None:
+    """Return the validation: every n-th pose is predicted by a fit to the others."""
+    count = len(equations.lengths)
+    every = round(1.0 / hold_out) if hold_out > 0.0 else count + 1
+    held = np.arange(count) % every == every // 2
+    if not held.any() or np.count_nonzero(~held) < _FEWEST_OTHERS:
+        return None
+    others = equations.part(~held)
+    unknown = bool(unknowns.basis[GEOMETRY:].any())
+    before = _with_frames(others, unknowns, unknown)
+    after = fit(others, unknowns, found.noise).values
+    return Validation(*(pose_errors(
+        with_geometry(parameters, each), equations.part(held), equations.frames_at(each))
+        for each in (before, after)))
+
+
+def _shown(errors: PoseErrors) -> str:
+    position, rotation = errors.rms
+    return f'{1e3 * position:.3g} mm and {1e3 * rotation:.3g} mrad'
+
+
+def _rms(residuals: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(residuals ** 2, axis=0)))

@@ -1,0 +1,128 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line of stewart_calibrate."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from stewart_dynamics.program import between, DONE, interrupt_on_signals, node_name, Program
+from stewart_dynamics.replay.replay_options import NODE
+from stewart_dynamics.reporting.estimates import FIXED, HOLD_OUT, IDENTIFIED
+
+NOT_ALL_IDENTIFIED = 1
+_PROGRAM = Program('stewart_calibrate')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    parser = _arguments()
+    given = parser.parse_args(arguments)
+    if given.poses is None:
+        parser.error('the following arguments are required: POSES')
+    return _PROGRAM.exit_code(lambda: _run(given))
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Calibrate a hexapod's geometry, base joints, platform joints and zero "
+                    'lengths, from leg positions and poses that a tracker, camera or probe '
+                    'measured.',
+        epilog='DIR/ gets calibrated.yaml (the whole parameter file, for the node), '
+               'calibration.json and report.html.\n\nexit codes: 0 done; 1 with --strict, '
+               'when a number is not identifiable or there is a lack of fit;\n2 bad arguments, '
+               'parameters or poses, or a likely mistake: nothing is written; 130 interrupted')
+    parser.add_argument('poses', nargs='?', type=Path, metavar='POSES',
+                        help='CSV file with a column for each leg (its position, as '
+                             '~/leg_states has it), x, y, z [m] and qx, qy, qz, qw, or alpha, '
+                             'beta, gamma [rad]')
+    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
+                        help='parameters of the hexapod as it is drawn, the file that the node '
+                             'takes')
+    parser.add_argument('--output', type=Path, default=Path('calibrated'), metavar='DIR',
+                        help='folder of the results (default: calibrated)')
+    parser.add_argument('--force', action='store_true', help='replace results that exist')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit code 1 when a number is not identifiable or there is a lack '
+                             'of fit')
+    parser.add_argument('--no-report', action='store_true', help='write no report.html')
+    parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
+                        help=f'node whose parameters are read (default: {NODE})')
+    data = parser.add_argument_group('measurements')
+    data.add_argument('--mm', action='store_true',
+                      help='x, y, z and the leg positions are in mm, not in m')
+    data.add_argument('--degrees', action='store_true', help='angles are in degrees, not in rad')
+    data.add_argument('--frames', choices=('known', 'unknown'), default='known',
+                      help='unknown: the device measures a target on the platform in a frame of '
+                           'its own; both are calibrated as well (default: known)')
+    data.add_argument('--noise', nargs=3, type=between(0.0, 1e3),
+                      metavar=('LENGTH', 'POSITION', 'ROTATION'),
+                      help='standard deviations of leg positions [m], of each coordinate of the '
+                           'poses [m] and of their rotation about each axis [rad] (default: '
+                           'estimated)')
+    calibrated = parser.add_argument_group('what is calibrated, and how')
+    calibrated.add_argument('--fixed', type=_names, default=(), metavar='NAME,...',
+                            help="parts that keep the file's values, as zero_length, "
+                                 'base_joints.leg_1, platform_joints.leg_3.z')
+    calibrated.add_argument('--hold-out', type=between(0.0, 0.5), default=HOLD_OUT,
+                            metavar='PART',
+                            help='share of the poses that validates a fit to the others; 0: none '
+                                 f'(default: {HOLD_OUT:g})')
+    calibrated.add_argument('--accept-mistakes', action='store_true',
+                            help='write results although a mistake is likely')
+    return parser
+
+
+def _run(given: argparse.Namespace) -> int:
+    # Imported here, so that --help is fast.
+    from stewart_dynamics.calibration.calibration_options import CalibrationOptions
+    from stewart_dynamics.calibration.measured_poses import read_poses
+    from stewart_dynamics.calibration.noise import Noise
+    from stewart_dynamics.calibration.one_run import FUNCTIONS, run
+    from stewart_dynamics.calibration.results import result_text
+    from stewart_dynamics.compilation.functions import prepare
+    from stewart_dynamics.compilation.machine_code import HINT
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.parameters.table import Parameters
+
+    interrupt_on_signals()
+    options = CalibrationOptions(
+        given.fixed, given.frames, given.noise and Noise(*given.noise), given.hold_out, given.mm,
+        given.degrees, given.accept_mistakes, not given.no_report, given.force)
+    parameters = Parameters.from_yaml(given.params, given.node)
+    measured = read_poses(given.poses, parameters['joints'], given.mm, given.degrees)
+    if HINT:
+        _PROGRAM.complain(HINT)
+    prepare(FUNCTIONS)
+    for mistake in likely_mistakes(parameters):
+        _PROGRAM.complain(f'warning: {mistake}')
+    result = run(measured, str(given.poses), parameters, given.output, options)
+    for each in result['likely_mistakes']:
+        _PROGRAM.complain(f'warning: {each["text"]}')
+    _PROGRAM.say(result_text(result))
+    _PROGRAM.say(f'results: {given.output}')
+    everything = all(each['state'] in (IDENTIFIED, FIXED) for each in result['parameters'])
+    return NOT_ALL_IDENTIFIED if given.strict and not (
+        everything and result['lack_of_fit'] is None) else DONE
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(each.strip() for each in text.split(',') if each.strip())
+    if not names:
+        raise argparse.ArgumentTypeError('names nothing')
+    return names

@@ -1,0 +1,120 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The report of a calibration as one HTML page: what moved, how far, and how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.calibration.calibrate import Calibration
+from stewart_dynamics.calibration.equations import BASE, PLATFORM, ZERO
+from stewart_dynamics.calibration.results import outlier_text, validation_text
+from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+from stewart_dynamics.reporting.estimates import FIXED, page_values
+from stewart_dynamics.reporting.pages import page
+from stewart_dynamics.reporting.vector_picture import Chart, Picture, tick_text, ticks
+from stewart_dynamics.whole_file import write_files
+
+_FOLDER = Path(__file__).with_name('templates')
+_MM = 1e3
+# Length of the longest arrow in a view, by the radius of the joints.
+_ARROW = 0.35
+
+
+def write_report(path: Path, result: Mapping[str, Any], found: Calibration) -> None:
+    """Write the page with the content of calibration.json."""
+    text = page(
+        _FOLDER, 'calibration', document=True, r=result, name=Path(result['poses']['source']).name,
+        validation=validation_text(result['validation']),
+        outliers=[outlier_text(each) for each in result['outliers']],
+        changes=_changes(found), views=[
+            _view(found, BASE, 'Base joints, from above'),
+            _view(found, PLATFORM, 'Platform joints, from above')],
+        **page_values(result))
+    write_files({path: text})
+
+
+def _changes(found: Calibration) -> str:
+    """Return a picture of all changes with their intervals."""
+    moved = _MM * (found.values - found.start)
+    halves = _MM * TWO_SIDED * np.where([each == FIXED for each in found.states], 0.0,
+                                        found.errors)
+    shown = np.abs(moved) + np.minimum(halves, np.abs(moved).max() + 1e-9)
+    end = max(float(shown.max()) * 1.08, 1e-9)
+    picture = Picture(1160, 350, 'Change of each joint coordinate and zero length [mm], with its '
+                      '95 % interval')
+    left = 60.0
+    for part, width, title, axes in (
+            (BASE, 445.0, 'base joints', 'xyz'), (PLATFORM, 445.0, 'platform joints', 'xyz'),
+            (ZERO, 130.0, 'zero lengths', ' ')):
+        count = part.stop - part.start
+        chart = Chart(picture, (left, 34.0, width, 220.0), (-0.6, count - 0.4), (-end, end))
+        _frame(picture, chart, title, left == 60.0)
+        for n in range(count):
+            leg, axis = divmod(n, len(axes))
+            value, half = moved[part][n], min(halves[part][n], 2.0 * end)
+            x, y = chart.at([n, value])
+            _, zero = chart.at([n, 0.0])
+            low, high = (float(np.clip(chart.at([n, value + sign * half])[1], 34.0, 254.0))
+                         for sign in (-1.0, 1.0))
+            picture.line([x, zero], [x, y], css=f'bar leg{leg}')
+            picture.line([x, low], [x, high], css='whisker')
+            picture.text([x, 270.0], axes[axis], 'middle', css='tick')
+            if axis == len(axes) // 2:
+                picture.text([x, 288.0], found.parameters['joints'][leg], 'end', 45.0, css='tick')
+        left += width + 28.0
+    return picture.svg()
+
+
+def _frame(picture: Picture, chart: Chart, title: str, first: bool) -> None:
+    left, top, width, _ = chart.frame
+    picture.text([left, top - 12.0], f'{title} [mm]', css='view')
+    for value in ticks(*chart.y, 6):
+        _, y = chart.at([0.0, value])
+        picture.line([left, y], [left + width, y], css='zero' if value == 0.0 else 'grid')
+        if first:
+            picture.text([left - 6.0, y + 3.5], tick_text(value), 'end', css='tick')
+
+
+def _view(found: Calibration, part: slice, title: str) -> str:
+    """Return joints from above, with arrows to where they are, larger than they are."""
+    start, end = (each[part].reshape(6, 3)[:, :2] for each in (found.start, found.values))
+    moved: Array = end - start
+    middle = start.mean(axis=0)
+    radius = float(np.linalg.norm(start - middle, axis=1).max())
+    longest = float(np.linalg.norm(moved, axis=1).max())
+    times = _ARROW * radius / longest if longest > 0.0 else 1.0
+    width = 1.6 * radius
+    picture = Picture(460, 400, f'{title}: change of each joint')
+    chart = Chart(picture, (55.0, 30.0, 350.0, 350.0), *(
+        (float(middle[n] - width), float(middle[n] + width)) for n in range(2)))
+    picture.path(chart.at(start), closed=True, css='grid')
+    picture.text([20.0, 16.0], f'{title}, arrows {times:.3g} times as long', css='view')
+    for leg in range(6):
+        at, to = chart.at([start[leg], start[leg] + times * moved[leg]])
+        picture.circle(at, 5.0, css='joint')
+        picture.line(at, to, css=f'edge leg{leg}')
+        picture.circle(to, 2.6, fill=f'var(--leg{leg})')
+        outward = (start[leg] - middle) / max(float(np.linalg.norm(start[leg] - middle)), 1e-9)
+        x, y = at + np.array([22.0, -22.0]) * outward
+        picture.text([x, y + 4.0], f'{found.parameters["joints"][leg]}: '
+                     f'{_MM * np.linalg.norm(moved[leg]):.3g} mm',
+                     'start' if outward[0] > 0.0 else 'end', css='tick')
+    return picture.svg()

@@ -1,0 +1,292 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Likely mistakes in measured poses, and a lack of fit of the model, each with its likeliest cause.
+
+A mistake is likely if the poses fit the file's geometry, up to a constant of each leg, several
+times better without it: a real error of the geometry does not do that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+import math
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.calibration.equations import (
+    BASE, Equations, GEOMETRY, inverse, PLATFORM, SAME, values_of, ZERO)
+from stewart_dynamics.calibration.fit import Outliers
+from stewart_dynamics.calibration.frames import find_frames
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.frames.rotation import from_euler, to_euler, to_quaternion
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reporting.estimates import LikelyMistake
+
+# A mistake is likely if the misfit without it is smaller than this part.
+_BETTER = 0.25
+# A joint that moves by a larger part of the characteristic length is not of this hexapod.
+_FARTHEST = 0.3
+# Residuals above this part of it mean that the model does not describe the poses.
+_UNEXPLAINED = 0.03
+# Zero lengths that become a smaller part of the file's are those of whole lengths.
+_WHOLE = 0.1
+# A lack of fit is significant if noise has it with a smaller probability; deviations of a leg
+# above this multiple of the others' are large.
+_PROBABILITY, _LARGE = 1e-6, 2.0
+_FIXED, _SCALE, _POSE, _PLAY, _NOISE = 'fixed', 'scale', 'pose', 'play', 'noise'
+_LACKS = {
+    _FIXED: 'the fixed values are not those of the hexapod: {}',
+    _SCALE: 'positions off by scale, from the lead of the screw or the encoder: {}',
+    _POSE: 'residuals depend on the pose, from deflection or joints without a common center: {}',
+    _PLAY: 'play, a loose joint or encoder: {}',
+    _NOISE: 'the residuals are {} the noise that was given'}
+# Minimum number of poses for each term of a test.
+_FEWEST = 3
+
+
+def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_frames: bool,
+                      angles: Array | None, degrees: bool) -> Iterator[LikelyMistake]:
+    """Yield the likeliest mistake in lengths, poses or their angles (N, 3), if one is likely."""
+    given = _misfit(parameters, equations, unknown_frames)
+    tried = [(_misfit(parameters, each, unknown_frames), mistake)
+             for mistake, each in _without_mistakes(parameters, equations)]
+    if angles is not None:
+        turned = from_euler(np.degrees(angles) if degrees else np.radians(angles))
+        tried.append((_misfit(parameters, equations._replace(
+            pose=Pose(equations.pose.position, turned)), unknown_frames), LikelyMistake(
+                'degrees', 'the angles are in radians, not in degrees: without --degrees they '
+                'are read so' if degrees else
+                'the angles are in degrees, not in radians: --degrees reads them')))
+    if not unknown_frames:
+        tried.append((_misfit(parameters, equations, True), LikelyMistake(
+            'frames', 'the poses are not those of the platform frame in the base frame, but of '
+            'other frames: --frames unknown calibrates them as well')))
+    best, mistake = min(tried, key=lambda each: each[0])
+    if best < _BETTER * given:
+        yield mistake._replace(text=f'{mistake.text} (misfit {best:.2g} of the motion'
+                               + (f' instead of {given:.2g})' if given < math.inf else ')'))
+
+
+def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, size: float,
+                       ) -> Iterator[LikelyMistake]:
+    """Yield likely mistakes that show in calibrated values and their residuals (N, 6)."""
+    left = float(np.sqrt(np.mean(residuals ** 2)))
+    if left > _UNEXPLAINED * size:
+        yield LikelyMistake('misfit', f'no geometry explains the poses: residuals of {_mm(left)} '
+                            'mm remain; lengths and poses must be of the same instants')
+    start, joints = values_of(parameters), parameters['joints']
+    zero = start[ZERO]
+    moved = np.linalg.norm((values - start)[:PLATFORM.stop].reshape(12, 3), axis=1)
+    if moved.max() > _FARTHEST * size:
+        worst = int(np.argmax(moved))
+        where = 'base' if worst < BASE.stop // 3 else 'platform'
+        yield LikelyMistake('far', f'the {where} joint of {joints[worst % 6]} would move by '
+                            f'{_mm(moved[worst])} mm: the poses are not those of this hexapod')
+    if (zero > _FARTHEST * size).all() and (np.abs(values[ZERO]) < _WHOLE * zero).all():
+        yield LikelyMistake(
+            'zero_length', 'the leg positions are whole lengths between the joints, not positions '
+            'from geometry.zero_length; if the hexapod publishes them so, it is zero')
+
+
+def _without_mistakes(parameters: Parameters, given: Equations,
+                      ) -> Iterator[tuple[LikelyMistake, Equations]]:
+    """Yield mistakes, and what the measurements were without them."""
+    lengths, pose = given.lengths, given.pose
+    for factor, wrong, right in ((1e-3, 'mm', 'm'), (1e3, 'm', 'mm')):
+        moved = Pose(factor * pose.position, pose.rotation)
+        hint = '--mm reads millimeters' if wrong == 'mm' else 'without --mm they are in m'
+        text = f'are in {wrong}, not in {right}: {hint}'
+        yield LikelyMistake('unit', f'positions {text}'), given._replace(pose=moved)
+        yield LikelyMistake('unit', f'leg positions {text}'), given._replace(
+            lengths=factor * lengths)
+        yield LikelyMistake('unit', f'positions and leg positions {text}'), given._replace(
+            lengths=factor * lengths, pose=moved)
+    q = to_quaternion(pose.rotation)
+    yield LikelyMistake('quaternion', 'quaternions have w first, not last'), given._replace(
+        pose=Pose.from_quaternion(pose.position, np.roll(q, -1, axis=1)))
+    yield LikelyMistake(
+        'inverse', 'the poses are those of the base in the platform frame: the inverse is needed',
+    ), given._replace(pose=inverse(pose))
+    yield LikelyMistake(
+        'inverse', 'the rotations are those of the base in the platform frame: the inverse is '
+        'needed'), given._replace(pose=Pose(pose.position, np.swapaxes(pose.rotation, 1, 2)))
+    yield LikelyMistake('sign', 'leg positions have the opposite sign: they must increase as a '
+                        'leg extends'), given._replace(lengths=-lengths)
+    joints = parameters['joints']
+    for a, b in combinations(range(6), 2):
+        order = [{a: b, b: a}.get(leg, leg) for leg in range(6)]
+        yield LikelyMistake('swapped', f'{joints[a]} and {joints[b]} are swapped'), given._replace(
+            lengths=lengths[:, order])
+    for turn in range(6):
+        rolled = [*range(turn, 6), *range(turn)]
+        for order in (rolled, rolled[::-1]):
+            names = ', '.join(joints[n] for n in order)
+            yield LikelyMistake('swapped', f'the legs are in another order: {names}'), (
+                given._replace(lengths=lengths[:, order]))
+
+
+def _misfit(parameters: Parameters, equations: Equations, unknown_frames: bool) -> float:
+    """Return how far lengths are from those of the file, up to a constant, by their spread."""
+    try:
+        frames = find_frames(parameters, equations) if unknown_frames else SAME
+    except StewartError:
+        return math.inf
+
+    def spread(lengths: Array) -> float:
+        return float(np.linalg.norm(np.median(np.abs(lengths - np.median(lengths, 0)), axis=0)))
+
+    r = equations._replace(frames=frames).at(values_of(parameters, frames)).residuals
+    whole = max(spread(equations.lengths), spread(r + equations.lengths))
+    return spread(r) / whole if whole > 0.0 else math.inf
+
+
+def lack_of_fit(parameters: Parameters, equations: Equations, found: Outliers,
+                whitened: Array | None, unknowns: int, fixed: Flags,
+                ) -> tuple[LikelyMistake, ...]:
+    """
+    Return the causes of residuals that are more than noise, the likeliest first.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the file.
+    equations : Equations
+        N poses that are not outliers.
+    found : Outliers
+        A fit to them with equal weights.
+    whitened : (N, 6) or None
+        Residuals by the noise that was given.
+    unknowns : int
+        Number of directions that were determined.
+    fixed : (42,)
+        Which numbers keep the file's values.
+
+    """
+    from scipy.stats import chi2, f
+
+    lin, joints = equations.at(found.values), parameters['joints']
+    r, count = lin.residuals, len(lin.residuals)
+    pose = np.concatenate([equations.pose.position, to_euler(equations.pose.rotation)], axis=1)
+    pose = (pose - pose.mean(axis=0)) / np.maximum(pose.std(axis=0), 1e-12)
+    squares = np.stack([pose[:, a] * pose[:, b] for a in range(6) for b in range(a, 6)], axis=1)
+    # Lengths are nearly quadratic in the pose themselves: cubic terms, too.
+    of_pose = np.concatenate([squares, pose ** 3], axis=1)
+    causes: dict[str, list[tuple[float, str]]] = {}
+    for leg, joint in enumerate(joints):
+        own, held = (each[:, np.abs(each).max(axis=0, initial=0.0) > 0.0] for each in (
+            lin.derivatives[:, leg, :GEOMETRY][:, which] for which in (~fixed, fixed)))
+        for what, terms in ((_FIXED, held), (_SCALE, equations.lengths[:, leg:leg + 1]),
+                            (_POSE, of_pose)):
+            gain, slope = _explained(r[:, leg], own, terms)
+            if gain > 0.0:
+                name = f'{joint} ({-slope:+.2%})' if what == _SCALE else joint
+                causes.setdefault(what, []).append((gain, name))
+                break
+    free = max(count - unknowns / 6.0, 1.0)
+    deviations = np.sqrt(np.sum(r ** 2, axis=0) / free)
+    usual = float(np.median(deviations))
+    named = [name.split(' ')[0] for each in causes.values() for _, name in each]
+    for deviation, joint in zip(deviations, joints, strict=True):
+        ratio = deviation / max(usual, 1e-300)
+        if joint not in named and ratio > _LARGE and f.sf(ratio ** 2, free, free) < _PROBABILITY:
+            causes.setdefault(_PLAY, []).append((
+                float(free * deviation ** 2), f'{joint} (residuals of {1e6 * deviation:.3g} um, '
+                f'{1e6 * usual:.3g} um in the median leg)'))
+    if whitened is not None and not causes:
+        rest = max(whitened.size - unknowns, 1)
+        square = float(np.sum(whitened ** 2))
+        if chi2.sf(square, rest) < _PROBABILITY:
+            causes[_NOISE] = [(0.0, f'{math.sqrt(square / rest):.2g} times')]
+    order = sorted(causes, key=lambda what: -sum(gain for gain, _ in causes[what]))
+    return tuple(LikelyMistake(what, _LACKS[what].format(
+        ', '.join(name for _, name in sorted(causes[what], reverse=True)))) for what in order)
+
+
+def _explained(r: Array, own: Array, terms: Array) -> tuple[float, float]:
+    """Return the squared residual that terms explain if it is significant, and the last slope."""
+    from scipy.stats import f
+
+    if not terms.size or len(r) < own.shape[1] + _FEWEST * terms.shape[1]:
+        return 0.0, 0.0
+    both = np.concatenate([own, terms], axis=1)
+    both = both / np.maximum(np.linalg.norm(both, axis=0), 1e-300)
+    lefts, ranks, slope = [], [], 0.0
+    for each in (both[:, :own.shape[1]], both):
+        x, _, rank, _ = np.linalg.lstsq(each, r, rcond=1e-9)
+        lefts.append(float(np.sum((r - each @ x) ** 2)))
+        ranks.append(int(rank))
+        slope = float(x[-1] / max(np.linalg.norm(terms[:, -1]), 1e-300))
+    more, rest = ranks[1] - ranks[0], len(r) - ranks[1]
+    if more < 1 or rest < 1:
+        return 0.0, 0.0
+    ratio = (lefts[0] - lefts[1]) / more / max(lefts[1] / rest, 1e-24)
+    return (lefts[0] - lefts[1] if f.sf(ratio, more, rest) < _PROBABILITY else 0.0), slope
+
+
+def not_identified(joints: Sequence[str], shares: Array, largest: float, equations: Equations,
+                   size: float) -> str | None:
+    """Return which numbers the poses cannot distinguish and why, in words; None: all of them."""
+    unclear = shares[:GEOMETRY] > largest
+    if not unclear.any():
+        return None
+    kinds = []
+    for part, name in ((BASE, 'base joints'), (PLATFORM, 'platform joints')):
+        of_axes: dict[tuple[bool, ...], list[str]] = {}
+        for axis, each in zip(('x', 'y', 'heights (z)'), unclear[part].reshape(6, 3).T,
+                              strict=True):
+            of_axes.setdefault(tuple(each.tolist()), []).append(axis)
+        for of_legs, axes in of_axes.items():
+            if any(of_legs):
+                legs = '' if all(of_legs) else ' of ' + _listed(
+                    [joint for joint, has in zip(joints, of_legs, strict=True) if has])
+                kinds.append(f'{name}{legs}' if len(axes) == 3 else
+                             f'{_listed(axes)} of the {name}{legs}')
+    kinds += ['zero lengths'] if unclear[ZERO].any() else []
+    middle = equations.pose.rotation.mean(axis=0)
+    u, _, v = np.linalg.svd(middle)
+    turns = 2.0 * to_quaternion(equations.pose.rotation @ (u @ v).T)[:, :3]
+    spreads, directions = np.linalg.eigh(turns.T @ turns / len(turns))
+    turned = int(np.count_nonzero(np.sqrt(np.maximum(spreads, 0.0)) > 0.01))
+    moved = np.linalg.svd(equations.pose.position - equations.pose.position.mean(axis=0),
+                          compute_uv=False) / math.sqrt(len(turns))
+    lines = int(np.count_nonzero(moved > 0.01 * size))
+    if turned == 0:
+        motion = 'translations only' if lines else 'one and the same pose'
+        more = 'add poses that are turned about two axes or more'
+    elif turned == 1:
+        along = directions[:, -1]
+        near = int(np.argmax(np.abs(along)))
+        name = ('yaw' if near == 2 else f'turns about {"xyz"[near]}') if abs(
+            along[near]) > 0.99 else f'turns about ({", ".join(f"{x:.2f}" for x in along)})'
+        motion, more = f'{name} only', 'add poses that are turned about another axis'
+    elif lines < 3:
+        motion = ('a fixed position', 'positions on a line', 'positions in a plane')[lines]
+        more = 'add poses at other positions'
+    else:
+        motion, more = 'the poses vary too little for their residuals', (
+            'larger motions and more poses identify more')
+    return f'{motion}: {_listed(kinds)} cannot be distinguished; {more}'
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ' and '.join([', '.join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+
+
+def _mm(meters: float) -> str:
+    return f'{1e3 * meters:.3g}'

@@ -1,0 +1,138 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Measured legs and poses from a CSV file whose first line names the columns."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import shown, shown_name, StewartError
+from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.frames.rotation import is_unit
+from stewart_dynamics.whole_file import read_text
+
+POSITION = ('x', 'y', 'z')
+QUATERNION = ('qx', 'qy', 'qz', 'qw')
+ANGLES = ('alpha', 'beta', 'gamma')
+# Largest size of a file [bytes], and number of its poses.
+_LARGEST, _MOST = 64 << 20, 20_000
+# A number of a larger size would overflow when squared.
+_END = 1e100
+
+
+class MeasuredPoses(NamedTuple):
+    """N measured poses."""
+
+    lengths: Array
+    """(N, 6) positions of the legs [m]."""
+    poses: Pose
+    names: tuple[str, ...]
+    """Of each pose, such as ``row 2``."""
+    angles: Array | None = None
+    """(N, 3) angles as they were read, if the poses were given by angles."""
+
+
+def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
+               degrees: bool = False) -> MeasuredPoses:
+    """
+    Return the poses of a file with the columns of ``joints``, x, y, z and the rotation.
+
+    The rotation is a quaternion, qx, qy, qz, qw, or the angles alpha, beta, gamma of
+    Rz(gamma) Ry(beta) Rx(alpha). Other columns are ignored.
+
+    Parameters
+    ----------
+    path : Path
+        Columns are separated by commas, semicolons or tabs; row 1 has their names.
+    joints : tuple of str
+        Names of the legs.
+    millimeters, degrees : bool
+        Units of positions and leg positions, and of angles, instead of m and rad.
+
+    Raises
+    ------
+    StewartError
+        In one line: the file cannot be read, lacks a column, or has a value that is not a number.
+
+    """
+    text = read_text(path, _LARGEST, StewartError).lstrip('\ufeff')
+    first = text.partition('\n')[0]
+    separator = next((each for each in (';', '\t') if each in first), ',')
+    try:
+        rows = [row for row in csv.reader(io.StringIO(text), delimiter=separator, strict=True)
+                if any(cell.strip() for cell in row)]
+    except csv.Error as exc:
+        raise StewartError(f'{path}: not a CSV file: {exc}') from exc
+    if not rows:
+        raise StewartError(f'{path}: is empty: row 1 must name the columns')
+    header = [cell.strip() for cell in rows[0]]
+    rotation = QUATERNION if set(QUATERNION) & set(header) else ANGLES
+    wanted = (*joints, *POSITION, *rotation)
+    missing = [name for name in wanted if name not in header]
+    if missing:
+        raise StewartError(
+            f'{path}: has no column {", ".join(missing)}; it has {shown(header)}: needed are '
+            f'{", ".join((*joints, *POSITION))} and {", ".join(QUATERNION)}, or '
+            f'{", ".join(ANGLES)}')
+    double = [name for name in wanted if header.count(name) > 1]
+    if double:
+        raise StewartError(f'{path}: column {double[0]}: is there {header.count(double[0])} times')
+    if len(rows) - 1 > _MOST:
+        raise StewartError(f'{path}: {len(rows) - 1} poses: at most {_MOST}')
+    places = [header.index(name) for name in wanted]
+    values = np.empty((len(rows) - 1, len(wanted)))
+    for n, row in enumerate(rows[1:]):
+        if len(row) != len(header):
+            raise StewartError(f'{path}: row {n + 2}: has {len(row)} cells, row 1 has '
+                               f'{len(header)}')
+        for column, place in enumerate(places):
+            values[n, column] = _number(row[place], f'{path}: row {n + 2}: '
+                                        f'{shown_name(header[place])}')
+    unit = 1e-3 if millimeters else 1.0
+    lengths, positions, turns = unit * values[:, :6], unit * values[:, 6:9], values[:, 9:]
+    names = tuple(f'row {n + 2}' for n in range(len(values)))
+    if rotation == ANGLES:
+        return MeasuredPoses(lengths, Pose.from_euler(positions, turns, degrees=degrees), names,
+                             turns)
+    sizes = np.linalg.norm(turns, axis=1)
+    for n in np.flatnonzero(~is_unit(sizes))[:1]:
+        raise StewartError(f'{path}: row {n + 2}: quaternion of length {sizes[n]:.6g}: must be 1 '
+                           'within 0.001')
+    return MeasuredPoses(lengths, Pose.from_quaternion(positions, turns), names)
+
+
+def _number(cell: str, where: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError as exc:
+        raise StewartError(f'{where}: {shown(cell)}: must be a number') from exc
+    if not abs(value) < _END:
+        raise StewartError(f'{where}: {shown(cell)}: must be a finite number')
+    return value
+
+
+def poses_csv(joints: tuple[str, ...], lengths: Array, poses: Pose) -> str:
+    """Return poses and leg positions as text that ``read_poses`` reads."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator='\n')
+    table.writerow([*joints, *POSITION, *QUATERNION])
+    table.writerows(np.concatenate([lengths, poses.position, poses.quaternion], axis=1).tolist())
+    return text.getvalue()

@@ -1,0 +1,143 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Content of calibration.json, see docs/calibration.md, and of the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime, timezone
+import math
+import textwrap
+from typing import Any
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.calibration.calibrate import Calibration
+from stewart_dynamics.calibration.frames import PoseErrors, target_in_platform
+from stewart_dynamics.calibration.measured_poses import MeasuredPoses
+from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+from stewart_dynamics.replay.fingerprint import plain_parameters, software
+from stewart_dynamics.replay.statements import plural
+from stewart_dynamics.reporting.estimates import (
+    combined, estimate, FIXED, IDENTIFIED, NOT_IDENTIFIABLE, not_identifiable_lines, table_lines)
+
+# Version of calibration.json; increased when the meaning of a key changes.
+VERSION = 1
+
+
+def document(found: Calibration, measured: MeasuredPoses, source: str, options: Mapping[str, Any],
+             ) -> dict[str, Any]:
+    """Return the content of calibration.json."""
+    what, joints = found.identifiability, found.parameters['joints']
+    lack = found.lack_of_fit
+    units = ['m'] * len(found.names)
+    return {
+        'version': VERSION, 'software': software(),
+        'date': datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ'),
+        'poses': {'source': source, 'read': len(measured.names), 'used': found.poses},
+        'options': dict(options),
+        'parameters': [
+            estimate(name, 'm', start, value, state, error, share, False, not lack)
+            for name, start, value, state, error, share in zip(
+                found.names, found.start, found.values, found.states, found.errors, what.shares,
+                strict=True)],
+        'combinations': combined(what, found.names, units, found.values, found.covariance),
+        'rank': what.rank, 'unknowns': len(found.names) - found.states.count(FIXED),
+        'singular_values': what.singular_values.tolist(),
+        'not_identified': found.not_identified,
+        'noise': {'given': found.noise_given, 'length_m': found.noise.length,
+                  'position_m': found.noise.position, 'rotation_rad': found.noise.rotation},
+        'frames': None if found.frames is None else {
+            'device_in_base': _pose(found.frames.device),
+            'target_in_platform': _pose(target_in_platform(found.frames))},
+        'residuals': {'legs': {joint: {'before_rms_m': float(before), 'after_rms_m': float(after)}
+                               for joint, before, after in zip(
+                                   joints, found.before, found.after, strict=True)},
+                      'before_rms_m': _rms(found.before), 'after_rms_m': _rms(found.after)},
+        'outliers': [{'pose': measured.names[each.pose], 'legs': [joints[n] for n in each.legs],
+                      'residual_m': each.residual} for each in found.outliers],
+        'validation': None if found.validation is None else {
+            'poses': len(found.validation.after.position),
+            'before': _errors(found.validation.before), 'after': _errors(found.validation.after)},
+        'lack_of_fit': None if not lack else {
+            'cause': lack[0].what, 'text': '; '.join(each.text for each in lack),
+            'intervals': 'none', 'causes': [each._asdict() for each in lack]},
+        'likely_mistakes': [each._asdict() for each in found.likely],
+        'calibrated': plain_parameters(found.parameters)}
+
+
+def _pose(pose: Pose) -> dict[str, list[float]]:
+    return {'position_m': pose.position.tolist(), 'quaternion': pose.quaternion.tolist()}
+
+
+def _rms(values: Array) -> float:
+    return math.sqrt(float((values ** 2).mean()))
+
+
+def _errors(errors: PoseErrors) -> dict[str, float]:
+    return {'position_rms_m': errors.rms[0], 'position_max_m': errors.largest[0],
+            'rotation_rms_rad': errors.rms[1], 'rotation_max_rad': errors.largest[1]}
+
+
+def outlier_text(each: Mapping[str, Any]) -> str:
+    """Return a pose that was left out, in words."""
+    legs = 'all legs' if len(each['legs']) == 6 else ', '.join(each['legs'])
+    return f'{each["pose"]}: left out, {legs} off by up to {1e3 * each["residual_m"]:.3g} mm'
+
+
+def validation_text(held: Mapping[str, Any] | None) -> str:
+    """Return the errors of held-out poses in words."""
+    if held is None:
+        return 'not validated: too few poses to hold some out'
+    before, after = (
+        f'{1e3 * held[key]["position_rms_m"]:.3g} mm and '
+        f'{1e3 * held[key]["rotation_rms_rad"]:.3g} mrad' for key in ('before', 'after'))
+    return (f'pose errors on {plural(held["poses"], "held-out pose")}, RMS: {before} by the file, '
+            f'{after} by a fit to the others')
+
+
+def result_text(result: Mapping[str, Any]) -> str:
+    """Return the content of calibration.json as text for the terminal."""
+    lack, noise = result['lack_of_fit'], result['noise']
+    lines = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
+    lines += [
+        validation_text(result['validation']),
+        f'residuals of the legs, RMS: {1e6 * result["residuals"]["before_rms_m"]:.3g} um by the '
+        f'file, {1e6 * result["residuals"]["after_rms_m"]:.3g} um calibrated',
+        f'noise {"as given" if noise["given"] else "estimated"}: leg positions '
+        f'{1e6 * noise["length_m"]:.2g} um, poses {1e6 * noise["position_m"]:.2g} um and '
+        f'{1e6 * noise["rotation_rad"]:.2g} urad',
+        *map(outlier_text, result['outliers']), '', *table_lines(result['parameters'])]
+    if result['not_identified']:
+        lines += ['', *textwrap.wrap(result['not_identified'], 100)]
+    return '\n'.join([*lines, *not_identifiable_lines(result, 'poses')])
+
+
+def comments(result: Mapping[str, Any]) -> dict[str, str]:
+    """Return the comments of calibrated.yaml by parameter: date and largest interval."""
+    texts = {}
+    for name in dict.fromkeys('.'.join(each['name'].split('.')[:2])
+                              for each in result['parameters']):
+        each = [row for row in result['parameters'] if row['name'].startswith(f'{name}.')]
+        halves = [TWO_SIDED * row['standard_error'] for row in each
+                  if row['state'] == IDENTIFIED and row['interval']]
+        kept = sum(row['state'] in (FIXED, NOT_IDENTIFIABLE) for row in each)
+        texts[name] = ', '.join([
+            f'calibrated {result["date"][:10]}' if kept < len(each) else 'kept',
+            *([f'95 %: within +-{max(halves):.2g} m'] if halves else []),
+            *([f'{len(each) - len(halves) - kept} without an interval of its own']
+              if 0 < len(halves) < len(each) - kept else []),
+            *([f'{kept} kept'] if 0 < kept < len(each) else [])])
+    return texts

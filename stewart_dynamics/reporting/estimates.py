@@ -1,0 +1,197 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Estimated parameters as results show them: states, intervals, combinations; as JSON and as text.
+
+Identification and calibration describe their estimates alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.least_squares import (
+    combinations, Identifiability, LEAST_SHARE, TWO_SIDED)
+
+IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE = 'identified', 'in_combination', 'not_identifiable'
+FIXED = 'fixed'
+"""Held at the file's value by an option."""
+
+HOLD_OUT = 0.2
+"""Share of the data that validates a fit to the rest, by default."""
+_WITHOUT_VALUE = {IN_COMBINATION: 'only in a combination', FIXED: 'fixed',
+                  NOT_IDENTIFIABLE: 'kept: not identifiable'}
+# Numbers with more decimals have an exponent.
+_MOST_DECIMALS = 9
+
+
+class LikelyMistake(NamedTuple):
+    """A likely mistake in the data, or a likely cause of a lack of fit."""
+
+    what: str
+    """Keyword for programs, as sign, unit, swapped."""
+    text: str
+    """Description in one line."""
+
+
+def states_of(what: Identifiability) -> list[str]:
+    """Return the state of each parameter."""
+    return [IDENTIFIED if known else IN_COMBINATION if part >= LEAST_SHARE else NOT_IDENTIFIABLE
+            for known, part in zip(what.identifiable, what.known_shares, strict=True)]
+
+
+def estimate(name: str, unit: str, start: float, value: float, state: str, error: float,
+             share: float, at_bound: bool, sure: bool) -> dict[str, Any]:
+    """
+    Return an estimated parameter for JSON.
+
+    Parameters
+    ----------
+    name, unit, state : str
+        Of the parameter.
+    start, value : float
+        The file's value and the estimate.
+    error, share : float
+        Standard error; share of the unknown directions.
+    at_bound, sure : bool
+        Whether the value is at a bound; whether it has an interval, if it is identified.
+
+    """
+    return {
+        'name': name, 'unit': unit, 'file': float(start), 'value': float(value),
+        'state': state, 'standard_error': (
+            float(error) if state != NOT_IDENTIFIABLE and math.isfinite(error) else None),
+        'interval': ([float(value - TWO_SIDED * error), float(value + TWO_SIDED * error)]
+                     if state == IDENTIFIED and sure else None),
+        'unknown_share': float(share), 'at_bound': at_bound}
+
+
+def combined(what: Identifiability, names: Sequence[str], units: Sequence[str], values: Array,
+             covariance: Array) -> list[dict[str, Any]]:
+    """Return the combinations of parameters that are identifiable, for JSON."""
+    result = []
+    for each in combinations(what):
+        places = list(each.parameters)
+        c = each.coefficients
+        variance = float(c @ covariance[np.ix_(places, places)] @ c)
+        result.append({
+            'parameters': [names[n] for n in places], 'coefficients': c.tolist(),
+            'unit': units[places[0]], 'value': float(c @ values[places]),
+            'standard_error': math.sqrt(max(variance, 0.0)),
+            'words': in_words(c, [names[n] for n in places])})
+    return result
+
+
+def justified(values: Array, errors: Array) -> Array:
+    """Return values rounded to a hundredth of their standard errors, finite ones above zero."""
+    result = values.copy()
+    for n, (value, error) in enumerate(zip(values, errors, strict=True)):
+        if error > 0.0 and math.isfinite(error):
+            result[n] = round(value, max(0, 2 - math.floor(math.log10(error))))
+    return result
+
+
+def in_words(coefficients: Array, names: Sequence[str]) -> str:
+    """Return a combination of parameters as a sum in text form."""
+    text = ''
+    for c, name in zip(coefficients, names, strict=True):
+        sign = ' - ' if c < 0.0 else ' + '
+        size = f'{abs(c):.3g} '
+        text += (sign if text else '-' if c < 0.0 else '') + ('' if size == '1 ' else size) + name
+    return text
+
+
+def table_lines(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the table of estimates for the terminal."""
+    name_width = max([len(each['name']) for each in parameters] + [9])
+    lines = [f'{"parameter":<{name_width}} {"file":>10} {"identified":>11} {"95 % interval":>24}'
+             '  unit']
+    for each in parameters:
+        if each['state'] == IDENTIFIED:
+            error = each['standard_error']
+            shown = f'{rounded(each["value"], error):>11}', 'none: lack of fit'
+            if each['interval']:
+                shown = shown[0], ' .. '.join(rounded(end, error) for end in each['interval'])
+            remark = '  at its bound' if each['at_bound'] else ''
+        else:
+            shown, remark = (f'{"-":>11}', _WITHOUT_VALUE[each['state']]), ''
+        lines.append(f'{each["name"]:<{name_width}} {each["file"]:>10.5g} {shown[0]} '
+                     f'{shown[1]:>24}  {each["unit"]}{remark}')
+    return lines
+
+
+def not_identifiable_lines(result: Mapping[str, Any], source: str) -> list[str]:
+    """Return the parameters and combinations that the motion or the poses do not identify."""
+    unknown = [each['name'] for each in result['parameters'] if each['state'] == NOT_IDENTIFIABLE]
+    lines = []
+    if unknown:
+        lines += ['', f"not identifiable from the {source} (the file's values are kept):",
+                  *(f'  {name}' for name in grouped(unknown))]
+    if result['combinations']:
+        lines += ['', 'identifiable only in combinations:']
+        for each in result['combinations']:
+            size = TWO_SIDED * each['standard_error']
+            value, half = (rounded(number, each['standard_error'])
+                           for number in (each['value'], size))
+            lines.append(f'  {each["words"]} = {value} +- {half} {each["unit"]}')
+    return lines
+
+
+def rounded(value: float, error: float) -> str:
+    """Return a number as text with two digits of its standard error."""
+    digits = decimals(error)
+    if value == 0.0 or error == 0.0 or (digits < _MOST_DECIMALS and abs(value) < 1e9):
+        return f'{value:.{digits}f}'
+    places = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
+    return f'{value:.{max(0, places)}e}'
+
+
+def decimals(error: float) -> int:
+    """Return the number of decimals that show two digits of a standard error."""
+    digits = 0
+    while digits < _MOST_DECIMALS and error * 10 ** digits < 1.95:
+        digits += 1
+    return digits
+
+
+def grouped(names: Sequence[str]) -> list[str]:
+    """Return names; those that differ only in their last part share a line."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        begin, _, end = name.rpartition('.')
+        groups.setdefault(begin, []).append(end)
+    return [f'{begin}: {" ".join(ends)}' if begin else ' '.join(ends)
+            for begin, ends in groups.items()]
+
+
+def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of the template ``estimates.html``."""
+    def drawn(each: Mapping[str, Any]) -> dict[str, Any]:
+        error = each['standard_error']
+        return {**each, 'half': None if error is None else TWO_SIDED * error,
+                'digits': decimals(error) if error else 4}
+
+    def named(state: str) -> list[str]:
+        return grouped([each['name'] for each in result['parameters'] if each['state'] == state])
+
+    return {'parameters': [drawn(each) for each in result['parameters']],
+            'combinations': [drawn(each) for each in result['combinations']],
+            'identified': sum(each['state'] == IDENTIFIED for each in result['parameters']),
+            'combined': named(IN_COMBINATION), 'not_identifiable': named(NOT_IDENTIFIABLE)}

@@ -1,0 +1,162 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""stewart_calibrate: its input, its files, its page, and its messages about bad input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from running import PLATFORM
+from stewart_dynamics import Parameters, Pose, StewartError
+from stewart_dynamics.calibration import main
+from stewart_dynamics.calibration.measured_poses import poses_csv, read_poses
+from stewart_dynamics.calibration.noise import Noise
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+from test_calibration import HEXAPOD, measured, random_poses, true_values
+
+JOINTS = HEXAPOD.parameters['joints']
+
+
+@pytest.fixture(scope='module')
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of 40 poses with noise, of which row 5 is an outlier."""
+    rng = np.random.default_rng(0)
+    lengths, seen = measured(rng, true_values(rng), random_poses(rng, 40), Noise(2e-6, 1e-5, 1e-5))
+    lengths[3] += 0.01
+    path = tmp_path_factory.mktemp('poses') / 'poses.csv'
+    path.write_text(poses_csv(JOINTS, lengths, seen))
+    return path
+
+
+def test_files_and_page(table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / 'out'
+    arguments = [str(table), '--params', str(PLATFORM), '--output', str(output)]
+    assert main([*arguments, '--strict']) == 0
+    shown = capsys.readouterr().out
+    assert 'row 5: left out, all legs off by up to 1' in shown
+    result = json.loads((output / 'calibration.json').read_text())
+    true = true_values(np.random.default_rng(0))
+    names = [each['name'] for each in result['parameters']]
+    assert names[:4] == [*(f'geometry.base_joints.leg_1.{axis}' for axis in 'xyz'),
+                         'geometry.base_joints.leg_2.x']
+    assert names[18] == 'geometry.platform_joints.leg_1.x'
+    assert names[36:] == [f'geometry.zero_length.leg_{n}' for n in range(1, 7)]
+    inside = [each['interval'][0] < value < each['interval'][1]
+              for each, value in zip(result['parameters'], true, strict=False)]
+    assert sum(inside) > 36
+    assert result['validation']['after']['position_rms_m'] < 3e-5 < 1e-3 < (
+        result['validation']['before']['position_rms_m'])
+    calibrated = Parameters.from_yaml(output / 'calibrated.yaml')
+    assert calibrated['platform.mass'] == HEXAPOD.parameters['platform.mass']
+    values = np.concatenate([
+        calibrated[f'geometry.{name}'].ravel()
+        for name in ('base_joints', 'platform_joints', 'zero_length')])
+    assert np.abs(values - [each['value'] for each in result['parameters']]).max() < 1e-7
+    page = (output / 'report.html').read_text()
+    assert page.count('<svg') == 3 and 'row 5: left out' in page and 'nan' not in page
+    # Results are not replaced without being told to.
+    assert main(arguments) == 2
+    assert 'exists already' in capsys.readouterr().err
+    assert main([*arguments, '--force', '--no-report', '--fixed', 'zero_length']) == 0
+    assert not (output / 'report.html').exists()
+
+
+def test_units_and_angles(table: Path, tmp_path: Path) -> None:
+    given = read_poses(table, JOINTS)
+    angles = np.random.default_rng(1).uniform(-0.3, 0.3, (40, 3))
+    path = tmp_path / 'angles.csv'
+    lines = [';'.join(['note', *reversed(JOINTS), 'z', 'y', 'x', 'gamma', 'alpha', 'beta'])]
+    for lengths, position, turn in zip(1e3 * given.lengths, 1e3 * given.poses.position,
+                                       np.degrees(angles), strict=True):
+        lines.append(';'.join(['a b', *map(repr, map(float, (
+            *lengths[::-1], *position[::-1], turn[2], turn[0], turn[1])))]))
+    path.write_text('\ufeff' + '\r\n'.join(lines) + '\r\n\r\n')
+    found = read_poses(path, JOINTS, millimeters=True, degrees=True)
+    np.testing.assert_allclose(found.lengths, given.lengths, atol=1e-15)
+    np.testing.assert_allclose(found.poses.position, given.poses.position, atol=1e-15)
+    np.testing.assert_allclose(found.poses.rotation, from_euler(angles), atol=1e-15)
+    assert found.names[:2] == ('row 2', 'row 3')
+
+
+def edited(change: Callable[[list[str]], list[str]], table: Path, tmp_path: Path) -> Path:
+    path = tmp_path / 'edited.csv'
+    path.write_text('\n'.join(change(table.read_text().splitlines())) + '\n')
+    return path
+
+
+@pytest.mark.parametrize(('change', 'words'), [
+    (lambda rows: [], 'is empty: row 1 must name the columns'),
+    (lambda rows: rows[:1], '0 poses: at least 8 are needed'),
+    (lambda rows: [rows[0].replace('leg_2', 'leg2'), *rows[1:]], 'has no column leg_2; it has'),
+    (lambda rows: [rows[0].replace('qw', 'q4'), *rows[1:]], 'has no column qw'),
+    (lambda rows: [rows[0].replace('leg_2', 'leg_1'), *rows[1:]], 'has no column leg_2'),
+    (lambda rows: [f'{rows[0]},x', *(f'{row},1' for row in rows[1:])],
+     'column x: is there 2 times'),
+    (lambda rows: [*rows[:3], rows[3] + ',1', *rows[4:]], 'row 4: has 14 cells, row 1 has 13'),
+    (lambda rows: [*rows[:3], 'nan' + rows[3][rows[3].index(','):], *rows[4:]],
+     "row 4: leg_1: 'nan': must be a finite number"),
+    (lambda rows: [*rows[:3], '0,5' + rows[3][rows[3].index(','):], *rows[4:]], 'row 4: has 14'),
+    (lambda rows: [*rows[:3], 'long' + rows[3][rows[3].index(','):], *rows[4:]],
+     "row 4: leg_1: 'long': must be a number"),
+    (lambda rows: [*rows[:3], rows[3].rpartition(',')[0] + ',3.0', *rows[4:]],
+     'row 4: quaternion of length 3'),
+    (lambda rows: [rows[0], *[rows[1]] * 20], 'no number is identifiable by itself')])
+def test_bad_files_are_rejected_in_one_line(
+        change: Callable[[list[str]], list[str]], words: str, table: Path, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    path = edited(change, table, tmp_path)
+    output = tmp_path / 'out'
+    assert main([str(path), '--params', str(PLATFORM), '--output', str(output)]) == 2
+    error = capsys.readouterr().err
+    assert words in error and error.count('\n') == 1 and not output.exists()
+
+
+def test_other_bad_input(table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'binary').write_bytes(b'\xff\x00' * 99)
+    for path in (tmp_path / 'missing.csv', tmp_path, tmp_path / 'binary', Path('/dev/zero')):
+        assert main([str(path), '--params', str(PLATFORM)]) == 2
+        error = capsys.readouterr().err
+        assert 'cannot be read' in error and error.count('\n') == 1
+    for option in (['--fixed', ','], ['--noise', '1', '2'], ['--hold-out', '0.9'],
+                   ['--frames', 'other'], []):
+        with pytest.raises(SystemExit, match='2'):
+            main([*([str(table)] if option else []), '--params', str(PLATFORM), *option])
+    capsys.readouterr()
+    assert main([str(table), '--params', str(PLATFORM), '--fixed', 'leg_7']) == 2
+    assert 'leg_7: not a part of the geometry' in capsys.readouterr().err
+    assert main([str(table), '--params', str(PLATFORM), '--mm']) == 2
+    assert 'are in m, not in mm: without --mm' in capsys.readouterr().err
+
+
+def test_degrees_read_as_radians_are_named(table: Path, tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    angles = rng.uniform(-0.3, 0.3, (40, 3))
+    home = random_poses(rng, 40)
+    lengths, seen = measured(rng, true_values(rng), Pose(home.position, from_euler(angles)))
+    path = tmp_path / 'degrees.csv'
+    rows = np.concatenate([lengths, seen.position, np.degrees(angles)], axis=1)
+    path.write_text('\n'.join([','.join([*JOINTS, 'x', 'y', 'z', 'alpha', 'beta', 'gamma']), *(
+        ','.join(map(repr, row)) for row in rows.tolist())]))
+    from stewart_dynamics.calibration.calibration_options import CalibrationOptions
+    from stewart_dynamics.calibration.one_run import run
+    with pytest.raises(StewartError, match='angles are in degrees, not in radians: --degrees'):
+        run(read_poses(path, JOINTS), str(path), HEXAPOD.parameters, tmp_path / 'out',
+            CalibrationOptions())
+    assert main([str(path), '--params', str(PLATFORM), '--degrees', '--output',
+                 str(tmp_path / 'out')]) == 0

@@ -1,0 +1,350 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Calibration: geometry recovered, intervals that hold, and what the poses cannot identify."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.testing import assert_allclose
+import pytest
+from running import PLATFORM
+from stewart_dynamics import (
+    calibrate, MotionError, ParameterError, Parameters, Pose, StewartError, StewartPlatform)
+from stewart_dynamics.calibration.equations import (
+    ALL, Equations, Frames, GEOMETRY, inverse, product, values_of, with_geometry)
+from stewart_dynamics.calibration.fit import fit, Unknowns
+from stewart_dynamics.calibration.frames import find_frames, target_in_platform
+from stewart_dynamics.calibration.noise import Noise
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+
+# M. J. Nategh, M. M. Agheli, "A total solution to kinematic calibration of hexapod machine tools
+# with a minimum number of measurement configurations and superior accuracies", Int. J. Machine
+# Tools and Manufacture 49(15), 2009, doi:10.1016/j.ijmachtools.2009.08.009, tables 1 and 2 [mm]:
+# platform joint, base joint, zero length of each leg.
+NOMINAL = np.array([
+    [92.1597, 84.4488, 0, 305.4001, 111.1565, 0, 604.8652],
+    [27.055, 122.037, 0, -56.4357, 320.0625, 0, 604.8652],
+    [-119.2146, 37.5882, 0, -248.9644, 208.9060, 0, 604.8652],
+    [-119.2146, -37.5882, 0, -248.9644, -208.9060, 0, 604.8652],
+    [27.055, -122.037, 0, -56.4357, -320.0625, 0, 604.8652],
+    [92.1597, -84.4488, 0, 305.4001, -111.1565, 0, 604.8652]])
+REAL = np.array([
+    [96.6610, 81.7602, 1.0684, 305.2599, 115.0695, 2.6210, 604.4299],
+    [22.2476, 125.2511, -0.5530, -55.2814, 322.9819, 4.2181, 607.2473],
+    [-122.4519, 36.6453, 4.3547, -244.7954, 208.0087, 3.9365, 600.4441],
+    [-120.6859, -34.4565, -4.9014, -252.5755, -211.8783, -3.0128, 605.9031],
+    [24.7769, -125.0489, -4.8473, -53.9678, -320.6115, 4.3181, 604.5251],
+    [91.3462, -80.9866, 0.2515, 302.4266, -109.4351, 3.3812, 600.0616]])
+
+EXACT = Noise(0.0, 0.0, 0.0)
+HEXAPOD = StewartPlatform.from_yaml(PLATFORM)
+FRAMES = Frames(Pose([1.0, 2.0, 0.3], from_euler([0.3, 0.2, 2.0])),
+                Pose([0.1, 0.2, 0.3], from_euler([0.5, -0.2, 1.0])))
+
+
+def published(table: np.ndarray) -> np.ndarray:
+    """Return the values of a table [m]."""
+    return np.concatenate([1e-3 * table[:, 3:6].ravel(), 1e-3 * table[:, :3].ravel(),
+                           1e-3 * table[:, 6], np.zeros(12)])
+
+
+def random_poses(rng: np.random.Generator, count: int, travel: float = 0.15,
+                 tilt: tuple[float, float, float] = (0.3, 0.3, 0.3)) -> Pose:
+    home = HEXAPOD.home_pose()
+    return Pose(home.position + rng.uniform(-travel, travel, (count, 3)),
+                from_euler(rng.uniform(-1.0, 1.0, (count, 3)) * tilt))
+
+
+def true_values(rng: np.random.Generator, deviation: float = 1e-3) -> np.ndarray:
+    values = values_of(HEXAPOD.parameters)
+    values[:GEOMETRY] += rng.normal(0.0, deviation, GEOMETRY)
+    return values
+
+
+def measured(rng: np.random.Generator, values: np.ndarray, poses: Pose,
+             noise: Noise = EXACT) -> tuple[np.ndarray, Pose]:
+    """Return leg positions at true poses, and the poses with noise."""
+    lengths = Equations(np.zeros((len(poses), 6)), poses).at(values).residuals
+    turns = from_euler(rng.normal(0.0, noise.rotation, (len(poses), 3)))
+    return lengths + rng.normal(0.0, noise.length, lengths.shape), Pose(
+        poses.position + rng.normal(0.0, noise.position, (len(poses), 3)), turns @ poses.rotation)
+
+
+def test_residuals_are_those_of_inverse_kinematics() -> None:
+    rng = np.random.default_rng(0)
+    poses, values = random_poses(rng, 20), true_values(rng)
+    real = StewartPlatform(with_geometry(HEXAPOD.parameters, values))
+    positions = real.inverse_kinematics(poses) - real.parameters['geometry.zero_length']
+    assert_allclose(Equations(positions, poses).at(values).residuals, 0.0, atol=1e-15)
+    # The same poses, as a device in another frame measures another part of the platform.
+    seen = Equations(positions, poses, FRAMES).as_measured(poses, FRAMES)
+    values[42:] = [*FRAMES.device.position, 0, 0, 0, *FRAMES.target.position, 0, 0, 0]
+    there = Equations(positions, seen, FRAMES)
+    assert_allclose(there.at(values).residuals, 0.0, atol=2e-15)
+    assert_allclose(there.in_base(FRAMES).rows, poses.rows, atol=1e-14)
+
+
+def test_derivatives_are_those_of_finite_differences() -> None:
+    rng = np.random.default_rng(1)
+    values = true_values(rng)
+    values[GEOMETRY:] = rng.normal(0.0, 0.3, 12)
+    equations = Equations(rng.normal(0.0, 1.0, (5, 6)), random_poses(rng, 5), FRAMES)
+    steps = 1e-6 * np.eye(ALL)
+    differences = np.stack([
+        (equations.at(values + step).residuals - equations.at(values - step).residuals) / 2e-6
+        for step in steps], axis=-1)
+    lin = equations.at(values)
+    assert_allclose(lin.derivatives, differences, atol=2e-9)
+    # An error of the measured pose changes the lengths as position and rotation say.
+    shift, turn = 1e-7 * rng.normal(size=(2, 3))
+    device = product(FRAMES.device, Pose(np.zeros(3), np.eye(3)))
+    moved = product(inverse(device), Pose(shift, np.eye(3)))
+    frames = equations.frames_at(values)
+    axes = frames.device.rotation.T
+    other = equations._replace(pose=Pose(
+        equations.pose.position + axes @ shift,
+        from_euler(axes @ turn) @ equations.pose.rotation))
+    assert_allclose(other.at(values).residuals - lin.residuals,
+                    lin.position @ shift + lin.rotation @ turn, atol=1e-12)
+    assert moved.shape == ()
+
+
+@pytest.mark.parametrize('frames', ['known', 'unknown'])
+def test_the_published_geometry_is_recovered(frames: str) -> None:
+    """Without noise to 1e-9 mm, from the published nominal geometry."""
+    p = Parameters.from_yaml(PLATFORM).replaced({
+        'limits.length_min': None, 'limits.length_max': None})
+    nominal = StewartPlatform(with_geometry(p, published(NOMINAL)))
+    true = published(REAL)
+    rng = np.random.default_rng(2)
+    poses = Pose(np.array([0.0, 0.0, 0.7]) + rng.uniform(-0.15, 0.15, (40, 3)),
+                 from_euler(rng.uniform(-0.3, 0.3, (40, 3))))
+    lengths, seen = measured(rng, true, poses)
+    assert np.abs(true - published(NOMINAL)).max() > 4e-3
+    if frames == 'known':
+        found = calibrate(nominal, lengths, seen)
+        assert set(found.states) == {'identified'}
+        assert np.abs(found.values - true[:GEOMETRY]).max() < 1e-12
+        assert found.validation is not None
+        assert found.validation.before.rms[0] > 1e-3
+        assert found.validation.after.largest[0] < 1e-12
+        return
+    # Three joints at the true values define the base frame, and three the platform frame.
+    joints = ('leg_1', 'leg_3', 'leg_5')
+    fixed = [f'{part}.{joint}' for part in ('base_joints', 'platform_joints') for joint in joints]
+    known = published(NOMINAL)
+    for leg in (0, 2, 4):
+        for part in (0, 18):
+            which = slice(part + 3 * leg, part + 3 * leg + 3)
+            known[which] = true[which]
+    partly = StewartPlatform(with_geometry(p, known))
+    seen = Equations(lengths, seen).as_measured(seen, FRAMES)
+    found = calibrate(partly, lengths, seen, frames='unknown', fixed=fixed)
+    assert np.abs(found.values - true[:GEOMETRY]).max() < 1e-12
+    assert found.frames is not None
+    for each, wanted in zip(found.frames, FRAMES, strict=True):
+        assert_allclose(each.rows, wanted.rows, atol=1e-11)
+
+
+def test_unknown_frames_are_defined_by_the_joints_of_the_file() -> None:
+    rng = np.random.default_rng(3)
+    values, poses = true_values(rng), random_poses(rng, 40)
+    lengths, seen = measured(rng, values, poses)
+    seen = Equations(lengths, seen).as_measured(seen, FRAMES)
+    start = find_frames(HEXAPOD.parameters, Equations(lengths, seen))
+    assert_allclose(start.device.position, FRAMES.device.position, atol=0.02)
+    found = calibrate(HEXAPOD, lengths, seen, frames='unknown')
+    assert set(found.states) == {'identified'}
+    moved = (found.values - found.start)[:36].reshape(2, 6, 3)
+    assert_allclose(moved.mean(axis=1), 0.0, atol=1e-12)
+    assert found.frames is not None
+    # Whatever the frames, distances between joints are those of the hexapod.
+    for part in (slice(0, 18), slice(18, 36)):
+        joints, true = (each[part].reshape(6, 3) for each in (found.values, values))
+        assert_allclose(np.linalg.norm(joints[:, None] - joints, axis=-1),
+                        np.linalg.norm(true[:, None] - true, axis=-1), atol=1e-11)
+    target = target_in_platform(found.frames)
+    assert_allclose(product(found.frames.target, target).rows,
+                    Pose(np.zeros(3), np.eye(3)).rows, atol=1e-13)
+
+
+def test_unknown_frames_of_an_exact_file_are_found_exactly() -> None:
+    rng = np.random.default_rng(4)
+    poses = random_poses(rng, 30)
+    lengths, seen = measured(rng, values_of(HEXAPOD.parameters), poses)
+    seen = Equations(lengths, seen).as_measured(seen, FRAMES)
+    for each, wanted in zip(find_frames(HEXAPOD.parameters, Equations(lengths, seen)), FRAMES,
+                            strict=True):
+        assert_allclose(each.rows, wanted.rows, atol=1e-12)
+
+
+@pytest.mark.parametrize(('tilt', 'rank', 'words'), [
+    ((0.0, 0.0, 0.0), 4, 'translations only: base joints and platform joints cannot'),
+    ((0.0, 0.0, 0.5), 6, 'yaw only: heights (z) of the base joints and heights (z) of the '
+     'platform joints cannot be distinguished; add poses that are turned about another axis'),
+    ((0.3, 0.3, 0.0), 7, '')])
+@pytest.mark.parametrize('noise', [EXACT, Noise(2e-6, 1e-5, 1e-5)])
+def test_the_kind_of_motion_gives_what_is_identifiable(
+        tilt: tuple[float, float, float], rank: int, words: str, noise: Noise) -> None:
+    rng = np.random.default_rng(5)
+    values = true_values(rng)
+    lengths, seen = measured(rng, values, random_poses(rng, 60, tilt=tilt), noise)
+    found = calibrate(HEXAPOD, lengths, seen)
+    assert found.identifiability.rank == 6 * rank
+    assert (found.not_identified or '').startswith(words)
+    assert (found.not_identified is None) == (rank == 7)
+    # Poses of this kind are predicted as well as if all numbers were known.
+    assert found.validation is not None
+    assert found.validation.after.rms[0] < 1e-2 * found.validation.before.rms[0]
+    # The identified numbers are right, the others keep the file's values along the unknown.
+    of_state = np.array(found.states) == 'identified'
+    assert np.abs(found.values - values[:GEOMETRY])[of_state].max(initial=0.0) < (
+        1e-12 if not noise.position else 1.5e-3)
+
+
+def test_intervals_hold_the_truth() -> None:
+    """Seeds enough for 95 % +- 3 %; benchmarks/calibration.py has 500."""
+    noise, unknowns = Noise(2e-6, 1e-5, 1e-5), Unknowns.of(
+        values_of(HEXAPOD.parameters), 0.6, np.zeros(GEOMETRY, dtype=bool), False)
+    inside, estimates = [], []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        values = true_values(rng)
+        lengths, seen = measured(rng, values, random_poses(rng, 40), noise)
+        found = fit(Equations(lengths, seen), unknowns)
+        errors = np.sqrt(np.diag(found.covariance))[:GEOMETRY]
+        inside.append(np.abs(found.values - values)[:GEOMETRY] < 1.96 * errors)
+        estimates.append(found.noise)
+    assert 0.91 < np.mean(inside) < 0.98
+    assert_allclose(np.mean(estimates, axis=0)[1:], noise[1:], rtol=0.1)
+
+
+def test_outliers_are_named_and_do_not_matter() -> None:
+    rng = np.random.default_rng(6)
+    values = true_values(rng)
+    lengths, seen = measured(rng, values, random_poses(rng, 60), Noise(2e-6, 1e-5, 1e-5))
+    clean = calibrate(HEXAPOD, lengths, seen)
+    assert not clean.outliers and not clean.lack_of_fit
+    lengths[7, 2] += 3e-4
+    position = seen.position.copy()
+    position[3] += 0.02
+    found = calibrate(HEXAPOD, lengths, Pose(position, seen.rotation))
+    assert [each.pose for each in found.outliers] == [3, 7]
+    assert len(found.outliers[0].legs) > 3 and found.outliers[1].legs == (2,)
+    assert_allclose(found.values, clean.values, atol=2e-4)
+
+
+@pytest.mark.parametrize(('what', 'words'), [
+    ('positions in mm', 'positions are in mm, not in m: --mm'),
+    ('legs in mm', 'leg positions are in mm, not in m'),
+    ('all in mm', 'positions and leg positions are in mm, not in m'),
+    ('swapped', 'leg_2 and leg_5 are swapped'),
+    ('another order', 'the legs are in another order: leg_6, leg_1'),
+    ('degrees', 'the angles are in degrees, not in radians: --degrees'),
+    ('inverse', 'the inverse is needed'), ('transposed', 'the rotations are those of the base'),
+    ('sign', 'leg positions have the opposite sign'),
+    ('quaternion', 'quaternions have w first'),
+    ('whole lengths', 'the leg positions are whole lengths between the joints'),
+    ('frames', 'of other frames: --frames unknown'),
+    ('shuffled', 'lengths and poses must be of the same instants')])
+def test_likely_mistakes_are_named(what: str, words: str) -> None:
+    rng = np.random.default_rng(7)
+    poses = random_poses(rng, 40)
+    angles = rng.uniform(-0.3, 0.3, (40, 3))
+    poses = Pose(poses.position, from_euler(angles))
+    lengths, seen = measured(rng, true_values(rng), poses, Noise(2e-6, 1e-5, 1e-5))
+    position, rotation, given = seen.position, seen.rotation, None
+    if what in ('positions in mm', 'all in mm'):
+        position = 1e3 * position
+    if what in ('legs in mm', 'all in mm'):
+        lengths = 1e3 * lengths
+    if what == 'swapped':
+        lengths = lengths[:, [0, 4, 2, 3, 1, 5]]
+    if what == 'another order':
+        lengths = lengths[:, [1, 2, 3, 4, 5, 0]]
+    if what == 'degrees':
+        given = np.degrees(angles)
+        rotation = from_euler(given)
+    if what == 'inverse':
+        position, rotation = inverse(seen).position, inverse(seen).rotation
+    if what == 'transposed':
+        rotation = np.swapaxes(rotation, 1, 2)
+    if what == 'sign':
+        lengths = -lengths
+    if what == 'quaternion':
+        rotation = Pose.from_quaternion(position, np.roll(seen.quaternion, 1, axis=1)).rotation
+    if what == 'whole lengths':
+        lengths = lengths + 0.95
+    if what == 'shuffled':
+        position = rng.permutation(position)
+    pose = Pose(position, rotation)
+    if what == 'frames':
+        pose = Equations(lengths, pose).as_measured(pose, FRAMES)
+    with pytest.raises(StewartError) as caught:
+        calibrate(HEXAPOD, lengths, pose, angles=given)
+    assert words in str(caught.value) and 'nothing is calibrated' in str(caught.value)
+
+
+@pytest.mark.parametrize(('what', 'words'), [
+    ('play', 'play, a loose joint or encoder: leg_3 (residuals of'),
+    ('scale', 'positions off by scale, from the lead of the screw or the encoder: leg_3 (+0.2'),
+    ('fixed', 'the fixed values are not those of the hexapod: '),
+    ('noise', 'times the noise that was given')])
+def test_a_lack_of_fit_is_named(what: str, words: str) -> None:
+    rng = np.random.default_rng(8)
+    noise = Noise(2e-6, 1e-5, 1e-5)
+    lengths, seen = measured(rng, true_values(rng), random_poses(rng, 60), noise)
+    if what == 'play':
+        lengths[:, 2] += np.where(rng.random(60) < 0.5, 1e-4, -1e-4)
+    if what == 'scale':
+        lengths[:, 2] *= 1.002
+    found = calibrate(HEXAPOD, lengths, seen, fixed=['zero_length'] if what == 'fixed' else [],
+                      noise=Noise(1e-6, 5e-6, 5e-6) if what == 'noise' else None)
+    assert words in found.lack_of_fit[0].text
+
+
+def test_too_little_is_rejected() -> None:
+    rng = np.random.default_rng(9)
+    lengths, seen = measured(rng, true_values(rng), random_poses(rng, 40), Noise(2e-6, 1e-5, 1e-5))
+    with pytest.raises(StewartError, match='7 poses: at least 8 are needed'):
+        calibrate(HEXAPOD, lengths[:7], seen[:7])
+    with pytest.raises(MotionError, match=r'lengths \(40, 6\), poses \(7,\)'):
+        calibrate(HEXAPOD, lengths, seen[:7])
+    with pytest.raises(ParameterError, match='joint_7: not a part of the geometry'):
+        calibrate(HEXAPOD, lengths, seen, fixed=['joint_7'])
+    with pytest.raises(ParameterError, match='nothing is left'):
+        calibrate(HEXAPOD, lengths, seen,
+                  fixed=['base_joints', 'platform_joints', 'geometry.zero_length'])
+    with pytest.raises(StewartError, match='identifiable by itself: one and the same pose'):
+        same = np.zeros(40, dtype=int)
+        calibrate(HEXAPOD, lengths[same] + rng.normal(0.0, 1e-6, (40, 6)), Pose(
+            seen.position[same] + rng.normal(0.0, 1e-5, (40, 3)), seen.rotation[same]))
+    # Noise that is larger than the errors of the geometry.
+    rough = measured(rng, true_values(rng, 1e-6), random_poses(rng, 16), Noise(0.0, 1e-4, 1e-4))
+    with pytest.raises(StewartError, match='the poses do not support a better geometry'):
+        calibrate(HEXAPOD, *rough)
+
+
+def test_fixed_parts_keep_the_values_of_the_file() -> None:
+    rng = np.random.default_rng(10)
+    values = true_values(rng)
+    values[36:42] = 0.95
+    lengths, seen = measured(rng, values, random_poses(rng, 40), Noise(2e-6, 1e-5, 1e-5))
+    free = calibrate(HEXAPOD, lengths, seen)
+    found = calibrate(HEXAPOD, lengths, seen, fixed=['zero_length'])
+    assert found.states[36:] == ('fixed',) * 6
+    assert (found.parameters['geometry.zero_length'] == 0.95).all()
+    assert (found.errors[:36] <= free.errors[:36] * 1.05).all()
+    assert found.errors[2] < 0.5 * free.errors[2]
