@@ -253,8 +253,8 @@ def test_no_module_has_the_name_of_one_of_python() -> None:
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_entry_point_loads(distribution: importlib.metadata.Distribution, name: str) -> None:
     """The function behind each executable exists."""
-    if name not in ('stewart_calibrate', 'stewart_capability', 'stewart_describe', 'stewart_export',
-                    'stewart_replay'):
+    if name not in ('stewart_calibrate', 'stewart_capability', 'stewart_describe',
+                    'stewart_export', 'stewart_replay'):
         pytest.importorskip('rclpy')
     point, = distribution.entry_points.select(name=name)
     assert callable(point.load())
