@@ -204,6 +204,7 @@ class ParameterSet(Mapping[str, Any]):
     table: ClassVar[Mapping[str, Parameter]]
     node: ClassVar[str]
     unused: ClassVar[frozenset[str]] = frozenset()  # accepted in a shared file, without effect
+    described: ClassVar[tuple[str, ...]] = ()  # groups that a file describes by giving any of them
 
     def __init__(self, values: Mapping[str, Any], source: str = 'parameters', *,
                  exact_types: bool = False) -> None:
@@ -305,7 +306,8 @@ class ParameterSet(Mapping[str, Any]):
 
         """
         values = {name: self._given.get(name, parameter.default)
-                  for name, parameter in self.table.items()}
+                  for name, parameter in self.table.items()
+                  if name in self._given or not name.startswith(self.described)}
         added = comments or {}
         texts = {name: '; '.join(filter(None, (parameter.unit, added.get(name))))
                  for name, parameter in self.table.items()}

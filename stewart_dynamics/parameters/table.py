@@ -291,6 +291,7 @@ class Parameters(ParameterSet):
 
     table = PARAMETERS
     node = 'stewart_dynamics'
+    described = ('drive.',)
     drives: tuple[str, ...]
     """Names of drive.* that are given; without them no motors are computed."""
 
