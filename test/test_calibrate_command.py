@@ -70,7 +70,7 @@ def test_files_and_page(table: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     assert np.abs(values - [each['value'] for each in result['parameters']]).max() < 1e-7
     page = (output / 'report.html').read_text()
     assert page.count('<svg') == 3 and 'row 5: left out' in page and 'nan' not in page
-    # Results are not replaced without being told to.
+    # Results are replaced on request alone.
     assert main(arguments) == 2
     assert 'exists already' in capsys.readouterr().err
     assert main([*arguments, '--force', '--no-report', '--fixed', 'zero_length']) == 0

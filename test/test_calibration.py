@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Calibration: geometry recovered, intervals that hold, and what the poses cannot identify."""
+"""Calibration: geometry recovered, intervals that hold, numbers that are not identifiable."""
 
 from __future__ import annotations
 

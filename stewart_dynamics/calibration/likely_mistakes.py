@@ -106,7 +106,7 @@ def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, 
 
 def _without_mistakes(parameters: Parameters, given: Equations,
                       ) -> Iterator[tuple[LikelyMistake, Equations]]:
-    """Yield mistakes, and what the measurements were without them."""
+    """Yield mistakes, each with the measurements as they were without it."""
     lengths, pose = given.lengths, given.pose
     for factor, wrong, right in ((1e-3, 'mm', 'm'), (1e3, 'm', 'mm')):
         moved = Pose(factor * pose.position, pose.rotation)
@@ -165,7 +165,7 @@ def lack_of_fit(parameters: Parameters, equations: Equations, found: Outliers,
     Parameters
     ----------
     parameters : Parameters
-        Of the file.
+        The file's parameters.
     equations : Equations
         N poses that are not outliers.
     found : Outliers

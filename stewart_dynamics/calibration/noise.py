@@ -64,7 +64,7 @@ def estimated_noise(lin: Linearization, whiten: Array, size: float, unknowns: in
     """
     Return the noise of residuals of a fit, from their products in each pose.
 
-    The three variances fit the products of whitened residuals best, and none is negative
+    The three variances, not negative, fit the products of whitened residuals best
     (Rao, "Estimation of variance and covariance components - MINQUE theory", J. Multivariate
     Analysis 1(3), 1971, doi:10.1016/0047-259X(71)90001-7).
     """

@@ -65,7 +65,7 @@ def estimate(name: str, unit: str, start: float, value: float, state: str, error
     Parameters
     ----------
     name, unit, state : str
-        Of the parameter.
+        Name, unit and state of the parameter.
     start, value : float
         The file's value and the estimate.
     error, share : float
