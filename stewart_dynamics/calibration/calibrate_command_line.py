@@ -20,7 +20,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from stewart_dynamics.program import between, DONE, interrupt_on_signals, node_name, Program
+from stewart_dynamics.program import (
+    add_results, between, DONE, interrupt_on_signals, node_name, Program)
 from stewart_dynamics.replay.replay_options import NODE
 from stewart_dynamics.reporting.estimates import FIXED, HOLD_OUT, IDENTIFIED
 
@@ -54,12 +55,7 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--params', required=True, type=Path, metavar='FILE',
                         help='parameters of the hexapod as it is drawn, the file that the node '
                              'takes')
-    parser.add_argument('--output', type=Path, default=Path('calibrated'), metavar='DIR',
-                        help='folder of the results (default: calibrated)')
-    parser.add_argument('--force', action='store_true', help='replace results that exist')
-    parser.add_argument('--strict', action='store_true',
-                        help='exit code 1 when a number is not identifiable or there is a lack '
-                             'of fit')
+    add_results(parser, 'calibrated', 'a number is not identifiable or there is a lack of fit')
     parser.add_argument('--no-report', action='store_true', help='write no report.html')
     parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
                         help=f'node whose parameters are read (default: {NODE})')
