@@ -24,13 +24,13 @@ import numpy as np
 import pytest
 from referees import (
     Array, random_motion, random_parameters, rng, rotation_about, size_of, symmetric_parameters)
-from scipy.optimize import lsq_linear
+from scipy.optimize import lsq_linear, nnls
 
 from stewart_dynamics import Capability, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
+from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE, LegClearance, PLATFORM
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
-from stewart_dynamics.parameters.table import LEG_SHAPE
+from stewart_dynamics.parameters.table import LEG_SHAPE, OUTLINES
 from stewart_dynamics.planned.checks import LIMIT
 from stewart_dynamics.planned.trajectory import check_planned_trajectory
 from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
@@ -116,6 +116,90 @@ def test_parameters_that_do_not_fit_are_rejected(changes: dict[str, Any], words:
         LegClearance(symmetric_parameters())
 
 
+# Plates
+
+def outline(random: np.random.Generator, center: Array, radius: float) -> list[float]:
+    """Return the corners of a random convex plate, in order."""
+    corners = random.integers(3, 9)
+    angles = np.sort(random.uniform(0.0, 2.0 * np.pi, corners))
+    while np.diff(np.append(angles, angles[0] + 2.0 * np.pi)).max() > np.pi:
+        angles = np.sort(random.uniform(0.0, 2.0 * np.pi, corners))
+    x, y = np.linalg.qr(random.normal(size=(3, 3)))[0][:2]
+    return (center + radius * (np.outer(np.cos(angles), x) + np.outer(np.sin(angles), y))
+            ).ravel().tolist()
+
+
+def hull_distance(p: Array, q: Array) -> float:
+    """Return the distance of the convex hulls of points (M, 3), by least squares of weights."""
+    sums = 1e5 * np.array([[*np.ones(len(p)), *np.zeros(len(q))],
+                           [*np.zeros(len(p)), *np.ones(len(q))]])
+    weights, _ = nnls(np.concatenate([np.concatenate([p, -q]).T, sums]),
+                      np.array([0.0, 0.0, 0.0, 1e5, 1e5]))
+    return float(np.linalg.norm(weights @ np.concatenate([p, -q])))
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_clearance_from_a_plate_is_the_least_distance_of_the_hulls(seed: int) -> None:
+    random = rng(seed)
+    p = random_parameters(random)
+    motion, size = random_motion(p, random, 5), size_of(p)
+    p = p.replaced({
+        'legs.cylinder.radius': 0.001 * size, 'legs.piston.radius': 0.0,
+        'legs.cylinder.length': random.uniform(0.2, 1.0, 6) * size,
+        **{name: outline(random, random.normal(size=3) * size, random.uniform(0.2, 2.0) * size)
+           for name in OUTLINES}})
+    without = LegClearance(p.replaced(dict.fromkeys(OUTLINES)))(motion.rows)
+    found, nearest = LegClearance(p).nearest(motion.rows)
+    for n, leg in product(range(5), range(6)):
+        position, rotation = motion.position[n], motion.rotation[n]
+        b = p['geometry.base_joints'][leg]
+        end = position + rotation @ p['geometry.platform_joints'][leg]
+        s = (end - b) / np.linalg.norm(end - b)
+        cylinder = b + min(p['legs.cylinder.length'][leg], np.linalg.norm(end - b)) * s
+        out = b + p['legs.cylinder.length'][leg] * s
+        values = [without[n, leg], hull_distance(np.array([out, end]), p[OUTLINES[0]]),
+                  hull_distance(np.array([b, cylinder]), position + p[OUTLINES[1]] @ rotation.T)
+                  - 0.001 * size]
+        assert found[n, leg] == pytest.approx(min(values), abs=1e-9 * size)
+        assert nearest[n, leg] >= 6 or values[0] <= min(values[1:]) + 1e-9 * size
+        if nearest[n, leg] >= 6:
+            assert nearest[n, leg] == (BASE, PLATFORM)[int(values[2] < values[1])]
+
+
+@pytest.mark.parametrize(('corners', 'words'), [
+    ([0.0] * 6, 'must have three corners or more'),
+    ([0.0] * 4, 'must have 3 n entries, has 4'),
+    ([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0], 'the corners are on one line'),
+    ([0.0] * 9, 'the corners are on one line'),
+    ([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.01, 0.0, 1.0, 0.0],
+     'the corners must be in one plane, to 1e-06 of its size'),
+    ([0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 'on one line'),
+    ([0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 2.0, 0.0],
+     'must be convex, its corners in order around it'),
+    ([np.cos(4.0 * np.pi * n / 5.0 * k) if k == 1 else 0.0 for n in range(5) for k in range(3)],
+     'on one line'),
+    ([f(4.0 * np.pi * n / 5.0) for n in range(5) for f in (np.cos, np.sin, lambda _: 0.0)],
+     'must be convex, its corners in order around it')])
+def test_a_plate_that_is_none_is_rejected(corners: list[float], words: str) -> None:
+    for name in OUTLINES:
+        with pytest.raises(ParameterError, match=re.escape(words)):
+            symmetric_parameters().replaced({name: corners})
+
+
+def test_a_message_names_what_a_leg_is_near_to() -> None:
+    home = StewartPlatform(SYMMETRIC).home_pose()
+    square = [1.0, 1.0, -0.3, -1.0, 1.0, -0.3, -1.0, -1.0, -0.3, 1.0, -1.0, -0.3]
+    row = Motion.from_pose(home).rows
+    for changes, other in (({}, 'leg_2'), ({OUTLINES[1]: square}, OUTLINES[1])):
+        p = SYMMETRIC.replaced({CLEARANCE_MIN: 1.0, **changes})
+        output = Step(p)(Setpoint(0, tuple(row.tolist())), None)
+        assert output is not None
+        assert f'leg_1: clearance to {other}, ' in output.exceedances[0].words(p['joints'])
+        result = check_planned_trajectory(
+            StewartPlatform(p), [0.0, 1.0], Motion.of_rows(np.stack([row, row])))
+        assert f'leg_1: clearance to {other}, ' in result.message
+
+
 # Where it is checked
 
 # The cylinders of legs 1 and 2 approach each other as the platform comes down.
@@ -162,6 +246,25 @@ def test_the_step_reports_a_clearance_below_its_limit_for_one_and_for_many() -> 
     assert not without.exceeding.any()
 
 
+def test_a_corner_of_a_plate_between_two_points_of_a_trajectory_is_found() -> None:
+    # Tilted to and fro between two points: the corners move farther than the joints.
+    corners = [2.0, 0.2, 0.0, -2.0, 0.2, 0.0, -2.0, -0.2, 0.0, 2.0, -0.2, 0.0]
+    p = SYMMETRIC.replaced({
+        OUTLINES[1]: corners, 'limits.length_min': None, 'limits.length_max': None})
+    rates = Motion(np.stack([HOME.position] * 2), np.stack([HOME.rotation] * 2), np.zeros((2, 3)),
+                   np.array([[0.0, 1.6, 0.0], [0.0, -1.6, 0.0]]), np.zeros((2, 3)),
+                   np.zeros((2, 3)))
+    tilted = Motion.from_pose(Pose(HOME.position, rotation_about(np.array([0.0, 1.0, 0.0]), 0.5)))
+    clearances = LegClearance(p)
+    here, there = (float(clearances(each.rows.reshape(-1, each.rows.shape[-1])).min())
+                   for each in (rates, tilted))
+    assert there < here - 0.01
+    for bound, accepted in ((there + 1e-3, False), (there - 1e-3, True)):
+        result = check_planned_trajectory(
+            StewartPlatform(p.replaced({CLEARANCE_MIN: bound})), [0.0, 1.0], rates)
+        assert result.accepted is accepted, result.message
+
+
 @pytest.mark.parametrize('points', [4, 12])
 def test_the_least_clearance_between_the_points_of_a_trajectory_is_found(points: int) -> None:
     def at(times: Array) -> Motion:
@@ -205,13 +308,21 @@ def near(seed: int) -> tuple[StewartPlatform, Pose, np.random.Generator]:
         'legs.cylinder.length': random.uniform(0.2, 1.0, 6),
         'legs.piston.radius': random.uniform(0.0, 0.01, 6),
         'limits.length_max': 5.0 * size_of(platform.parameters)})
+    if seed % 3 == 0:
+        size = size_of(shaped)
+        center = pose.rotation.T @ (shaped['geometry.base_joints'].mean(axis=0) - pose.position)
+        shaped = shaped.replaced({
+            OUTLINES[0]: outline(random, shaped['geometry.base_joints'].mean(axis=0),
+                                 random.uniform(0.1, 1.0) * size),
+            OUTLINES[1]: outline(random, random.uniform(0.0, 0.3) * center,
+                                 random.uniform(0.1, 1.0) * size)})
     here = Capability(StewartPlatform(shaped)).clearance(pose)
     part = random.choice([0.0, 0.5, 0.9, 0.999, 1.0])
     return StewartPlatform(shaped.replaced({CLEARANCE_MIN: max(part * here, 0.0)})), pose, random
 
 
 def test_a_travel_ends_where_two_legs_are_too_near() -> None:
-    ended = 0
+    ended = [0] * 8
     for seed in range(60):
         platform, pose, random = near(seed)
         p = platform.parameters
@@ -223,13 +334,27 @@ def test_a_travel_ends_where_two_legs_are_too_near() -> None:
             assert clearances(Motion.from_pose(pose).rows[None]).min() - bound < 1e-12 * size
             continue
         by = np.append(np.linspace(0.0, found.value, 2001), found.value + 1e-7 * size)
-        margins = clearances(Motion.from_pose(moved(pose, direction, pivot, by)).rows) - bound
+        poses = Motion.from_pose(moved(pose, direction, pivot, by)).rows
+        margins, nearest = clearances.nearest(poses)
+        margins -= bound
         assert margins[:-1].min() >= -1e-12 * size
         if found.limit == CLEARANCE_MIN.removeprefix('limits.'):
             assert abs(margins[-2, found.leg]) < 1e-12 * size
             assert margins[-1].min() < 0.0
-            ended += 1
-    assert ended > 25
+            ended[nearest[-2, found.leg]] += 1
+    assert sum(ended[:6]) > 20
+    assert min(ended[6:]) > 1
+
+
+def test_legs_that_become_parallel_far_away_do_not_end_a_travel() -> None:
+    free = SYMMETRIC.replaced({
+        CLEARANCE_MIN: 0.02, 'limits.length_max': None, 'limits.length_min': None,
+        'limits.base_joint_angle_max': None, 'limits.platform_joint_angle_max': None,
+        'singularity.stop_condition': 1e9})
+    for direction in ([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [1.0, 0.3, 1.0, 0.0, 0.0, 0.0]):
+        found = Capability(StewartPlatform(free)).travel(HOME, direction)
+        assert found.limit == 'singularity'
+        assert found.value > 1e6
 
 
 def test_no_pose_of_a_box_that_is_reachable_has_legs_too_near() -> None:
@@ -246,6 +371,9 @@ def test_no_pose_of_a_box_that_is_reachable_has_legs_too_near() -> None:
                 poses = poses_in(scaled, pose, np.zeros(3), random)
                 nearest = LegClearance(p)(Motion.from_pose(poses).rows).min()
                 assert nearest >= p[CLEARANCE_MIN] * (1.0 - 1e-9)
+        if found.limit == 'leg_clearance_min' and found.value > 1e-6:
+            larger = capability.reachable(1.05 * found.value * box, pose)
+            assert larger.worst.excess > 0.0, 'a larger box is not reachable'
     assert limiting > 2
 
 

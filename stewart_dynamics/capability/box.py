@@ -35,9 +35,8 @@ limits are searched over three dimensions. The condition number is over six: wit
 ``smallest_c (1 - |sum_k h_k |M_k||) - |R|`` (Golub and Van Loan, Matrix Computations, 4th ed.,
 8.6.2).
 
-The clearance of two legs over a cell is bounded by how far their joints at one end move in the
-frame of the joints at the other end (``leg_clearance.pair_room``). This bound is of first order:
-boxes that are nearer to the limit than cells can be small are not proven.
+The clearance of two legs, or of a leg and a plate, over a cell is bounded along one vector for all
+of their corners (``clearance_bounds``), up to terms of second order in h.
 """
 
 from __future__ import annotations
@@ -45,12 +44,15 @@ from __future__ import annotations
 import math
 
 from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.capability.clearance_bounds import (
+    ARM, BASE_JOINT, BODIES, bodies, Body, corner_pair, CYLINDER, follow, FOLLOWING, MORE, OF_LEG,
+    PLATES, PLATFORM_JOINT, RATES, ROTATING, shortest, STAYING, STILL, TURNING)
 from stewart_dynamics.capability.travel import (
-    BASE_ANGLE_MAX, largest_eigenvalue, LENGTH_MAX, LENGTH_MIN, PLATFORM_ANGLE_MAX, put6)
+    BASE_ANGLE_MAX, BEND, largest_eigenvalue, LENGTH_MAX, LENGTH_MIN, PLATFORM_ANGLE_MAX, put6)
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
     characteristic_length_of, joints_of)
-from stewart_dynamics.mechanics.kinematics.leg_clearance import pair_room, put_axis
+from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE, PLATFORM
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.matrix6 import gram, inverse_and_determinant
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
@@ -74,13 +76,11 @@ _C, _A, _BASE_AXIS, _PLATFORM_AXIS, _ARM, LEG = 0, 3, 6, 9, 12, 15
 ROWS = 36 + 6 + 6 + 36
 """Columns of the scratch memory of the condition number."""
 
-# Bound of |s''| / (|l'| / |l|)^2 of a unit vector s = l / |l| with l'' = 0: 2 / sqrt(3), and more.
-_BEND = 1.2
 # The largest excess is found to this part of a limit (of a radian); whether it is above zero to
 # the tolerance of limits.
 _EXACT = 1e-7
-# The largest excess of a clearance below its limit is found to this part.
-_COARSE = 0.1
+PAIRS = tuple((i, j) for i in range(6) for j in range(i + 1, 8))
+"""Legs and the other legs and plates, in the order of ``clearance_in_box``."""
 
 Bounded = tuple[float, float, Vector6, Vector6]
 """A value, its bound in a cell, the gradient, and the bound of the gradient's change."""
@@ -216,8 +216,8 @@ def _angle(leg: Array, at_platform: bool, limit: float, cell: Array) -> Bounded:
             1.0, 1.0, 1.0, arm, arm, arm)
     inverse = 1.0 / shortest
     swing = moved * inverse
-    by_d = _BEND * swing * inverse
-    by_r = arm * (half * inverse + _BEND * swing * inverse)
+    by_d = BEND * swing * inverse
+    by_r = arm * (half * inverse + BEND * swing * inverse)
     if at_platform:
         by_d += half * inverse
         by_r += swing + arm * half * inverse + half
@@ -349,105 +349,266 @@ def legs_in_box(constants: Array, axes: Array, bounds: Array, row: Array, pivot:
 
 
 @compiled
-def _clearance(constants: Array, shapes: Array, legs: Array, i: int, j: int, cell: Array,
-               axes: Array) -> tuple[float, float, float]:
-    """Return the clearance of two legs in the middle of a cell, its bound, and the longer arm."""
+def _prepare_plates(base: Array, platform: Array, row: Array, pivot: Array, corners: Array,
+                    ) -> None:
+    """Write the corners of the base's plate, and the arms of those of the platform's."""
+    rotation = read9(row, ROTATION.start)
+    for n in range(len(base)):
+        corner = corners[PLATES + n]
+        corner[:] = 0.0
+        put3(corner, 0, read3(base[n], 0))
+    for n in range(len(platform)):
+        put3(corners[PLATES + len(base) + n], ARM,
+             rotate(rotation, subtract(read3(platform[n], 0), read3(pivot, 0))))
+
+
+@compiled
+def _put_spins(k: tuple[float, float, float], cell: Array, corners: Array) -> None:
+    """Write the angular velocities of the platform for each coordinate of a cell."""
     r = read3(cell, 3)
-    k = _coefficients(r)
+    turn = corners[len(corners) - 2]
+    for axis in range(3):
+        unit = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
+        once = cross(r, unit)
+        put3(turn, RATES + 3 * axis, (0.0, 0.0, 0.0))
+        put3(turn, RATES + 9 + 3 * axis,
+             add(unit, add(scale(k[1], once), scale(k[2], cross(r, once)))))
+
+
+@inlined
+def _put_rates(corners: Array, at: int, turned: Vector3) -> None:
+    """Write the derivatives of a point of the platform, ``turned`` from the pivot."""
+    turn = corners[len(corners) - 2]
+    for axis in range(3):
+        put3(corners[at], RATES + 3 * axis, (
+            1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0))
+        put3(corners[at], RATES + 9 + 3 * axis, cross(read3(turn, RATES + 9 + 3 * axis), turned))
+
+
+@compiled
+def _put_leg(constants: Array, shapes: Array, legs: Array, corners: Array,
+             k: tuple[float, float, float], cell: Array, n: int) -> None:
+    """Write the corners of a leg."""
+    base_joint, _ = joints_of(constants, n)
+    center = add(read3(legs[n], _C), read3(cell, 0))
+    turned = _turned(k, read3(cell, 3), read3(legs[n], _A))
+    line = add(center, turned)
+    length, cylinder = norm(line), shapes[n, 1]
+    s = scale(1.0 / length if length > 0.0 else 0.0, line)
     half_d, half_r = norm(read3(cell, _HALF)), norm(read3(cell, _HALF + 3))
-    arm, other_arm = norm(read3(legs[i], _A)), norm(read3(legs[j], _A))
-    from_base = other_from_base = 0.0
-    base_joint, platform_joint = joints_of(constants, i)
-    other_base_joint, other_platform_joint = joints_of(constants, j)
-    for n in (i, j):
-        center = add(read3(legs[n], _C), read3(cell, 0))
-        line = add(center, _turned(k, r, read3(legs[n], _A)))
-        length = norm(line)
-        put_axis(shapes, axes, n, base_joint if n == i else other_base_joint,
-                 scale(1.0 / length if length > 0.0 else 0.0, line), length)
-        if n == i:
-            from_base = norm(center)
+    arm = norm(turned)
+    moved = half_d + arm * half_r
+    shortest_length = length - moved
+    # a vector that turns with the platform, times the way from the center to a point of the base
+    turning = half_r * (0.5 * half_r * norm(center) + half_d)
+    swing = moved / shortest_length if shortest_length > 0.0 else math.inf
+    bend = arm * half_r * half_r / shortest_length + BEND * swing * swing
+    if not shortest_length > 0.0:
+        bend = math.inf
+    for place in range(OF_LEG):
+        at = OF_LEG * n + place
+        corner = corners[at]
+        if place == BASE_JOINT:
+            corner[:] = 0.0
+            put3(corner, 0, base_joint)
+            corner[TURNING] = turning
+        elif place == PLATFORM_JOINT or (place == CYLINDER and length <= cylinder):
+            put3(corner, 0, add(base_joint, line))
+            _put_rates(corners, at, turned)
+            corner[STILL], corner[TURNING] = 0.5 * arm * half_r * half_r, 0.0
         else:
-            other_from_base = norm(center)
-    clearance, lowest, _ = pair_room(
-        shapes, axes, i, j, half_d + arm * half_r, half_d + other_arm * half_r,
-        half_r * norm(subtract(platform_joint, other_platform_joint)), False, 0.0)
-    _, other_lowest, _ = pair_room(
-        shapes, axes, i, j, half_d + from_base * half_r, half_d + other_from_base * half_r,
-        half_r * norm(subtract(base_joint, other_base_joint)), True, 0.0)
-    return clearance, max(lowest, other_lowest), max(arm, other_arm)
+            put3(corner, 0, add(base_joint, scale(cylinder, s)))
+            _put_rates(corners, at, turned)
+            for coordinate in range(6):
+                change = read3(corner, RATES + 3 * coordinate)
+                put3(corner, RATES + 3 * coordinate, scale(
+                    cylinder / length if length > 0.0 else 0.0,
+                    subtract(change, scale(dot(s, change), s))))
+            corner[STILL] = 0.5 * cylinder * bend
+            corner[TURNING] = turning + 0.5 * cylinder * (bend + half_r * (2.0 * swing + half_r))
 
 
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'i8',
-             'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
-def clearance_in_box(constants: Array, axes: Array, shapes: Array, limit: float, row: Array,
-                     pivot: Array, box: Array, most: int, legs: Array, cells: Array,
-                     leg_axes: Array, found: Array) -> None:
+@compiled
+def _put_plate(constants: Array, legs: Array, corners: Array, base_corners: int,
+               k: tuple[float, float, float], cell: Array, plate: int) -> None:
+    """Write the corners of a plate."""
+    joint, _ = joints_of(constants, 0)
+    center = add(joint, add(read3(legs[0], _C), read3(cell, 0)))
+    half_d, half_r = norm(read3(cell, _HALF)), norm(read3(cell, _HALF + 3))
+    if plate == BASE:
+        for n in range(PLATES, PLATES + base_corners):
+            corners[n, TURNING] = half_r * (
+                0.5 * half_r * norm(subtract(center, read3(corners[n], 0))) + half_d)
+        return
+    for n in range(PLATES + base_corners, len(corners) - MORE):
+        arm = read3(corners[n], ARM)
+        turned = _turned(k, read3(cell, 3), arm)
+        put3(corners[n], 0, add(center, turned))
+        _put_rates(corners, n, turned)
+        corners[n, STILL], corners[n, TURNING] = 0.5 * norm(arm) * half_r * half_r, 0.0
+
+
+@compiled
+def _lowest(corners: Array, a: Body, b: Body, n: Vector3, cell: Array, how: int,
+            ) -> tuple[float, int, int]:
+    """Return the least distance of two bodies over a cell along n, and the corners of it."""
+    follow(corners, a, b, n, 6, how)
+    follows = corners[len(corners) - 1]
+    x = y = z = 0.0
+    for k in range(6):
+        half = cell[_HALF + k]
+        x += half * abs(follows[RATES + 3 * k])
+        y += half * abs(follows[RATES + 3 * k + 1])
+        z += half * abs(follows[RATES + 3 * k + 2])
+    turned = math.sqrt(x * x + y * y + z * z) if how == FOLLOWING else 0.0
+    longer = math.sqrt(1.0 + turned * turned)
+    rest = TURNING if how == ROTATING else STILL
+    lowest, worst, other_worst = math.inf, a[0], b[0]
+    for p in range(a[0], a[2], a[1]):
+        for q in range(b[0], b[2], b[1]):
+            distance = dot(n, subtract(read3(corners[p], 0), read3(corners[q], 0)))
+            distance -= longer * (corners[p, rest] + corners[q, rest])
+            x = y = z = 0.0
+            for k in range(6):
+                half = cell[_HALF + k]
+                moved, slope = corner_pair(corners, p, q, n, k)
+                distance -= half * abs(slope)
+                x += half * abs(moved[0])
+                y += half * abs(moved[1])
+                z += half * abs(moved[2])
+            distance -= turned * math.sqrt(x * x + y * y + z * z)
+            if distance < lowest:
+                lowest, worst, other_worst = distance, p, q
+    return lowest / longer if lowest > 0.0 else lowest, worst, other_worst
+
+
+@compiled
+def _clearance(constants: Array, shapes: Array, legs: Array, corners: Array, base_corners: int,
+               i: int, j: int, cell: Array, limit: float, slopes: Array) -> tuple[float, float]:
     """
-    Prove that no two legs are nearer than a limit over a box.
+    Return the clearance of a leg and a leg or plate in the middle of a cell, and a bound of it.
+
+    Writes the slopes (6,) of the distance of those corners that bound it, where the bound is below
+    the limit.
+    """
+    k = _coefficients(read3(cell, 3))
+    _put_spins(k, cell, corners)
+    _put_leg(constants, shapes, legs, corners, k, cell, i)
+    if j < 6:
+        _put_leg(constants, shapes, legs, corners, k, cell, j)
+    else:
+        _put_plate(constants, legs, corners, base_corners, k, cell, j)
+    clearance = bound = math.inf
+    for pair in range(BODIES):
+        given, a, b, radii = bodies(shapes, corners, base_corners, i, j, pair)
+        if not given:
+            continue
+        vector = shortest(corners, a, b)
+        distance = norm(vector)
+        clearance = min(clearance, distance - radii)
+        if distance == 0.0:
+            bound = -radii
+            continue
+        n = scale(1.0 / distance, vector)
+        lowest, p, q = _lowest(corners, a, b, n, cell, FOLLOWING)
+        if lowest - radii < limit and lowest - radii < bound:
+            for coordinate in range(6):
+                _, slopes[coordinate] = corner_pair(corners, p, q, n, coordinate)
+            for how in (STAYING, ROTATING):
+                other_lowest, _, _ = _lowest(corners, a, b, n, cell, how)
+                lowest = max(lowest, other_lowest)
+        bound = min(bound, max(lowest, 0.0) - radii)
+    return clearance, bound
+
+
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8', 'f8[::1]',
+             'f8[::1]', 'f8[::1]', 'i8', 'f8', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
+def clearance_in_box(constants: Array, axes: Array, shapes: Array, base: Array, platform: Array,
+                     limit: float, row: Array, pivot: Array, box: Array, most: int, coarse: float,
+                     legs: Array, cells: Array, corners: Array, found: Array) -> None:
+    """
+    Prove that no leg is nearer than a limit to another one, or to a plate, over a box.
 
     Parameters
     ----------
     constants, axes, row, pivot, box, legs, cells
         As in ``legs_in_box``.
-    shapes : (6, 3)
+    shapes, base, platform : (6, 3), (M, 3), (M, 3)
         As in ``leg_clearance``.
     limit : float
         Smallest clearance [m].
     most : int
-        Largest number of cells for each pair of legs.
-    leg_axes : (6, AXIS)
-        Scratch memory, see ``leg_clearance``.
-    found : (15, FOUND)
-        Written: for each pair of legs, in order, the largest excess found, a bound of the excess
-        [m], and the point [d; r]. A pair that keeps the limit everywhere is not searched further.
+        Largest number of cells for each pair.
+    coarse : float
+        The largest excess of a pair that does not keep the limit is found to this part; infinite:
+        the search ends with the first pair that does not.
+    corners : (PLATES + corners of the plates + MORE, CORNER)
+        Scratch memory, see ``clearance_bounds``.
+    found : (PAIRS, FOUND)
+        Written: for each pair the largest excess found, a bound of the excess [m], and the point
+        [d; r]; minus infinity where there is no plate. A pair that keeps the limit everywhere is
+        not searched further.
 
     """
     _prepare(constants, axes, row, pivot, legs)
+    _prepare_plates(base, platform, row, pivot, corners)
+    for pair in range(len(found)):
+        found[pair, EXCESS] = found[pair, UPPER] = -math.inf
     pair = 0
     for i in range(6):
-        for j in range(i + 1, 6):
-            for k in range(12):
-                cells[0, k] = box[k]
-            cells[0, _BOUND] = math.inf
-            _search_pair(constants, shapes, legs, i, j, limit, cells, most, leg_axes, found[pair])
+        for j in range(i + 1, 8):
+            if (j != BASE or len(base)) and (j != PLATFORM or len(platform)):
+                for k in range(12):
+                    cells[0, k] = box[k]
+                cells[0, _BOUND] = math.inf
+                _search_pair(constants, shapes, legs, corners, len(base), i, j, limit, cells,
+                             most, coarse, found[pair])
+                if coarse == math.inf and found[pair, EXCESS] > TOLERANCE * limit:
+                    return
             pair += 1
 
 
 @compiled
-def _search_pair(constants: Array, shapes: Array, legs: Array, i: int, j: int, limit: float,
-                 cells: Array, most: int, axes: Array, found: Array) -> None:
-    """Write the largest excess of the clearance of two legs over the cell that waits."""
+def _search_pair(constants: Array, shapes: Array, legs: Array, corners: Array, base_corners: int,
+                 i: int, j: int, limit: float, cells: Array, most: int, coarse: float,
+                 found: Array) -> None:
+    """Write the largest excess of the clearance of a pair over the cell that waits."""
     kept = 0.5 * TOLERANCE * limit
     best, upper, count, top = -math.inf, -math.inf, 0, 1
+    slopes = cells[DEPTH]
+    slopes[:] = 0.0
     while top > 0:
         top -= 1
         cell = cells[top]
-        enough = kept if best <= kept else best + _COARSE * abs(best)
+        enough = kept if best <= kept else best + coarse * abs(best)
         if cell[_BOUND] <= enough or count >= most or top + 2 >= DEPTH:
             upper = max(upper, cell[_BOUND])
             continue
         count += 1
-        clearance, lowest, arm = _clearance(constants, shapes, legs, i, j, cell, axes)
+        clearance, lowest = _clearance(
+            constants, shapes, legs, corners, base_corners, i, j, cell, limit - enough, slopes)
         if limit - clearance > best:
             best = limit - clearance
             for n in range(6):
                 found[POINT.start + n] = cell[n]
         cell[_BOUND] = min(cell[_BOUND], limit - lowest)
-        widest, at = -1.0, 0
+        widest, at = 0.0, 0
+        arm = max(norm(read3(legs[i], _A)), norm(read3(legs[j if j < 6 else i], _A)))
         for n in range(6):
             wide = cell[_HALF + n] * (1.0 if n < 3 else arm)
+            wide *= abs(slopes[n]) / (1.0 if n < 3 else arm) + 0.1
             if wide > widest:
                 widest, at = wide, n
         if cell[_BOUND] <= enough or widest <= 0.0:
             upper = max(upper, cell[_BOUND])
             continue
         half = 0.5 * cell[_HALF + at]
+        step = math.copysign(half, slopes[at])
         cell[_HALF + at] = half
         for n in range(CELL):
             cells[top + 1, n] = cell[n]
-        cell[at] -= half
-        cells[top + 1, at] += half
+        cell[at] += step
+        cells[top + 1, at] -= step  # nearer, and taken first
         top += 2
     found[EXCESS], found[UPPER] = best, max(best, upper)
 
@@ -496,7 +657,7 @@ def _condition(constants: Array, legs: Array, cell: Array, stop: float, rows: Ar
         shortest = length - moved
         near = near and shortest > 0.0
         swing = moved / shortest
-        curve = reach * half_r * half_r / shortest + _BEND * swing * swing
+        curve = reach * half_r * half_r / shortest + BEND * swing * swing
         lever = norm(arm)
         moment = lever * (half_r * half_r + 2.0 * half_r * swing + curve)
         bending += curve * curve + moment * moment

@@ -137,7 +137,9 @@ class Capability:
                 *((name, math.inf) for name in limits.OF_JOINTS),
                 (limits.CLEARANCE_MIN, -math.inf))])
         clearance = clearance_to_check(platform.parameters)
+        none = np.empty((0, 3))
         self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes
+        self._plates = (none, none) if clearance is None else (clearance.base, clearance.platform)
         angles = angles_to_check(platform.parameters, self._limits.of_joints)
         self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
         self._frictionless = StewartPlatform(platform.parameters.replaced({
@@ -174,12 +176,12 @@ class Capability:
         stop = self.platform.parameters['singularity.stop_condition']
 
         def solve(constants: Array, *arrays: Any) -> None:
-            travel.travels(constants, self._axes, self._bounds, self._shapes, stop,
-                           *arrays)
+            travel.travels(constants, self._axes, self._bounds, self._shapes, *self._plates,
+                           stop, *arrays)
 
         in_parts(solve, self.platform.constants, rows, copies(directions, shape),
                  copies(pivots, shape), values, codes, legs,
-                 scratch=(travel.SCRATCH, travel.LEG))
+                 scratch=(travel.SCRATCH + sum(map(len, self._plates)), travel.LEG))
         return _extent(values.reshape(shape) / sizes, _ENDS[codes].reshape(shape),
                        legs.reshape(shape))
 
@@ -191,8 +193,8 @@ class Capability:
         Lengths, joint angles, clearance of the legs, the condition number up to
         ``singularity.stop_condition``, and the sign of det(J), by branch and bound
         (``capability.box``). The work is bounded: a box that is within the limits, but too near to
-        a singularity or to the smallest clearance, may be answered with ``certain`` False and a
-        worst pose whose excess is negative.
+        a singularity, may be answered with ``certain`` False and a worst pose whose excess is
+        negative.
 
         Parameters
         ----------
@@ -215,7 +217,8 @@ class Capability:
 
         Arguments are those of ``reachable``; each range includes zero. The box of the answer is
         proven to be reachable. Where lengths or joint angles limit, a box larger by 1e-8 is not;
-        where the clearance of the legs or a singularity limits the factor may be too small.
+        where the clearance of the legs limits it is found to 1 %, if that takes a bounded number
+        of steps; where a singularity limits the factor may be too small.
         Rotations grow up to a turn.
         """
         ranges = checked_ranges(box)
@@ -314,7 +317,7 @@ class Capability:
         center = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
         if center.ndim > 1:
             raise MotionError(f'pivot: shape {center.shape}: must be (3,)')
-        return Boxes(self.platform, self._axes, self._bounds, self._shapes,
+        return Boxes(self.platform, self._axes, self._bounds, self._shapes, self._plates,
                      self._single(pose).rows, center)
 
     def wrench(self, pose: Pose | Motion, direction: ArrayLike, base: BaseMotion | None = None,
@@ -340,7 +343,7 @@ class Capability:
             self._at_rest(pose, base), self._per_wrench(pose, directions)), sizes)
 
     def clearance(self, pose: Pose | Motion) -> Array | float:
-        """Return the smallest distance between the surfaces of two legs [m]; negative: overlap."""
+        """Return the smallest distance of a leg from another or a plate [m]; negative: overlap."""
         values = LegClearance(self.platform.parameters)(motion_rows(pose)).min(axis=1)
         return float(values[0]) if pose.shape == () else values.reshape(pose.shape)
 

@@ -16,8 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import combinations
+from collections.abc import Callable, Sequence
 import math
 from typing import NamedTuple
 
@@ -26,12 +25,12 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import box as boxes
+from stewart_dynamics.capability.clearance_bounds import CORNER, MORE, PLATES
 from stewart_dynamics.capability.travel import CLEARANCE_MIN
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import characteristic_length_of
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.mechanics.kinematics.leg_clearance import AXIS
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -41,8 +40,8 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 # for the condition number.
 _MOST_OF_LEGS, _MOST_OF_CLEARANCE, _MOST_OF_CONDITION = 20_000, 100_000, 100_000
 _CODES = ('length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_angle_max')
-# The first leg of each pair.
-_FIRST = [i for i, _ in combinations(range(6), 2)]
+# The largest excess of a clearance is found to this part.
+_COARSE = 0.1
 # Factors of a box are found to this part.
 _EXACT = 1e-9
 # For a box that ends at a clearance or a singularity the factor is found to these parts: each
@@ -103,7 +102,7 @@ class Boxes:
     ----------
     platform : StewartPlatform
         The hexapod.
-    axes, bounds, shapes : (12, 3), (5, 6), (6, 3)
+    axes, bounds, shapes, plates : (12, 3), (5, 6), (6, 3), two of (M, 3)
         As in ``travel.travels``.
     row, pivot : (MOTION,), (3,)
         Pose from which boxes are measured, and center of rotation in the platform frame [m].
@@ -111,15 +110,16 @@ class Boxes:
     """
 
     def __init__(self, platform: StewartPlatform, axes: Array, bounds: Array, shapes: Array,
-                 row: Array, pivot: Array) -> None:
+                 plates: Sequence[Array], row: Array, pivot: Array) -> None:
         self._platform, self._axes = platform, axes
-        self._bounds, self._shapes = bounds[:CLEARANCE_MIN], shapes
+        self._bounds, self._shapes, self._plates = bounds[:CLEARANCE_MIN], shapes, plates
         self._nearest = float(bounds[CLEARANCE_MIN, 0])
         self._row, self._pivot = row, pivot
         self._stop = min(platform.parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
         self._legs = np.empty((6, boxes.LEG))
         self._cells = np.empty((boxes.DEPTH + 1, boxes.CELL))
         self._rows = np.empty((7, boxes.ROWS))
+        self._corners = np.empty((PLATES + sum(map(len, plates)) + MORE, CORNER))
 
     def reachable(self, ranges: Array) -> Reachable:
         """Return whether a box (6, 2) is within the limits."""
@@ -154,7 +154,7 @@ class Boxes:
             lambda factor: self._worst_of_legs(_box(factor * ranges)), most, _EXACT)
         if factor > 0.0 and self._nearest > -math.inf:
             factor, worst = _largest(
-                lambda factor: self._worst_clearance(_box(factor * ranges)), factor,
+                lambda factor: self._worst_clearance(_box(factor * ranges), math.inf), factor,
                 _EXACT_OF_CLEARANCE, worst)
         if factor > 0.0:
             factor, worst = _largest(
@@ -176,18 +176,19 @@ class Boxes:
         return _Proof(Worst(self.poses(found[at, boxes.POINT]), at % 6, _CODES[at // 6],
                             float(found[at, boxes.EXCESS])), certain, float(parts[at]))
 
-    def _worst_clearance(self, box: Array) -> _Proof:
+    def _worst_clearance(self, box: Array, coarse: float = _COARSE) -> _Proof:
         """Return the worst pose by clearance of the legs, and whether the limit is kept."""
-        found = np.empty((15, boxes.FOUND))
+        found = np.empty((len(boxes.PAIRS), boxes.FOUND))
         boxes.clearance_in_box(
-            self._platform.constants, self._axes, self._shapes, self._nearest, self._row,
-            self._pivot, box, _MOST_OF_CLEARANCE, self._legs, self._cells, np.empty((6, AXIS)),
-            found)
+            self._platform.constants, self._axes, self._shapes, *self._plates, self._nearest,
+            self._row, self._pivot, box, _MOST_OF_CLEARANCE, coarse, self._legs, self._cells,
+            self._corners, found)
         at = int(found[:, boxes.EXCESS].argmax())
         excess = float(found[at, boxes.EXCESS])
         certain = bool(np.all(found[:, boxes.UPPER] <= TOLERANCE * self._nearest))
         size = self._platform.parameters['singularity.characteristic_length']
-        return _Proof(Worst(self.poses(found[at, boxes.POINT]), _FIRST[at], 'leg_clearance_min',
+        return _Proof(Worst(self.poses(found[at, boxes.POINT]), boxes.PAIRS[at][0],
+                            'leg_clearance_min',
                             excess), certain, excess / size)
 
     def _worst_condition(self, box: Array) -> _Proof:

@@ -35,10 +35,9 @@ is bounded as above: each evaluation clears an interval around it. Where such an
 shorter than 1e-7 of the hexapod's size over its speed, the root is bracketed by the margin and the
 sign of det(J) instead.
 
-The clearance of two legs falls no faster than their ends can approach each other, at V of both
-legs at most: steps of ``leg_clearance.pair_room`` never pass a root, and where they are as short
-the root is bracketed in the same way. Platform joints keep their distance: where they are nearest,
-longer steps follow from the speed of the base joints in the frame of the platform.
+The clearance of two legs, or of a leg and a plate, is at least ``n . (p - q)`` of all corners p
+and q of the two (``clearance_bounds``), whose second derivatives are bounded: safe steps again,
+and where they are as short the root is bracketed in the same way.
 """
 
 from __future__ import annotations
@@ -46,10 +45,13 @@ from __future__ import annotations
 import math
 
 from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.capability.clearance_bounds import (
+    ARM, BASE_JOINT, BODIES, bodies, Body, corner_pair, CYLINDER, follow, FOLLOWING, MORE, OF_LEG,
+    PLATES, PLATFORM_JOINT, RATES, ROTATING, shortest, STAYING, STILL, TURNING)
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
     characteristic_length_of, joints_of)
-from stewart_dynamics.mechanics.kinematics.leg_clearance import pair_room, put_axis
+from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE, PLATFORM
 from stewart_dynamics.mechanics.matrix6 import (
     gram, inverse_and_determinant, laguerre_step, Symmetric, tridiagonal)
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
@@ -59,8 +61,8 @@ from stewart_dynamics.mechanics.vectors import (
 (LENGTH_MIN, LENGTH_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX, CLEARANCE_MIN, SINGULARITY,
  NOTHING) = range(7)
 """Codes of the limit that ends a travel."""
-SCRATCH = 12
-"""Rows of scratch memory: six legs, and their axes for the clearance."""
+SCRATCH = 6 + PLATES + MORE
+"""Rows of scratch memory: six legs, and their corners for the clearance; more for plates."""
 
 # The constants of a leg: A, B, C, speed V and reach |B| of its platform joint; the axis of the
 # base joint; three parts each (kept, by cos, by sin) of the platform joint's axis and of its arm
@@ -81,8 +83,10 @@ _SHORTER = 0.8
 _NARROW = 1e-7
 # Some clearances stay the same along a travel: rounding errors are below this part of the size.
 _EXACT_CLEARANCE = 1e-14
-# The frame of the platform is used for steps below this part of it.
+# Other directions are tried where a step is below this part of it.
 _NEAR = 0.01
+# Bound of |s''| / (|l'| / |l|)^2 of a unit vector s = l / |l| with l'' = 0: 2 / sqrt(3), and more.
+BEND = 1.2
 
 
 @inlined
@@ -294,61 +298,182 @@ def _end_of_leg(leg: Array, velocity: Vector3, rate: float, bound: float, code: 
     return low
 
 
+@compiled
+def _prepare_plates(constants: Array, base: Array, platform: Array, pose: Array,
+                    direction: Array, pivot: Array, corners: Array) -> None:
+    """Write the constant numbers of the corners of the plates."""
+    turn = corners[len(corners) - 2]
+    put3(turn, RATES, read3(direction, 3))
+    rotation = read9(pose, ROTATION.start)
+    farthest = 0.0
+    for n in range(len(base)):
+        corner = corners[PLATES + n]
+        put3(corner, 0, read3(base[n], 0))
+        put3(corner, RATES, (0.0, 0.0, 0.0))
+        corner[STILL] = 0.0
+    for n in range(len(platform)):
+        arm = rotate(rotation, subtract(read3(platform[n], 0), read3(pivot, 0)))
+        corner = corners[PLATES + len(base) + n]
+        put3(corner, ARM, arm)
+        corner[TURNING] = 0.0
+        farthest = max(farthest, norm(arm))
+    # the speed of the platform's plate, and the step for which bounds of TURNING hold
+    speed = norm(read3(direction, 0))
+    turn[STILL] = speed + norm(read3(direction, 3)) * farthest
+    turn[TURNING] = (math.inf if speed == 0.0 or norm(read3(direction, 3)) == 0.0 else
+                     characteristic_length_of(constants) / speed)
+
+
+@compiled
+def _put_leg(constants: Array, shapes: Array, legs: Array, corners: Array, velocity: Vector3,
+             rate: float, n: int, t: float) -> float:
+    """Write the corners of a leg; return the step for which their bounds hold."""
+    leg = legs[n]
+    base_joint, _ = joints_of(constants, n)
+    size, speed = characteristic_length_of(constants), norm(velocity)
+    line, change = _line(leg, velocity, rate, t)
+    length = norm(line)
+    inverse = 1.0 / length if length > 0.0 else math.inf
+    s = scale(inverse, line) if length > 0.0 else line
+    s_change = scale(inverse, subtract(change, scale(dot(s, change), s)))
+    away = norm(add(read3(leg, _CENTER), scale(t, velocity)))
+    turning = rate * (rate * (away + size) + 2.0 * speed)
+    # over a step of half the leg's length it stays longer than half of it
+    swing = 2.0 * leg[_SPEED] * inverse
+    bend = 2.0 * rate * rate * leg[_REACH] * inverse + BEND * swing * swing
+    cylinder = shapes[n, 1]
+    for place in range(OF_LEG):
+        corner = corners[OF_LEG * n + place]
+        if place == BASE_JOINT:
+            put3(corner, 0, base_joint)
+            put3(corner, RATES, (0.0, 0.0, 0.0))
+            corner[STILL], corner[TURNING] = 0.0, turning
+        elif place == PLATFORM_JOINT or (place == CYLINDER and length <= cylinder):
+            put3(corner, 0, add(base_joint, line))
+            put3(corner, RATES, change)
+            corner[STILL], corner[TURNING] = rate * rate * leg[_REACH], 0.0
+        else:
+            put3(corner, 0, add(base_joint, scale(cylinder, s)))
+            put3(corner, RATES, scale(cylinder, s_change))
+            corner[STILL] = cylinder * bend
+            corner[TURNING] = turning + cylinder * (bend + rate * (2.0 * swing + rate))
+    longest: float = 0.5 * length / max(leg[_SPEED], _ROUNDING * rate * length)
+    return longest
+
+
+@compiled
+def _put_plate(constants: Array, legs: Array, corners: Array, base_corners: int,
+               velocity: Vector3, rate: float, plate: int, t: float) -> None:
+    """Write the corners of a plate."""
+    joint, _ = joints_of(constants, 0)
+    center = add(joint, add(read3(legs[0], _CENTER), scale(t, velocity)))
+    if plate == BASE:
+        size = characteristic_length_of(constants)
+        for n in range(base_corners):
+            corner = corners[PLATES + n]
+            away = norm(subtract(center, read3(corner, 0)))
+            corner[TURNING] = rate * (rate * (away + size) + 2.0 * norm(velocity))
+        return
+    turn = read3(corners[len(corners) - 2], RATES)
+    axis = scale(1.0 / rate if rate > 0.0 else 0.0, turn)
+    cosine, sine = math.cos(rate * t), math.sin(rate * t)
+    for n in range(PLATES + base_corners, len(corners) - MORE):
+        corner = corners[n]
+        arm = read3(corner, ARM)
+        along = scale(dot(axis, arm), axis)
+        turned = add(along, add(scale(cosine, subtract(arm, along)),
+                                scale(sine, cross(axis, arm))))
+        put3(corner, 0, add(center, turned))
+        put3(corner, RATES, add(velocity, cross(turn, turned)))
+        corner[STILL] = rate * rate * norm(arm)
+
+
+@compiled
+def _step_of_bodies(corners: Array, a: Body, b: Body, n: Vector3, limit: float, how: int,
+                    ) -> float:
+    """Return the step for which two bodies are at least ``limit`` apart along n."""
+    follow(corners, a, b, n, 1, how)
+    follows = read3(corners[len(corners) - 1], RATES)
+    turned = norm(follows)
+    step: float = (corners[len(corners) - 2, TURNING] if how == ROTATING else
+                   1.0 / turned if turned > 0.0 else math.inf)
+    rest = TURNING if how == ROTATING else STILL
+    for p in range(a[0], a[2], a[1]):
+        for q in range(b[0], b[2], b[1]):
+            gap = dot(n, subtract(read3(corners[p], 0), read3(corners[q], 0))) - limit
+            moved, slope = corner_pair(corners, p, q, n, 0)
+            bend = corners[p, rest] + corners[q, rest]
+            if how == FOLLOWING:
+                # n is no longer than sqrt(2) over the step
+                bend = 2.0 * (bend - dot(follows, moved)) + max(limit, 0.0) * turned * turned
+            step = min(step, _safe_step(max(gap, 0.0), slope, bend))
+    return step
+
+
+@compiled
+def _room(constants: Array, shapes: Array, legs: Array, corners: Array, base_corners: int,
+          velocity: Vector3, rate: float, bound: float, i: int, j: int, t: float,
+          ) -> tuple[float, float]:
+    """Return the margin of the clearance of a leg and a leg or plate, and the step it clears."""
+    longest = _put_leg(constants, shapes, legs, corners, velocity, rate, i, t)
+    if j < 6:
+        longest = min(longest, _put_leg(constants, shapes, legs, corners, velocity, rate, j, t))
+    else:
+        _put_plate(constants, legs, corners, base_corners, velocity, rate, j, t)
+    margin, step = math.inf, longest
+    for pair in range(BODIES):
+        given, a, b, radii = bodies(shapes, corners, base_corners, i, j, pair)
+        if not given:
+            continue
+        vector = shortest(corners, a, b)
+        distance = norm(vector)
+        margin = min(margin, distance - radii - bound)
+        n = scale(1.0 / distance if distance > 0.0 else 0.0, vector)
+        if distance == 0.0:
+            step = 0.0
+            continue
+        clear = _step_of_bodies(corners, a, b, n, radii + bound, FOLLOWING)
+        if clear * _approach(legs, corners, i, j) < _NEAR * characteristic_length_of(constants):
+            clear = max(clear, _step_of_bodies(corners, a, b, n, radii + bound, STAYING),
+                        _step_of_bodies(corners, a, b, n, radii + bound, ROTATING))
+        step = min(step, clear)
+    return margin, step
+
+
 @inlined
-def _reach_of_base(leg: Array, t: float, velocity: Vector3) -> float:
-    """Return the distance of a base joint from the center of rotation."""
-    return norm(add(read3(leg, _CENTER), scale(t, velocity)))
+def _approach(legs: Array, corners: Array, i: int, j: int) -> float:
+    """Return the largest speed at which a leg and a leg or plate approach each other."""
+    speed: float = legs[i, _SPEED] + (
+        legs[j, _SPEED] if j < 6 else corners[len(corners) - 2, STILL] if j == PLATFORM else 0.0)
+    return speed
 
 
 @compiled
-def _room(constants: Array, shapes: Array, legs: Array, velocity: Vector3, rate: float,
-          bound: float, i: int, j: int, t: float) -> tuple[float, float]:
-    """Return the margin of the clearance of two legs, and the step after t that it clears."""
-    axes = legs[6:]
-    base_joint, platform_joint = joints_of(constants, i)
-    other_base_joint, other_platform_joint = joints_of(constants, j)
-    for n in (i, j):
-        line, _ = _line(legs[n], velocity, rate, t)
-        length = norm(line)
-        direction = scale(1.0 / length if length > 0.0 else 0.0, line)
-        put_axis(shapes, axes, n, base_joint if n == i else other_base_joint, direction, length)
-    clearance, _, step = pair_room(
-        shapes, axes, i, j, legs[i, _SPEED], legs[j, _SPEED],
-        rate * norm(subtract(platform_joint, other_platform_joint)), False, bound)
-    if step * (legs[i, _SPEED] + legs[j, _SPEED]) < _NEAR * characteristic_length_of(constants):
-        # while the center moves by no more than its distance from a base joint
-        arm, other_arm = _reach_of_base(legs[i], t, velocity), _reach_of_base(legs[j], t, velocity)
-        linear = norm(velocity)
-        _, _, longer = pair_room(
-            shapes, axes, i, j, linear + 2.0 * rate * arm, linear + 2.0 * rate * other_arm,
-            rate * norm(subtract(base_joint, other_base_joint)), True, bound)
-        if linear > 0.0 and rate > 0.0:
-            longer = min(longer, min(arm, other_arm) / linear)
-        step = max(step, longer)
-    return clearance - bound, step
-
-
-@compiled
-def _end_of_clearance(constants: Array, shapes: Array, legs: Array, velocity: Vector3,
-                      rate: float, bound: float, i: int, j: int, end: float) -> float:
-    """Return the first t in [0, end] at which two legs are nearer than a bound, or end."""
+def _end_of_clearance(constants: Array, shapes: Array, legs: Array, corners: Array,
+                      base_corners: int, velocity: Vector3, rate: float, bound: float, i: int,
+                      j: int, end: float) -> float:
+    """Return the first t in [0, end] at which a leg and a leg or plate are too near, or end."""
     size = characteristic_length_of(constants)
     bound -= _EXACT_CLEARANCE * size
-    margin, step = _room(constants, shapes, legs, velocity, rate, bound, i, j, 0.0)
+    margin, step = _room(
+        constants, shapes, legs, corners, base_corners, velocity, rate, bound, i, j, 0.0)
     if margin < -_ROUNDING * size:
         return 0.0
-    narrow = _NARROW * size / max(legs[i, _SPEED] + legs[j, _SPEED], _ROUNDING * rate * size)
+    narrow = _NARROW * size / max(_approach(legs, corners, i, j), _ROUNDING * rate * size)
     t = 0.0
     for _ in range(2000 * _MOST_STEPS):
         if step > narrow:
             t += step
             if t >= end:
                 return end
-            margin, step = _room(constants, shapes, legs, velocity, rate, bound, i, j, t)
+            margin, step = _room(
+                constants, shapes, legs, corners, base_corners, velocity, rate, bound, i, j, t)
             continue
         if t >= end:
             return end
-        margin, step = _room(constants, shapes, legs, velocity, rate, bound, i, j, t + narrow)
+        margin, step = _room(
+            constants, shapes, legs, corners, base_corners, velocity, rate, bound, i, j,
+            t + narrow)
         if margin < 0.0:
             break  # the root is between the two
         t += narrow
@@ -357,7 +482,8 @@ def _end_of_clearance(constants: Array, shapes: Array, legs: Array, velocity: Ve
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             break
-        margin, _ = _room(constants, shapes, legs, velocity, rate, bound, i, j, middle)
+        margin, _ = _room(
+            constants, shapes, legs, corners, base_corners, velocity, rate, bound, i, j, middle)
         if margin >= 0.0:
             low = middle
         else:
@@ -495,8 +621,8 @@ def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: fl
 
 
 @compiled
-def _travel(constants: Array, bounds: Array, shapes: Array, stop: float, legs: Array,
-            direction: Array) -> tuple[float, int, int]:
+def _travel(constants: Array, bounds: Array, shapes: Array, base_corners: int, stop: float,
+            legs: Array, direction: Array) -> tuple[float, int, int]:
     """Return t at the first limit, its code, and the leg (-1: none)."""
     velocity = read3(direction, 0)
     rate = norm(read3(direction, 3))
@@ -517,9 +643,12 @@ def _travel(constants: Array, bounds: Array, shapes: Array, stop: float, legs: A
         end, limit, leg = t, SINGULARITY, -1
     if bounds[CLEARANCE_MIN, 0] > -math.inf:
         for i in range(6):
-            for j in range(i + 1, 6):
-                t = _end_of_clearance(constants, shapes, legs, velocity, rate,
-                                      bounds[CLEARANCE_MIN, 0], i, j, end)
+            for j in range(i + 1, 8):
+                if (j == BASE and base_corners == 0) or (
+                        j == PLATFORM and len(legs) == SCRATCH + base_corners):
+                    continue
+                t = _end_of_clearance(constants, shapes, legs, legs[6:], base_corners, velocity,
+                                      rate, bounds[CLEARANCE_MIN, 0], i, j, end)
                 if t < end:
                     end, limit, leg = t, CLEARANCE_MIN, i
     if limit == NOTHING:
@@ -527,11 +656,11 @@ def _travel(constants: Array, bounds: Array, shapes: Array, stop: float, legs: A
     return end, limit, leg
 
 
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8', 'f8[:,::1]', 'f8[:,::1]',
-             'f8[:,::1]', 'f8[::1]', 'i8[::1]', 'i8[::1]', 'f8[:,::1]')
-def travels(constants: Array, axes: Array, bounds: Array, shapes: Array, stop: float,
-            poses: Array, directions: Array, pivots: Array, values: Array, limits: Integers,
-            legs: Integers, work: Array) -> None:
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8',
+             'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[::1]', 'i8[::1]', 'i8[::1]', 'f8[:,::1]')
+def travels(constants: Array, axes: Array, bounds: Array, shapes: Array, base: Array,
+            platform: Array, stop: float, poses: Array, directions: Array, pivots: Array,
+            values: Array, limits: Integers, legs: Integers, work: Array) -> None:
     """
     Write the largest travel from each pose in its direction.
 
@@ -547,6 +676,8 @@ def travels(constants: Array, axes: Array, bounds: Array, shapes: Array, stop: f
         infinity where there is no bound.
     shapes : (6, 3)
         As in ``leg_clearance``; not read where the clearance has no bound.
+    base, platform : (M, 3)
+        Corners of the plates, likewise.
     stop : float
         Condition number that ends a travel.
     poses : (N, MOTION)
@@ -559,11 +690,13 @@ def travels(constants: Array, axes: Array, bounds: Array, shapes: Array, stop: f
         Written: multiple of the direction until the first limit, its code, and the leg, of two
         legs that are too near the first; infinity, NOTHING and -1 if nothing limits, leg -1 at a
         singularity.
-    work : (SCRATCH, LEG)
+    work : (SCRATCH + corners of the plates, LEG)
         Scratch memory.
 
     """
     for n in range(len(poses)):
         _prepare(constants, axes, poses[n], directions[n], pivots[n], work)
+        _prepare_plates(
+            constants, base, platform, poses[n], directions[n], pivots[n], work[6:])
         values[n], limits[n], legs[n] = _travel(
-            constants, bounds, shapes, stop, work, directions[n])
+            constants, bounds, shapes, len(base), stop, work, directions[n])

@@ -30,7 +30,8 @@ from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import LIMITS, Limits
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import inertia_matrix, LEG_SHAPE, Parameters
+from stewart_dynamics.parameters.table import (
+    inertia_matrix, LEG_SHAPE, Parameters, PLATFORM_OUTLINE)
 from stewart_dynamics.planned.interpolation import rotation_vector
 
 
@@ -168,8 +169,9 @@ class RatedHexapod:
             found = limits.exceeded_angles(np.concatenate(whole.joint_angles(pose)).tolist())
         clearances = clearance_to_check(self.given)
         if not found and clearances is not None:
-            found = limits.exceeded_clearance(
-                clearances(Motion.from_pose(pose).rows[None])[0].tolist())
+            found = limits.exceeded_clearance(*(
+                each[0].tolist() for each in clearances.nearest(
+                    Motion.from_pose(pose).rows[None])))
         if found:
             raise PoseError(f'pose: {found[0].words(self.joints)}')
 
@@ -180,6 +182,7 @@ def _moved(p: Parameters, pivot: Array) -> Parameters:
         return p
     return p.replaced({
         'geometry.platform_joints': p['geometry.platform_joints'] - pivot,
+        PLATFORM_OUTLINE: None if p[PLATFORM_OUTLINE] is None else p[PLATFORM_OUTLINE] - pivot,
         'platform.center_of_mass': p['platform.center_of_mass'] - pivot,
         'singularity.characteristic_length': p['singularity.characteristic_length']})
 

@@ -27,7 +27,7 @@ from stewart_dynamics.arrays import Array, Flags, Six
 from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.mechanics.rows import (
     BASE_JOINT_ANGLES, consecutive, FORCES, LENGTHS, PLATFORM_JOINT_ANGLES, RATES)
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import OUTLINES, Parameters
 
 LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = OF_RESULTS = (
     'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
@@ -69,6 +69,8 @@ class Exceedance(NamedTuple):
     leg: int
     value: float
     bound: float
+    other: int = -1
+    """Of a clearance, the leg or plate that is nearest, see ``leg_clearance``; else -1."""
 
     @property
     def excess(self) -> float:
@@ -81,6 +83,8 @@ class Exceedance(NamedTuple):
         quantity, unit = QUANTITIES[self.limit]
         how = 'below' if self.limit in _MINIMA else 'above'
         limit = VELOCITY_MAX if self.limit == JUMP else self.limit
+        if self.other >= 0:
+            quantity += f' to {(*joints, *OUTLINES)[self.other]},'
         return (f'{joints[self.leg]}: {quantity} {self.value:.6g} {unit} is {self.excess:.6g} '
                 f'{unit} {how} {limit}')
 
@@ -156,12 +160,13 @@ class Limits:
             _add_exceeding(found, limit, angles[where], bounds, thresholds)
         return tuple(found)
 
-    def exceeded_clearance(self, clearances: Sequence[float]) -> tuple[Exceedance, ...]:
+    def exceeded_clearance(self, clearances: Sequence[float], nearest: Sequence[int],
+                           ) -> tuple[Exceedance, ...]:
         """Return the legs whose clearance (6,) is below CLEARANCE_MIN, which is given."""
         found: list[Exceedance] = []
         _add_exceeding(found, CLEARANCE_MIN, clearances, self.bounds[CLEARANCE_MIN].tolist(),
                        self.thresholds[LIMITS.index(CLEARANCE_MIN)].tolist())
-        return tuple(found)
+        return tuple(each._replace(other=nearest[each.leg]) for each in found)
 
 
 def _add_exceeding(found: list[Exceedance], limit: str, values: Sequence[float],

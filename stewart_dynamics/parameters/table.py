@@ -39,6 +39,8 @@ QUATERNION_TOLERANCE = 1e-3
 HYSTERESIS = 0.8
 # Relative tolerance of actuator.reflected_mass if drive.* gives the inertias: both may be rounded.
 REFLECTED_MASS_TOLERANCE = 0.01
+# Corners of a plate are in a plane to this part of its size.
+_FLAT = 1e-6
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 """[m/s^2]"""
 
@@ -119,7 +121,9 @@ AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'
 IGNORE, CHECK, PREPEND = 'ignore', 'check', 'prepend'
 """Values of trajectory.approach."""
 LEG_SHAPE = 'legs.cylinder.radius', 'legs.cylinder.length', 'legs.piston.radius'
-"""Parameters that the clearance between legs needs."""
+"""Parameters that the clearance of the legs needs."""
+BASE_OUTLINE, PLATFORM_OUTLINE = OUTLINES = 'geometry.base_outline', 'geometry.platform_outline'
+"""Parameters of the plates that the clearance counts for."""
 
 _NEEDED_BY = {
     'drive.resistance': ('drive.torque_constant',),
@@ -146,6 +150,12 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'angle of each platform joint is measured, from the base toward the platform, of '
               'any length, platform axes; default: along the leg at the home pose', '', (),
               sizes=(18,)),
+    Parameter(BASE_OUTLINE, 'double', 'x y z of the corners of a flat convex plate of the base, '
+              'in order, base frame; pistons keep limits.leg_clearance_min from it', 'm', (),
+              sizes=(3,), repeated=True),
+    Parameter(PLATFORM_OUTLINE, 'double', 'x y z of the corners of a flat convex plate of the '
+              'platform, in order, platform frame; cylinders keep limits.leg_clearance_min from '
+              'it', 'm', (), sizes=(3,), repeated=True),
     Parameter('geometry.platform_side', 'string', 'side of the base joints on which the platform '
               'is: positive where the base axis nearest to the normal of their plane points, '
               'usually z, or negative; auto: positive, unless only the other side has a level '
@@ -204,8 +214,9 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     _legs('limits.platform_joint_angle_max', 'maximum angle between a leg and its '
           'geometry.platform_joint_axes; unlimited if not set', 'rad', (), minimum=0.0, above=True,
           maximum=math.pi),
-    Parameter('limits.leg_clearance_min', 'double', 'minimum distance between the surfaces of two '
-              'legs, a cylinder and a thinner piston each; unlimited if not set', 'm',
+    Parameter('limits.leg_clearance_min', 'double', 'minimum distance of the surface of a leg, a '
+              'cylinder and a thinner piston, from that of another leg, and from the outlines of '
+              'geometry that are given; unlimited if not set', 'm',
               minimum=0.0),
     Parameter('limits.action', 'string', 'action while a length, rate, joint angle or clearance '
               'limit is exceeded, or a setpoint is too far from the last one for '
@@ -315,6 +326,9 @@ class Parameters(ParameterSet):
         if self['limits.leg_clearance_min'] is not None and missing:
             raise ParameterError(
                 f'{source}: {", ".join(missing)}: not set: needed by limits.leg_clearance_min')
+        for name in OUTLINES:
+            if self[name] is not None and (rule := _broken_rule_of_plate(self[name])):
+                raise ParameterError(f'{source}: {name}: {self[name].tolist()}: {rule}')
         outer, inner = self['legs.cylinder.radius'], self['legs.piston.radius']
         if outer is not None and inner is not None and np.any(inner > outer):
             raise ParameterError(
@@ -389,6 +403,26 @@ class Parameters(ParameterSet):
         """Set the value of a parameter that follows from others."""
         value.setflags(write=False)
         self._values[name] = value
+
+
+def _broken_rule_of_plate(corners: Any) -> str:
+    """Return the rule that corners (M, 3) of a plate break; empty if they break none."""
+    if len(corners) < 3:
+        return 'must have three corners or more'
+    arms = corners - corners[0]
+    area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
+    size = float(np.abs(arms).max())
+    if np.linalg.norm(area) <= _FLAT * size ** 2:
+        return 'the corners are on one line'
+    normal = area / np.linalg.norm(area)
+    if np.abs(arms @ normal).max() > _FLAT * size:
+        return f'the corners must be in one plane, to {_FLAT:g} of its size'
+    edges = np.roll(corners, -1, axis=0) - corners
+    turns = np.cross(edges, np.roll(edges, -1, axis=0)) @ normal
+    around = np.arctan2(turns, np.sum(edges * np.roll(edges, -1, axis=0), axis=1)).sum()
+    if turns.min() < -_FLAT * size ** 2 or around > 3.0 * math.pi:
+        return 'must be convex, its corners in order around it'
+    return ''
 
 
 def inertia_matrix(six: ArrayLike) -> Any:

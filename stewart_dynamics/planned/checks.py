@@ -16,8 +16,8 @@
 The checks of a planned trajectory: limits and singularities, at samples and between them.
 
 Between two samples, lengths and rates of the legs, det(J) and sin^2(angle / 2) of the joints are
-cubics in time through their values and derivatives at both. The clearance between the legs falls
-by no more than the platform joints move.
+cubics in time through their values and derivatives at both. The clearance of the legs falls by
+no more than the platform joints, and corners of its plate, move.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.mechanics.dynamics import friction
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
@@ -44,7 +44,7 @@ from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 # Where |det(J)| falls below this part of its values at two samples, the samples between them are
 # made closer.
 DIP = 0.9
-# Between two samples the clearance between the legs may be below its limit by less than this part
+# Between two samples the clearance of the legs may be below its limit by less than this part
 # of the characteristic length.
 _CLEARANCE = 1e-4
 
@@ -173,7 +173,7 @@ class Checks:
     def check_clearance(self, times: Array, motions: Array, joined: Flags, ways: Array,
                         ) -> list[int]:
         """
-        Check the clearance between the legs at samples, and between those that are joined.
+        Check the clearance of the legs at samples, and between those that are joined.
 
         Parameters
         ----------
@@ -182,7 +182,8 @@ class Checks:
         motions : (M, MOTION)
             Rows of motion.
         ways : (M - 1,)
-            Bound of how far a platform joint moves from each sample to the next [m].
+            Bound of how far a platform joint, or corner of its plate, moves from each sample to
+            the next [m].
 
         Returns
         -------
@@ -193,12 +194,12 @@ class Checks:
         if self._clearance is None:
             return []
         with np.errstate(all='ignore'):  # numbers that overflow are found by ``check``
-            clearances = self._clearance(motions)
+            clearances, others = self._clearance.nearest(motions)
             # Two legs approach each other by no more than both of their joints move.
             nearest = clearances.min(axis=1)
             lowest = 0.5 * (nearest[:-1] + nearest[1:]) - ways
         self._check_limit(CLEARANCE_MIN, clearances,
-                          np.broadcast_to(times[:, None], clearances.shape))
+                          np.broadcast_to(times[:, None], clearances.shape), others)
         bound = float(self._limits.bounds[CLEARANCE_MIN][0])
         held = np.minimum(nearest[:-1], nearest[1:]) >= self._limits.thresholds[
             LIMITS.index(CLEARANCE_MIN), 0]
@@ -254,7 +255,8 @@ class Checks:
             self._exceed_known(np.maximum(highest, -lowest))].tolist()
         return unclear
 
-    def _check_limit(self, limit: str, values: Array, times: Array) -> None:
+    def _check_limit(self, limit: str, values: Array, times: Array,
+                     others: Integers | None = None) -> None:
         """Note the first of the values (M, 6) at their times that exceeds a limit."""
         exceeding = self._limits.exceeds(limit, values)
         if not exceeding.any():
@@ -262,7 +264,8 @@ class Checks:
         n, leg = map(int, np.unravel_index(
             np.argmin(np.where(exceeding, times, np.inf)), exceeding.shape))
         exceedance = Exceedance(
-            limit, leg, float(values[n, leg]), float(self._limits.bounds[limit][leg]))
+            limit, leg, float(values[n, leg]), float(self._limits.bounds[limit][leg]),
+            -1 if others is None else int(others[n, leg]))
         self.violations.append(Violation(
             float(times[n, leg]), LIMIT, f' {exceedance.words(self._joints)}', leg, limit))
 

@@ -40,7 +40,6 @@ from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics import (
     forward_kinematics, joint_angles, leg_clearance)
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_VELOCITY, consecutive, FORCES, LENGTHS, LINEAR_VELOCITY, RATES, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -250,10 +249,9 @@ class _Work:
         self._legs_checks = Checks(self._parameters)
         self._sampling = Sampling(self._parameters)
         self._samples = 0
-        self._checks_clearance = self._parameters[CLEARANCE_MIN] is not None
-        # Distance of the farthest platform joint from the platform's origin [m].
-        self._reach = float(np.linalg.norm(
-            self._parameters['geometry.platform_joints'], axis=1).max())
+        clearance = leg_clearance.clearance_to_check(self._parameters)
+        self._checks_clearance = clearance is not None
+        self._reach = clearance.reach if clearance else 0.0
 
     def check(self) -> Iterator[None]:
         """Compute motion and forces of the legs; raise _RejectedError at a violation."""

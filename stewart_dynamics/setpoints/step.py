@@ -340,8 +340,8 @@ class Step:
                 forces = None
         clearances: tuple[float, ...] = ()
         if self._clearance_of_one is not None:
-            clearances = self._clearance_of_one()
-            exceeded = self._limits.exceeded_clearance(clearances)
+            clearances, nearest = self._clearance_of_one()
+            exceeded = self._limits.exceeded_clearance(clearances, nearest)
             exceedances += exceeded
             if exceeded and self._limits_suppress:
                 forces = None

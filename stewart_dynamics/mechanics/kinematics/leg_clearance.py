@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The clearance between the legs: smallest distance between the surfaces of two legs; compiled.
+The clearance of the legs: smallest distance of a leg from another one, or from a plate; compiled.
 
 Each leg is two capsules on one axis, from the base joint along the leg: the cylinder, as long as
 ``legs.cylinder.length`` but no longer than the leg, and the thinner piston, as long as the leg:
@@ -25,22 +25,21 @@ clamped, and the best u for that, it is found in closed form (Ericson, Real-Time
 Detection, 2005, 5.1.9); where legs are parallel, any u does to begin with. The four pairs of
 capsules of two legs differ only in the ends of their rectangles.
 
-The axis of a cylinder ends at the point of a ball around the base joint that is nearest to the
-platform joint, so it moves no farther than the platform joint does: the clearance of two legs
-changes by no more than the sum of the distances that their platform joints move. With the unit
-vector n from one axis to the other at their nearest points the distance is, whatever they do, at
-least that of their ends along n. In the frame of the base the base joints do not move, in that of
-the platform the platform joints do not: ``pair_room`` is for both.
+A plate is a flat convex polygon, fixed to the base or to the platform. A leg is joined to both: so
+cylinders count for the platform's plate, and pistons, from the end of the cylinder on, for that of
+the base. Their distance is zero where the axis crosses the polygon; else an end of the axis above
+the polygon is nearest, or an edge is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 import math
+from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
@@ -49,11 +48,14 @@ from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_consta
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.mechanics.vectors import (
-    cross, dot, norm, read3, read9, scale, subtract, Vector3)
-from stewart_dynamics.parameters.table import LEG_SHAPE, Parameters
+    add, cross, dot, norm, put3, read3, read9, rotate_back, scale, subtract, Vector3)
+from stewart_dynamics.parameters.table import BASE_OUTLINE, LEG_SHAPE, Parameters, PLATFORM_OUTLINE
+
+BASE, PLATFORM = 6, 7
+"""Numbers of the plates, where 0 to 5 are legs."""
 
 # The axis of a leg in scratch memory: base joint, direction, length, length of the cylinder.
-_BASE, _DIRECTION, _LENGTH, _CYLINDER, AXIS = 0, 3, 6, 7, 8
+_BASE, _DIRECTION, _LENGTH, _CYLINDER, _AXIS = 0, 3, 6, 7, 8
 
 
 @inlined
@@ -77,8 +79,8 @@ def _distance(gap: Vector3, s: Vector3, t: Vector3, cosine: float, along_s: floa
 
 
 @inlined
-def pair_clearance(shapes: Array, axes: Array, i: int, j: int) -> float:
-    """Return the clearance of two legs of shapes (6, 3) on axes (6, AXIS); negative: overlap."""
+def _pair_clearance(shapes: Array, axes: Array, i: int, j: int) -> float:
+    """Return the clearance of two legs of shapes (6, 3) on axes (6, _AXIS); negative: overlap."""
     s, t = read3(axes[i], _DIRECTION), read3(axes[j], _DIRECTION)
     gap = subtract(read3(axes[i], _BASE), read3(axes[j], _BASE))
     cosine, along_s, along_t = dot(s, t), dot(gap, s), dot(gap, t)
@@ -102,86 +104,86 @@ def pair_clearance(shapes: Array, axes: Array, i: int, j: int) -> float:
 
 
 @compiled
-def pair_room(shapes: Array, axes: Array, i: int, j: int, moved: float, other_moved: float,
-              turned: float, at_base: bool, bound: float) -> tuple[float, float, float]:
-    """
-    Return the clearance of two legs, and its least value when the joints at one end move.
-
-    Parameters
-    ----------
-    shapes, axes : (6, 3), (6, AXIS)
-        As in ``pair_clearance``.
-    i, j : int
-        The two legs.
-    moved, other_moved : float
-        Largest distances that their joints at one end move, in the frame of the others [m].
-    turned : float
-        Largest change of the vector between these two joints, likewise [m].
-    at_base : bool
-        The base joints move; else the platform joints.
-    bound : float
-        Smallest clearance [m].
-
-    Returns
-    -------
-    clearance, lowest, room : float
-        Clearance, a lower bound of it after these moves [m], and the multiple of the moves up to
-        which it cannot be below ``bound``; 0 where it is.
-
-    """
-    s, t = read3(axes[i], _DIRECTION), read3(axes[j], _DIRECTION)
-    gap = subtract(read3(axes[i], _BASE), read3(axes[j], _BASE))
-    cosine, along_s, along_t = dot(s, t), dot(gap, s), dot(gap, t)
+def between(p: Vector3, p_end: Vector3, q: Vector3, q_end: Vector3) -> Vector3:
+    """Return the shortest vector from a segment q to a segment p."""
+    along, other_along = subtract(p_end, p), subtract(q_end, q)
+    length, other_length = norm(along), norm(other_along)
+    s = scale(1.0 / length if length > 0.0 else 0.0, along)
+    t = scale(1.0 / other_length if other_length > 0.0 else 0.0, other_along)
+    gap = subtract(p, q)
+    cosine = dot(s, t)
     normal = cross(s, t)
     square = dot(normal, normal)
     u = dot(gap, subtract(scale(cosine, t), s)) / square if square > 0.0 else 0.0
-    clearance = lowest = room = math.inf
-    for capsules in range(4):
-        cylinder, other_cylinder = capsules & 1 == 1, capsules & 2 == 2
-        u_end = axes[i, _CYLINDER] if cylinder else axes[i, _LENGTH]
-        v_end = axes[j, _CYLINDER] if other_cylinder else axes[j, _LENGTH]
-        inside = cylinder and u_end < axes[i, _LENGTH]
-        other_inside = other_cylinder and v_end < axes[j, _LENGTH]
-        radii = (shapes[i, 0] if cylinder else shapes[i, 2]) + (
-            shapes[j, 0] if other_cylinder else shapes[j, 2])
-        x = _shortest(gap, s, t, cosine, along_s, along_t, u, u_end, v_end)
-        distance = norm(x)
-        n = scale(1.0 / distance if distance > 0.0 else 0.0, x)
-        at_bases = dot(n, gap) - radii
-        clearance = min(clearance, distance - radii)
-        for ends in range(4):
-            far, other_far = ends & 1 == 1, ends & 2 == 2
-            apart = at_bases + (u_end * dot(n, s) if far else 0.0) - (
-                v_end * dot(n, t) if other_far else 0.0)
-            # the end of a cylinder moves with the joints at either end, and no farther
-            by = 0.0
-            if far != at_base or (far and inside):
-                by += moved
-            if other_far != at_base or (other_far and other_inside):
-                by += other_moved
-            if far == other_far != at_base and not (far and (inside or other_inside)):
-                by = min(by, turned)
-            lowest = min(lowest, max(apart - by, -radii))
-            if by > 0.0:
-                room = min(room, (apart - bound) / by)
-    return clearance, lowest, max(room, 0.0) if clearance >= bound else 0.0
+    return _shortest(gap, s, t, cosine, dot(gap, s), dot(gap, t), u, length, other_length)
+
+
+@compiled
+def from_plate(plate: Array, first: int, end: int, p: Vector3, p_end: Vector3, enough: float,
+               ) -> Vector3:
+    """
+    Return the shortest vector from a plate to a segment; zero where the segment crosses it.
+
+    Parameters
+    ----------
+    plate : (M, 3 or more)
+        Rows that begin with the corners of the plate, in order [m].
+    first, end : int
+        Its rows.
+    p, p_end : (3,)
+        Ends of the segment.
+    enough : float
+        Where the segment is this far from the plane of the plate, the distance from the plane
+        will do [m].
+
+    """
+    origin = read3(plate[first], 0)
+    area = (0.0, 0.0, 0.0)
+    for n in range(first + 1, end - 1):
+        area = add(area, cross(subtract(read3(plate[n], 0), origin),
+                               subtract(read3(plate[n + 1], 0), origin)))
+    normal = scale(1.0 / norm(area), area)
+    height = dot(normal, subtract(p, origin))
+    end_height = dot(normal, subtract(p_end, origin))
+    crossing = (height < 0.0) != (end_height < 0.0)
+    if not crossing and min(abs(height), abs(end_height)) >= enough:
+        return scale(min(abs(height), abs(end_height)), normal)
+    part = height / (height - end_height) if crossing else 0.0
+    x = add(p, scale(part, subtract(p_end, p)))
+    above = end_above = True
+    shortest, distance = x, math.inf
+    for n in range(first, end):
+        corner = read3(plate[n], 0)
+        following = read3(plate[n + 1 if n + 1 < end else first], 0)
+        inward = cross(normal, subtract(following, corner))
+        above = above and dot(inward, subtract(p, corner)) >= 0.0
+        end_above = end_above and dot(inward, subtract(p_end, corner)) >= 0.0
+        crossing = crossing and dot(inward, subtract(x, corner)) >= 0.0
+        vector = between(p, p_end, corner, following)
+        if norm(vector) < distance:
+            shortest, distance = vector, norm(vector)
+    if crossing:
+        return 0.0, 0.0, 0.0
+    if above and abs(height) < distance:
+        shortest, distance = scale(height, normal), abs(height)
+    if end_above and abs(end_height) < distance:
+        shortest = scale(end_height, normal)
+    return shortest
 
 
 @inlined
-def put_axis(shapes: Array, axes: Array, leg: int, base: Vector3, direction: Vector3,
-             length: float) -> None:
-    """Write the axis of a leg (AXIS,)."""
-    axis = axes[leg]
-    axis[_BASE], axis[_BASE + 1], axis[_BASE + 2] = base
-    axis[_DIRECTION], axis[_DIRECTION + 1], axis[_DIRECTION + 2] = direction
-    axis[_LENGTH], axis[_CYLINDER] = length, min(shapes[leg, 1], length)
+def _keep_nearest(clearances: Array, nearest: Integers, leg: int, other: int, clearance: float,
+                  ) -> None:
+    if clearance < clearances[leg]:
+        clearances[leg], nearest[leg] = clearance, other
 
 
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
-def leg_clearances(constants: Array, shapes: Array, motions: Array, clearances: Array,
-                   axes: Array) -> None:
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]',
+             'i8[:,::1]', 'f8[:,::1]')
+def leg_clearances(constants: Array, shapes: Array, base: Array, platform: Array, motions: Array,
+                   clearances: Array, nearest: Integers, axes: Array) -> None:
     """
-    Write the clearance of each leg from the nearest other leg.
+    Write the clearance of each leg from the nearest other leg or plate.
 
     Parameters
     ----------
@@ -189,33 +191,54 @@ def leg_clearances(constants: Array, shapes: Array, motions: Array, clearances: 
         Constants of the hexapod, see ``hexapod_constants``.
     shapes : (6, 3)
         Radius and length of the cylinder and radius of the piston of each leg [m].
+    base, platform : (M, 3)
+        Corners of the plates, base frame and platform frame [m]; none without a plate.
     motions : (N, MOTION)
         Rows of motion.
-    clearances : (N, 6)
-        Written [m]; negative where legs overlap.
-    axes : (6, AXIS)
+    clearances, nearest : (N, 6)
+        Written: clearance [m], negative where legs overlap; and number of the leg or plate.
+    axes : (6, _AXIS)
         Scratch memory.
 
     """
     for row in range(len(motions)):
         position = read3(motions[row], POSITION.start)
         rotation = read9(motions[row], ROTATION.start)
-        nearest = clearances[row]
         for leg in range(6):
             _, length, _, direction = leg_line(constants, leg, position, rotation)
-            base, _ = joints_of(constants, leg)
-            put_axis(shapes, axes, leg, base, direction, length)
-            nearest[leg] = math.inf
+            joint, _ = joints_of(constants, leg)
+            axis = axes[leg]
+            put3(axis, _BASE, joint)
+            put3(axis, _DIRECTION, direction)
+            axis[_LENGTH], axis[_CYLINDER] = length, min(shapes[leg, 1], length)
+            clearances[row, leg], nearest[row, leg] = math.inf, leg
         for i in range(6):
             for j in range(i + 1, 6):
-                clearance = pair_clearance(shapes, axes, i, j)
-                nearest[i] = min(nearest[i], clearance)
-                nearest[j] = min(nearest[j], clearance)
+                clearance = _pair_clearance(shapes, axes, i, j)
+                _keep_nearest(clearances[row], nearest[row], i, j, clearance)
+                _keep_nearest(clearances[row], nearest[row], j, i, clearance)
+        for leg in range(6):
+            joint, direction = read3(axes[leg], _BASE), read3(axes[leg], _DIRECTION)
+            if len(platform):
+                begin = rotate_back(rotation, subtract(joint, position))
+                vector = from_plate(
+                    platform, 0, len(platform), begin, add(begin, scale(
+                        axes[leg, _CYLINDER], rotate_back(rotation, direction))),
+                    clearances[row, leg] + shapes[leg, 0])
+                _keep_nearest(clearances[row], nearest[row], leg, PLATFORM,
+                              norm(vector) - shapes[leg, 0])
+            if len(base):
+                vector = from_plate(
+                    base, 0, len(base), add(joint, scale(shapes[leg, 1], direction)),
+                    add(joint, scale(axes[leg, _LENGTH], direction)),
+                    clearances[row, leg] + shapes[leg, 2])
+                _keep_nearest(clearances[row], nearest[row], leg, BASE,
+                              norm(vector) - shapes[leg, 2])
 
 
 class LegClearance:
     """
-    The clearance between a hexapod's legs.
+    The clearance of a hexapod's legs.
 
     Parameters
     ----------
@@ -226,6 +249,10 @@ class LegClearance:
     ----------
     shapes : (6, 3)
         Radius and length of the cylinder and radius of the piston of each leg [m].
+    base, platform : (M, 3)
+        Corners of the plates, base frame and platform frame [m]; none without a plate.
+    reach : float
+        Distance of the farthest platform joint or corner from the platform's origin [m].
 
     Raises
     ------
@@ -238,32 +265,41 @@ class LegClearance:
         missing = [name for name in LEG_SHAPE if parameters[name] is None]
         if missing:
             raise ParameterError(f'parameters: {", ".join(missing)}: not set: needed by the '
-                                 'clearance between the legs')
+                                 'clearance of the legs')
         self._constants = hexapod_constants(parameters)
         self.shapes = np.column_stack([parameters[name] for name in LEG_SHAPE])
+        self.base, self.platform = (
+            np.empty((0, 3)) if parameters[name] is None else parameters[name].copy()
+            for name in (BASE_OUTLINE, PLATFORM_OUTLINE))
+        self.reach = float(np.linalg.norm(np.concatenate([
+            parameters['geometry.platform_joints'], self.platform]), axis=1).max())
 
     def __call__(self, motions: Array) -> Array:
         """Return the clearance of each leg (N, 6) [m] in motions (N, MOTION)."""
-        clearances = np.empty((len(motions), 6))
+        return self.nearest(motions)[0]
+
+    def nearest(self, motions: Array) -> tuple[Array, Integers]:
+        """Return the clearance of each leg (N, 6) [m], and number of the leg or plate."""
+        clearances, nearest = np.empty((len(motions), 6)), np.empty((len(motions), 6), np.int64)
         batch.in_parts(self._clearances, self._constants, batch.compact(motions), clearances,
-                       scratch=(6, AXIS))
-        return clearances
+                       nearest, scratch=(6, _AXIS))
+        return clearances, nearest
 
-    def of_one(self, motion: Array) -> Callable[[], tuple[float, ...]]:
-        """Return a function that gives the clearances (6,) of a row's current values."""
-        clearances = np.empty((1, 6))
+    def of_one(self, motion: Array) -> Callable[[], tuple[tuple[float, ...], tuple[int, ...]]]:
+        """Return a function that gives ``nearest`` (6,) of a row's current values."""
+        clearances, nearest = np.empty((1, 6)), np.empty((1, 6), np.int64)
         compute = leg_clearances.bound(
-            self._constants, self.shapes, motion.reshape(1, len(motion)), clearances,
-            np.empty((6, AXIS)))
+            self._constants, self.shapes, self.base, self.platform,
+            motion.reshape(1, len(motion)), clearances, nearest, np.empty((6, _AXIS)))
 
-        def of_row() -> tuple[float, ...]:
+        def of_row() -> tuple[tuple[float, ...], tuple[int, ...]]:
             compute()
-            return tuple(clearances[0].tolist())
+            return tuple(clearances[0].tolist()), tuple(nearest[0].tolist())
 
         return of_row
 
-    def _clearances(self, constants: Array, *arrays: Array) -> None:
-        leg_clearances(constants, self.shapes, *arrays)
+    def _clearances(self, constants: Array, *arrays: Any) -> None:
+        leg_clearances(constants, self.shapes, self.base, self.platform, *arrays)
 
 
 def clearance_to_check(parameters: Parameters) -> LegClearance | None:

@@ -1,0 +1,171 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Bounds of the clearance of two bodies whose corners move; compiled.
+
+A body is the convex hull of corners: two of a cylinder or piston, any number of a plate. Whatever
+vector n is chosen, two bodies are at least ``min n . (p - q) / |n|`` apart, over the corners p of
+one and q of the other. At a pose the shortest vector between them is the best n, and the bound is
+their distance. When the coordinates of the pose change by x, corners are at
+
+    p(x) = p + sum_k x_k p_k + rest,  |rest| bounded,
+
+and n may follow: ``n + sum_k x_k n_k``. Where several corners are equally near, as those of two
+legs that cross, the n_k are chosen by least squares so that they stay so: then the bound differs
+from the distance by terms of second order. Besides this n, one that stays, and one that turns with
+the platform are tried: corners of one part, base or platform, keep their distances exactly.
+
+The axis of a cylinder longer than its leg ends at the platform joint. Over a change of the pose
+the hull of the base joint and of either end contains it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import compiled, inlined
+from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE, between, from_plate, PLATFORM
+from stewart_dynamics.mechanics.vectors import (
+    add, cross, dot, norm, put3, read3, scale, subtract, Vector3)
+
+# A corner: where it is, its derivatives by the coordinates, and bounds of the rest, in the base
+# frame and in a frame that turns with the platform; and its arm where it is of the platform.
+RATES, STILL, TURNING, ARM, CORNER = 3, 21, 22, 23, 26
+# Corners of a leg: base joint, end of the cylinder (twice: no longer than the leg, as it is), and
+# platform joint. The plates of base and platform follow those of six legs.
+BASE_JOINT, CYLINDER, CYLINDER_END, PLATFORM_JOINT, OF_LEG = 0, 1, 2, 3, 4
+PLATES = 6 * OF_LEG
+# Rows behind the corners: derivatives of the rotation, and of n.
+MORE = 2
+BODIES = 4
+"""Largest number of pairs of bodies of two legs."""
+
+FOLLOWING, STAYING, ROTATING = 0, 1, 2
+"""How n changes."""
+
+# Corners whose direction from the nearest one is this near to a right angle with n count as near.
+_NEAR = 0.05
+# Part of the least squares that keeps n_k small where legs are almost parallel.
+_RIDGE = 1e-3
+
+Body = tuple[int, int, int]
+"""First corner, step to the next one, and end."""
+
+
+@inlined
+def bodies(shapes: Array, corners: Array, base_corners: int, leg: int, other: int, pair: int,
+           ) -> tuple[bool, Body, Body, float]:
+    """
+    Return whether there is such a pair, two bodies of a leg and a leg or plate, and their radii.
+
+    Parameters
+    ----------
+    shapes : (6, 3)
+        As in ``leg_clearance``.
+    corners : (M, CORNER)
+        Of the legs and plates.
+    base_corners : int
+        Corners of the base's plate.
+    leg, other, pair : int
+        Leg, other leg or plate, and 0 to BODIES - 1.
+
+    """
+    first = OF_LEG * leg
+    cylinder = (first, CYLINDER, first + CYLINDER + 1)
+    piston = (first, PLATFORM_JOINT, first + OF_LEG)
+    plate = PLATES + base_corners
+    if other == PLATFORM:
+        end = len(corners) - MORE
+        return pair == 0 and end > plate, cylinder, (plate, 1, end), shapes[leg, 0]
+    if other == BASE:
+        out = (first + CYLINDER_END, 1, first + OF_LEG)
+        return pair == 0 and base_corners > 0, out, (PLATES, 1, plate), shapes[leg, 2]
+    second = OF_LEG * other
+    return (True, cylinder if pair & 1 else piston,
+            (second, CYLINDER, second + CYLINDER + 1) if pair & 2 else (
+                second, PLATFORM_JOINT, second + OF_LEG),
+            (shapes[leg, 0] if pair & 1 else shapes[leg, 2])
+            + (shapes[other, 0] if pair & 2 else shapes[other, 2]))
+
+
+@inlined
+def shortest(corners: Array, a: Body, b: Body) -> Vector3:
+    """Return the shortest vector from body b to body a, which is a segment."""
+    p, p_end = read3(corners[a[0]], 0), read3(corners[a[2] - 1], 0)
+    if b[2] - b[0] > b[1] + 1:
+        return from_plate(corners, b[0], b[2], p, p_end, math.inf)
+    return between(p, p_end, read3(corners[b[0]], 0), read3(corners[b[2] - 1], 0))
+
+
+@inlined
+def _support(corners: Array, body: Body, n: Vector3) -> int:
+    """Return the corner of a body that is farthest against n."""
+    best, lowest = body[0], math.inf
+    for k in range(body[0], body[2], body[1]):
+        along = dot(n, read3(corners[k], 0))
+        if along < lowest:
+            best, lowest = k, along
+    return best
+
+
+@compiled
+def follow(corners: Array, a: Body, b: Body, n: Vector3, coordinates: int, how: int) -> None:
+    """Write the derivatives of n, from body b to body a, by the coordinates."""
+    turn, rates = corners[len(corners) - 2], corners[len(corners) - 1]
+    if how != FOLLOWING:
+        for k in range(coordinates):
+            put3(rates, RATES + 3 * k, scale(
+                1.0 if how == ROTATING else 0.0, cross(read3(turn, RATES + 3 * k), n)))
+        return
+    x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
+    e = cross(n, (1.0 if x <= min(y, z) else 0.0, 1.0 if y < x and y <= z else 0.0,
+                  1.0 if z < min(x, y) else 0.0))
+    e = scale(1.0 / norm(e), e)
+    f = cross(n, e)
+    ee, ef, ff = _RIDGE, 0.0, _RIDGE
+    for k in range(coordinates):
+        put3(rates, RATES + 3 * k, (0.0, 0.0, 0.0))
+    for body, sign in ((a, 1.0), (b, -1.0)):
+        nearest = _support(corners, body, scale(sign, n))
+        for other in range(body[0], body[2], body[1]):
+            q = subtract(read3(corners[other], 0), read3(corners[nearest], 0))
+            length = norm(q)
+            if other == nearest or not abs(dot(n, q)) < _NEAR * length:
+                continue
+            q_e, q_f = dot(q, e) / length, dot(q, f) / length
+            ee, ef, ff = ee + q_e * q_e, ef + q_e * q_f, ff + q_f * q_f
+            for k in range(coordinates):
+                at = RATES + 3 * k
+                falling = dot(n, subtract(
+                    read3(corners[other], at), read3(corners[nearest], at))) / length
+                rates[at] -= falling * q_e
+                rates[at + 1] -= falling * q_f
+    scaling = 1.0 / (ee * ff - ef * ef)
+    for k in range(coordinates):
+        at = RATES + 3 * k
+        r_e, r_f = rates[at], rates[at + 1]
+        put3(rates, at, add(scale(scaling * (ff * r_e - ef * r_f), e),
+                            scale(scaling * (ee * r_f - ef * r_e), f)))
+
+
+@inlined
+def corner_pair(corners: Array, p: int, q: int, n: Vector3, k: int) -> tuple[Vector3, float]:
+    """Return the derivatives of p - q, and of n . (p - q), by a coordinate."""
+    at = RATES + 3 * k
+    moved = subtract(read3(corners[p], at), read3(corners[q], at))
+    follows = read3(corners[len(corners) - 1], at)
+    return moved, dot(n, moved) + dot(follows, subtract(read3(corners[p], 0),
+                                                        read3(corners[q], 0)))
