@@ -155,7 +155,8 @@ $(DEPENDENCIES): $(REQUIREMENTS)
 
 # Not isolated: the build uses the pinned setuptools. It warns of every editable package that has a
 # folder of its own name.
-$(INSTALLED): $(DEPENDENCIES) setup.py setup.cfg pyproject.toml
+$(INSTALLED): $(DEPENDENCIES) requirements-fmi.txt setup.py setup.cfg pyproject.toml
+	@$(PIP) install --no-deps --requirement requirements-fmi.txt
 	@PYTHONWARNINGS=ignore $(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@
 

@@ -217,6 +217,19 @@ def test_parameters_are_tunable(unit: Unit) -> None:
     assert unit.step() == at_home(heavy).forces.tolist()
 
 
+def test_initialization(unit: Unit) -> None:
+    """Outputs are read while inputs are set; the side of a singularity is that of the last."""
+    home = unit.get(FORCES)
+    unit.put(2, [-HOME[2]])
+    assert unit.get([REFERENCES['determinant']])[0] < 0.0
+    unit.put(2, [HOME[2]])
+    assert unit.get(FORCES) == home
+    assert unit.get([REFERENCES['determinant']])[0] > 0.0
+    unit.fmu.exitInitializationMode()
+    assert not unit.warning
+    assert unit.step() == home
+
+
 def test_suppressed(unit: Unit) -> None:
     """Above stop_condition forces are zero if singularity.suppress_forces is set."""
     unit.fmu.exitInitializationMode()

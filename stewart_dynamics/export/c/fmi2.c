@@ -38,7 +38,7 @@ typedef struct {
 } fmi2CallbackFunctions;
 #endif
 
-#ifdef FMI2_FUNCTION_PREFIX  /* several FMUs in one executable */
+#ifdef FMI2_FUNCTION_PREFIX  /* static linking, of one hexapod beside other FMUs */
 #define PASTE(a, b) a ## b
 #define PASTE_EXPANDED(a, b) PASTE(a, b)
 #define FUNCTION(type, name) type PASTE_EXPANDED(FMI2_FUNCTION_PREFIX, name)
@@ -114,8 +114,9 @@ STATUS(fmi2EnterInitializationMode)(void * instance)
 STATUS(fmi2ExitInitializationMode)(void * instance)
 {
   fmu_memory * memory = &((fmu_instance *)instance)->memory;
+  fmi2Status status = step(instance, memory->values[FMU_TIME]);
   memory->initializing = 0;
-  return step(instance, memory->values[FMU_TIME]);
+  return status;
 }
 
 STATUS(fmi2DoStep)(void * instance, double time, double size, int no_set_state_prior)

@@ -34,7 +34,7 @@ typedef void (* fmi3IntermediateUpdateCallback)(
   void *, double, bool, bool, bool, bool, bool *, double *);
 #endif
 
-#ifdef FMI3_FUNCTION_PREFIX  /* several FMUs in one executable */
+#ifdef FMI3_FUNCTION_PREFIX  /* static linking, of one hexapod beside other FMUs */
 #define PASTE(a, b) a ## b
 #define PASTE_EXPANDED(a, b) PASTE(a, b)
 #define FUNCTION(type, name) type PASTE_EXPANDED(FMI3_FUNCTION_PREFIX, name)
@@ -113,8 +113,9 @@ STATUS(fmi3EnterInitializationMode)(
 STATUS(fmi3ExitInitializationMode)(void * instance)
 {
   fmu_memory * memory = &((fmu_instance *)instance)->memory;
+  fmi3Status status = step(instance, memory->values[FMU_TIME]);
   memory->initializing = 0;
-  return step(instance, memory->values[FMU_TIME]);
+  return status;
 }
 
 STATUS(fmi3DoStep)(

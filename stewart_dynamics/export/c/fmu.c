@@ -102,6 +102,9 @@ int fmu_step(fmu_instance * instance, double time)
   stewart_base base;
   stewart_output output;
   int code, n;
+  if (instance->memory.initializing) {  /* each set of inputs is the first */
+    memset(&instance->memory.state, 0, sizeof instance->memory.state);
+  }
   put_motion(values, &motion, &base);
   code = stewart_rotation(values + FMU_ORIENTATION, motion.rotation);
   if (!put_parameters(values, &platform) || !(fabs(time) < 2e9)) {
