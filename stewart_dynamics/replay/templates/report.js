@@ -5,10 +5,7 @@
 const report = JSON.parse(document.getElementById('data').textContent);
 
 function decode(text, Kind) {
-  const binary = atob(text);
-  const bytes = new Uint8Array(binary.length);
-  for (let n = 0; n < binary.length; n++) bytes[n] = binary.charCodeAt(n);
-  return new Kind(bytes.buffer);
+  return new Kind(Uint8Array.from(atob(text), each => each.charCodeAt(0)).buffer);
 }
 
 const decoded = new Map();
@@ -248,11 +245,8 @@ class TimePlot {
       traces.push({
         type: 'scatter', mode: 'lines', x: times, y: values, visible, hoverinfo: 'skip',
         name: each.name, line: {color: each.color, width: each.width, dash: each.dash, simplify: false}});
-      const alone = [];
-      for (let k = 0; k < values.length; k++) {
-        if (!Number.isNaN(values[k]) && !(k > 0 && !Number.isNaN(values[k - 1]))
-            && !(k + 1 < values.length && !Number.isNaN(values[k + 1]))) alone.push(k);
-      }
+      const isGap = k => Number.isNaN(values[k] ?? NaN);
+      const alone = [...values.keys()].filter(k => isGap(k - 1) && !isGap(k) && isGap(k + 1));
       // a sample between two gaps is drawn as a marker
       if (alone.length) {
         traces.push({
@@ -517,29 +511,26 @@ function platformJoints(frame) {
 }
 
 const column = (points, k) => points.map(point => point[k]);
+const xyz = points => ({x: column(points, 0), y: column(points, 1), z: column(points, 2)});
+const SILENT = {hoverinfo: 'skip', showlegend: false};
 
 function outline(points, options) {
-  const closed = [...points, points[0]];
-  return {type: 'scatter3d', mode: 'lines+markers', x: column(closed, 0), y: column(closed, 1),
-    z: column(closed, 2), hoverinfo: 'skip', showlegend: false, ...options};
+  return {type: 'scatter3d', mode: 'lines+markers', ...xyz([...points, points[0]]), ...SILENT, ...options};
 }
 
 // A plate over the joints: triangles from the first of them.
 function plate(points, of, opacity) {
-  return {type: 'mesh3d', x: column(points, 0), y: column(points, 1), z: column(points, 2),
-    i: [0, 0, 0, 0], j: [1, 2, 3, 4], k: [2, 3, 4, 5], color: of, opacity, hoverinfo: 'skip',
-    flatshading: true, showlegend: false};
+  return {type: 'mesh3d', ...xyz(points), i: [0, 0, 0, 0], j: [1, 2, 3, 4], k: [2, 3, 4, 5], color: of,
+    opacity, flatshading: true, ...SILENT};
 }
 
-function legLines(joints, forces) {
-  const points = [], colors = [];
-  report.baseJoints.forEach((base, n) => {
-    points.push(base, joints[n], [null, null, null]);
-    const force = forces ? forces[n] : 0;
-    const color = Number.isFinite(force) ? force : 0;
-    colors.push(color, color, color);
-  });
-  return {x: column(points, 0), y: column(points, 1), z: column(points, 2), colors};
+// The legs as one line with gaps, and a number for the color of each of its points.
+function legLines(joints) {
+  return xyz(report.baseJoints.flatMap((base, n) => [base, joints[n], [null, null, null]]));
+}
+
+function legColors(frame) {
+  return [...frame.subarray(18)].flatMap(force => Array(3).fill(Number.isFinite(force) ? force : 0));
 }
 
 // A narrow scene is seen from farther away.
@@ -547,17 +538,10 @@ function distance(width) { return Math.max(1, 620 / width, width < NARROW ? 720 
 
 // Axes of equal scale that contain base and platform in all frames.
 function scene(numbers, width) {
-  const beside = besideBase();
-  const low = [0, 1, 2].map(k => Math.min(...column(beside, k)));
-  const high = [0, 1, 2].map(k => Math.max(...column(beside, k)));
-  for (const number of numbers) {
-    for (const joint of platformJoints(frameAt(number))) {
-      for (let k = 0; k < 3; k++) {
-        low[k] = Math.min(low[k], joint[k]);
-        high[k] = Math.max(high[k], joint[k]);
-      }
-    }
-  }
+  const points = besideBase();
+  for (const number of numbers) points.push(...platformJoints(frameAt(number)));
+  const extreme = (choose, k) => points.reduce((found, point) => choose(found, point[k]), points[0][k]);
+  const low = [0, 1, 2].map(k => extreme(Math.min, k)), high = [0, 1, 2].map(k => extreme(Math.max, k));
   const pad = 0.06 * Math.max(...high.map((value, k) => value - low[k]), 1e-9);
   const far = distance(width);
   const axis = (name, k) => ({title: {text: `${name} [m]`}, range: [low[k] - pad, high[k] + pad],
@@ -579,13 +563,19 @@ function besideBase() {
 }
 
 function baseTraces() {
-  const beside = besideBase();
   return [
     plate(report.baseJoints, '#98a2af', 0.35),
-    outline(report.baseJoints, {mode: 'lines+markers', line: {color: color('soft'), width: 4},
-      marker: {size: 4, color: color('soft')}}),
-    {type: 'scatter3d', mode: 'text', x: column(beside, 0), y: column(beside, 1), z: column(beside, 2),
-      text: report.legs.map(name => plainText(shortened(name))), textposition: 'middle center', textfont: {size: 11, color: INK}, hoverinfo: 'skip', showlegend: false}];
+    outline(report.baseJoints, {line: {color: color('soft'), width: 4}, marker: {size: 4, color: color('soft')}}),
+    {type: 'scatter3d', mode: 'text', ...xyz(besideBase()), text: report.legs.map(name => plainText(shortened(name))),
+      textposition: 'middle center', textfont: {size: 11, color: INK}, ...SILENT}];
+}
+
+// A scene of the hexapod is not much higher than wide.
+function drawScene(canvas, traces, numbers, below = 0) {
+  const height = Math.min(520, Math.max(300, Math.round(1.15 * canvas.clientWidth)));
+  Plotly.newPlot(canvas, [...baseTraces(), ...traces], {height, margin: {l: 0, r: 0, t: 0, b: below}, font: FONT,
+    showlegend: false, hovermode: false, separators: `.${THIN_SPACE}`, scene: scene(numbers, canvas.clientWidth),
+    paper_bgcolor: '#fff'}, CONFIG_3D);
 }
 
 // The force at the end of the color scale; a few spikes do not set it.
@@ -635,21 +625,18 @@ class Player {
   }
 
   draw() {
-    const frame = frameAt(0), joints = platformJoints(frame), lines = legLines(joints, frame.subarray(18));
+    const frame = frameAt(0), joints = platformJoints(frame);
     const narrow = this.canvas.clientWidth < NARROW;
     this.frame = 0;
-    Plotly.newPlot(this.canvas, [
-      ...baseTraces(),
+    drawScene(this.canvas, [
       plate(joints, '#3b7dbd', 0.45),
       outline(joints, {line: {color: '#1b4f86', width: 5}, marker: {size: 4, color: '#1b4f86'}}),
-      {type: 'scatter3d', mode: 'lines', x: lines.x, y: lines.y, z: lines.z, hoverinfo: 'skip',
-        showlegend: false, connectgaps: false, line: {width: 13, color: lines.colors,
-          colorscale: FORCE_COLORS, cmin: -this.reach, cmax: this.reach, showscale: true,
-          colorbar: {title: {text: narrow ? 'leg force [N], + pushes' : 'leg force [N]<br>+ pushes', side: 'top'},
+      {type: 'scatter3d', mode: 'lines', ...legLines(joints), ...SILENT, connectgaps: false,
+        line: {width: 13, color: legColors(frame), colorscale: FORCE_COLORS, cmin: -this.reach, cmax: this.reach,
+          showscale: true, colorbar: {title: {text: narrow ? 'leg force [N], + pushes' : 'leg force [N]<br>+ pushes', side: 'top'},
             thickness: 14, outlinewidth: 0, separatethousands: true, exponentformat: 'none',
             ...(narrow ? {orientation: 'h', len: 0.9, nticks: 5, x: 0.5, y: 0, yanchor: 'top'} : {len: 0.7, x: 1})}}},
-    ], {height: heightOf(this.canvas), margin: {l: 0, r: 0, t: 0, b: narrow ? 70 : 0}, font: FONT, showlegend: false,
-      hovermode: false, separators: `.${THIN_SPACE}`, scene: scene(frames.times.keys(), this.canvas.clientWidth), paper_bgcolor: '#fff'}, CONFIG_3D);
+    ], frames.times.keys(), narrow ? 70 : 0);
     this.drawn = true;
     this.showValues(0);
   }
@@ -669,15 +656,13 @@ class Player {
   }
 
   async take(number) {
-    const frame = frameAt(number), joints = platformJoints(frame), lines = legLines(joints, frame.subarray(18));
-    const closed = [...joints, joints[0]];
+    const frame = frameAt(number), joints = platformJoints(frame);
+    const places = [xyz(joints), xyz([...joints, joints[0]]), legLines(joints)];
     this.frame = number;
     this.showValues(number);
     await Plotly.restyle(this.canvas, {
-      x: [column(joints, 0), column(closed, 0), lines.x],
-      y: [column(joints, 1), column(closed, 1), lines.y],
-      z: [column(joints, 2), column(closed, 2), lines.z],
-      'line.color': [undefined, '#1b4f86', lines.colors]}, [3, 4, 5]);
+      x: places.map(each => each.x), y: places.map(each => each.y), z: places.map(each => each.z),
+      'line.color': [undefined, '#1b4f86', legColors(frame)]}, [3, 4, 5]);
   }
 
   showValues(number) {
@@ -693,9 +678,6 @@ class Player {
       + (frames.times.length < report.samples ? `, one of ${grouped(frames.times.length)} shown` : '');
   }
 }
-
-// A scene is not much higher than wide.
-function heightOf(canvas) { return Math.min(520, Math.max(300, Math.round(1.15 * canvas.clientWidth))); }
 
 class InitialAndFinal {
   constructor(place) {
@@ -715,16 +697,11 @@ class InitialAndFinal {
   appear() {
     if (this.drawn) return;
     this.drawn = true;
-    const last = frames.times.length - 1;
-    const traces = baseTraces();
-    for (const [number, of, width] of this.ends) {
-      const joints = platformJoints(frameAt(number)), lines = legLines(joints, null), line = {color: of, width};
-      traces.push(plate(joints, of, 0.4), outline(joints, {line, marker: {size: 4, color: of}}),
-        {type: 'scatter3d', mode: 'lines', x: lines.x, y: lines.y, z: lines.z, hoverinfo: 'skip',
-          showlegend: false, line});
-    }
-    Plotly.newPlot(this.canvas, traces, {height: heightOf(this.canvas), margin: {l: 0, r: 0, t: 0, b: 0}, font: FONT,
-      showlegend: false, hovermode: false, scene: scene([0, last], this.canvas.clientWidth), paper_bgcolor: '#fff'}, CONFIG_3D);
+    drawScene(this.canvas, this.ends.flatMap(([number, of, width]) => {
+      const joints = platformJoints(frameAt(number)), line = {color: of, width};
+      return [plate(joints, of, 0.4), outline(joints, {line, marker: {size: 4, color: of}}),
+        {type: 'scatter3d', mode: 'lines', ...legLines(joints), ...SILENT, line}];
+    }), column(this.ends, 0));
   }
 }
 
@@ -732,20 +709,20 @@ class InitialAndFinal {
 
 const playing = {since: null, from: 0};
 
+function label(text, ariaLabel) {
+  Object.assign(document.getElementById('play'), {textContent: text, ariaLabel});
+}
+
 function stop() {
   playing.since = null;
-  const button = document.getElementById('play');
-  button.textContent = '▶';
-  button.ariaLabel = 'play';
+  label('▶', 'play');
 }
 
 function play() {
   if (time.cursor >= report.end) moveCursor(report.begin);
   playing.from = time.cursor;
   playing.since = performance.now();
-  const button = document.getElementById('play');
-  button.textContent = '❚❚';
-  button.ariaLabel = 'pause';
+  label('❚❚', 'pause');
   requestAnimationFrame(playOn);
 }
 
