@@ -152,7 +152,7 @@ def test_a_payload_in_any_orientation_exceeds_no_force_under_any_gravity() -> No
     platform, random = StewartPlatform(PARAMETERS), rng()
     home = platform.home_pose()
     for offset, height in ((0.0, 0.0), (0.3, 0.4)):
-        mass = Payloads(platform, home[None]).any_orientation(offset, height)
+        mass = Payloads(Capability(platform), home[None]).any_orientation(offset, height)
         largest = 0.0
         for azimuth in np.linspace(0.0, 2.0 * math.pi, 36, endpoint=False)[::1 if offset else 36]:
             center = np.array([offset * math.cos(azimuth), offset * math.sin(azimuth), height])

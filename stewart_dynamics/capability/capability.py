@@ -29,6 +29,7 @@ from stewart_dynamics.capability.force_intervals import (
     largest_multiple, quadratic_exit)
 from stewart_dynamics.capability.motions import (
     constant, Deviations, faster, first_exit, timed)
+from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
@@ -46,7 +47,7 @@ from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import (
     clearance_to_check, LegClearance)
 from stewart_dynamics.mechanics.platform_arguments import check_kind, copies, motion_rows
-from stewart_dynamics.mechanics.rows import MOTION, POSE, TWIST
+from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, NaturalModes
 
@@ -70,7 +71,8 @@ class Extent(NamedTuple):
         In the unit of the question; 0 where a limit is exceeded already, infinity where nothing
         limits.
     limit : str or (...)
-        Name of the limit without ``limits.``, or ``singularity``; empty where nothing limits.
+        Name of the limit without ``limits.`` or ``drive.``, or ``singularity``; empty where
+        nothing limits.
     leg : int or (...)
         Index from 0 of the leg that reaches it, of two legs that are too near the first; -1 for a
         singularity or nothing.
@@ -112,7 +114,9 @@ class Capability:
     Parameters
     ----------
     platform : StewartPlatform
-        The hexapod; its ``limits.*`` that are not set do not limit.
+        The hexapod; its ``limits.*`` that are not set do not limit. Where ``drive.*`` limits the
+        motors, loads and accelerations end at their torques, rates at their speeds: of two limits
+        the tighter one.
 
     Raises
     ------
@@ -142,6 +146,7 @@ class Capability:
         self._plates = (none, none) if clearance is None else (clearance.base, clearance.platform)
         angles = angles_to_check(platform.parameters, self._limits.of_joints)
         self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
+        self._motors = MotorBounds(platform.parameters) if platform.parameters.drives else None
         self._frictionless = StewartPlatform(platform.parameters.replaced({
             'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}))
 
@@ -326,7 +331,7 @@ class Capability:
         Return the largest wrench that the platform at rest can exert on its surroundings.
 
         Applied as ``wrench = -value * direction`` to ``inverse_dynamics``, it brings the leg that
-        is named to its ``limits.force_max``.
+        is named to its limit of force or torque, the latter with the breakaway torque.
 
         Parameters
         ----------
@@ -339,8 +344,9 @@ class Capability:
 
         """
         directions, sizes = _directions(direction)
+        still = self._held(pose)
         return _divided(self._multiple(
-            self._at_rest(pose, base), self._per_wrench(pose, directions)), sizes)
+            still, self._forces(still, base), self._per_wrench(pose, directions)), sizes)
 
     def clearance(self, pose: Pose | Motion) -> Array | float:
         """Return the smallest distance of a leg from another or a plate [m]; negative: overlap."""
@@ -357,7 +363,7 @@ class Capability:
         check_kind(pose, Pose, Motion)
         legs = lagrange.legs(self.platform.parameters, pose.position, pose.rotation)
         return self.platform.stiffness(pose, leg_stiffness) + geometric_stiffness(
-            legs, self._at_rest(pose, None))
+            legs, self._forces(self._held(pose), None))
 
     def modes(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> NaturalModes:
         """
@@ -395,17 +401,20 @@ class Capability:
         return self._in_every_direction(pose, slice(3, 6))
 
     def velocity(self, pose: Pose | Motion, direction: ArrayLike) -> Extent:
-        """Return the largest twist along a direction (..., 6) that ``velocity_max`` permits."""
-        fastest = self._required(limits.VELOCITY_MAX)
+        """Return the largest twist along a direction (..., 6) that legs and motors permit."""
         directions, sizes = _directions(direction)
-        rates = np.einsum('...ij,...j->...i', self.platform.inverse_jacobian(pose), directions)
-        return _divided(_smallest(
-            largest_multiple(np.zeros(6), rates, fastest), 'velocity_max'), sizes)
+        rows = np.zeros((*common_shape(pose=pose.shape, direction=directions.shape[:-1]), MOTION))
+        rows[..., POSE], rows[..., TWIST] = pose.rows[..., POSE], directions
+        moving = Motion.of_rows(rows)
+        found = self._of_rates(moving, self.platform.inverse_dynamics(moving))
+        if not found:
+            raise self._unlimited((limits.VELOCITY_MAX,))
+        return _divided(_smallest(*_tightest(found)), sizes)
 
     def acceleration(self, pose: Pose | Motion, direction: ArrayLike,
                      motion: Motion | None = None) -> Extent:
         """
-        Return the largest acceleration along a direction that ``force_max`` permits.
+        Return the largest acceleration along a direction that forces and torques permit.
 
         Parameters
         ----------
@@ -420,8 +429,10 @@ class Capability:
         """
         directions, sizes = _directions(direction)
         inertial = np.einsum('...ij,...j->...i', self.platform.mass_matrix(pose), directions)
+        moving = self._held(pose, motion)
         return _divided(self._multiple(
-            self._at_rest(pose, None, motion), self._per_wrench(pose, inertial)), sizes)
+            moving, self._forces(moving, None), self._per_wrench(pose, inertial),
+            directions=directions), sizes)
 
     def payload(self, motion: Pose | Motion, center_of_mass: ArrayLike,
                 times: ArrayLike | None = None) -> Extent:
@@ -448,7 +459,7 @@ class Capability:
         with np.errstate(over='ignore', invalid='ignore'):
             mass = np.array([1.0, *center, *about_origin(1.0, center, np.zeros(6))])
             per_mass = check_finite('center_of_mass', matrix @ mass, 0)
-        return self._multiple(forces, per_mass, whole=isinstance(motion, Motion))
+        return self._multiple(moving, forces, per_mass, whole=isinstance(motion, Motion))
 
     def speed_factor(self, motion: Motion, wrench: ArrayLike | None = None,
                      base: BaseMotion | None = None, times: ArrayLike | None = None) -> Extent:
@@ -457,7 +468,8 @@ class Capability:
 
         Played k times as fast, leg rates are k times as large, and leg forces
         ``g + k c1 + k^2 c2`` with a Coulomb friction that is linear below
-        ``actuator.coulomb_velocity``: so the answer is the smallest root of all samples. Below 1
+        ``actuator.coulomb_velocity``: so the answer is the smallest root of all samples. Torques
+        of motors likewise, piece by piece of ``drive.torque_speed``. Below 1
         the motion is not possible as it is; 0 where a length, a joint angle, a clearance or a
         singularity, up to ``singularity.stop_condition``, ends it at any speed.
 
@@ -484,11 +496,10 @@ class Capability:
         ended = self._of_path(motion, solved)
         if ended is not None:
             return ended
-        known = [each for each in (self._speed_of_rates(solved), self._speed_of_forces(
-            motion, wrench, base)) if each is not None]
-        if not known:
+        found = [*self._of_rates(motion, solved), *self._speed_of_forces(motion, wrench, base)]
+        if not found:
             raise self._unlimited((limits.VELOCITY_MAX, limits.FORCE_MAX))
-        return min(known, key=lambda each: float(each.value))
+        return _of_all(*_tightest(found))
 
     def amplitude_factor(self, motion: Motion, center: Pose | Motion | None = None,
                          wrench: ArrayLike | None = None, base: BaseMotion | None = None,
@@ -535,26 +546,35 @@ class Capability:
                           int(travels.leg[at]), int(moving[at]))
         bounds = {name: self._limits.bounds[name] for name in (
             limits.VELOCITY_MAX, limits.FORCE_MAX) if name in self._limits.bounds}
+        names = [_short(name) for name in bounds]
+        motors = self._motors
+        if motors is not None:
+            names += ['speed_max', 'torque']
 
         def ratios(factor: float, which: Any) -> Array:
-            """Return rates and forces relative to their limits (N, 6 or 12)."""
+            """Return rates, forces, speeds and torques relative to their limits (N, 6 M)."""
             load = None if wrench is None else _some(np.asarray(wrench), motion.shape, which)
             moved = None if base is None else BaseMotion.of_rows(
                 _some(base.rows, motion.shape, which))
             solved = self.platform.inverse_dynamics(
                 Motion.of_rows(deviations.at(factor, which)), load, moved, singular='nan')
             return np.concatenate([
-                (solved.rates if name == limits.VELOCITY_MAX else solved.forces) / bound
-                for name, bound in bounds.items()], axis=1)
+                *((solved.rates if name == limits.VELOCITY_MAX else solved.forces) / bound
+                  for name, bound in bounds.items()),
+                *(motors.ratios(deviations.at(factor, which), solved.rows) if motors else ())],
+                axis=1)
 
-        if not bounds or path.value == 0.0:
+        if not names or path.value == 0.0:
             return path
         found = first_exit(ratios, min(path.value, most))
         if found is None:
             return path
         factor, sample, column = found
-        name = list(bounds)[column // 6]
-        return Extent(factor, _short(name), column % 6, sample)
+        name, leg = names[column // 6], column % 6
+        if name == 'torque' and motors is not None:
+            rows = deviations.at(factor, [sample])
+            name = motors.torque_limit(rows, self.platform.solve(rows))[0, leg]
+        return Extent(factor, str(name), leg, sample)
 
     def _of_path(self, motion: Motion, solved: InverseDynamics) -> Extent | None:
         """
@@ -579,17 +599,26 @@ class Capability:
             'singularity.stop_condition']) | ~(side * side[:1] > 0.0)
         return Extent(0.0, 'singularity', -1, int(singular.argmax())) if singular.any() else None
 
-    def _speed_of_rates(self, solved: InverseDynamics) -> Extent | None:
-        fastest = self._limits.bounds.get(limits.VELOCITY_MAX)
-        if fastest is None:
-            return None
-        return _of_all(largest_multiple(np.zeros(6), solved.rates, fastest), 'velocity_max')
+    def _of_rates(self, motion: Motion, solved: InverseDynamics) -> list[tuple[Array, Any]]:
+        """Return multiples (..., 6) of the twist at which legs and motors are too fast."""
+        found: list[tuple[Array, Any]] = []
+        if limits.VELOCITY_MAX in self._limits.bounds:
+            found.append((largest_multiple(
+                np.zeros(6), solved.rates, self._limits.bounds[limits.VELOCITY_MAX]),
+                'velocity_max'))
+        if self._motors is not None and np.isfinite(self._motors.fastest).any():
+            found.append((largest_multiple(
+                np.zeros(6), self._motors.moving(motion.rows, solved.rows).speeds,
+                self._motors.fastest), 'speed_max'))
+        return found
 
     def _speed_of_forces(self, motion: Motion, wrench: ArrayLike | None,
-                         base: BaseMotion | None) -> Extent | None:
+                         base: BaseMotion | None) -> list[tuple[Array, Any]]:
+        """Return factors (..., 6) at which forces and torques are too large."""
         strongest = self._limits.bounds.get(limits.FORCE_MAX)
-        if strongest is None:
-            return None
+        torques = self._motors is not None and self._motors.limited
+        if strongest is None and not torques:
+            return []
         rows = motion.rows
         still, back = rows.copy(), rows.copy()
         still[..., TWIST.start:] = 0.0
@@ -603,16 +632,27 @@ class Capability:
         square = (solved.forces + backward) / 2.0 - constant
         coulomb, band = p['actuator.coulomb_friction'], p['actuator.coulomb_velocity']
         with np.errstate(divide='ignore'):
-            knee = np.where(coulomb > 0.0, band / np.abs(solved.rates), 0.0)
-        slope = np.where(knee > 0.0, coulomb * solved.rates / band, 0.0)
-        slow = quadratic_exit(constant, linear + slope, square, strongest, np.zeros(()), knee)
-        fast = quadratic_exit(constant + coulomb * np.sign(solved.rates), linear, square,
-                              strongest, knee, np.full((), math.inf))
-        return _of_all(np.minimum(slow, fast), 'force_max')
+            knee = band / np.abs(solved.rates)
+        sign = np.sign(solved.rates)
+        # (forces by powers of k, direction of the leg, begin, end)
+        pieces = (
+            ((constant, linear + coulomb * solved.rates / band, square), 0.0 * sign,
+             np.zeros(()), knee),
+            ((constant + coulomb * sign, linear, square), sign, knee, np.full((), math.inf)))
+        found: list[tuple[Array, Any]] = []
+        for forces, direction, begin, end in pieces:
+            if strongest is not None:
+                found.append((quadratic_exit(forces, strongest, begin, end), 'force_max'))
+            if self._motors is not None and torques:
+                motors = self._motors.moving(rows, solved.rows)
+                none = np.zeros(6)
+                found.append(self._motors.exits(
+                    (*forces[:2], forces[2] - motors.inertial), (none, none, motors.own),
+                    motors.speeds, direction, begin, end, growing=True))
+        return found
 
-    def _at_rest(self, pose: Pose | Motion, base: BaseMotion | None,
-                 motion: Motion | None = None) -> Array:
-        """Return the leg forces (..., 6) at a pose without acceleration."""
+    def _held(self, pose: Pose | Motion, motion: Motion | None = None) -> Motion:
+        """Return a pose with the twist of a motion, without acceleration."""
         check_kind(pose, Pose, Motion)
         if motion is not None and not isinstance(motion, Motion):
             raise wrong_type('motion', motion, 'a Motion')
@@ -622,21 +662,73 @@ class Capability:
         rows[..., POSE] = pose.rows[..., POSE]
         if motion is not None:
             rows[..., TWIST] = motion.rows[..., TWIST]
-        return self.platform.inverse_dynamics(Motion.of_rows(rows), base=base).forces
+        return Motion.of_rows(rows)
+
+    def _forces(self, motion: Motion, base: BaseMotion | None) -> Array:
+        return self.platform.inverse_dynamics(motion, base=base).forces
 
     def _per_wrench(self, pose: Pose | Motion, wrenches: Array) -> Array:
         """Return the leg forces (..., 6) that balance wrenches (..., 6) alone."""
         transposed = np.swapaxes(self.platform.inverse_jacobian(pose), -1, -2)
         return np.asarray(np.linalg.solve(transposed, wrenches[..., None])[..., 0], dtype=float)
 
-    def _multiple(self, forces: Array, change: Array, whole: bool = False) -> Extent:
-        """Return the largest multiple of a change of leg forces that ``force_max`` permits."""
-        multiples = largest_multiple(forces, change, self._required(limits.FORCE_MAX))
-        return (_of_all if whole else _smallest)(multiples, 'force_max')
+    def _multiple(self, motion: Motion, forces: Array, change: Array, whole: bool = False,
+                  directions: Array | None = None) -> Extent:
+        """
+        Return the largest multiple of a change of leg forces that forces and torques permit.
+
+        ``directions`` (..., 6): the change is that of this acceleration.
+        """
+        found: list[tuple[Array, Any]] = []
+        if limits.FORCE_MAX in self._limits.bounds:
+            found.append((largest_multiple(
+                forces, change, self._limits.bounds[limits.FORCE_MAX]), 'force_max'))
+        if self._motors is not None and self._motors.limited:
+            found.append(self._torques(self._motors, motion, forces, change, directions))
+        if not found:
+            raise self._unlimited((limits.FORCE_MAX,))
+        return (_of_all if whole else _smallest)(*_tightest(found))
+
+    def _torques(self, bounds: MotorBounds, motion: Motion, forces: Array, change: Array,
+                 directions: Array | None) -> tuple[Array, Array]:
+        """Return the multiples of ``_multiple`` at which torques end them, and the limits."""
+        shape = np.broadcast_shapes(forces.shape, change.shape)
+        rows = np.broadcast_to(motion.rows, (*shape[:-1], MOTION))
+        solved = self.platform.inverse_dynamics(Motion.of_rows(rows))
+        motors, none = bounds.moving(rows, solved.rows), np.zeros(shape)
+        more = motors
+        if directions is not None:
+            accelerated = rows.copy()
+            accelerated[..., ACCELERATION] += directions
+            more = bounds.moving(accelerated, solved.rows)
+        slow = np.abs(solved.rates) < self.platform.parameters['actuator.coulomb_velocity']
+        return bounds.exits(
+            (forces - motors.inertial, change - (more.inertial - motors.inertial), none),
+            (motors.own, more.own - motors.own, none), motors.speeds,
+            np.where(slow, 0.0, np.sign(solved.rates)), np.zeros(()), np.full((), math.inf))
+
+    @property
+    def limits_rates(self) -> bool:
+        """Return whether there is a limit of the legs' rates or of the motors' speeds."""
+        return limits.VELOCITY_MAX in self._limits.bounds or (
+            self._motors is not None and bool(np.isfinite(self._motors.fastest).any()))
+
+    @property
+    def forces_at_rest(self) -> Array:
+        """Return the largest leg forces at rest (6,) [N]; infinite without a limit."""
+        forces = self._limits.bounds.get(limits.FORCE_MAX, np.full(6, math.inf))
+        return forces if self._motors is None else np.minimum(
+            forces, self._motors.forces_at_rest)
+
+    @property
+    def limits_forces(self) -> bool:
+        """Return whether there is a limit of the legs' forces or of the motors' torques."""
+        return bool(np.isfinite(self.forces_at_rest).any())
 
     def _in_every_direction(self, pose: Pose | Motion, part: slice) -> Array | float:
-        strongest = self._required(limits.FORCE_MAX)
-        forces = self._at_rest(pose, None)
+        if not self.limits_forces:
+            raise self._unlimited((limits.FORCE_MAX,))
+        strongest, forces = self.forces_at_rest, self._forces(self._held(pose), None)
         inverse = np.linalg.inv(np.swapaxes(self.platform.inverse_jacobian(pose), -1, -2))
         reach = np.linalg.norm(inverse[..., part], axis=-1)
         with np.errstate(divide='ignore'):
@@ -677,21 +769,31 @@ def _short(limit: str) -> str:
     return limit.removeprefix('limits.')
 
 
-def _smallest(multiples: Array, limit: str) -> Extent:
+def _tightest(found: Sequence[tuple[Array, Any]]) -> tuple[Array, Array]:
+    """Return the smallest of several multiples (..., 6), and the names of their limits."""
+    multiples = np.stack(np.broadcast_arrays(*(each for each, _ in found)))
+    names = np.stack([np.broadcast_to(name, multiples.shape[1:]) for _, name in found])
+    which = multiples.argmin(axis=0)[None]
+    return (np.take_along_axis(multiples, which, axis=0)[0],
+            np.take_along_axis(names, which, axis=0)[0])
+
+
+def _smallest(multiples: Array, names: Array) -> Extent:
     """Return the smallest of six multiples of each sample (..., 6)."""
     legs = multiples.argmin(axis=-1)
     values = multiples.min(axis=-1)
     limited = np.isfinite(values)
-    return _extent(values, np.where(limited, limit, ''), np.where(limited, legs, -1))
+    name = np.take_along_axis(names, legs[..., None], axis=-1)[..., 0]
+    return _extent(values, np.where(limited, name, ''), np.where(limited, legs, -1))
 
 
-def _of_all(multiples: Array, limit: str) -> Extent:
+def _of_all(multiples: Array, names: Array) -> Extent:
     """Return the smallest of six multiples of all samples (..., 6)."""
     flat = multiples.reshape(-1, 6)
     sample, leg = divmod(int(flat.argmin()), 6)
     if not math.isfinite(flat[sample, leg]):
         return Extent(math.inf, '', -1)
-    return Extent(float(flat[sample, leg]), limit, leg, sample)
+    return Extent(float(flat[sample, leg]), str(names.reshape(-1, 6)[sample, leg]), leg, sample)
 
 
 def _extent(values: Array, names: Any, legs: Any) -> Extent:

@@ -45,19 +45,21 @@ def largest_multiple(values: Array, changes: Array, bounds: Array) -> Array:
     return np.where(np.abs(values) > bounds * (1.0 + TOLERANCE), 0.0, np.maximum(multiples, 0.0))
 
 
-def quadratic_exit(constant: Array, linear: Array, square: Array, bounds: Array, begin: Array,
-                   end: Array) -> Array:
+def quadratic_exit(values: tuple[Array, ...], bounds: Array, begin: Array, end: Array,
+                   slopes: Array | float = 0.0) -> Array:
     """
-    Return the first k in [begin, end] from which ``|constant + k linear + k^2 square| > bounds``.
+    Return the first k in [begin, end] with ``|c + k b + k^2 a| > bound + k slope``.
 
     Parameters
     ----------
-    constant, linear, square : (..., 6)
-        Coefficients of leg forces.
-    bounds : (6,)
-        Largest magnitudes.
+    values : three of (..., 6)
+        Coefficients c, b and a of leg forces, or torques.
+    bounds : (..., 6)
+        Largest magnitudes at k = 0.
     begin, end : (..., 6) or ()
         Ends of the interval of each leg.
+    slopes : (..., 6)
+        Changes of the bounds for k = 1.
 
     Returns
     -------
@@ -66,19 +68,20 @@ def quadratic_exit(constant: Array, linear: Array, square: Array, bounds: Array,
         ``end``.
 
     """
+    constant, linear, square = values
     first = np.full(np.broadcast_shapes(constant.shape, begin.shape, end.shape), np.inf)
     for sign in (1.0, -1.0):
         # room = c + b k + a k^2 is positive within the bound
-        a, b, c = -sign * square, -sign * linear, bounds - sign * constant
+        a, b, c = -sign * square, slopes - sign * linear, bounds - sign * constant
         with np.errstate(all='ignore'):
             root = np.sqrt(b * b - 4.0 * a * c)
             far = -0.5 * (b + np.copysign(root, b))
             candidates = np.stack([far / a, c / far])
-            slopes = b + 2.0 * a * candidates
+            falls = b + 2.0 * a * candidates
             # room ends where it falls, or touches zero with a falling square
             ends = (candidates >= begin) & (candidates <= end) & (
-                (slopes < 0.0) | ((slopes == 0.0) & (a < 0.0)))
-            outside = c + begin * (b + begin * a) < -TOLERANCE * bounds
+                (falls < 0.0) | ((falls == 0.0) & (a < 0.0)))
+            outside = c + begin * (b + begin * a) < -TOLERANCE * (bounds + begin * slopes)
         found = np.where(ends, candidates, np.inf).min(axis=0)
         first = np.minimum(first, np.where(outside, begin, found))
     return first

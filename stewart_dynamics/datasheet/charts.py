@@ -130,8 +130,9 @@ def use_chart(seconds: Array, used: Mapping[str, Array], timeout: float) -> Pict
         times, values = curves.drawn(n)
         points = chart.at(np.stack([times, np.minimum(values, top)], axis=1))
         picture.path(points, css=f'curve curve{n}')
-        picture.line([46.0 + 112.0 * n, 284.5], [64.0 + 112.0 * n, 284.5], css=f'curve curve{n}')
-        picture.text([69.0 + 112.0 * n, 288.0], name, css='tick')
+        left = 46.0 + min(112.0, 654.0 / len(used)) * n
+        picture.line([left, 284.5], [left + 14.0, 284.5], css=f'curve curve{n}')
+        picture.text([left + 18.0, 288.0], name, css='tick')
     return picture
 
 

@@ -90,14 +90,14 @@ class Pictures(NamedTuple):
 
     def _payload(self) -> Picture:
         """Return the largest payload over the distance of its center of mass from the pivot."""
-        platform = self.hexapod.platform
+        loads = self.hexapod.loads
         radius = float(np.linalg.norm(
-            platform.parameters['geometry.platform_joints'], axis=1).mean())
+            loads.platform.parameters['geometry.platform_joints'], axis=1).mean())
         offsets = np.linspace(0.0, 1.5 * radius, 31, dtype=float)
-        here = Payloads(platform, self.hexapod.pose[None])
+        here = Payloads(loads, self.hexapod.pose[None])
         curves = {'at the pose': np.array([here.level(each) for each in offsets])}
         if self.ranges is not None:
-            corners = Payloads(platform, poses_of(self.hexapod, grid(self.ranges, 2)))
+            corners = Payloads(loads, poses_of(self.hexapod, grid(self.ranges, 2)))
             curves['worst'] = np.array([corners.level(each) for each in offsets])
         curves['any orientation'] = np.array([here.any_orientation(each) for each in offsets])
         return charts.curves_chart(

@@ -41,7 +41,9 @@ ANGULAR = {'travel': DEGREE, 'velocity': Unit('°/s', DEGREE.factor),
 
 _NAMES = {
     'length_max': 'longest leg', 'length_min': 'shortest leg', 'velocity_max': 'speed of a leg',
-    'force_max': 'force of a leg', 'base_joint_angle_max': 'joint angle at the base',
+    'force_max': 'force of a leg', 'torque_max': 'torque of a motor',
+    'torque_speed': 'torque of a motor at its speed', 'speed_max': 'speed of a motor',
+    'base_joint_angle_max': 'joint angle at the base',
     'platform_joint_angle_max': 'joint angle at the platform',
     'leg_clearance_min': 'clearance between legs'}
 

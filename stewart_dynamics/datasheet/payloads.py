@@ -19,10 +19,10 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.capability.force_intervals import largest_multiple
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters, PLATFORM
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
-from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Azimuths of a center of mass beside the pivot, of which the worst counts.
 _AZIMUTHS = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
@@ -30,22 +30,23 @@ _AZIMUTHS = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
 
 class Payloads:
     """
-    Largest point masses that can be added to a platform at rest, by ``limits.force_max``.
+    Largest point masses that can be added to a platform at rest, by forces and torques.
 
     Forces of the legs are linear in gravity, in the mass, and in its first moment.
 
     Parameters
     ----------
-    platform : StewartPlatform
-        With ``limits.force_max``.
+    capability : Capability
+        With limits of forces.
     poses : Pose
         (N,)
 
     """
 
-    def __init__(self, platform: StewartPlatform, poses: Pose) -> None:
+    def __init__(self, capability: Capability, poses: Pose) -> None:
+        platform = capability.platform
         p = platform.parameters
-        self._largest = p['limits.force_max']
+        self._largest = capability.forces_at_rest
         self._gravity = np.asarray(p['gravity'])
         rows = Motion.from_pose(poses).rows
         matrices = np.stack([platform.regressors_at_rest(rows, each[None]) for each in np.eye(3)])

@@ -64,9 +64,9 @@ def _loads(hexapod: RatedHexapod, poses: Pose) -> dict[str, Any]:
     many = poses[None] if one else poses
     at = many[:, None]
     found: dict[str, Any] = {}
-    if hexapod.limited('velocity_max'):
+    if c.limits_rates:
         found['velocity'] = _smallest(c.velocity(at, DIRECTIONS), joints, KEYS)
-    if hexapod.limited('force_max'):
+    if c.limits_forces:
         found['acceleration'] = _smallest(c.acceleration(at, DIRECTIONS), joints, KEYS)
         for name, part in (('force', slice(0, 6)), ('moment', slice(6, 12))):
             found[name] = _smallest(c.wrench(at, DIRECTIONS[part]), joints, KEYS[part])
@@ -76,7 +76,7 @@ def _loads(hexapod: RatedHexapod, poses: Pose) -> dict[str, Any]:
         column = Extent(*(each[:, None] for each in payload[:3]))
         found['payload'] = _smallest(column, joints, ['mass'])['mass']
         found['payload']['any_orientation'] = (
-            Payloads(hexapod.platform, many).any_orientation()
+            Payloads(c, many).any_orientation()
             if hexapod.given['gravity'].any() else None)
     return found
 

@@ -26,6 +26,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.capability.capability import Capability
+from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.datasheet.ratings import answer
 from stewart_dynamics.errors import BagError, MotionError
 from stewart_dynamics.mechanics import limits
@@ -40,8 +41,9 @@ from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.step import Batch
 
-LENGTH, RATE, FORCE, ANGLE, CLEARANCE, SINGULARITY = (
-    'length', 'rate', 'force', 'joint angle', 'leg clearance', 'singularity')
+LENGTH, RATE, FORCE, SPEED, TORQUE, ANGLE, CLEARANCE, SINGULARITY = (
+    'length', 'rate', 'force', 'motor speed', 'motor torque', 'joint angle', 'leg clearance',
+    'singularity')
 # Largest number of samples of which the amplitude is computed, and the motion between them, which
 # takes 0.6 ms for each.
 _MOST, _MOST_BETWEEN = 100_000, 10_000
@@ -132,6 +134,13 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
     if p[limits.FORCE_MAX] is not None:
         forces = np.where(np.isfinite(result.forces), np.abs(result.forces), np.inf)
         found[FORCE] = forces / p[limits.FORCE_MAX]
+    if p.drives:
+        motors = MotorBounds(p)
+        speeds, torques = motors.ratios(recorded.motion.rows, result.rows)
+        if np.isfinite(motors.fastest).any():
+            found[SPEED] = speeds
+        if motors.limited:
+            found[TORQUE] = np.where(np.isfinite(torques), torques, np.inf)
     known = [name for name in limits.OF_JOINTS if p[name] is not None]
     if known:
         angles = dict(zip(limits.OF_JOINTS, platform.joint_angles(recorded.motion), strict=True))
@@ -168,7 +177,7 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
         return found | {'factor': 0.0, 'limit': 'singularity', 'leg': None,
                         'at_s': float(recorded.seconds[at]), 'between_setpoints': None,
                         'amplitude': None, 'payload': None}
-    if found['possible'] and p[limits.VELOCITY_MAX] is None and p[limits.FORCE_MAX] is None:
+    if found['possible'] and not (c.limits_rates or c.limits_forces):
         found |= {'factor': None, 'limit': None, 'leg': None, 'at_s': None,
                   'between_setpoints': None}
     else:
@@ -179,7 +188,7 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
     if len(recorded.seconds) <= _MOST:
         larger = c.amplitude_factor(recorded.motion, None, recorded.wrench, recorded.base)
         amplitude = answer(float(larger.value), str(larger.limit), int(larger.leg), joints)
-    if p[limits.FORCE_MAX] is not None:
+    if c.limits_forces:
         more = c.payload(recorded.motion, np.zeros(3))
         payload = answer(float(more.value), str(more.limit), int(more.leg), joints)
     return found | {'amplitude': amplitude, 'payload': payload}

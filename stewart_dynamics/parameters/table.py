@@ -302,7 +302,7 @@ class Parameters(ParameterSet):
 
     table = PARAMETERS
     node = 'stewart_dynamics'
-    described = ('drive.',)
+    described = 'drive.', 'actuator.reflected_mass'  # which may follow from drive.*
     drives: tuple[str, ...]
     """Names of drive.* that are given; without them no motors are computed."""
 

@@ -1,0 +1,192 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Intervals in which the motors stay within their torques while something grows from zero."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability.force_intervals import quadratic_exit
+from stewart_dynamics.mechanics.drives.motors import (
+    ACCELERATIONS, drive_constants, Drives, Motors, SPEEDS)
+from stewart_dynamics.mechanics.limits import TOLERANCE
+from stewart_dynamics.mechanics.rows import MOTION, RESULT
+from stewart_dynamics.parameters.table import GUIDED, Parameters
+
+TORQUE_MAX, TORQUE_SPEED, SPEED_MAX = (
+    'drive.torque_max', 'drive.torque_speed', 'drive.speed_max')
+
+# Ratio of a torque to none that is available: finite, for searches.
+_FAR_BEYOND = 1e9
+
+
+class MovingMotors(NamedTuple):
+    """What the motors do in a motion, whatever the forces (..., 6)."""
+
+    speeds: Array
+    """[rad/s]"""
+    own: Array
+    """Torques that turn rotors and screws [N m]."""
+    inertial: Array
+    """Parts of the leg forces that do not pass the screws [N]."""
+
+
+class MotorBounds:
+    """
+    The limits of the motors of a hexapod; those that are not given do not limit.
+
+    A torque is ``own + factor load / k`` with the load of the screw. The factor is one of two:
+    where the leg moves, that of the motor that drives or is driven; near standstill both count, as
+    in ``drives.motors``.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        With ``drive.*``.
+
+    Attributes
+    ----------
+    limited : bool
+        There is a limit of torques.
+    fastest : (6,)
+        ``drive.speed_max``, or infinity [rad/s].
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        p = parameters
+        self._drives = Drives(p)
+        self._guided = Drives(p.replaced({'drive.screw_rotation': GUIDED}))
+        constants = drive_constants(p)
+        self._ratio, self._mass = constants[:, 0], constants[:, 2]
+        self._factors = 1.0 + constants[:, 3], 1.0 + constants[:, 4]
+        self._strongest, self.fastest = (
+            np.full(6, math.inf) if p[name] is None else p[name] for name in (
+                TORQUE_MAX, SPEED_MAX))
+        self._curve = p[TORQUE_SPEED]
+        self.limited = p[TORQUE_MAX] is not None or self._curve is not None
+        self._knees = np.empty((6, 0))  # speeds at which the largest torque has kinks
+        if self._curve is not None:
+            speeds, torques = self._curve.T
+            with np.errstate(divide='ignore', invalid='ignore'):
+                share = (self._strongest[:, None] - torques[:-1]) / np.diff(torques)
+                crossings = np.where((share > 0.0) & (share < 1.0),
+                                     speeds[:-1] + share * np.diff(speeds), math.inf)
+            self._knees = np.concatenate(
+                [np.broadcast_to(speeds, (6, len(speeds))), crossings], axis=1)
+
+    def moving(self, motions: Array, results: Array) -> MovingMotors:
+        """Return the motors for rows (..., MOTION) and (..., RESULT)."""
+        shape = results.shape[:-1]
+        rows = np.broadcast_to(motions, (*shape, MOTION)).reshape(-1, MOTION)
+        turning, straight = (drives(rows, results.reshape(-1, RESULT)).reshape(*shape, -1)
+                             for drives in (self._drives, self._guided))
+        own = self._mass / self._ratio ** 2 * turning[..., ACCELERATIONS]
+        return MovingMotors(turning[..., SPEEDS], own,
+                            self._mass / self._ratio * straight[..., ACCELERATIONS])
+
+    def ratios(self, motions: Array, results: Array) -> list[Array]:
+        """Return speeds and torques relative to their limits, two of (N, 6)."""
+        motors = Motors.of_rows(self._drives(motions, results))
+        with np.errstate(divide='ignore'):
+            torques = np.abs(motors.breakaway_torques) / motors.available_torques
+        return [np.abs(motors.speeds) / self.fastest, np.minimum(torques, _FAR_BEYOND)]
+
+    def torque_limit(self, motions: Array, results: Array) -> Array:
+        """Return the names of the limits of torque (N, 6)."""
+        return self._names(Motors.of_rows(self._drives(motions, results)).available_torques)
+
+    def _names(self, largest: Array) -> Array:
+        return np.where(largest < self._strongest, 'torque_speed', 'torque_max')
+
+    @property
+    def forces_at_rest(self) -> Array:
+        """Return the largest leg forces at rest (6,) [N], by the breakaway torque."""
+        forces: Array = self._largest(np.zeros(6)) * self._ratio / np.max(
+            np.abs(self._factors), axis=0)
+        return forces if self.limited else np.full(6, math.inf)
+
+    def exits(self, load: tuple[Array, ...], own: tuple[Array, ...], speeds: Array,
+              direction: Array, begin: Array, end: Array, growing: bool = False,
+              ) -> tuple[Array, Array]:
+        """
+        Return the first t in [begin, end] from which a torque exceeds the largest at its speed.
+
+        Parameters
+        ----------
+        load, own : three of (..., 6)
+            Coefficients of 1, t and t^2: loads of the screws [N], torques of the rotors [N m].
+        speeds : (..., 6)
+            [rad/s], where they grow at t = 1.
+        direction : (..., 6)
+            Signs of the rates of the legs; 0 near standstill.
+        begin, end : (..., 6) or ()
+            Ends of the interval of each leg.
+        growing : bool
+            Speeds grow with t.
+
+        Returns
+        -------
+        exits, limits : (..., 6)
+            ``begin`` where a torque is exceeded there, infinity where it is not exceeded up to
+            ``end``; names of the limits without ``drive.``.
+
+        """
+        constant, linear, square = load
+        speeds = np.abs(speeds)
+        with np.errstate(all='ignore'):
+            edges = [np.broadcast_to(begin, speeds.shape), np.broadcast_to(end, speeds.shape)]
+            if growing:
+                edges += list(np.moveaxis(self._knees / speeds[..., None], -1, 0))
+            root = np.sqrt(linear * linear - 4.0 * square * constant)
+            far = -0.5 * (linear + np.copysign(root, linear))
+            edges += [far / square, constant / far]  # where the load changes its sign
+            pieces = np.sort(np.clip(np.nan_to_num(np.stack(np.broadcast_arrays(*edges)),
+                                                   nan=math.inf, posinf=math.inf), begin, end),
+                             axis=0)
+            first = np.full(pieces.shape[1:], math.inf)
+            for low, high in zip(pieces[:-1], pieces[1:], strict=True):
+                open_ended = np.isinf(high)
+                middle = np.where(open_ended, 2.0 * low + 1.0, 0.5 * (low + high))
+                here = self._largest(speeds * middle if growing else speeds)
+                slope: Array = np.zeros(speeds.shape)
+                if growing:
+                    rise = self._largest(speeds * high) - self._largest(speeds * low)
+                    flat = open_ended | (here == 0.0) | ~(high > low)
+                    slope = np.where(flat, 0.0, rise / (high - low))
+                driving = (constant + middle * (linear + middle * square)) * direction > 0.0
+                for factor, active in zip(self._factors, (driving, ~driving), strict=True):
+                    scale = factor / self._ratio
+                    torques = tuple(a + scale * b for a, b in zip(own, load, strict=True))
+                    found = quadratic_exit(
+                        torques, here - slope * middle, low, high, slope)
+                    used = (active | (direction == 0.0)) & (high > low)
+                    first = np.minimum(first, np.where(used, found, math.inf))
+            at = speeds * np.where(np.isfinite(first), first, 0.0) if growing else speeds
+        return first, self._names(self._largest(at))
+
+    def _largest(self, speeds: Array) -> Array:
+        """Return the largest torques at speeds (..., 6)."""
+        if self._curve is None:
+            return np.broadcast_to(self._strongest, speeds.shape)
+        last = self._curve[-1, 0]
+        torques = np.interp(speeds, *self._curve.T)
+        largest: Array = np.minimum(self._strongest, np.where(
+            speeds > last * (1.0 + TOLERANCE), 0.0, torques))
+        return largest
