@@ -127,7 +127,8 @@ def test_no_random_pose_of_a_box_has_less_than_the_smallest_value() -> None:
        "pose: 'x': must be a Pose or a Motion") for name, more in (
            ('travel', (np.ones(6),)), ('wrench', (np.ones(6),)), ('force', ()),
            ('stiffness', (1e6,)))),
-    (lambda c: c.tilt(azimuths=2), MotionError, 'azimuths: 2: must be at least 3'),
+    (lambda c: c.tilt(azimuths=2), MotionError, 'azimuths: 2: must be an integer of at least 3'),
+    (lambda c: c.tilt(azimuths='x'), MotionError, 'azimuths: .*x.*: must be an integer'),
     (lambda c: Capability(StewartPlatform(Parameters({
         name: value for name, value in PLATFORM.parameters.given.items()
         if not name.startswith('limits.')}))).section(

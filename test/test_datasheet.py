@@ -34,6 +34,7 @@ from referees import random_direction, rng, rotation_about
 from stewart_dynamics import (
     BaseMotion, Capability, Motion, Parameters, Pose, PoseError, StewartPlatform)
 from stewart_dynamics.datasheet import main
+from stewart_dynamics.datasheet.datasheet import soft_legs
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, motion_verdict, rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.figures import both_ways, down, LINEAR
@@ -298,6 +299,13 @@ def test_the_page_fits_a_phone_and_two_sheets_of_paper(sheet: Path) -> None:
         pdf = page.pdf(prefer_css_page_size=True)
         assert b'/Count 2' in pdf
         browser.close()
+
+
+def test_a_stiffness_in_another_unit_is_a_likely_mistake() -> None:
+    assert not [*soft_legs(PARAMETERS, 5e7), *soft_legs(PARAMETERS, None)]
+    (found,) = soft_legs(PARAMETERS, 50.0)
+    assert found.startswith('--leg-stiffness: 50 N/m: six such legs and ')
+    assert found.endswith('in N/um, or in N/mm?')
 
 
 BAD: list[tuple[list[str], str]] = [

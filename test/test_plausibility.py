@@ -547,3 +547,18 @@ def test_the_likely_mistake_names_the_leg_and_the_place():
     assert len(mistakes) == 1
     assert mistakes[0].startswith('geometry.platform_joints: leg_')
     assert 'repeat after a third of a turn' in mistakes[0]
+
+
+def test_legs_that_share_a_joint_or_are_all_cylinder_are_reported() -> None:
+    shape = {'legs.cylinder.radius': 0.02, 'legs.piston.radius': 0.01, 'legs.cylinder.length': 0.1,
+             'limits.leg_clearance_min': 0.005}
+    p = PLATFORM.replaced(shape)
+    assert likely_mistakes(p) == likely_mistakes(PLATFORM)
+    joints = p['geometry.base_joints'].copy()
+    joints[1] = joints[0]
+    found = likely_mistakes(p.replaced({'geometry.base_joints': joints.ravel()}))
+    assert any('limits.leg_clearance_min: 0.005 m, but leg_1 and leg_2 have the same place in '
+               'geometry.base_joints' in each for each in found)
+    found = likely_mistakes(p.replaced({'legs.cylinder.length': 400.0}))
+    assert any('legs.cylinder.length: 400 m, but leg_1 can be as short as' in each
+               for each in found)

@@ -109,7 +109,8 @@ class Capability:
     added mass: each question at a pose is six intervals. Poses and directions have any leading
     shapes that broadcast against each other. A direction is six numbers, translation and rotation
     (or force and moment), base axes; answers are multiples of it, so a unit vector gives meters,
-    radians, newtons.
+    radians, newtons. Loads, rates and payload are those of a pose whether or not its lengths,
+    joint angles and clearance are within their limits: ``reachable`` and ``travel`` say that.
 
     Parameters
     ----------
@@ -290,8 +291,8 @@ class Capability:
 
         """
         start = self._single(pose)
-        if azimuths < 3:
-            raise wrong_type('azimuths', azimuths, 'at least 3')
+        if not isinstance(azimuths, int) or azimuths < 3:
+            raise wrong_type('azimuths', azimuths, 'an integer of at least 3')
 
         def about(angles: Array) -> Extent:
             directions = np.zeros((len(angles), 6))

@@ -76,7 +76,7 @@ def bodies(shapes: Array, corners: Array, base_corners: int, leg: int, other: in
     shapes : (6, 3)
         As in ``leg_clearance``.
     corners : (M, CORNER)
-        Of the legs and plates.
+        Corners of the legs and plates.
     base_corners : int
         Corners of the base's plate.
     leg, other, pair : int

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import date
 import math
 from pathlib import Path
@@ -74,6 +74,9 @@ class Progress(NamedTuple):
     read: Callable[[int], object]
     """Called with the numbers of bytes of the bag that were read."""
 
+
+# Natural frequency below that of any platform on its legs [Hz].
+_SLOWEST = 1.0
 
 STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
 
@@ -216,3 +219,11 @@ def check_order(order: Order) -> None:
         raise StewartError(f'--payload: mass {order.payload.mass:g} kg: must be above 0')
     if order.leg_stiffness is not None and not order.leg_stiffness > 0.0:
         raise StewartError(f'--leg-stiffness: {order.leg_stiffness:g} N/m: must be above 0')
+
+
+def soft_legs(parameters: Parameters, stiffness: float | None) -> Iterator[str]:
+    """Yield a likely mistake in the stiffness of the legs [N/m]: its unit."""
+    mass = parameters['platform.mass']
+    if stiffness is not None and 6.0 * stiffness < mass * (2.0 * math.pi * _SLOWEST) ** 2:
+        yield (f'--leg-stiffness: {stiffness:g} N/m: six such legs and {mass:.3g} kg have a '
+               f'natural frequency below {_SLOWEST:g} Hz: in N/um, or in N/mm?')

@@ -96,7 +96,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.bags.find import bytes_of
     from stewart_dynamics.datasheet.claimed_box import read_box
     from stewart_dynamics.datasheet.datasheet import (
-        check_order, FUNCTIONS, is_possible, Order, Progress, STAGES, write_datasheet)
+        check_order, FUNCTIONS, is_possible, Order, Progress, soft_legs, STAGES, write_datasheet)
     from stewart_dynamics.datasheet.datasheet_text import sheet_text
     from stewart_dynamics.datasheet.rated_hexapod import Payload
     from stewart_dynamics.mechanics.frames.motion import Pose
@@ -121,7 +121,8 @@ def _run(given: argparse.Namespace) -> int:
     check_order(order)
     check_free(given.output, options, DATASHEET)
     remove_abandoned([given.output])
-    _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))
+    _PROGRAM.prepare(FUNCTIONS, (
+        *likely_mistakes(parameters), *soft_legs(parameters, order.leg_stiffness)))
     size = 0 if given.motion is None else bytes_of(given.motion)
     # Each stage counts as a part of the bag, whose reading is the longest where it is large.
     part = max(size // len(STAGES), 1)

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from itertools import permutations
+from itertools import combinations, permutations
 import math
 
 import numpy as np
@@ -35,6 +35,7 @@ from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import (
     DRIVE_INERTIAS, inertia_matrix, Parameters, STANDARD_GRAVITY)
@@ -121,7 +122,8 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
         shape = shape_of(parameters)
         sizes = [*_sizes(parameters, shape)]
         found = [*sizes, *_inertia(parameters, shape),
-                 *_reflected_mass(parameters, shape), *_others(parameters, shape)]
+                 *_reflected_mass(parameters, shape), *_others(parameters, shape),
+                 *_clearance(parameters)]
         if geometry:
             reach = reach_of(parameters, shape)
             found += _legs(parameters, shape, reach, bool(sizes))
@@ -269,6 +271,25 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
     fastest = p['limits.velocity_max']
     if fastest is not None and fastest.max() > _FASTEST * max(shape.radius, 1.0):
         yield f'limits.velocity_max: {fastest.max():.3g} m/s: in mm/s?'
+
+
+def _clearance(p: Parameters) -> Iterator[str]:
+    shortest, cylinders = p['limits.length_min'], p['legs.cylinder.length']
+    if shortest is not None and cylinders is not None and np.any(cylinders > shortest):
+        at = int(np.argmax(cylinders - shortest))
+        yield (f'legs.cylinder.length: {cylinders[at]:.3g} m, but {p["joints"][at]} can be as '
+               f'short as limits.length_min, {shortest[at]:.3g} m: in mm? It is the length from '
+               'the base joint to the end of the cylinder')
+    if p[CLEARANCE_MIN] is None:
+        return
+    for name in ('base_joints', 'platform_joints'):
+        joints = p[f'geometry.{name}']
+        for i, j in combinations(range(6), 2):
+            if np.array_equal(joints[i], joints[j]):
+                yield (f'{CLEARANCE_MIN}: {p[CLEARANCE_MIN]:.3g} m, but {p["joints"][i]} and '
+                       f'{p["joints"][j]} have the same place in geometry.{name}: their '
+                       'clearance is never above zero; leave the limit out')
+                return
 
 
 def _legs(p: Parameters, shape: Shape, reach: Reach, wrong_size: bool) -> Iterator[str]:
