@@ -41,7 +41,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
-from stewart_dynamics import StewartPlatform
+from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_euler, to_quaternion
 from stewart_dynamics.reference_motion.motion import motion_at, sample_times
@@ -63,7 +63,22 @@ def trajectory(start: list, end: list, duration: float) -> MultiDOFJointTrajecto
         'motion.type': 'quintic', 'motion.initial': start, 'motion.final': end,
         'motion.duration': duration, 'rate': 100.0})
     times = sample_times(parameters)  # [ns], a point every 10 ms
-    motion = motion_at(parameters, times * 1e-9)
+    return message_of(times, motion_at(parameters, times * 1e-9))
+
+
+def from_file(path: Path) -> MultiDOFJointTrajectory:
+    """Return the motion of a file of stewart_calibrate --design."""
+    try:
+        rows = np.loadtxt(path, delimiter=',', skiprows=1, ndmin=2)
+        parts = [rows[:, n:n + 3] for n in range(8, 20, 3)]
+        motion = Motion.from_quaternion(rows[:, 1:4], rows[:, 4:8], *parts)
+    except (OSError, ValueError) as exc:
+        sys.exit(f'{path}: cannot be read: {exc}')
+    return message_of(np.rint(rows[:, 0] * 1e9).astype(np.int64), motion)
+
+
+def message_of(times: np.ndarray, motion: Motion) -> MultiDOFJointTrajectory:
+    """Return a motion as a message; times in ns."""
     message = MultiDOFJointTrajectory(joint_names=['platform'])
     message.header.frame_id = 'base'
     # A stamp of zero: the controller starts at once.
@@ -155,6 +170,8 @@ def main() -> None:
     parser.add_argument('--params', type=Path, default=CONFIG / 'platform.yaml', metavar='FILE',
                         help="the node's parameters, for the pose of the measured legs")
     parser.add_argument('--to', default=[0.1, -0.05, 1.2, 0.0, 0.1, 0.3], help='[m, rad]', **pose)
+    parser.add_argument('--file', type=Path, metavar='CSV',
+                        help='trajectory.csv of stewart_calibrate --design, instead of two poses')
     parser.add_argument('--duration', type=float, default=2.0, help='[s]')
     parser.add_argument('--timeout', type=float, default=10.0,
                         help='for the node to appear, and to answer [s]')
@@ -166,8 +183,12 @@ def main() -> None:
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     try:
         planner = Planner()
-        start = options.start or present_pose(planner, options.params, options.timeout)
-        answer = ask(planner, trajectory(start, options.to, options.duration), options.timeout)
+        if options.file:
+            motion = from_file(options.file)
+        else:
+            start = options.start or present_pose(planner, options.params, options.timeout)
+            motion = trajectory(start, options.to, options.duration)
+        answer = ask(planner, motion, options.timeout)
     except KeyboardInterrupt:
         sys.exit(130)
     except StewartError as exc:

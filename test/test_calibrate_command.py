@@ -22,12 +22,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_typestore, Stores
 from running import PLATFORM
-from stewart_dynamics import Parameters, Pose, StewartError
+from stewart_dynamics import (
+    check_planned_trajectory, Motion, ParameterError, Parameters, Pose, StewartError,
+    StewartPlatform)
 from stewart_dynamics.calibration import main
+from stewart_dynamics.calibration.calibration_options import CalibrationOptions
+from stewart_dynamics.calibration.design import design_poses, NOISE
+from stewart_dynamics.calibration.equations import Equations, values_of
+from stewart_dynamics.calibration.fit import fit, Unknowns
 from stewart_dynamics.calibration.measured_poses import poses_csv, read_poses
 from stewart_dynamics.calibration.noise import Noise
+from stewart_dynamics.calibration.one_run import run
 from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.messages.joint_state import JointStateWriter
+from stewart_dynamics.messages.setpoint import StampedWriter
 from test_calibration import HEXAPOD, measured, random_poses, true_values
 
 JOINTS = HEXAPOD.parameters['joints']
@@ -153,10 +164,83 @@ def test_degrees_read_as_radians_are_named(table: Path, tmp_path: Path) -> None:
     rows = np.concatenate([lengths, seen.position, np.degrees(angles)], axis=1)
     path.write_text('\n'.join([','.join([*JOINTS, 'x', 'y', 'z', 'alpha', 'beta', 'gamma']), *(
         ','.join(map(repr, row)) for row in rows.tolist())]))
-    from stewart_dynamics.calibration.calibration_options import CalibrationOptions
-    from stewart_dynamics.calibration.one_run import run
     with pytest.raises(StewartError, match='angles are in degrees, not in radians: --degrees'):
         run(read_poses(path, JOINTS), str(path), HEXAPOD.parameters, tmp_path / 'out',
             CalibrationOptions())
     assert main([str(path), '--params', str(PLATFORM), '--degrees', '--output',
                  str(tmp_path / 'out')]) == 0
+
+
+def test_poses_of_a_bag_at_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The platform stops in each pose; legs at 100 Hz, a tracker at 20 Hz."""
+    rng = np.random.default_rng(3)
+    values, poses = true_values(rng), random_poses(rng, 30)
+    lengths, seen = measured(rng, values, poses)
+    folder = tmp_path / 'bag'
+    types = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        legs = writer.add_connection('/joint_states', 'sensor_msgs/msg/JointState',
+                                     typestore=types)
+        device = writer.add_connection('/tracker', 'geometry_msgs/msg/PoseStamped',
+                                       typestore=types)
+        states, poser = JointStateWriter(JOINTS), StampedWriter('tracker', 7)
+        for n in range(30):
+            for tick in range(100):
+                # A second for each pose, of which 0.3 s lead to the next one.
+                stamp = 10 ** 9 + n * 10 ** 9 + tick * 10 ** 7
+                part = max(0.0, (tick - 70) / 30.0)
+                following = min(n + 1, 29)
+                row = lengths[n] + part * (lengths[following] - lengths[n])
+                noise = 1e-6 * rng.normal(size=6)
+                writer.write(legs, stamp, states.write(stamp, row + noise, [0.0] * 6, None))
+                if tick % 5 == 0:
+                    position = seen.position[n] + part * (
+                        seen.position[following] - seen.position[n])
+                    sign = 1.0 if tick % 2 else -1.0  # of the same rotation
+                    writer.write(device, stamp, poser.write(
+                        stamp, [*position, *(sign * seen.quaternion[n])]))
+    output = tmp_path / 'out'
+    assert main([str(folder), '--params', str(PLATFORM), '--output', str(output)]) == 0
+    result = json.loads((output / 'calibration.json').read_text())
+    assert result['poses']['read'] == 30
+    found = np.array([each['value'] for each in result['parameters']])
+    assert np.abs(found - values[:42]).max() < 1e-4
+    capsys.readouterr()
+    assert main([str(folder), '--params', str(PLATFORM), '--pose', '/other']) == 2
+    assert '--pose /other: not a topic of type' in capsys.readouterr().err
+
+
+def test_a_design_identifies_better_than_random_poses(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = design_poses(HEXAPOD, 24, seed=1)
+    assert (found.half_widths < found.random_half_widths).all()
+    # The prediction is that of a fit to such poses.
+    rng = np.random.default_rng(5)
+    seen = measured(rng, values_of(HEXAPOD.parameters), found.poses, NOISE)
+    fitted = fit(Equations(*seen), Unknowns.of(
+        values_of(HEXAPOD.parameters), HEXAPOD.parameters['singularity.characteristic_length'],
+        np.zeros(42, dtype=bool), False), NOISE)
+    errors = 1.959964 * np.sqrt(np.diag(fitted.covariance))[:42]
+    np.testing.assert_allclose(errors, found.half_widths, rtol=0.01)
+    assert main(['--design', '8', '--params', str(PLATFORM), '--output', str(tmp_path / 'out'),
+                 '--rest', '1']) == 0
+    assert 'designed  random poses' in capsys.readouterr().out
+    poses = read_poses(tmp_path / 'out' / 'poses.csv', JOINTS)
+    limits = HEXAPOD.parameters
+    lengths = HEXAPOD.inverse_kinematics(poses.poses)
+    assert (lengths > limits['limits.length_min']).all()
+    assert (lengths < limits['limits.length_max']).all()
+    np.testing.assert_allclose(lengths - 0.95, poses.lengths, atol=1e-12)
+    table = np.loadtxt(tmp_path / 'out' / 'trajectory.csv', delimiter=',', skiprows=1)
+    motion = Motion(table[:, 1:4], Pose.from_quaternion(table[:, 1:4], table[:, 4:8]).rotation,
+                    *(table[:, n:n + 3] for n in range(8, 20, 3)))
+    result = check_planned_trajectory(HEXAPOD, table[:, 0], motion)
+    assert result.accepted, result.message
+    for position in poses.poses.position:
+        still = np.abs(table[:, 1:4] - position).max(axis=1) < 1e-9
+        assert np.ptp(table[still, 0]) > 0.99
+    with pytest.raises(SystemExit, match='2'):
+        main(['--design', '7', '--params', str(PLATFORM)])
+    with pytest.raises(ParameterError, match='needed for a design'):
+        design_poses(StewartPlatform(HEXAPOD.parameters.replaced(
+            {'limits.length_min': None, 'limits.length_max': None})), 10)

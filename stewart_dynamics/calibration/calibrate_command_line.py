@@ -20,8 +20,9 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from stewart_dynamics.calibration import design_command
 from stewart_dynamics.program import (
-    add_results, between, DONE, interrupt_on_signals, node_name, Program)
+    add_results, between, DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
 from stewart_dynamics.replay.replay_options import NODE
 from stewart_dynamics.reporting.estimates import FIXED, HOLD_OUT, IDENTIFIED
 
@@ -33,8 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
     parser = _arguments()
     given = parser.parse_args(arguments)
-    if given.poses is None:
-        parser.error('the following arguments are required: POSES')
+    if (given.poses is None) == (given.design is None):
+        parser.error('the following arguments are required: POSES' if given.poses is None else
+                     '--design takes no POSES')
     return _PROGRAM.exit_code(lambda: _run(given))
 
 
@@ -47,19 +49,23 @@ def _arguments() -> argparse.ArgumentParser:
         epilog='DIR/ gets calibrated.yaml (the whole parameter file, for the node), '
                'calibration.json and report.html.\n\nexit codes: 0 done; 1 with --strict, '
                'when a number is not identifiable or there is a lack of fit;\n2 bad arguments, '
-               'parameters or poses, or a likely mistake: nothing is written; 130 interrupted')
+               'parameters or poses, or a likely mistake: nothing is written; 3 part of a bag '
+               'could not be read, the rest is done; 130 interrupted')
     parser.add_argument('poses', nargs='?', type=Path, metavar='POSES',
                         help='CSV file with a column for each leg (its position, as '
                              '~/leg_states has it), x, y, z [m] and qx, qy, qz, qw, or alpha, '
-                             'beta, gamma [rad]')
+                             'beta, gamma [rad]; or a bag with measured legs and poses')
     parser.add_argument('--params', required=True, type=Path, metavar='FILE',
                         help='parameters of the hexapod as it is drawn, the file that the node '
                              'takes')
     add_results(parser, 'calibrated', 'a number is not identifiable or there is a lack of fit')
     parser.add_argument('--no-report', action='store_true', help='write no report.html')
     parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
-                        help=f'node whose parameters are read (default: {NODE})')
+                        help='node whose parameters are read, and name before its topics '
+                             f'(default: {NODE})')
     data = parser.add_argument_group('measurements')
+    data.add_argument('--measured', metavar='TOPIC', help='of a bag: JointState of the legs')
+    data.add_argument('--pose', metavar='TOPIC', help='of a bag: PoseStamped of the device')
     data.add_argument('--mm', action='store_true',
                       help='x, y, z and the leg positions are in mm, not in m')
     data.add_argument('--degrees', action='store_true', help='angles are in degrees, not in rad')
@@ -81,6 +87,7 @@ def _arguments() -> argparse.ArgumentParser:
                                  f'(default: {HOLD_OUT:g})')
     calibrated.add_argument('--accept-mistakes', action='store_true',
                             help='write results although a mistake is likely')
+    design_command.add_options(parser)
     return parser
 
 
@@ -90,6 +97,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.calibration.measured_poses import read_poses
     from stewart_dynamics.calibration.noise import Noise
     from stewart_dynamics.calibration.one_run import FUNCTIONS, run
+    from stewart_dynamics.calibration.recorded_poses import read_bag
     from stewart_dynamics.calibration.results import result_text
     from stewart_dynamics.compilation.functions import prepare
     from stewart_dynamics.compilation.machine_code import HINT
@@ -101,7 +109,15 @@ def _run(given: argparse.Namespace) -> int:
         given.fixed, given.frames, given.noise and Noise(*given.noise), given.hold_out, given.mm,
         given.degrees, given.accept_mistakes, not given.no_report, given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
-    measured = read_poses(given.poses, parameters['joints'], given.mm, given.degrees)
+    if given.design is not None:
+        _PROGRAM.say(design_command.run(given, parameters))
+        return DONE
+    missing: list[str] = []
+    if given.poses.is_dir() or given.poses.suffix in ('.mcap', '.db3', '.bag', '.zstd'):
+        measured, missing = read_bag(
+            given.poses, parameters, given.node, given.measured, given.pose)
+    else:
+        measured = read_poses(given.poses, parameters['joints'], given.mm, given.degrees)
     if HINT:
         _PROGRAM.complain(HINT)
     prepare(FUNCTIONS)
@@ -112,6 +128,9 @@ def _run(given: argparse.Namespace) -> int:
         _PROGRAM.complain(f'warning: {each["text"]}')
     _PROGRAM.say(result_text(result))
     _PROGRAM.say(f'results: {given.output}')
+    if missing:
+        _PROGRAM.complain(f'{given.poses}: part of it could not be read: {"; ".join(missing)}')
+        return PARTLY_READ
     everything = all(each['state'] in (IDENTIFIED, FIXED) for each in result['parameters'])
     return NOT_ALL_IDENTIFIED if given.strict and not (
         everything and result['lack_of_fit'] is None) else DONE

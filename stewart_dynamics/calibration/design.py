@@ -1,0 +1,222 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Poses that identify the geometry best, within the limits of the hexapod.
+
+Of random poses within the limits the N are chosen whose information has the largest determinant
+(D-optimal), leg by leg: the exchange of one chosen pose for another that increases it most is
+repeated (V. V. Fedorov, Theory of Optimal Experiments, Academic Press, 1972). Equal seeds give
+equal poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import io
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.calibration.equations import Equations, GEOMETRY, names_of, values_of
+from stewart_dynamics.calibration.fit import Unknowns
+from stewart_dynamics.calibration.measured_poses import POSITION, QUATERNION
+from stewart_dynamics.calibration.noise import covariances, Noise, whitening
+from stewart_dynamics.errors import MotionError, ParameterError, StewartError
+from stewart_dynamics.mechanics import limits
+from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
+from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR, TWO_SIDED
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.planned.approach import approach, TimedMotion
+
+NOISE = Noise(1e-5, 1e-5, 1e-5)
+"""Noise for the predicted intervals, by default [m, m, rad]."""
+# Poses to choose from, poses tried for each of them, and random sets for comparison.
+_CANDIDATES, _TRIES, _RANDOM = 1500, 40, 100
+# Part of the stroke that stays free at both ends; largest angle of a pose [rad].
+_MARGIN, _LARGEST_ANGLE = 0.02, 0.6
+# An exchange that increases the logarithm of the determinant by less ends the search.
+_LEAST_GAIN, _MOST_EXCHANGES = 1e-3, 500
+_AXES = 'xyz'
+
+
+class PoseDesign(NamedTuple):
+    """Designed poses in the order of their visit."""
+
+    poses: Pose
+    """(N,)"""
+    lengths: Array
+    """(N, 6) leg positions to be commanded [m]."""
+    half_widths: Array
+    """(42,) predicted 95 % intervals [m]."""
+    random_half_widths: Array
+    """(42,) the same, median of as many random poses within the limits."""
+    names: tuple[str, ...]
+
+
+def design_poses(platform: StewartPlatform, count: int, noise: Noise = NOISE, seed: int = 0,
+                 ) -> PoseDesign:
+    """
+    Return poses from which the geometry is identifiable, and its predicted intervals.
+
+    Raises
+    ------
+    ParameterError
+        A limit of length is missing, or home is not within the limits.
+    StewartError
+        Too few poses are within the limits.
+
+    """
+    random = np.random.default_rng(seed)
+    p = platform.parameters
+    candidates = _within_limits(platform, random, max(_CANDIDATES, 3 * count))
+    if len(candidates) < 3 * count:
+        raise StewartError(f'{len(candidates)} of {_TRIES * _CANDIDATES} random poses are within '
+                           f'the limits: too few to choose {count}')
+    size = p['singularity.characteristic_length']
+    values = values_of(p)
+    unknowns = Unknowns.of(values, size, np.zeros(GEOMETRY, dtype=bool), False)
+    lin = Equations(np.zeros((len(candidates), 6)), candidates).at(values)
+    whiten = whitening(covariances(noise, size, lin))
+
+    def half_widths(which: Integers) -> Array:
+        part = lin._replace(derivatives=lin.derivatives[which])
+        what = unknowns.identifiability(part, whiten[which], LARGEST_ERROR)
+        variances = np.sum((what.directions / np.maximum(what.singular_values, 1.0)) ** 2, axis=1)
+        widths: Array = TWO_SIDED * what.scales * np.sqrt(variances)
+        return widths[:GEOMETRY]
+
+    deviations = np.sqrt(np.einsum('nll->nl', covariances(noise, size, lin)))
+    of_leg = [[*range(3 * n, 3 * n + 3), *range(18 + 3 * n, 21 + 3 * n), 36 + n]
+              for n in range(6)]
+    rows = np.stack([lin.derivatives[:, n, columns] / deviations[:, n, None]
+                     for n, columns in enumerate(of_leg)]) * unknowns.scales[0]
+    chosen = _exchange(rows, random.choice(len(candidates), count, replace=False))
+    others = [half_widths(random.choice(len(candidates), count, replace=False))
+              for _ in range(_RANDOM)]
+    found = candidates[_in_order(candidates[chosen], platform.home_pose(), size, chosen)]
+    return PoseDesign(found, platform.inverse_kinematics(found) - p['geometry.zero_length'],
+                      half_widths(chosen), np.median(others, axis=0), names_of(p))
+
+
+def _within_limits(platform: StewartPlatform, random: np.random.Generator, count: int) -> Pose:
+    """Return random poses within all limits, on home's side of singularities."""
+    p = platform.parameters
+    low, high = p[limits.LENGTH_MIN], p[limits.LENGTH_MAX]
+    if low is None or high is None:
+        raise ParameterError('limits.length_min and limits.length_max: needed for a design')
+    home, stroke = platform.home_pose(), high - low
+    tries = _TRIES * count
+    spread = float(stroke.max())
+    angle = min(spread / p['singularity.characteristic_length'], _LARGEST_ANGLE)
+    poses = Pose(home.position + random.uniform(-0.5, 0.5, (tries, 3)) * spread,
+                 from_euler(random.uniform(-angle, angle, (tries, 3))) @ home.rotation)
+    lengths = platform.inverse_kinematics(poses)
+    sound = ((lengths > low + _MARGIN * stroke) & (lengths < high - _MARGIN * stroke)).all(axis=1)
+    poses = poses[np.flatnonzero(sound)[:count]]
+    result = platform.inverse_dynamics(Motion(poses.position, poses.rotation), singular='nan')
+    side = platform.inverse_dynamics(Motion(home.position, home.rotation)).determinant
+    sound = (result.condition_number < p['singularity.warn_condition']) & (
+        result.determinant * side > 0.0)
+    known = limits.Limits(p)
+    for name, angles in zip(limits.OF_JOINTS, platform.joint_angles(poses), strict=True):
+        if name in known.of_joints:
+            sound &= ~known.exceeds(name, angles).any(axis=1)
+    if limits.FORCE_MAX in known.bounds:
+        sound &= ~known.exceeds(limits.FORCE_MAX, np.abs(result.forces)).any(axis=1)
+    clearances = clearance_to_check(p)
+    if clearances is not None:
+        sound &= clearances(poses.rows).min(axis=-1) > p[limits.CLEARANCE_MIN]
+    return poses[sound]
+
+
+def _exchange(rows: Array, chosen: Integers) -> Integers:
+    """Return the indices of poses with a large determinant of their information (6, M, 7)."""
+    chosen = chosen.copy()
+    least = 1e-9 * np.eye(rows.shape[2]) * float(np.mean(rows ** 2))
+    for _ in range(_MOST_EXCHANGES):
+        own = rows[:, chosen]
+        inverse = np.linalg.inv(own.swapaxes(1, 2) @ own + least)
+        across = own @ inverse @ rows.swapaxes(1, 2)  # (6, N, M)
+        new = np.sum((rows @ inverse) * rows, axis=2)
+        old = np.sum((own @ inverse) * own, axis=2)
+        ratios = (1.0 + new[:, None]) * (1.0 - old[..., None]) + across ** 2
+        gains = np.log(np.maximum(ratios, 1e-300)).sum(axis=0)
+        gains[:, chosen] = -np.inf
+        out, into = np.unravel_index(int(np.argmax(gains)), gains.shape)
+        if gains[out, into] < _LEAST_GAIN:
+            break
+        chosen[out] = into
+    return chosen
+
+
+def _in_order(poses: Pose, home: Pose, size: float, chosen: Integers) -> list[int]:
+    """Return the indices in an order of short ways, from home to the nearest one left."""
+    left, order = list(range(len(chosen))), []
+    position, rotation = home.position, home.rotation
+    while left:
+        ways = np.linalg.norm(poses.position[left] - position, axis=1) + size * np.linalg.norm(
+            poses.rotation[left] - rotation, axis=(1, 2))
+        nearest = left.pop(int(np.argmin(ways)))
+        position, rotation = poses.position[nearest], poses.rotation[nearest]
+        order.append(int(chosen[nearest]))
+    return order
+
+
+def visit(platform: StewartPlatform, poses: Pose, rest: float,
+          progress: Callable[[int], object] = lambda done: None) -> TimedMotion:
+    """
+    Return a planned trajectory from home through all poses, at rest for a time [s] in each.
+
+    Each part is within all limits; a pose that cannot be reached directly is reached over home.
+    """
+    home = platform.home_pose()
+    times: list[Array] = [np.zeros(1)]
+    rows: list[Array] = [Motion(home.position, home.rotation).rows[None]]
+    end, here = 0.0, home
+
+    def append(way: TimedMotion) -> None:
+        nonlocal end
+        times.append(end + way.times[1:])
+        rows.append(way.motion.rows[1:])
+        end = float(times[-1][-1])
+
+    for n in range(len(poses)):
+        try:
+            append(approach(platform, here, poses[n]))
+        except MotionError:
+            append(approach(platform, here, home))
+            append(approach(platform, home, poses[n]))
+        here = poses[n]
+        times.append(np.array([end + rest]))
+        rows.append(Motion(here.position, here.rotation).rows[None])
+        end += rest
+        progress(n + 1)
+    return TimedMotion(np.concatenate(times), Motion.of_rows(np.concatenate(rows)))
+
+
+def trajectory_csv(motion: TimedMotion) -> str:
+    """Return a planned trajectory as text: time, pose, twist and acceleration of each point."""
+    text = io.StringIO()
+    names = ['time', *POSITION, *QUATERNION, *(f'{kind}{axis}' for kind in (
+        'v', 'w', 'a', 'dw') for axis in _AXES)]
+    m = motion.motion
+    np.savetxt(text, np.column_stack([
+        motion.times, m.position, m.pose.quaternion, m.linear_velocity, m.angular_velocity,
+        m.linear_acceleration, m.angular_acceleration]), '%.12g', ',',
+        header=','.join(names), comments='')
+    return text.getvalue()

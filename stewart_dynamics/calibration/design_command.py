@@ -1,0 +1,80 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``stewart_calibrate --design N``: options, files and terminal output."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.program import between, whole
+
+POSES, TRAJECTORY = 'poses.csv', 'trajectory.csv'
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that only a design has."""
+    group = parser.add_argument_group('design of poses (--design)')
+    group.add_argument('--design', type=whole(8, 500), metavar='N',
+                       help='calibrate nothing, but choose the N poses within the limits that '
+                            f'identify best: DIR/{POSES}, and DIR/{TRAJECTORY} that visits them '
+                            '(default DIR: designed)')
+    group.add_argument('--rest', type=between(0.0, 3600.0), default=3.0, metavar='S',
+                       help='time at rest in each pose (default: %(default)g)')
+    group.add_argument('--seed', type=whole(0, 2 ** 32 - 1), default=0, metavar='N',
+                       help='equal seeds give equal poses (default: %(default)s)')
+
+
+def run(given: argparse.Namespace, parameters: Parameters) -> str:
+    """Design poses, write them and return the text for the terminal."""
+    # Imported here, so that --help is fast.
+    from stewart_dynamics.calibration.calibration_options import CalibrationOptions
+    from stewart_dynamics.calibration.design import design_poses, NOISE, trajectory_csv, visit
+    from stewart_dynamics.calibration.measured_poses import poses_csv
+    from stewart_dynamics.calibration.noise import Noise
+    from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+    from stewart_dynamics.reporting.results_folder import (
+        check_free, remove_abandoned, whole_folder)
+    from stewart_dynamics.whole_file import write_files
+    from tqdm import tqdm
+
+    folder = Path('designed') if given.output == Path('calibrated') else given.output
+    options = CalibrationOptions(force=given.force)
+    check_free(folder, options, POSES)
+    remove_abandoned([folder])
+    platform = StewartPlatform(parameters)
+    noise = Noise(*given.noise) if given.noise else NOISE
+    found = design_poses(platform, given.design, noise, given.seed)
+    with tqdm(total=given.design, disable=None, leave=False, unit='pose') as bar:
+        motion = visit(platform, found.poses, given.rest, lambda done: bar.update(done - bar.n))
+    with whole_folder(folder, options, POSES) as partial:
+        write_files({partial / POSES: poses_csv(parameters['joints'], found.lengths, found.poses),
+                     partial / TRAJECTORY: trajectory_csv(motion)})
+    lines = ['predicted 95 % intervals, widest of the legs, for noise of '
+             f'{1e6 * noise.length:.3g} um, {1e6 * noise.position:.3g} um and '
+             f'{1e6 * noise.rotation:.3g} urad:',
+             f'  {"":28}{"designed":>10}  random poses']
+    widest: dict[str, tuple[float, float]] = {}
+    for name, own, other in zip(
+            found.names, found.half_widths, found.random_half_widths, strict=True):
+        parts = name.split('.')
+        kind = '.'.join([parts[1], *parts[3:]])
+        widest[kind] = tuple(map(max, zip(  # type: ignore[assignment]
+            widest.get(kind, (0.0, 0.0)), (float(own), float(other)), strict=True)))
+    lines += [f'  {kind:28}{f"+- {1e3 * own:.3g}":>10}  +- {1e3 * other:.3g} mm'
+              for kind, (own, other) in widest.items()]
+    return '\n'.join([*lines, f'{given.design} poses: {folder / POSES}; {motion.times[-1]:.0f} s '
+                      f'through them: {folder / TRAJECTORY}'])

@@ -1,0 +1,142 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Poses at rest from a bag: the means of measured legs and of a PoseStamped topic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, SECOND, Stamps
+from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.calibration.measured_poses import MeasuredPoses
+from stewart_dynamics.errors import BagError
+from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
+from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.messages import setpoint, type_names
+from stewart_dynamics.messages.cdr import MalformedError
+from stewart_dynamics.messages.joint_state import JointStateReader
+from stewart_dynamics.parameters.table import is_unit, Parameters
+
+# Legs are at rest while no position changes by more than this part of the characteristic length,
+# for at least this time [s], of which this part at each end is left out: the platform settles.
+_STILL, _SHORTEST, _SETTLING = 3e-4, 0.5, 0.2
+
+
+class RecordedPoses(NamedTuple):
+    """Poses of a bag, and the parts of it that could not be read."""
+
+    measured: MeasuredPoses
+    missing: list[str]
+
+
+def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None,
+             pose: str | None) -> RecordedPoses:
+    """
+    Return the poses at rest of a bag, joined by the stamps of the messages' headers.
+
+    ``measured`` and ``pose`` are topics; by default the usual one, or the only one of its type.
+
+    Raises
+    ------
+    BagError
+        The bag cannot be read, a topic is not found, or nothing was measured at rest.
+
+    """
+    with closing(Recording(path)) as recording:
+        topics = {
+            _topic(recording, type_names.JOINT_STATE, measured, f'{node}/{MEASURED_LEGS}',
+                   '--measured'): 'legs',
+            _topic(recording, type_names.POSE_STAMPED, pose, '', '--pose'): 'pose'}
+        reader = JointStateReader(parameters['joints'], ['position'])
+        leg_stamps: list[Stamps] = []
+        leg_values: list[Array] = []
+        poses: list[tuple[int, tuple[float, ...]]] = []
+        for messages, _ in recording.messages(topics):
+            which = messages.places().get('legs')
+            if which is not None:
+                states = reader.read_many(
+                    messages.data, messages.starts[which], messages.sizes[which])
+                leg_stamps.append(states.stamps)
+                leg_values.append(states.values)
+            for topic, _, data in messages.each():
+                if topic == 'pose':
+                    try:
+                        stamp, _, values = setpoint.pose(data)
+                    except MalformedError:
+                        continue
+                    if np.isfinite(values).all() and is_unit(np.linalg.norm(values[3:])):
+                        poses.append((stamp, values))
+        missing = list(recording.missing)
+    stamps = np.concatenate(leg_stamps) if leg_stamps else np.empty(0, dtype=np.int64)
+    if not len(stamps) or not poses:
+        raise BagError(f'{path}: {" and ".join(topics)}: no valid message of the '
+                       f'{"poses" if len(stamps) else "legs"}')
+    order = np.argsort(stamps, kind='stable')
+    stamps, lengths = stamps[order], np.concatenate(leg_values)[order]
+    poses.sort()
+    at = np.array([stamp for stamp, _ in poses])
+    seen = np.array([values for _, values in poses])
+    rows, names = [], []
+    for first, last in _rests(stamps, lengths,
+                              _STILL * parameters['singularity.characteristic_length']):
+        margin = round(_SETTLING * (stamps[last] - stamps[first]))
+        begin, end = stamps[first] + margin, stamps[last] - margin
+        part = seen[np.searchsorted(at, begin):np.searchsorted(at, end, 'right')]
+        legs = lengths[np.searchsorted(stamps, begin):np.searchsorted(stamps, end, 'right')]
+        if len(part) and len(legs):
+            turns = part[:, 3:] * np.sign(part[:, 3:] @ part[0, 3:])[:, None]
+            mean = turns.mean(axis=0)
+            rows.append(np.concatenate([legs.mean(axis=0), part[:, :3].mean(axis=0),
+                                        mean / np.linalg.norm(mean)]))
+            names.append(f't = {(begin - stamps[0]) / SECOND:.1f} s')
+    if not rows:
+        raise BagError(
+            f'{path}: no pose was measured while the legs were at rest for {_SHORTEST:g} s; '
+            f'legs from {stamps[0] / SECOND:.1f} to {stamps[-1] / SECOND:.1f} s, poses from '
+            f'{at[0] / SECOND:.1f} to {at[-1] / SECOND:.1f} s')
+    table = np.array(rows)
+    return RecordedPoses(MeasuredPoses(
+        table[:, :6], Pose.from_quaternion(table[:, 6:9], table[:, 9:]), tuple(names)), missing)
+
+
+def _topic(recording: Recording, kind: str, wanted: str | None, usual: str, option: str) -> str:
+    found = sorted(name for name, of in recording.topics.items() if of == kind)
+    name = wanted or (usual if usual in found else found[0] if len(found) == 1 else None)
+    if name in found:
+        return str(name)
+    listed = ', '.join(found) or 'no topic'
+    raise BagError(f'{recording.path}: ' + (
+        f'{option} {wanted}: not a topic of type {kind}, which {listed} has' if wanted else
+        f'{listed} of type {kind}: {option} selects one'))
+
+
+def _rests(stamps: Stamps, lengths: Array, tolerance: float) -> Iterator[tuple[int, int]]:
+    """Yield first and last index of each time at rest."""
+    first, low, high = 0, lengths[0], lengths[0]
+    for n in range(1, len(stamps) + 1):
+        if n < len(stamps):
+            lower, upper = np.minimum(low, lengths[n]), np.maximum(high, lengths[n])
+            if np.all(upper - lower <= tolerance):
+                low, high = lower, upper
+                continue
+        if stamps[n - 1] - stamps[first] >= _SHORTEST * SECOND:
+            yield first, n - 1
+        if n < len(stamps):
+            first, low, high = n, lengths[n], lengths[n]
