@@ -5,8 +5,9 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-capability bench-coverage bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
-  bench-replay clean demo demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment lint test
+.PHONY: bags bench bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
+  bench-replay clean demo demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment export-demo \
+  lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -89,11 +90,17 @@ demo-ship: $(INSTALLED)
 demo-identify: $(INSTALLED)
 	@$(VENV)/bin/python demo/identify.py
 
+export-demo: $(INSTALLED)
+	@$(VENV)/bin/python demo/export.py
+
 bench: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/bench.py --write
 
 bench-capability: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/capability.py --write
+
+bench-export: $(INSTALLED)
+	$(VENV)/bin/python benchmarks/exported_source.py --write
 
 bench-loop: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/simulator.py --write

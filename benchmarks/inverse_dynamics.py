@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The runtime path beside Pinocchio and beside plain C, measured in turns in one run.
+The runtime path beside Pinocchio and beside the exported C source, measured in turns in one run.
 
 Run by hand, ``make bench``; see README.md beside this file.
 """
@@ -38,9 +38,11 @@ from numpy.typing import NDArray
 import pinocchio as pin
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.export.hexapod_source import platform_source
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, lagrange
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.mechanics.rows import FORCES, NO_BASE, RESULT, WRENCH
+from stewart_dynamics.mechanics.rows import (
+    DETERMINANT, FORCES, NO_BASE, RESULT, UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.parameters.table import inertia_matrix
 
 Array = NDArray[np.float64]
@@ -48,7 +50,7 @@ Array = NDArray[np.float64]
 HERE = Path(__file__).parent
 README = HERE / 'README.md'
 BEGIN, END = '<!-- measured: begin -->', '<!-- measured: end -->'
-C_COMPILER = ['gcc', '-O3', '-march=native']
+C_COMPILER = ['gcc', '-std=c99', '-O3', '-march=native', '-ffp-contract=off']
 
 ROUNDS = 41
 SAMPLES = 200_000
@@ -102,25 +104,32 @@ def random_motions(many: int) -> Motion:
 # --- plain C ---------------------------------------------------------------------------------
 
 class PlainC:
-    """inverse_dynamics.c, compiled here and now."""
+    """The exported C source of a hexapod, compiled here and now."""
 
-    def __init__(self) -> None:
-        with tempfile.TemporaryDirectory() as directory:
-            library = Path(directory) / 'inverse_dynamics.so'
+    def __init__(self, parameters: Parameters) -> None:
+        folder = HERE.parent / 'stewart_dynamics' / 'export' / 'c'
+        with tempfile.TemporaryDirectory() as name:
+            hexapod, library = Path(name) / 'hexapod.c', Path(name) / 'hexapod.so'
+            hexapod.write_text('#include "stewart_dynamics.h"\n#include <math.h>\n'
+                               + platform_source(parameters, 'hexapod'), encoding='utf-8')
             subprocess.run(
-                [*C_COMPILER, '-shared', '-fPIC', '-o', str(library),
-                 str(HERE / 'inverse_dynamics.c'), '-lm'], check=True)
-            self.function = ctypes.CDLL(str(library)).solve
-        pointer, size = ctypes.c_void_p, ctypes.c_size_t
-        self.function.argtypes = [pointer, pointer, pointer, size, pointer, size]
+                [*C_COMPILER, '-shared', '-fPIC', f'-I{folder}', '-o', library, hexapod,
+                 folder / 'stewart_dynamics.c', HERE.parent / 'test' / 'export_calls.c', '-lm'],
+                check=True)
+            loaded = ctypes.CDLL(str(library))
+        self.function = loaded.inverse_dynamics
+        self.function.argtypes = [ctypes.c_size_t, ctypes.c_void_p, ctypes.c_size_t,
+                                  *[ctypes.c_void_p] * 6]
         self.function.restype = None
+        self._hexapod = ctypes.addressof(ctypes.c_char.in_dll(loaded, 'hexapod'))
 
-    @staticmethod
-    def arguments(constants: Array, motions: Array, wrenches: Array, results: Array) -> list[Any]:
+    def arguments(self, motions: Array, wrenches: Array | None, results: Array) -> list[Any]:
         """Return what the function takes for these C-contiguous arrays; it keeps them alive."""
-        m, x, w, out = (array.ctypes.data_as(ctypes.c_void_p)
-                        for array in (constants, motions, wrenches, results))
-        return [m, x, w, int(len(wrenches) > 1), out, len(motions)]
+        given = np.full(len(motions), wrenches is not None, dtype=np.int32)
+        codes = np.empty(len(motions), dtype=np.int32)
+        x, w, g, out, c = (None if array is None else array.ctypes.data_as(ctypes.c_void_p)
+                           for array in (motions, wrenches, given, results, codes))
+        return [len(motions), self._hexapod, 0, x, w, None, g, out, c]
 
 
 # --- Pinocchio -------------------------------------------------------------------------------
@@ -276,13 +285,19 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     rows, no_wrench = motion.rows, np.zeros((1, WRENCH))
     results, c_results = (np.empty((samples, RESULT)) for _ in range(2))
     sound, tile = np.empty(samples, dtype=bool), np.empty(inverse_dynamics.TILE)
-    c, tree = PlainC(), Tree(parameters)
+    c, tree = PlainC(parameters), Tree(parameters)
 
     wrenches = np.random.default_rng(20260102).normal(0.0, 500.0, (samples, WRENCH))
-    for name, wrench in ('plain C under a wrench', wrenches), ('plain C', no_wrench):
-        inverse_dynamics.solve(numbers, rows, wrench, STILL, results, sound, tile)
-        c.function(*c.arguments(numbers, rows, wrench, c_results))
-        check(name, c_results, results)
+    for name, wrench in ('plain C under a wrench', wrenches), ('plain C', None):
+        inverse_dynamics.solve(
+            numbers, rows, no_wrench if wrench is None else wrench, STILL, results, sound, tile)
+        c.function(*c.arguments(rows, wrench, c_results))
+        # in C the forces under a unit load come last
+        in_order = np.concatenate([
+            results[:, :UNIT_LOAD_FORCES.start], results[:, DETERMINANT:],
+            results[:, UNIT_LOAD_FORCES]], axis=1)
+        if not np.array_equal(c_results, in_order):
+            raise SystemExit(f'{name} does not have the bits of the runtime path')
     forces = results[:, FORCES]
     few = [_part(motion, slice(k, k + 1)) for k in range(min(50, samples))]
     check('Pinocchio', np.array([tree.leg_forces(_single(one)) for one in few]),
@@ -307,14 +322,14 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
                 one.linear_acceleration, one.angular_acceleration)]), RNEA),
         Contestant('plain C through ctypes', repeated(
             'solve(*arguments)', solve=c.function,
-            arguments=c.arguments(numbers, row, no_wrench, result)), RNEA)]
+            arguments=c.arguments(row, None, result)), RNEA)]
     batch = [
         Contestant(BATCH, once(
             samples, inverse_dynamics.solve, numbers, rows, no_wrench, STILL, results, sound,
             tile),
             PLAIN_C),
         Contestant(PLAIN_C, once(
-            samples, c.function, *c.arguments(numbers, rows, no_wrench, c_results)), PLAIN_C),
+            samples, c.function, *c.arguments(rows, None, c_results)), PLAIN_C),
         Contestant('`StewartPlatform.solve`: the default, all cores', once(
             samples, hexapod.solve, rows), PLAIN_C),
         Contestant('`lagrange`, the reference in numpy', once(
