@@ -56,7 +56,7 @@ def _legs(name: str) -> list[str]:
     return [f'{name}_{leg}' for leg in range(1, 7)]
 
 
-# The columns of a vector, in parts: first what is given, then the results.
+# The columns of a vector, in parts: the inputs first, then the results.
 PARTS: dict[str, list[str]] = {
     'STAMP': ['stamp'],
     'HAS_BASE': ['has_base'],
