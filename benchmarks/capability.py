@@ -32,12 +32,14 @@ from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import Capability, Motion, Pose, StewartPlatform
 from stewart_dynamics.capability.motions import faster
+from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / 'test'))
 from referees import rng, size_of  # noqa: E402, I100
 from test_capability import limited, random_travel  # noqa: E402
 import test_capability_boxes as boxes  # noqa: E402
+from test_leg_clearance import near, SHAPE  # noqa: E402, I100
 
 BEGIN, END = '<!-- capability: begin -->', '<!-- capability: end -->'
 PLATFORM = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
@@ -152,6 +154,36 @@ def reachable(number: int, poses: int) -> list[tuple[str, str]]:
              f'{1e3 * np.median(growths):.1f}, {1e3 * max(growths):.0f}')]
 
 
+def clearances(number: int) -> list[tuple[str, str]]:
+    """Return rows: time of a clearance, and of the factor of a box that a clearance limits."""
+    corners = 0.8 * np.exp(1j * np.pi / 4.0 * np.arange(8))
+    outline = np.stack([corners.real, corners.imag, np.full(8, -0.05)], axis=1)
+    rows = []
+    for name, plates in (('', {}), (', with two plates of eight corners', {
+            'geometry.base_outline': outline * [1.5, 1.5, 0.0],
+            'geometry.platform_outline': outline})):
+        measure = LegClearance(PLATFORM.parameters.replaced({**SHAPE, **plates}))
+        motions = Motion.from_pose(boxes.poses_in(
+            np.ones((6, 2)) * [-0.1, 0.1], PLATFORM.home_pose(), np.zeros(3), rng())).rows
+        took = []
+        for _ in range(20):
+            begin = time.process_time()
+            measure(motions)
+            took.append((time.process_time() - begin) / len(motions))
+        rows.append((f'clearance of a sample{name}: least, median (us)',
+                     f'{1e6 * min(took):.2f}, {1e6 * np.median(took):.2f}'))
+    growths = []
+    for seed in range(number):
+        platform, pose, random = near(seed)
+        box = np.stack([-random.uniform(0.1, 1.0, 6), random.uniform(0.1, 1.0, 6)], axis=1)
+        begin = time.process_time()
+        found = Capability(platform).reachable_factor(box, pose)
+        if found.limit == 'leg_clearance_min':
+            growths.append(time.process_time() - begin)
+    return [*rows, (f'factor of a box that a clearance limits, {len(growths)} boxes: median, '
+                    'largest (ms)', f'{1e3 * np.median(growths):.0f}, {1e3 * max(growths):.0f}')]
+
+
 def times_of_travel() -> list[tuple[str, str]]:
     """Return rows: time of twelve travels at one pose, and at many poses."""
     capability, home = Capability(PLATFORM), PLATFORM.home_pose()
@@ -192,6 +224,7 @@ def main() -> None:
         factor, ratio = factors(name)
         rows += [(f'speed factor of bags/{name}', factor), ('|ratio - 1| at it', ratio)]
     rows += times_of_travel()
+    rows += clearances(options.boxes // 4)
     rows += reachable(options.boxes, options.poses)
     lines = ['', *markdown(rows), '']
     print('\n'.join(lines))

@@ -36,6 +36,7 @@ from playwright.sync_api import sync_playwright
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.datasheet import main as datasheet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.replay_options import NODE
@@ -204,6 +205,20 @@ def draw_report(path: Path) -> None:
         page.screenshot(path=path)
 
 
+def draw_datasheet(path: Path) -> None:
+    """Take a picture of the upper part of a datasheet, where there is a browser."""
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        print(f'no browser ({", ".join(BROWSERS)}): {path.name} is left as it is')
+        return
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        datasheet(['--params', str(ROOT / 'config' / 'platform.yaml'), '--output', f'{folder}/of'])
+        page = playwright.chromium.launch(executable_path=browser, args=[
+            '--no-sandbox']).new_page(viewport={'width': 1300, 'height': 665})
+        page.goto((Path(folder) / 'of' / 'datasheet.html').as_uri())
+        page.screenshot(path=path)
+
+
 def euler(rotations: Array) -> Array:
     """Return alpha, beta, gamma (N, 3) [rad] of R = Rz(gamma) Ry(beta) Rx(alpha), rows of nine."""
     r = rotations.reshape(-1, 3, 3)
@@ -224,6 +239,7 @@ def main() -> None:
     draw_singular(HERE / 'singular.png', recorded)
     draw_figures(HERE / 'paper.png', recorded)
     draw_report(HERE / 'report.png')
+    draw_datasheet(HERE / 'datasheet.png')
     for demo in ('loop', 'ship'):
         subprocess.run(
             [sys.executable, ROOT / 'demo' / f'{demo}.py', '--output', HERE], check=True)
