@@ -94,7 +94,7 @@ def test_a_motion_can_be_played_faster_until_a_motor_is_at_its_limit(seed: int) 
 
 
 def scaled(motion: Motion, part: slice, change: Array) -> Any:
-    """Return a function from a multiple to the motion with so much of a change."""
+    """Return a function from a multiple to the motion with this multiple of a change."""
     def at(multiple: float) -> Motion:
         rows = motion.rows.copy()
         rows[..., part] += multiple * change

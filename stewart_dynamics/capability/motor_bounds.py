@@ -37,7 +37,7 @@ _FAR_BEYOND = 1e9
 
 
 class MovingMotors(NamedTuple):
-    """What the motors do in a motion, whatever the forces (..., 6)."""
+    """Quantities of the motors that follow from a motion alone (..., 6)."""
 
     speeds: Array
     """[rad/s]"""
