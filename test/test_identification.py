@@ -291,6 +291,26 @@ def test_motor_torques_need_the_right_lead(identified: Callable[..., Any], tmp_p
     assert 'actuator.screw_lead: has no value: --motor-torque needs it' in err
 
 
+def test_motor_currents_with_a_gear(identified: Callable[..., Any], tmp_path: Path) -> None:
+    constant = np.array([0.3, 0.35, 0.4, 0.45, 0.5, 0.55])
+
+    def currents(given: Recorded) -> Recorded:
+        return given._replace(efforts=given.efforts * 0.01 / (2.0 * np.pi * 3.0) / constant)
+
+    params = tmp_path / 'with gear.yaml'
+    driven = GIVEN.replaced({'actuator.screw_lead': 0.01, 'drive.gear_ratio': 3.0})
+    driven.replaced({'drive.torque_constant': constant}).to_yaml(params)
+    code, result, _, _ = identified('fourier', '--no-report', '--motor-current', change=currents,
+                                    params=params)
+    assert code == 0
+    assert values_of(result)['platform.mass'] == pytest.approx(180.0, rel=0.002)
+    assert result['options']['motor_current'] is True
+    driven.to_yaml(params)
+    code, _, _, err = identified('fourier', '--force', '--motor-current', params=params)
+    assert code == 2
+    assert 'drive.torque_constant: has no value: --motor-current needs it' in err
+
+
 def test_mistakes_may_be_accepted(identified: Callable[..., Any]) -> None:
     code, result, _, err = identified(
         'rest', '--no-report', '--accept-mistakes',

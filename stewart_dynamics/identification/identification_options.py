@@ -38,6 +38,8 @@ class IdentificationOptions(NamedTuple):
     """Parameters to be identified, from ``unknowns.KINDS``."""
     motor_torque: bool = False
     """Efforts are motor torques [N m]."""
+    motor_current: bool = False
+    """Efforts are motor currents [A]."""
     cutoff: float = CUTOFF
     """Cut-off frequency of the filter on regressor and efforts [Hz]."""
     prior: float | None = None

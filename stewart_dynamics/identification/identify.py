@@ -148,8 +148,16 @@ class Identification:
             raise ParameterError(
                 f'base.source: {parameters["base.source"]}: hexapods are identified on a base at '
                 'rest: must be fixed')
-        if options.motor_torque and parameters['actuator.screw_lead'] is None:
-            raise ParameterError('actuator.screw_lead: has no value: --motor-torque needs it')
+        self._per_effort: Array | None = None  # leg force for an effort of 1
+        for option, given, name in (
+                ('--motor-torque', options.motor_torque, 'actuator.screw_lead'),
+                ('--motor-current', options.motor_current, 'actuator.screw_lead'),
+                ('--motor-current', options.motor_current, 'drive.torque_constant')):
+            if given and parameters[name] is None:
+                raise ParameterError(f'{name}: has no value: {option} needs it')
+        if options.motor_torque or options.motor_current:
+            self._per_effort = motor_ratio(parameters) * (
+                parameters['drive.torque_constant'] if options.motor_current else 1.0)
         self.parameters, self._options = parameters, options
         self.platform = StewartPlatform(parameters)
         self.unknowns = Unknowns(parameters, options.kinds)
@@ -203,8 +211,8 @@ class Identification:
         for window in windows:
             if extraction is None:
                 extraction, begin = self._extraction(window), window.begin
-            if options.motor_torque:
-                window = window._replace(efforts=window.efforts * motor_ratio(p))
+            if self._per_effort is not None:
+                window = window._replace(efforts=window.efforts * self._per_effort)
             fewest = 2 * extraction.margin + 2 * extraction.step
             if len(window.positions) < fewest + lag:
                 left_out += 1
@@ -332,7 +340,7 @@ class Identification:
             found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
         likely = [*of_delay(bag.lag + delay for bag, delay in zip(
                       self.bags, found.delays, strict=True)),
-                  *of_efforts(sums, unknowns, self.parameters, options.motor_torque)]
+                  *of_efforts(sums, unknowns, self.parameters, self._per_effort is not None)]
         errors = errors_of(self.extracts, sums, unknowns, found, self.chosen, options.prior)
         clean, noisy = (Sums.stacked(each) for each in zip(*self._with_noise, strict=True))
         shift = shift_of_noise(clean, noisy, unknowns, found, self._cutoffs(), options.prior)

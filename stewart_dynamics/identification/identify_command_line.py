@@ -72,8 +72,13 @@ def _arguments() -> argparse.ArgumentParser:
     what.add_argument('--identify', type=_kinds, default=DEFAULT, metavar='LIST',
                       help=f'of {", ".join(KINDS)}, with commas (default: {",".join(DEFAULT)}); '
                            'tilt is the direction of gravity, for a base that is not level')
-    what.add_argument('--motor-torque', action='store_true',
-                      help='efforts are torques of the motors [N m]; needs actuator.screw_lead')
+    motors = what.add_mutually_exclusive_group()
+    motors.add_argument('--motor-torque', action='store_true',
+                        help='efforts are torques of the motors [N m]; needs actuator.screw_lead, '
+                             'and drive.gear_ratio where there is a gear')
+    motors.add_argument('--motor-current', action='store_true',
+                        help='efforts are currents of the motors [A]; needs drive.torque_constant '
+                             'as well')
     what.add_argument('--cutoff', type=between(0.1, 1000.0), default=CUTOFF, metavar='HZ',
                       help='cut-off frequency of the filter on both sides of the regression '
                            f'(default: {CUTOFF:g}): above the frequencies of the motion')
@@ -101,8 +106,8 @@ def _run(given: argparse.Namespace) -> int:
     interrupt_on_signals()
     options = IdentificationOptions(
         given.node, given.measured, given.efforts, given.identify, given.motor_torque,
-        given.cutoff, given.prior, given.hold_out, not given.no_delay, given.accept_mistakes,
-        not given.no_report, given.force)
+        given.motor_current, given.cutoff, given.prior, given.hold_out, not given.no_delay,
+        given.accept_mistakes, not given.no_report, given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
     if given.design:
         design_command.run(given, parameters)

@@ -36,6 +36,7 @@ from stewart_dynamics.identification.lack_of_fit import LackOfFit
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.least_squares import (
     Information, information, no_information, solve)
 from stewart_dynamics.parameters.table import AUTO, Parameters, STANDARD_GRAVITY
@@ -87,7 +88,7 @@ def of_delay(delays: Iterable[float]) -> Iterator[LikelyMistake]:
             'stamps of both must be of one clock')
 
 
-def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool,
+def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, of_motors: bool,
                ) -> Iterator[LikelyMistake]:
     """
     Yield likely mistakes in sign and unit of the efforts.
@@ -117,13 +118,14 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
     if 1.0 / _FAR < scale < _FAR:
         return
     lead = p['actuator.screw_lead']
-    if motor_torque:
+    if of_motors:
         yield LikelyMistake(
             'scale', f'the efforts are {scale:.3g} times what the model computes: likely '
             f'actuator.screw_lead, {lead[0]:g} m, is wrong: about '
-            f'{lead[0] * scale:.3g} m would fit')
+            f'{lead[0] * scale:.3g} m would fit; or drive.gear_ratio, '
+            f'{p["drive.gear_ratio"][0]:g}: about {p["drive.gear_ratio"][0] / scale:.3g}')
         return
-    torque = 1.0 if lead is None else lead.mean() / (2.0 * np.pi)
+    torque = 1.0 if lead is None else float(np.mean(1.0 / motor_ratio(p)))
     if lead is not None and 1.0 / _NEAR < scale / torque < _NEAR:
         yield LikelyMistake(
             'torque', f'the efforts are {scale:.3g} times what the model computes: '

@@ -65,6 +65,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
             found.bags, found.fit.delays, found.errors.delays, strict=True)],
         'options': {
             'identify': list(options.kinds), 'motor_torque': options.motor_torque,
+            'motor_current': options.motor_current,
             'cutoff_hz': options.cutoff, 'prior': options.prior, 'hold_out': options.hold_out,
             'delay': options.delay, 'accept_mistakes': options.accept_mistakes},
         'samples': found.samples, 'efforts_left_out': found.unsound,
