@@ -21,7 +21,6 @@ import io
 import os
 from pathlib import Path
 import platform
-import shlex
 import shutil
 import subprocess
 import tempfile
@@ -203,7 +202,7 @@ def fmu(parameters: Parameters, name: str, version: str = '3',
 def find_compiler() -> list[str] | None:
     """Return the words of the command in $CC, or of a C compiler on the PATH; None: not found."""
     for each in (os.environ.get('CC', ''), *_COMPILERS):
-        words = shlex.split(each)
+        words = each.split()
         if words and shutil.which(words[0]):
             return words
     return None
@@ -242,8 +241,8 @@ def _binary(sources: Mapping[str, str], name: str, version: str, compiler: list[
                    *(each for each in sources if each.endswith('.c')), '-lm']
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         if done.returncode:
-            raise StewartError(f'{shlex.join(compiler)}: cannot compile the FMU: '
-                               f'{done.stderr.strip().splitlines()[-1:] or done.returncode}')
+            messages = done.stderr.strip().splitlines() or [f'exit code {done.returncode}']
+            raise StewartError(f'{" ".join(compiler)}: cannot compile the FMU: {messages[-1]}')
         return f'binaries/{where}/{library}', Path(folder, library).read_bytes()
 
 
