@@ -340,7 +340,7 @@ class Parameters(ParameterSet):
                 f'{source}: singularity.stop_condition: {stop}: must be at least '
                 f'singularity.warn_condition, {warn}')
         length = float(np.linalg.norm(self['base.imu.orientation']))
-        if not is_unit(length):
+        if abs(length - 1.0) > QUATERNION_TOLERANCE:
             raise ParameterError(f'{source}: base.imu.orientation: '
                                  f'{self["base.imu.orientation"].tolist()}: {unit_rule(length)}')
         platform_joints = self['geometry.platform_joints']
@@ -429,11 +429,6 @@ def inertia_matrix(six: ArrayLike) -> Any:
     """Return the matrix (3, 3) of ixx ixy ixz iyy iyz izz [kg m^2]."""
     ixx, ixy, ixz, iyy, iyz, izz = np.asarray(six, dtype=float)
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-
-
-def is_unit(length: Any) -> Any:
-    """Return whether a quaternion's length, or each of an array, is one within the tolerance."""
-    return abs(length - 1.0) <= QUATERNION_TOLERANCE
 
 
 def unit_rule(length: float) -> str:
