@@ -61,7 +61,7 @@ def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
     states[:, CAUSE] = warnings
     flags = np.zeros(len(stamps), dtype=bool)
     return Outputs(~flags, stamps, results, forces, states, flags, flags,
-                   flags, *(np.empty((len(stamps), 0)) for _ in range(2)))
+                   flags, *(np.empty((len(stamps), 0)) for _ in range(3)))
 
 
 def bits(values: Any) -> list[int]:

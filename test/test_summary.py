@@ -117,7 +117,7 @@ class Samples:
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
         flags = np.zeros(many, dtype=bool)
         outputs = Outputs(~flags, self.stamps, results, self.forces, states, flags, flags,
-                          flags, self.joint_angles, self.clearances)
+                          flags, self.joint_angles, self.clearances, np.empty((many, 0)))
         np.testing.assert_array_equal(outputs.warnings, self.warnings)
         np.testing.assert_array_equal(outputs.times_to_crossing, self.time_to_crossing)
         return outputs

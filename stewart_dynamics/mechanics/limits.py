@@ -34,6 +34,8 @@ LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = OF_RESULTS = (
 BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX = OF_JOINTS = (
     'limits.base_joint_angle_max', 'limits.platform_joint_angle_max')
 CLEARANCE_MIN = 'limits.leg_clearance_min'
+TORQUE_MAX, TORQUE_SPEED, SPEED_MAX, TEMPERATURE_RISE_MAX = OF_MOTORS = (
+    'drive.torque_max', 'drive.torque_speed', 'drive.speed_max', 'drive.temperature_rise_max')
 LIMITS = (*OF_RESULTS, *OF_JOINTS, CLEARANCE_MIN)
 _MINIMA = LENGTH_MIN, CLEARANCE_MIN
 # Not a limit with a parameter of its own: a setpoint too far from the last one for VELOCITY_MAX.
@@ -53,9 +55,13 @@ QUANTITIES = {LENGTH_MIN: ('length', 'm'), LENGTH_MAX: ('length', 'm'),
               VELOCITY_MAX: ('rate', 'm/s'), FORCE_MAX: ('force', 'N'),
               BASE_ANGLE_MAX: ('base joint angle', 'rad'),
               PLATFORM_ANGLE_MAX: ('platform joint angle', 'rad'),
-              CLEARANCE_MIN: ('clearance', 'm'),
+              CLEARANCE_MIN: ('clearance', 'm'), TORQUE_MAX: ('motor torque', 'N m'),
+              TORQUE_SPEED: ('motor torque', 'N m'), SPEED_MAX: ('motor speed', 'rad/s'),
+              TEMPERATURE_RISE_MAX: ('temperature rise', 'K'),
               JUMP: ('mean rate from the last setpoint', 'm/s')}
 """Quantity and unit of each limit."""
+CLIPPED = FORCE_MAX, TORQUE_MAX, TORQUE_SPEED
+"""Limits to which published values are clipped; the others follow limits.action."""
 
 ANGLES = {BASE_ANGLE_MAX: BASE_JOINT_ANGLES, PLATFORM_ANGLE_MAX: PLATFORM_JOINT_ANGLES}
 """Where in a row of joint angles the values of a limit are."""
@@ -65,7 +71,7 @@ class Exceedance(NamedTuple):
     """A limit that a leg exceeds."""
 
     limit: str
-    """One of LIMITS, or JUMP."""
+    """One of LIMITS or OF_MOTORS, or JUMP."""
     leg: int
     value: float
     bound: float

@@ -44,7 +44,8 @@ from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
 from stewart_dynamics.setpoints.inputs import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
     SOURCES, TWIST, WRENCH)
-from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
+from stewart_dynamics.setpoints.output_messages import (
+    MOTOR_STATES, MOTOR_TORQUES, OUTPUT_TYPES)
 from stewart_dynamics.setpoints.sample_joining import WAITING
 
 DIAGNOSTICS, MARKERS, PAYLOAD, TRAVEL = '/diagnostics', 'markers', 'payload', 'travel'
@@ -102,8 +103,9 @@ SUBSCRIBED = (
 )
 
 
-def _output(name: str, meaning: str, details: str = '', latched: bool = False) -> Topic:
-    return Topic(name, OUTPUT_TYPES[name], meaning, details, latched=latched,
+def _output(name: str, meaning: str, details: str = '', latched: bool = False,
+            parameter: str = '') -> Topic:
+    return Topic(name, OUTPUT_TYPES[name], meaning, details, parameter, latched=latched,
                  depth=1 if latched else 10)
 
 
@@ -116,6 +118,11 @@ PUBLISHED = (
     _output('jacobian_determinant', 'det(J), m^3'),
     _output('singularity_warning', 'true near and at a [singularity](theory.md#singularity)',
             '; with the first setpoint and on every change, latched (transient local)', True),
+    _output(MOTOR_STATES, 'angle [rad], speed [rad/s] and torque [N m] of the six '
+            '[motors](drives.md), named as the joints with `_motor` after it',
+            parameter='drive.*'),
+    _output(MOTOR_TORQUES, 'six torques, N m; remap it to the `commands` of an effort controller '
+            'of the motors', parameter='drive.*'),
     Topic(planned.OUTPUT, planned.OUTPUT_TYPE,
           'answer to `~/platform_trajectory`', ', with its stamp and times: positions, velocities '
           'and effort of the legs; nothing when it is rejected', depth=LENGTH),
@@ -180,8 +187,8 @@ class NodeTopics:
         Parameters
         ----------
         parameters : Parameters
-            Select the setpoint topics, the topics of the base, and whether markers, joint states
-            and transforms are published.
+            Select the setpoint topics, the topics of the base, and whether markers, joint states,
+            transforms and motors are published.
         on_setpoint, on_base : callable
             Called with topic and bytes of a message on a setpoint topic, or on one of the base.
         others : mapping of topic to callable
@@ -195,6 +202,7 @@ class NodeTopics:
         """
         there = {MARKERS: parameters['visualization_rate'] > 0.0, TF: parameters['publish_tf']}
         there[JOINT_STATES] = there[MARKERS]
+        there[MOTOR_STATES] = there[MOTOR_TORQUES] = bool(parameters.drives)
         for topic in PUBLISHED:
             if there.get(topic.name, True):
                 self._publish(topic)

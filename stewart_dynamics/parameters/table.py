@@ -218,10 +218,10 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'cylinder and a thinner piston, from that of another leg, and from the outlines of '
               'geometry that are given; unlimited if not set', 'm',
               minimum=0.0),
-    Parameter('limits.action', 'string', 'action while a length, rate, joint angle or clearance '
-              'limit is exceeded, or a setpoint is too far from the last one for '
-              'limits.velocity_max: warn only, or publish no forces', '', 'warn',
-              choices=('warn', 'suppress_forces'), while_active=True),
+    Parameter('limits.action', 'string', 'action while a limit of length, rate, joint angle or '
+              'clearance, or of speed or temperature of a motor, is exceeded, or a setpoint is '
+              'too far from the last one for limits.velocity_max: warn only, or publish no forces '
+              'and torques', '', 'warn', choices=('warn', 'suppress_forces'), while_active=True),
     Parameter('singularity.characteristic_length', 'double', 'length by which moments are '
               'divided in the condition number; default: mean distance of the platform joints '
               'from their center', 'm', minimum=0.0, above=True),
@@ -368,10 +368,12 @@ class Parameters(ParameterSet):
             raise ParameterError(
                 f'{source}: actuator.screw_lead: not set: needed by {self.drives[0]}')
         if self['drive.back_driving_efficiency'] is None:
-            self._set('drive.back_driving_efficiency', 2.0 - 1.0 / self['drive.efficiency'])
+            with np.errstate(over='ignore'):
+                self._set('drive.back_driving_efficiency', 2.0 - 1.0 / self['drive.efficiency'])
         if any(name in self.given for name in DRIVE_INERTIAS):
-            follows = (2.0 * math.pi * ratio / lead) ** 2 * (
-                self[MOTOR_INERTIA] + self[SCREW_INERTIA] / ratio ** 2)
+            with np.errstate(all='ignore'):
+                follows = (2.0 * math.pi * ratio / lead) ** 2 * (
+                    self[MOTOR_INERTIA] + self[SCREW_INERTIA] / ratio ** 2)
             mass = self['actuator.reflected_mass']
             wrong = np.abs(mass - follows) > REFLECTED_MASS_TOLERANCE * follows
             if 'actuator.reflected_mass' in self.given and wrong.any():

@@ -35,7 +35,7 @@ from stewart_dynamics.bags.mcap_file import MAGIC
 from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.replay.recorded_model import (
     MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
-from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES, OutputMessages, Written
+from stewart_dynamics.setpoints.output_messages import OutputMessages, Written
 from stewart_dynamics.setpoints.step import Outputs
 import yaml  # type: ignore[import-untyped]
 
@@ -75,7 +75,7 @@ class OutputBag:
         self._messages, self._model = messages, model
         self._period = round(1e9 / rate) if rate else 0
         self._due: int | None = None  # when the model is written next
-        self._types = OUTPUT_TYPES | (MODEL_TYPES if rate else {})
+        self._types = messages.types | (MODEL_TYPES if rate else {})
         folder.mkdir()
         self._file = (folder / f'{folder.name}.mcap').open('wb')
         self._counts: Counter[int] = Counter()

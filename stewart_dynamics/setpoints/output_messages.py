@@ -30,8 +30,10 @@ from stewart_dynamics.messages.standard import (
     boolean, FLOAT64, float64, FLOAT64_ARRAY, float64_array)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
+from stewart_dynamics.setpoints.motor_step import ANGLES, SOUND, SPEEDS, TORQUES
 from stewart_dynamics.setpoints.step import Output, Outputs
 
+MOTOR_STATES, MOTOR_TORQUES = 'motor_states', 'motor_torques'
 # Topics relative to the node's name, in the order in which they are published for a setpoint.
 OUTPUT_TYPES = {
     'leg_states': type_names.JOINT_STATE,
@@ -40,19 +42,33 @@ OUTPUT_TYPES = {
     'jacobian_determinant': type_names.FLOAT64,
     'singularity_warning': type_names.BOOL,
     BASE_WRENCH: type_names.WRENCH_STAMPED,
+    MOTOR_STATES: type_names.JOINT_STATE,
+    MOTOR_TORQUES: type_names.FLOAT64_MULTI_ARRAY,
 }
 # A topic, the indices of the outputs that have a message on it, and the messages.
 Written = tuple[str, Stamps, NDArray[np.void]]
 
 
 class OutputMessages:
-    """Writes the output messages."""
+    """
+    Writes the output messages.
+
+    Attributes
+    ----------
+    types : dict of str to str
+        The topics of OUTPUT_TYPES that the hexapod has, with their types.
+
+    """
 
     def __init__(self, parameters: Parameters) -> None:
         self._zero_lengths = parameters['geometry.zero_length'].tolist()
         self._joint_state = JointStateWriter(parameters['joints'])
         self._with_effort, self._without_effort = (
             self._joint_state.layout(effort) for effort in (True, False))
+        names = [f'{joint}_motor' for joint in parameters['joints']]
+        self._motors = JointStateWriter(names) if parameters.drives else None
+        self.types = {topic: kind for topic, kind in OUTPUT_TYPES.items()
+                      if self._motors or topic not in (MOTOR_STATES, MOTOR_TORQUES)}
         self._wrench = StampedWriter(parameters['base_frame'], 6)
         self._wrenches = layout_of(wrench, self._wrench.write(0, NO_WRENCH))
 
@@ -67,6 +83,13 @@ class OutputMessages:
         yield 'jacobian_determinant', float64(output.determinant)
         if output.warning_changed:
             yield 'singularity_warning', boolean(output.singularity.warning)
+        motors = output.motors
+        if motors and self._motors is not None:
+            torques = None if output.forces is None else motors[TORQUES]
+            yield MOTOR_STATES, self._motors.write(
+                output.stamp, motors[ANGLES], motors[SPEEDS], torques)
+            if torques is not None:
+                yield MOTOR_TORQUES, float64_array(torques)
 
     def of_outputs(self, outputs: Outputs) -> list[Written]:
         """
@@ -99,7 +122,20 @@ class OutputMessages:
         warnings = [boolean(on) for on in outputs.warnings[changed].tolist()]
         messages.append(('singularity_warning', changed, np.frombuffer(
             b''.join(warnings), dtype=f'V{len(boolean(True))}')))
+        if self._motors is not None:
+            messages += self._of_motors(self._motors, outputs)
         return messages
+
+    def _of_motors(self, writer: JointStateWriter, outputs: Outputs) -> Iterator[Written]:
+        rows = outputs.motors
+        having = np.isfinite(rows[:, TORQUES.start])
+        for effort, which in ((True, having), (False, ~having)):
+            at = np.flatnonzero(which & (rows[:, SOUND.start] > 0.0))
+            parts = [ANGLES, SPEEDS, TORQUES][:3 if effort else 2]
+            yield MOTOR_STATES, at, writer.layout(effort).write(
+                outputs.stamps[at], *(rows[at, part] for part in parts))
+            if effort:
+                yield MOTOR_TORQUES, at, FLOAT64_ARRAY.write(None, rows[at, TORQUES])
 
     def of_wrench(self, stamp: int, wrench: Six) -> bytes:
         """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""

@@ -45,6 +45,8 @@ from stewart_dynamics.mechanics.singularity_warning import (
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.motor_step import (
+    EXCEEDING, MotorStep, RUNNING, times_followed, TORQUES)
 from stewart_dynamics.setpoints.result_checks import (
     check, check_many, FORCE_MAX, LIMITS, LIMITS_SUPPRESS, OF_WARNING, SUPPRESS)
 
@@ -79,6 +81,8 @@ class State(NamedTuple):
     """Stamp of the last setpoint that was not a jump [ns]."""
     lengths: Six | None = None
     """Leg lengths of that setpoint [m]; None before the first one."""
+    windings: tuple[float, ...] = ()
+    """Of the motors after that setpoint, see ``motor_step``; empty without thermal data."""
 
 
 class Output(NamedTuple):
@@ -102,6 +106,8 @@ class Output(NamedTuple):
     """Row of joint angles [rad], nan for those without a limit; empty without any limit."""
     clearances: tuple[float, ...] = ()
     """Distance of the surface of each leg to the nearest other leg [m]; empty without limit."""
+    motors: tuple[float, ...] = ()
+    """Begin of a row of motors, see ``motor_step``; empty without ``drive.*``."""
     state: State = State()
     """For the next setpoint."""
 
@@ -164,6 +170,8 @@ class Outputs(NamedTuple):
     """Rows of joint angles (N, 12) [rad], or (N, 0), as in Output."""
     clearances: Array
     """(N, 6) [m], or (N, 0), as in Output."""
+    motors: Array
+    """Rows of motors (N, MOTOR_ROW), or (N, 0); see ``motor_step``."""
     state: State = State()
     """For the next setpoint."""
 
@@ -286,6 +294,10 @@ class Step:
         self._clearance = clearance_to_check(parameters)
         self._clearance_of_one = (
             None if self._clearance is None else self._clearance.of_one(self._numbers[_MOTION]))
+        written = self._numbers[_WRITTEN]
+        self._motors = MotorStep(
+            parameters, self._numbers[_MOTION], written[_RESULT], written[_FORCES],
+            ) if parameters.drives else None
 
     def prepare(self) -> None:
         """Load or compile the function of single setpoints; else the first call does."""
@@ -308,7 +320,7 @@ class Step:
 
         """
         stamp = setpoint.stamp
-        singularity, followed_at, followed = before or State()
+        singularity, followed_at, followed, windings = before or State()
         elapsed = math.inf
         if stamp > followed_at and not setpoint.restart:
             elapsed = (stamp - followed_at) * 1e-9 + (
@@ -345,20 +357,29 @@ class Step:
             exceedances += exceeded
             if exceeded and self._limits_suppress:
                 forces = None
+        motors: tuple[float, ...] = ()
+        if self._motors is not None:
+            since = 0.0 if elapsed == math.inf else (stamp - followed_at) * 1e-9
+            motors, exceeded, after_it = self._motors(since, windings)
+            exceedances += exceeded
+            if exceeded and self._limits_suppress and motors[RUNNING.start]:
+                forces = None
+            windings = windings if jumped else after_it
         return Output(
             stamp, lengths, rates, demanded if solved else None, forces,
             written[UNIT_LOAD_FORCES], written[DETERMINANT], written[DETERMINANT_RATE],
             written[CONDITION], after,
             singularity is None or after.warning != singularity.warning, exceedances, angles,
-            clearances,
-            State(after, followed_at, followed) if jumped else State(after, stamp, lengths))
+            clearances, motors,
+            State(after, followed_at, followed, windings) if jumped
+            else State(after, stamp, lengths, windings))
 
     def many(self, setpoints: Batch, before: State | None) -> Outputs:
         """Return the outputs of a sequence of setpoints, as calls for one setpoint would."""
         results = self._platform.solve(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
         n_setpoints = len(results)
-        singularity, stamp, lengths = before or State()
+        singularity, stamp, lengths, windings = before or State()
         state = np.array((singularity or _FIRST).numbers)
         followed_at, followed = np.array([stamp]), np.array(lengths or _NO_LENGTHS)
         forces, states = np.empty((n_setpoints, 6)), np.empty((n_setpoints, STATE))
@@ -370,7 +391,10 @@ class Step:
                    slack, state, followed_at, followed, results, forces, states, answered,
                    exceeding, jumped)
         stamps, motions = setpoints.stamps, setpoints.motions
+        restarts = setpoints.restarts
         if not answered.all():
+            # If one cannot be answered, the next one is the restart.
+            restarts = np.diff(np.cumsum(restarts)[answered], prepend=0) > 0
             stamps, motions, results, forces = (
                 stamps[answered], motions[answered], results[answered], forces[answered])
             states, exceeding, jumped = states[answered], exceeding[answered], jumped[answered]
@@ -389,10 +413,20 @@ class Step:
             exceeding |= exceeded
             if self._limits_suppress:
                 forces[exceeded] = np.nan
+        motors: Array = np.empty((len(states), 0))
+        if self._motors is not None:
+            motors, windings = self._motors.many(
+                times_followed(stamps, restarts, jumped, stamp), jumped, motions, results, forces,
+                windings)
+            exceeding |= motors[:, EXCEEDING.start] > 0.0
+            if self._limits_suppress:
+                forces[motors[:, RUNNING.start] > 0.0] = np.nan
+            motors[np.isnan(forces[:, 0]), TORQUES] = np.nan
         if len(states):
             singularity = Singularity.of(states[-1].tolist())
         a, b, c, d, e, f = followed.tolist()
         return Outputs(
             answered, stamps, results, forces, states, changed, exceeding, jumped, angles,
-            clearances,
-            State(singularity, int(followed_at[0]), None if a != a else (a, b, c, d, e, f)))
+            clearances, motors,
+            State(singularity, int(followed_at[0]), None if a != a else (a, b, c, d, e, f),
+                  windings))

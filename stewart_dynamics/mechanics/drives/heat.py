@@ -30,8 +30,7 @@ from stewart_dynamics.parameters.table import Parameters
 def warmed(rise: float, heat: float, time: float, resistance: float, time_constant: float,
            ) -> float:
     """Return a temperature rise [K] after a time [s] of constant copper heat [W]."""
-    steady = heat * resistance
-    return steady + (rise - steady) * math.exp(-time / time_constant)
+    return rise + (rise - heat * resistance) * math.expm1(-time / time_constant)
 
 
 @entry_point('f8[::1]', 'f8[:,::1]', 'f8[::1]', 'f8[::1]', 'f8[:,::1]')

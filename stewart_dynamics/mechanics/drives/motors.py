@@ -39,7 +39,6 @@ the legs' axes, force times lead / (2 pi), are not part of the leg forces.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import math
 from typing import NamedTuple
 
@@ -62,11 +61,13 @@ from stewart_dynamics.mechanics.vectors import (
     add, dot, read3, read9, rotate, scale, subtract)
 from stewart_dynamics.parameters.table import Parameters, RIGHT, UNIVERSAL
 
-# A row of the six motors' quantities, in the order of Motors.
-(ANGLES, SPEEDS, ACCELERATIONS, TORQUES, CURRENTS, POWER, COPPER_HEAT, BREAKAWAY_TORQUES,
- AVAILABLE_TORQUES) = consecutive(*[6] * 9)
-MOTORS = 54
-MECHANICAL = slice(ANGLES.start, TORQUES.stop)
+# A row of the six motors' quantities. Commands are the torques of the forces that are published,
+# clipped to the available torques.
+(ANGLES, SPEEDS, COMMANDS, BREAKAWAY_TORQUES, TORQUES, ACCELERATIONS, CURRENTS, POWER, COPPER_HEAT,
+ AVAILABLE_TORQUES) = consecutive(*[6] * 10)
+MOTORS = 60
+# Of them, as in the C source.
+MECHANICAL = np.r_[ANGLES, SPEEDS, ACCELERATIONS, TORQUES]
 
 # Constants of one drive.
 (_RATIO, _ZERO, _MASS, _DRIVING, _DRIVEN, _SLOW, _TORQUE_CONSTANT, _RESISTANCE, TWIST,
@@ -132,10 +133,12 @@ class Motors(NamedTuple):
 
 
 @inlined
-def torque_factor(load: float, rate: float, driving: float, driven: float, slow: float) -> float:
-    """Return torque / (load / k): one plus the losses, linear near standstill."""
-    slip = abs(rate) / slow
-    return 1.0 + (driving if load * rate > 0.0 else driven) * (1.0 if slip > 1.0 else slip)
+def screw_torque(drive: Array, load: float, rate: float) -> float:
+    """Return the torque at the motor that holds a load [N] of the screw at a rate of the leg."""
+    slip = abs(rate) / drive[_SLOW]
+    loss: float = drive[_DRIVING] if load * rate > 0.0 else drive[_DRIVEN]
+    torque: float = load / drive[_RATIO] * (1.0 + loss * (1.0 if slip > 1.0 else slip))
+    return torque
 
 
 @inlined
@@ -153,10 +156,66 @@ def curve_torque(curve: Array, speed: float) -> float:
     return 0.0 if speed > curve[points - 1, 0] * (1.0 + TOLERANCE) else torque
 
 
+@inlined
+def put_motors(constants: Array, drives: Array, torque_max: Array, curve: Array, motion: Array,
+               result: Array, forces: Array, row: Array) -> None:
+    """Write the motors of a motion, with commands for forces (6,); see ``motor_rows``."""
+    rotation = read9(motion, ROTATION.start)
+    omega = read3(motion, ANGULAR_VELOCITY.start)
+    alpha = read3(motion, ANGULAR_ACCELERATION.start)
+    for leg in range(6):
+        drive = drives[leg]
+        a, length, inverse_length, s = leg_line(
+            constants, leg, read3(motion, POSITION.start), rotation)
+        a_rate, a_acc = turned(a, omega, alpha)
+        x_rate = add(read3(motion, LINEAR_VELOCITY.start), a_rate)
+        x_acc = add(read3(motion, LINEAR_ACCELERATION.start), a_acc)
+        rate = dot(s, x_rate)
+        s_rate = scale(inverse_length, subtract(x_rate, scale(rate, s)))
+        acc = dot(s, x_acc) + length * dot(s_rate, s_rate)
+        ratio = drive[_RATIO]
+        angle, speed, speed_rate = ratio * (length - drive[_ZERO]), ratio * rate, ratio * acc
+        if drive[TWIST] != 0.0:
+            s_acc = scale(inverse_length, subtract(
+                subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate)))
+            w = rotate(rotation, read3(drive, PLATFORM_AXIS))
+            w_rate, w_acc = turned(w, omega, alpha)
+            twist, twist_rate, twist_acc = leg_twist(
+                read3(drive, BASE_AXIS), w, w_rate, w_acc, s, s_rate, s_acc)
+            angle += drive[TWIST] * twist
+            speed += drive[TWIST] * twist_rate
+            speed_rate += drive[TWIST] * twist_acc
+        inertial = drive[_MASS] * acc
+        own = drive[_MASS] / ratio / ratio * speed_rate
+        load = result[FORCES.start + leg] - inertial
+        torque = own + screw_torque(drive, load, rate)
+        breakaway = torque
+        if abs(rate) < drive[_SLOW]:
+            breakaway = own + load / ratio * (1.0 + drive[_DRIVING])
+            other = own + load / ratio * (1.0 + drive[_DRIVEN])
+            if abs(other) > abs(breakaway):
+                breakaway = other
+        available = min(torque_max[leg], curve_torque(curve, speed))
+        command = own + screw_torque(drive, forces[leg] - inertial, rate)
+        current = torque / drive[_TORQUE_CONSTANT]
+        heat = drive[_RESISTANCE] * current * current
+        row[ANGLES.start + leg] = angle
+        row[SPEEDS.start + leg] = speed
+        row[COMMANDS.start + leg] = (available if command > available
+                                     else -available if command < -available else command)
+        row[BREAKAWAY_TORQUES.start + leg] = breakaway
+        row[TORQUES.start + leg] = torque
+        row[ACCELERATIONS.start + leg] = speed_rate
+        row[CURRENTS.start + leg] = current
+        row[POWER.start + leg] = torque * speed + heat
+        row[COPPER_HEAT.start + leg] = heat
+        row[AVAILABLE_TORQUES.start + leg] = available
+
+
 @entry_point('f8[::1]', 'f8[:,::1]', 'f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]',
-             'f8[:,::1]')
+             'f8[:,::1]', 'f8[:,::1]')
 def motor_rows(constants: Array, drives: Array, torque_max: Array, curve: Array, motions: Array,
-               results: Array, rows: Array) -> None:
+               results: Array, forces: Array, rows: Array) -> None:
     """
     Write the motors of each motion.
 
@@ -165,98 +224,58 @@ def motor_rows(constants: Array, drives: Array, torque_max: Array, curve: Array,
     constants : (CONSTANTS,)
         Constants of the hexapod, see ``hexapod_constants``.
     drives : (6, 15)
-        Constants of the drives.
+        Constants of the drives, see ``Drives``.
     torque_max : (6,)
         [N m]
     curve : (n, 2)
         Speed and torque at the points of the torque-speed curve [rad/s, N m].
     motions, results : (N, MOTION), (N, RESULT)
         Motions and what ``inverse_dynamics`` gives for them.
+    forces : (N, 6)
+        Forces of the legs for which commands are written [N].
     rows : (N, MOTORS)
         Written.
 
     """
     for n in range(len(motions)):
-        motion, row = motions[n], rows[n]
-        rotation = read9(motion, ROTATION.start)
-        omega = read3(motion, ANGULAR_VELOCITY.start)
-        alpha = read3(motion, ANGULAR_ACCELERATION.start)
-        for leg in range(6):
-            drive = drives[leg]
-            a, length, inverse_length, s = leg_line(
-                constants, leg, read3(motion, POSITION.start), rotation)
-            a_rate, a_acc = turned(a, omega, alpha)
-            x_rate = add(read3(motion, LINEAR_VELOCITY.start), a_rate)
-            x_acc = add(read3(motion, LINEAR_ACCELERATION.start), a_acc)
-            rate = dot(s, x_rate)
-            s_rate = scale(inverse_length, subtract(x_rate, scale(rate, s)))
-            acc = dot(s, x_acc) + length * dot(s_rate, s_rate)
-            ratio = drive[_RATIO]
-            angle, speed, speed_rate = ratio * (length - drive[_ZERO]), ratio * rate, ratio * acc
-            if drive[TWIST] != 0.0:
-                s_acc = scale(inverse_length, subtract(
-                    subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate)))
-                w = rotate(rotation, read3(drive, PLATFORM_AXIS))
-                w_rate, w_acc = turned(w, omega, alpha)
-                twist, twist_rate, twist_acc = leg_twist(
-                    read3(drive, BASE_AXIS), w, w_rate, w_acc, s, s_rate, s_acc)
-                angle += drive[TWIST] * twist
-                speed += drive[TWIST] * twist_rate
-                speed_rate += drive[TWIST] * twist_acc
-            load = results[n, FORCES.start + leg] - drive[_MASS] * acc
-            ideal = load / ratio
-            own = drive[_MASS] / ratio / ratio * speed_rate
-            torque = own + ideal * torque_factor(
-                load, rate, drive[_DRIVING], drive[_DRIVEN], drive[_SLOW])
-            breakaway = torque
-            if abs(rate) < drive[_SLOW]:
-                breakaway = own + ideal * (1.0 + drive[_DRIVING])
-                other = own + ideal * (1.0 + drive[_DRIVEN])
-                if abs(other) > abs(breakaway):
-                    breakaway = other
-            current = torque / drive[_TORQUE_CONSTANT]
-            heat = drive[_RESISTANCE] * current * current
-            row[ANGLES.start + leg] = angle
-            row[SPEEDS.start + leg] = speed
-            row[ACCELERATIONS.start + leg] = speed_rate
-            row[TORQUES.start + leg] = torque
-            row[CURRENTS.start + leg] = current
-            row[POWER.start + leg] = torque * speed + heat
-            row[COPPER_HEAT.start + leg] = heat
-            row[BREAKAWAY_TORQUES.start + leg] = breakaway
-            row[AVAILABLE_TORQUES.start + leg] = min(torque_max[leg], curve_torque(curve, speed))
+        put_motors(constants, drives, torque_max, curve, motions[n], results[n], forces[n],
+                   rows[n])
 
 
 class Drives:
-    """The motors of a hexapod: rows of motions and of their results to rows of motors."""
+    """
+    The motors of a hexapod: rows of motions and of their results to rows of motors.
+
+    Attributes
+    ----------
+    arguments : tuple
+        First arguments of ``motor_rows``: constants of hexapod and drives, limits of torque.
+
+    """
 
     def __init__(self, parameters: Parameters) -> None:
-        self._constants = hexapod_constants(parameters)
-        self._drives = drive_constants(parameters)
-        self._torque_max = _six(parameters, 'drive.torque_max', math.inf)
         curve = parameters['drive.torque_speed']
-        self._curve = np.empty((0, 2)) if curve is None else np.array(curve)
+        self.arguments = (
+            hexapod_constants(parameters), drive_constants(parameters),
+            np.array(_six(parameters, 'drive.torque_max', math.inf)),
+            np.empty((0, 2)) if curve is None else np.array(curve))
 
     def __call__(self, motions: Array, results: Array) -> Array:
         """Return rows (N, MOTORS) for rows of motion and results, unchecked."""
         rows = np.empty((len(motions), MOTORS))
-        batch.in_parts(self._compute, self._constants, *map(batch.compact, (motions, results)),
-                       rows)
+        batch.in_parts(self._compute, self.arguments[0], *map(batch.compact, (
+            motions, results, results[:, FORCES])), rows)
         return rows
 
-    def of_one(self, motion: Array, result: Array, row: Array) -> Callable[[], object]:
-        """Return a function that writes the row (1, MOTORS) for the current (1, ...) others."""
-        return motor_rows.bound(self._constants, self._drives, self._torque_max, self._curve,
-                                motion, result, row)
-
-    def _compute(self, constants: Array, motions: Array, results: Array, rows: Array) -> None:
-        motor_rows(constants, self._drives, self._torque_max, self._curve, motions, results, rows)
+    def _compute(self, _: Array, *rows: Array) -> None:
+        motor_rows(*self.arguments, *rows)
 
 
 def motor_ratio(parameters: Parameters) -> Array:
     """Return the turn of the motors for a metre of their legs (6,) [rad/m]; nan if not given."""
-    ratio: Array = (2.0 * math.pi * parameters['drive.gear_ratio']
-                    / _six(parameters, 'actuator.screw_lead', math.nan))
+    with np.errstate(over='ignore'):
+        ratio: Array = (2.0 * math.pi * parameters['drive.gear_ratio']
+                        / _six(parameters, 'actuator.screw_lead', math.nan))
     return ratio
 
 

@@ -19,12 +19,16 @@ from __future__ import annotations
 from collections import Counter
 
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, QUANTITIES)
+    ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, JUMP, LENGTH_MAX, LIMITS, OF_MOTORS, QUANTITIES)
 from stewart_dynamics.node.diagnostics.periodic_report import (
     Answers, ERROR, Level, LogLine, OK_LEVEL, StatusPart)
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.motor_step import DEMANDED_TORQUES, RISES, SPEEDS
 from stewart_dynamics.setpoints.step import Output
 
+_OF_MOTORS = (('motor speed', 'rad/s', SPEEDS), ('motor torque demanded', 'N m', DEMANDED_TORQUES),
+              ('temperature rise', 'K', RISES))
+_LIMITS = *LIMITS, *OF_MOTORS, JUMP
 # Factor by which legs exceed their maximum length if positions are in mm instead of m.
 _MILLIMETRES = 1000.0
 
@@ -35,7 +39,7 @@ class LimitsDiagnostics(StatusPart):
     name = 'limits'
 
     def __init__(self, parameters: Parameters, answers: Answers) -> None:
-        super().__init__(*LIMITS, JUMP)
+        super().__init__(*_LIMITS)
         self._joints: tuple[str, ...] = parameters['joints']
         self.parameters = parameters  # may be replaced at any time
         self._answers = answers
@@ -62,13 +66,13 @@ class LimitsDiagnostics(StatusPart):
                 self.parameters['limits.action'] == 'suppress_forces')
             self._suppressed += suppressed
             mistake = self._mistake(output)
-            for name in (*LIMITS, JUMP):
+            for name in _LIMITS:
                 exceeded = [each for each in output.exceedances if each.limit == name]
                 if not exceeded:
                     self.held.see(OK_LEVEL, now, name)
                     continue
                 words = ', '.join(map(self._words, exceeded))
-                if suppressed and name != FORCE_MAX:
+                if suppressed and name not in CLIPPED:
                     words += '; forces suppressed'
                 if name in (LENGTH_MAX, JUMP):
                     words += mistake
@@ -102,11 +106,15 @@ class LimitsDiagnostics(StatusPart):
         values += [(f'{leg}: {quantity} ({unit})', f'{clearance:.6g}')
                    for quantity, unit in [QUANTITIES[CLEARANCE_MIN]]
                    for leg, clearance in zip(self._joints, output.clearances, strict=False)]
+        if output.motors:
+            for quantity, unit, part in _OF_MOTORS:
+                values += [(f'{leg}: {quantity} ({unit})', f'{value:.6g}') for leg, value in zip(
+                    self._joints, output.motors[part], strict=True) if value == value]
         if self._largest_force:
             values += [
                 ('largest force demanded since activation (N)', f'{self._largest_force:.6g}'),
                 ('leg of the largest force demanded', self._joints[self._its_leg])]
-        for name in (each for each in (*LIMITS, JUMP) if each in self._worst):
+        for name in (each for each in _LIMITS if each in self._worst):
             values += [('jumps' if name == JUMP else f'setpoints that exceed {name}',
                         str(self._setpoints[name])),
                        (f'worst since activation, {name}', self._words(self._worst[name]))]
@@ -136,5 +144,5 @@ class LimitsDiagnostics(StatusPart):
         return ''
 
     def _words(self, exceedance: Exceedance) -> str:
-        clipped = ', clipped' if exceedance.limit == FORCE_MAX else ''
+        clipped = ', clipped' if exceedance.limit in CLIPPED else ''
         return exceedance.words(self._joints) + clipped

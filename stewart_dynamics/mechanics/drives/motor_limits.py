@@ -1,0 +1,71 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The limits of the motors: which motor exceeds which, and by how much."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.mechanics.drives.motors import (
+    AVAILABLE_TORQUES, BREAKAWAY_TORQUES, SPEEDS)
+from stewart_dynamics.mechanics.limits import (
+    Exceedance, OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE, TORQUE_MAX, TORQUE_SPEED)
+from stewart_dynamics.parameters.table import Parameters
+
+
+class MotorLimits:
+    """
+    The limits of the motors of a hexapod; those that are not given are never exceeded.
+
+    Attributes
+    ----------
+    bounds : dict of str to (6,)
+        Values of each of OF_MOTORS that is given [N m, rad/s, K]; torques at any speed are at
+        most drive.torque_max.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._curve = parameters[TORQUE_SPEED] is not None
+        self.bounds: dict[str, Array] = {
+            limit: np.full(6, math.inf) if parameters[limit] is None else parameters[limit]
+            for limit in OF_MOTORS if limit != TORQUE_SPEED}
+
+    def excesses(self, rows: Array, rises: Array) -> dict[str, tuple[Array, Array]]:
+        """Return values and bounds (..., 6) of each limit for rows of motors, and rises [K]."""
+        torques, available = rows[..., BREAKAWAY_TORQUES], rows[..., AVAILABLE_TORQUES]
+        most = np.broadcast_to(self.bounds[TORQUE_MAX], torques.shape)
+        return {
+            TORQUE_MAX: (torques, most),
+            TORQUE_SPEED: (torques, np.where(available < most, available, math.inf)),
+            SPEED_MAX: (rows[..., SPEEDS], np.broadcast_to(self.bounds[SPEED_MAX], torques.shape)),
+            TEMPERATURE_RISE_MAX: (
+                rises, np.broadcast_to(self.bounds[TEMPERATURE_RISE_MAX], rises.shape))}
+
+    def exceeded(self, row: Array, rises: Array) -> tuple[Exceedance, ...]:
+        """Return all limits that a row of motors (MOTORS,) with rises (6,) exceeds."""
+        return tuple(
+            Exceedance(limit, int(leg), float(values[leg]), float(bounds[leg]))
+            for limit, (values, bounds) in self.excesses(row, rises).items()
+            for leg in np.flatnonzero(exceeds(values, bounds)))
+
+
+def exceeds(values: Array, bounds: Array) -> Flags:
+    """Return where values exceed bounds; nan never does."""
+    exceeding: Flags = np.abs(values) > bounds * (1.0 + TOLERANCE)
+    return exceeding
