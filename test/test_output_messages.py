@@ -63,7 +63,7 @@ def test_messages_carry_the_output() -> None:
         output = answered(step, setpoint, wrench)
         messages = list(written.of_output(output))
         assert [topic for topic, _ in messages] == [
-            topic for topic in written.types if topic != BASE_WRENCH]
+            topic for topic in OUTPUT_TYPES if topic != BASE_WRENCH]
         of = decoded(messages)
         state = of['leg_states']
         assert state.header.stamp.sec * 10 ** 9 + state.header.stamp.nanosec == setpoint.stamp

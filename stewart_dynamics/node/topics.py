@@ -45,7 +45,7 @@ from stewart_dynamics.setpoints.inputs import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
     SOURCES, TWIST, WRENCH)
 from stewart_dynamics.setpoints.output_messages import (
-    MOTOR_STATES, MOTOR_TORQUES, OUTPUT_TYPES)
+    MOTOR_STATES, MOTOR_TORQUES, MOTOR_TYPES, OUTPUT_TYPES)
 from stewart_dynamics.setpoints.sample_joining import WAITING
 
 DIAGNOSTICS, MARKERS, PAYLOAD, TRAVEL = '/diagnostics', 'markers', 'payload', 'travel'
@@ -105,7 +105,7 @@ SUBSCRIBED = (
 
 def _output(name: str, meaning: str, details: str = '', latched: bool = False,
             parameter: str = '') -> Topic:
-    return Topic(name, OUTPUT_TYPES[name], meaning, details, parameter, latched=latched,
+    return Topic(name, {**OUTPUT_TYPES, **MOTOR_TYPES}[name], meaning, details, parameter, latched=latched,
                  depth=1 if latched else 10)
 
 

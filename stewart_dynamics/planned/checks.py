@@ -27,12 +27,17 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.mechanics.drives.heat import temperature_rises
+from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
+from stewart_dynamics.mechanics.drives.motors import (
+    ACCELERATIONS as ACCELERATIONS_OF_MOTORS, ANGLES as ANGLES_OF_MOTORS, AVAILABLE_TORQUES,
+    Drives, motor_ratio, Motors, SPEEDS)
 from stewart_dynamics.mechanics.dynamics import friction
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits,
-    VELOCITY_MAX)
+    SPEED_MAX, TEMPERATURE_RISE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -98,6 +103,10 @@ class Checks:
         self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
         self._coulomb = parameters['actuator.coulomb_friction']
         self._coulomb_velocity = parameters['actuator.coulomb_velocity']
+        self._parameters = parameters
+        self._drives = Drives(parameters) if parameters.drives else None
+        self._motor_limits = MotorLimits(parameters)
+        self._rises = np.zeros(6)
 
     def check(self, times: Array, durations: Array, results: Array, joined: Flags, near: Flags,
               ) -> list[int]:
@@ -169,6 +178,57 @@ class Checks:
             for fraction in between.extrema():
                 self._check_limit(
                     limit, _angle(between.at(fraction)), begin + fraction * duration)
+
+    def check_motors(self, times: Array, durations: Array, motions: Array, results: Array,
+                     joined: Flags) -> list[int]:
+        """
+        Check torques and speeds of the motors at samples, and speeds between those joined.
+
+        Arguments are those of ``check`` and ``check_joints``. Return the indices of samples after
+        which closer samples are needed: where a leg reverses, the losses in its screw do.
+        """
+        if self._drives is None:
+            return []
+        p = self._parameters
+        with np.errstate(all='ignore'):  # numbers that overflow are found by ``check``
+            rows = self._drives(motions, results)
+            at = np.broadcast_to(times[:, None], (len(times), 6))
+            for limit, (values, bounds) in self._motor_limits.excesses(
+                    rows, np.full((len(rows), 6), np.nan)).items():
+                self._note(limit, exceeds(values, bounds), values, bounds, at)
+            cubics = Cubics.between(rows[:, ANGLES_OF_MOTORS], rows[:, SPEEDS], durations[:, None])
+            most = self._motor_limits.bounds[SPEED_MAX]
+            suspect = np.flatnonzero(joined & exceeds(
+                cubics.middle_rate() / durations[:, None], most).any(axis=1))
+            fraction = (between := cubics.selected(suspect)).rate_extremum()
+            begin, duration = times[suspect, None], durations[suspect, None]
+            speeds = between.rate_at(fraction) / duration
+            self._note(SPEED_MAX, exceeds(speeds, most), speeds, np.broadcast_to(
+                most, speeds.shape), begin + fraction * duration)
+            rates, ratio = results[:, RATES], motor_ratio(p)
+            inertial = p['actuator.reflected_mass'] / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
+            highest = (np.abs(inertial) + (np.abs(results[:, FORCES] - inertial)
+                                           + 2.0 * self._coulomb) / p['drive.efficiency']) / ratio
+            may = exceeds(np.maximum(highest[:-1], highest[1:]), np.minimum(
+                rows[:-1, AVAILABLE_TORQUES], rows[1:, AVAILABLE_TORQUES]))
+            reverses = (rates[:-1] * rates[1:] < 0.0) & (np.maximum(
+                np.abs(rates[:-1]), np.abs(rates[1:])) > self._coulomb_velocity)
+        unclear: list[int] = np.flatnonzero(joined & (may & reverses).any(axis=1)).tolist()
+        return unclear
+
+    def check_windings(self, times: Array, motions: Array, results: Array) -> None:
+        """Check the temperatures of windings at samples (M,), after those of earlier calls."""
+        if self._drives is None:
+            return
+        with np.errstate(all='ignore'):
+            heat = Motors.of_rows(self._drives(motions, results)).copper_heat
+        # Between two samples the mean of both.
+        held = np.concatenate([0.5 * (heat[:-1] + heat[1:]), heat[-1:]])
+        rises = temperature_rises(self._parameters, times, held, self._rises)
+        self._rises = rises[-1]
+        bounds = np.broadcast_to(self._motor_limits.bounds[TEMPERATURE_RISE_MAX], rises.shape)
+        self._note(TEMPERATURE_RISE_MAX, exceeds(rises, bounds), rises, bounds,
+                   np.broadcast_to(times[:, None], rises.shape))
 
     def check_clearance(self, times: Array, motions: Array, joined: Flags, ways: Array,
                         ) -> list[int]:
@@ -258,13 +318,18 @@ class Checks:
     def _check_limit(self, limit: str, values: Array, times: Array,
                      others: Integers | None = None) -> None:
         """Note the first of the values (M, 6) at their times that exceeds a limit."""
-        exceeding = self._limits.exceeds(limit, values)
+        self._note(limit, self._limits.exceeds(limit, values), values, np.broadcast_to(
+            self._limits.bounds.get(limit, np.nan), values.shape), times, others)
+
+    def _note(self, limit: str, exceeding: Flags, values: Array, bounds: Array, times: Array,
+              others: Integers | None = None) -> None:
+        """Note the first of the values (M, 6) at their times that exceeds its bound."""
         if not exceeding.any():
             return
         n, leg = map(int, np.unravel_index(
             np.argmin(np.where(exceeding, times, np.inf)), exceeding.shape))
         exceedance = Exceedance(
-            limit, leg, float(values[n, leg]), float(self._limits.bounds[limit][leg]),
+            limit, leg, float(values[n, leg]), float(bounds[n, leg]),
             -1 if others is None else int(others[n, leg]))
         self.violations.append(Violation(
             float(times[n, leg]), LIMIT, f' {exceedance.words(self._joints)}', leg, limit))

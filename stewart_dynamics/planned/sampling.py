@@ -29,6 +29,7 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.mechanics.drives.motor_limits import force_limits, rate_limits
 from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.mechanics.rows import (
     BASE_ANGULAR_VELOCITY, CONDITION, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
@@ -43,6 +44,8 @@ _STEP = 0.01
 # At nearly one pose, forces are polynomials of at most 8th degree of time between two points: by
 # Markov's inequality this number of parts finds their largest value to 1 %.
 _ENOUGH = 64
+# Smallest force that matters at high speeds, as a part of the force that the motors hold at rest.
+_LEAST = 0.05
 # Smallest number of parts of an interval that needs samples: cubics join lengths and rates at the
 # samples, and their error is then below 1e-3.
 _FEWEST = 16
@@ -58,6 +61,11 @@ class Sampling:
         self._coulomb = parameters['actuator.coulomb_friction']
         self._coulomb_velocity = parameters['actuator.coulomb_velocity']
         self._reflected = parameters['actuator.reflected_mass']
+        self._parameters = parameters
+        # Rates above which a leg or its motor may exceed a limit.
+        self._fastest = self._limits.thresholds[2]
+        if parameters.drives:
+            self._fastest = np.minimum(self._fastest, rate_limits(parameters))
         # Largest speed of a platform joint at a speed |v| + arm |w| of the platform.
         radii = np.linalg.norm(parameters['geometry.platform_joints'], axis=1)
         self._lever = np.maximum(1.0, radii / arm)
@@ -103,13 +111,13 @@ class Sampling:
         """Return in which intervals a length or a rate may exceed its limit (N,)."""
         square = durations ** 2 / 8.0
         length = bounds.position_deviation + square * bounds.speed ** 2 * inverse_radius
-        shortest, longest, fastest = self._limits.thresholds[:3]
+        shortest, longest = self._limits.thresholds[:2]
         lengths, length_deviation = results[:, LENGTHS], self._lever * length[:, None]
         exceeding: Flags = (
             (_smaller(lengths) - length_deviation < shortest)
             | (_larger(lengths) + length_deviation > longest)
             | (_larger(np.abs(results[:, RATES])) + self._rate_deviation(
-                durations, bounds, inverse_radius) > fastest)).any(axis=1)
+                durations, bounds, inverse_radius) > self._fastest)).any(axis=1)
         return exceeding
 
     def _rate_deviation(self, durations: Array, bounds: Bounds, inverse_radius: Array) -> Array:
@@ -131,9 +139,17 @@ class Sampling:
         changes = (_smaller(np.abs(rates)) - rate_deviation < self._coulomb_velocity) | (
             rates[:-1] * rates[1:] < 0.0)
         friction = np.where(changes, 2.0 * self._coulomb, 0.0)
-        allowed = TOLERANCE * np.minimum(largest, self._limits.force_max)
+        strongest = self._limits.force_max
+        if self._parameters.drives:
+            # Losses in the screw change there as well. A curve may end at zero.
+            friction = friction + np.where(changes, _larger(magnitudes), 0.0) * (
+                2.0 / self._parameters['drive.efficiency'] - 2.0)
+            of_motors = force_limits(self._parameters, _larger(np.abs(rates)) + rate_deviation)
+            still = force_limits(self._parameters, np.zeros(6))
+            strongest = np.minimum(strongest, np.maximum(of_motors, _LEAST * still))
+        allowed = TOLERANCE * np.minimum(largest, strongest)
         relevant = _larger(magnitudes) + deviation + friction > np.minimum(
-            largest, self._limits.force_max) + allowed
+            largest, strongest) + allowed
         needed = relevant & (deviation + friction > allowed)
         parts: Array = np.where(needed, np.ceil(np.sqrt(deviation / allowed)).clip(
             _FEWEST, _ENOUGH), 1.0).max(axis=1)

@@ -40,6 +40,7 @@ from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics import (
     forward_kinematics, joint_angles, leg_clearance)
+from stewart_dynamics.mechanics.limits import TEMPERATURE_RISE_MAX
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_VELOCITY, consecutive, FORCES, LENGTHS, LINEAR_VELOCITY, RATES, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -252,6 +253,7 @@ class _Work:
         clearance = leg_clearance.clearance_to_check(self._parameters)
         self._checks_clearance = clearance is not None
         self._reach = clearance.reach if clearance else 0.0
+        self._warms = self._parameters[TEMPERATURE_RISE_MAX] is not None
 
     def check(self) -> Iterator[None]:
         """Compute motion and forces of the legs; raise _RejectedError at a violation."""
@@ -279,7 +281,10 @@ class _Work:
         dips = self._checks.check(times, durations, results, np.ones_like(near), near)
         self._checks.check_joints(times, durations, motions, near)
         dips = sorted({*dips, *self._checks.check_clearance(
-            times, motions, near, speeds * durations)})
+            times, motions, near, speeds * durations), *self._checks.check_motors(
+                times, durations, motions, results, near)})
+        if self._warms:
+            yield from self._check_windings(first, times, durations, between)
         self._count(_PARTS * len(dips))
         closer: deque[_Samples] = deque((np.full(_PARTS + 1, n), _IN_PARTS) for n in dips)
         coarse = _samples(many, self._piece)
@@ -292,18 +297,34 @@ class _Work:
             step = np.diff(fraction)
             at, after = times[which] + fraction * durations[which], step * durations[which[1:]]
             self._checks.check_joints(at, after, rows, joined)
+            results = self._solve(rows, first + which, fraction)
             unclear = {
+                *self._checks.check_motors(at, after, rows, results, joined),
                 *self._checks.check_clearance(at, rows, joined, speeds[which[1:]] * after),
                 *self._check_legs_path(
                     at, after, legs.selected(which), fraction, durations[which], rows),
-                *self._checks.check(
-                    at, after, self._solve(rows, first + which, fraction), joined, joined)}
+                *self._checks.check(at, after, results, joined, joined)}
             for n in sorted(unclear):
                 if step[n] > _CLOSEST:
                     self._count(_PARTS)
                     closer.append(
                         (np.full(_PARTS + 1, which[n]), fraction[n] + step[n] * _IN_PARTS))
         yield
+
+    def _check_windings(self, first: int, times: Array, durations: Array,
+                        between: Interpolation) -> Iterator[None]:
+        """Check the temperatures of windings, with a fixed number of samples in each interval."""
+        for n in range(0, len(durations), max(1, self._piece // _PARTS)):
+            which = np.repeat(np.arange(n, min(
+                n + max(1, self._piece // _PARTS), len(durations))), _PARTS)
+            fraction = np.tile(_IN_PARTS[:-1], len(which) // _PARTS)
+            which, fraction = np.append(which, which[-1]), np.append(fraction, 1.0)
+            with np.errstate(all='ignore'):
+                rows = between.at(which, fraction)
+            self._checks.check_windings(
+                times[which] + fraction * durations[which], rows,
+                self._solve(rows, first + which, fraction))
+            yield
 
     def _solve(self, rows: Array, which: Integers, fraction: Array | float) -> Array:
         """Return the results of rows of motion, so far between the points ``which`` and next."""

@@ -142,13 +142,13 @@ class MotorStep:
             *self._arguments, self._thresholds, motion[None], result[None], forces[None],
             numbers[_ELAPSED], np.zeros(1, dtype=bool), numbers[_STATE], self._row[None])
 
-    def __call__(self, elapsed: float, before: tuple[float, ...],
-                 ) -> tuple[tuple[float, ...], tuple[Exceedance, ...], tuple[float, ...]]:
+    def __call__(self, elapsed: float, before: tuple[float, ...] | None,
+                 ) -> tuple[tuple[float, ...], tuple[Exceedance, ...], tuple[float, ...] | None]:
         """
         Return the row of motors up to DEMANDED_TORQUES, exceedances, and state of the windings.
 
-        The row is empty if numbers overflow; rises are nan, and the state of the windings is
-        empty, without ``drive.thermal_resistance``. ``elapsed`` [s] is the time since the
+        The row is empty if numbers overflow; rises are nan, and there is no state of the windings,
+        without ``drive.thermal_resistance``. ``elapsed`` [s] is the time since the
         setpoint of the state before.
         """
         _GIVEN.pack_into(self._memory, 0, elapsed, *(before or _COLD))
@@ -159,10 +159,10 @@ class MotorStep:
             return (), (), before
         exceedances = self._limits.exceeded(
             self._row[OF_DRIVES], self._row[RISES]) if row[EXCEEDING.start] else ()
-        return row, exceedances, numbers[:_WINDINGS] if self._warms else ()
+        return row, exceedances, numbers[:_WINDINGS] if self._warms else None
 
     def many(self, elapsed: Array, jumped: Flags, motions: Array, results: Array, forces: Array,
-             before: tuple[float, ...]) -> tuple[Array, tuple[float, ...]]:
+             before: tuple[float, ...] | None) -> tuple[Array, tuple[float, ...] | None]:
         """Return rows (N, MOTOR_ROW) of a sequence of setpoints, and the windings' state."""
         rows = np.empty((len(motions), MOTOR_ROW))
         windings = np.array(before or _COLD)

@@ -42,6 +42,9 @@ OUTPUT_TYPES = {
     'jacobian_determinant': type_names.FLOAT64,
     'singularity_warning': type_names.BOOL,
     BASE_WRENCH: type_names.WRENCH_STAMPED,
+}
+# With drive.*.
+MOTOR_TYPES = {
     MOTOR_STATES: type_names.JOINT_STATE,
     MOTOR_TORQUES: type_names.FLOAT64_MULTI_ARRAY,
 }
@@ -56,7 +59,7 @@ class OutputMessages:
     Attributes
     ----------
     types : dict of str to str
-        The topics of OUTPUT_TYPES that the hexapod has, with their types.
+        Topics that the hexapod has, and their types.
 
     """
 
@@ -67,13 +70,12 @@ class OutputMessages:
             self._joint_state.layout(effort) for effort in (True, False))
         names = [f'{joint}_motor' for joint in parameters['joints']]
         self._motors = JointStateWriter(names) if parameters.drives else None
-        self.types = {topic: kind for topic, kind in OUTPUT_TYPES.items()
-                      if self._motors or topic not in (MOTOR_STATES, MOTOR_TORQUES)}
+        self.types = OUTPUT_TYPES | (MOTOR_TYPES if self._motors else {})
         self._wrench = StampedWriter(parameters['base_frame'], 6)
         self._wrenches = layout_of(wrench, self._wrench.write(0, NO_WRENCH))
 
     def of_output(self, output: Output) -> Iterator[tuple[str, bytes]]:
-        """Yield topics (keys of OUTPUT_TYPES) and messages for an output; see of_wrench."""
+        """Yield topics (keys of ``types``) and messages for an output; see of_wrench."""
         yield 'leg_states', self._joint_state.write(
             output.stamp, map(sub, output.lengths, self._zero_lengths), output.rates,
             output.forces)

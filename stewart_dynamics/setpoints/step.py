@@ -81,8 +81,8 @@ class State(NamedTuple):
     """Stamp of the last setpoint that was not a jump [ns]."""
     lengths: Six | None = None
     """Leg lengths of that setpoint [m]; None before the first one."""
-    windings: tuple[float, ...] = ()
-    """Of the motors after that setpoint, see ``motor_step``; empty without thermal data."""
+    windings: tuple[float, ...] | None = None
+    """Of the motors after that setpoint, see ``motor_step``; None without thermal data."""
 
 
 class Output(NamedTuple):

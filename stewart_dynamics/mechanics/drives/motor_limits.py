@@ -22,10 +22,12 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.drives.motors import (
-    AVAILABLE_TORQUES, BREAKAWAY_TORQUES, SPEEDS)
+    AVAILABLE_TORQUES, BREAKAWAY_TORQUES, motor_ratio, SPEEDS)
 from stewart_dynamics.mechanics.limits import (
     Exceedance, OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE, TORQUE_MAX, TORQUE_SPEED)
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, UNIVERSAL
+
+_WITHOUT_TWIST = 0.9
 
 
 class MotorLimits:
@@ -63,6 +65,35 @@ class MotorLimits:
             Exceedance(limit, int(leg), float(values[leg]), float(bounds[leg]))
             for limit, (values, bounds) in self.excesses(row, rises).items()
             for leg in np.flatnonzero(exceeds(values, bounds)))
+
+
+def force_limits(p: Parameters, rates: Array) -> Array:
+    """
+    Return leg forces (..., 6) [N] that motors can drive at rates of the legs (..., 6) [m/s].
+
+    For reflected masses that move uniformly; infinite without limits of torque.
+    """
+    curve, most = p[TORQUE_SPEED], p[TORQUE_MAX]
+    torques = np.full(6, math.inf) if most is None else most
+    ratio = motor_ratio(p)
+    if curve is not None:
+        torques = np.minimum(torques, np.interp(
+            ratio * np.abs(rates), curve[:, 0], curve[:, 1], right=0.0))
+    forces: Array = np.broadcast_to(
+        torques * ratio * p['drive.efficiency'], rates.shape)
+    return forces
+
+
+def rate_limits(p: Parameters) -> Array:
+    """Return rates of the legs (6,) [m/s] below which no motor exceeds a limit of speed."""
+    curve, most = p[TORQUE_SPEED], p[SPEED_MAX]
+    speeds = np.full(6, math.inf) if most is None else most
+    if curve is not None:
+        speeds = np.minimum(speeds, curve[-1, 0])
+    # The twist of a leg adds little to the speed of its motor.
+    rates: Array = speeds / motor_ratio(p) * (
+        _WITHOUT_TWIST if p['drive.screw_rotation'] == UNIVERSAL else 1.0)
+    return rates
 
 
 def exceeds(values: Array, bounds: Array) -> Flags:
