@@ -30,11 +30,12 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.mjcf import mjcf
+from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.simulator.node import SimulatorNode
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.parameters import FORCE, SimulatorParameters
 from stewart_dynamics.simulator.plant import PlantState
 
 # Coordinates of the MJCF: three of each leg, then the platform's free joint.
@@ -46,6 +47,8 @@ class MuJoCoPlant:
     """The hexapod in MuJoCo, with the calls of ``stewart_dynamics.simulator.plant.Plant``."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
+        if parameters['commands'] != FORCE:
+            raise ParameterError(f'commands: {parameters["commands"]}: must be {FORCE} in MuJoCo')
         self.parameters = parameters
         self.fault = ''
         self._model = mujoco.MjModel.from_xml_string(mjcf(Hexapod(parameters), 'hexapod'))

@@ -39,6 +39,7 @@ from stewart_dynamics.reference_motion.motion import motion_at, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.base import BaseInput
 from stewart_dynamics.setpoints.inputs import BASE_SOURCES
+from stewart_dynamics.setpoints.output_messages import MOTOR_STATES, MOTOR_TYPES
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.simulator import messages as simulator_messages
 
@@ -72,7 +73,7 @@ def test_every_parameter_is_on_the_page_of_parameters() -> None:
 def test_the_simulator_s_topics_are_those_of_the_code() -> None:
     for topic, kind in {
             **simulator_messages.INPUT_TYPES, **simulator_messages.OUTPUT_TYPES,
-            **simulator_messages.BASE_TYPES,
+            **simulator_messages.BASE_TYPES, MOTOR_STATES: MOTOR_TYPES[MOTOR_STATES],
             simulator_messages.IMU: simulator_messages.IMU_TYPE}.items():
         assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in TEXTS['docs/simulator.md']
 

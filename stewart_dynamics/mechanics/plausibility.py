@@ -31,6 +31,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.drives import likely_mistakes as drives
 from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
@@ -122,8 +123,8 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
         shape = shape_of(parameters)
         sizes = [*_sizes(parameters, shape)]
         found = [*sizes, *_inertia(parameters, shape),
-                 *_reflected_mass(parameters, shape), *_others(parameters, shape),
-                 *_clearance(parameters)]
+                 *_reflected_mass(parameters, shape), *drives.likely_mistakes(parameters),
+                 *_others(parameters, shape), *_clearance(parameters)]
         if geometry:
             reach = reach_of(parameters, shape)
             found += _legs(parameters, shape, reach, bool(sizes))

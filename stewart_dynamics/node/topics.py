@@ -105,8 +105,8 @@ SUBSCRIBED = (
 
 def _output(name: str, meaning: str, details: str = '', latched: bool = False,
             parameter: str = '') -> Topic:
-    return Topic(name, {**OUTPUT_TYPES, **MOTOR_TYPES}[name], meaning, details, parameter, latched=latched,
-                 depth=1 if latched else 10)
+    return Topic(name, (OUTPUT_TYPES | MOTOR_TYPES)[name], meaning, details, parameter,
+                 latched=latched, depth=1 if latched else 10)
 
 
 PUBLISHED = (

@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
 from stewart_dynamics.mechanics.drives.motors import Drives, put_motors
 from stewart_dynamics.mechanics.limits import (
     Exceedance, SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE)
-from stewart_dynamics.mechanics.rows import consecutive
+from stewart_dynamics.mechanics.rows import consecutive, FORCES
 from stewart_dynamics.parameters.table import Parameters
 
 # A row of the motors of a setpoint: temperature rises of the windings [K]; whether all numbers to
@@ -81,7 +81,8 @@ def check_motors(constants: Array, drives: Array, torque_max: Array, curve: Arra
     for n in range(len(motions)):
         row = rows[n]
         drive = row[OF_DRIVES]
-        put_motors(constants, drives, torque_max, curve, motions[n], results[n], forces[n], drive)
+        put_motors(constants, drives, torque_max, curve, motions[n], results[n, FORCES],
+                   forces[n], drive)
         sound, exceeding, running = True, False, False
         for leg in range(6):
             rise = warmed(windings[leg], windings[6 + leg], elapsed[n],

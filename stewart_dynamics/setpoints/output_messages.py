@@ -68,8 +68,7 @@ class OutputMessages:
         self._joint_state = JointStateWriter(parameters['joints'])
         self._with_effort, self._without_effort = (
             self._joint_state.layout(effort) for effort in (True, False))
-        names = [f'{joint}_motor' for joint in parameters['joints']]
-        self._motors = JointStateWriter(names) if parameters.drives else None
+        self._motors = motor_states_writer(parameters)
         self.types = OUTPUT_TYPES | (MOTOR_TYPES if self._motors else {})
         self._wrench = StampedWriter(parameters['base_frame'], 6)
         self._wrenches = layout_of(wrench, self._wrench.write(0, NO_WRENCH))
@@ -147,3 +146,9 @@ class OutputMessages:
         """Return messages for stamps (N,) [ns] and wrenches (N, 6); none for rows of nan."""
         known = np.flatnonzero(~np.isnan(base_wrenches[:, 0]))
         return BASE_WRENCH, known, self._wrenches.write(stamps[known], base_wrenches[known])
+
+
+def motor_states_writer(parameters: Parameters) -> JointStateWriter | None:
+    """Return the writer of the states of the motors; None without ``drive.*``."""
+    names = [f'{joint}_motor' for joint in parameters['joints']]
+    return JointStateWriter(names) if parameters.drives else None

@@ -24,6 +24,7 @@ from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints import inputs
+from stewart_dynamics.setpoints.output_messages import MOTOR_STATES, motor_states_writer
 from stewart_dynamics.simulator.base import BasePeriod
 from stewart_dynamics.simulator.imu import ImuWriter, SimulatedImu
 from stewart_dynamics.simulator.parameters import SimulatorParameters
@@ -52,13 +53,17 @@ class StateMessages:
     def __init__(self, parameters: Parameters) -> None:
         self._zero_lengths = parameters['geometry.zero_length'].tolist()
         self._joint_state = JointStateWriter(parameters['joints'])
+        self._motors = motor_states_writer(parameters)
         frame = parameters['base_frame']
         self._pose, self._six = StampedWriter(frame, 7), StampedWriter(frame, 6)
 
     def write(self, stamp: int, state: PlantState) -> Iterator[tuple[str, bytes]]:
-        """Yield topics, keys of OUTPUT_TYPES, and messages of a state at a time [ns]."""
+        """Yield topics and messages of a state at a time [ns]."""
         yield 'leg_states', self._joint_state.write(
             stamp, map(sub, state.lengths, self._zero_lengths), state.rates, state.forces)
+        if state.motors and self._motors is not None:
+            angles, speeds, torques = state.motors[:6], state.motors[6:12], state.motors[12:]
+            yield MOTOR_STATES, self._motors.write(stamp, angles, speeds, torques)
         yield 'pose', self._pose.write(stamp, state.pose)
         yield 'twist', self._six.write(stamp, state.twist)
         yield 'accel', self._six.write(stamp, state.acceleration)

@@ -43,12 +43,13 @@ from stewart_dynamics.ros.repeated_log import RepeatedLog, WARNING
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signals import SIGNALS
 from stewart_dynamics.setpoints.inputs import WrenchInput
+from stewart_dynamics.setpoints.output_messages import MOTOR_STATES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
 from stewart_dynamics.simulator.base import BaseOfTopics, BasePeriod, GeneratedBase
 from stewart_dynamics.simulator.messages import (
     BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)
-from stewart_dynamics.simulator.parameters import SimulatorParameters
-from stewart_dynamics.simulator.plant import Plant
+from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
+from stewart_dynamics.simulator.plant import Plant, PlantState
 
 _TYPES: dict[str, Any] = {
     type_names.POSE_STAMPED: PoseStamped,
@@ -72,7 +73,7 @@ NOT_SIX = 'not six numbers'
 
 class SimulatorNode(Node):
     """
-    Moves the hexapod under the commanded forces, and publishes its state.
+    Moves the hexapod under the commanded forces or torques, and publishes its state.
 
     Brakes hold it until the first command, and when none comes for ``command_timeout``. A base
     whose motion is generated is at rest until the first command, and then goes on.
@@ -109,6 +110,7 @@ class SimulatorNode(Node):
         self._base_messages = BaseMessages(self._settings)
         self._base_now: BasePeriod | None = None
         self._commands: Six | None = None
+        self._torques = self._settings['commands'] == TORQUE
         self._stamp = _BEGIN
         self._index = 0
         self._braked = False
@@ -146,10 +148,12 @@ class SimulatorNode(Node):
         gc.freeze()
 
     def _output_types(self) -> dict[str, str]:
+        types = OUTPUT_TYPES | (
+            {MOTOR_STATES: type_names.JOINT_STATE} if self._settings.drives else {})
         if self._base is None:
-            return OUTPUT_TYPES
+            return types
         generated = {} if isinstance(self._base, BaseOfTopics) else BASE_TYPES
-        return {**OUTPUT_TYPES, **generated, IMU: IMU_TYPE}
+        return {**types, **generated, IMU: IMU_TYPE}
 
     def _timer(self, seconds: float, callback: Any) -> Any:
         # ROS time stands still until it is advanced here, or jumps.
@@ -212,10 +216,13 @@ class SimulatorNode(Node):
                                         self._base_now and self._base_now.rows)
             if self._plant.fault:
                 self.get_logger().error(self._plant.fault)
-            elif state.forces != self._commands:
-                self._log_saturated(self._commands, state.forces)
+            elif self._applied(state) != self._commands:
+                self._log_saturated(self._commands, self._applied(state))
         self._messages = self._messages_now()
         self._publish()
+
+    def _applied(self, state: PlantState) -> tuple[float, ...]:
+        return state.motors[12:] if self._torques else state.forces
 
     def _brake(self) -> None:
         if not self._braked:
@@ -255,12 +262,14 @@ class SimulatorNode(Node):
 
     # -- logging --------------------------------------------------------------------------
 
-    def _log_saturated(self, commands: Six, forces: Six) -> None:
-        joint, command, force = max(
-            zip(self._settings['joints'], commands, forces, strict=True),
+    def _log_saturated(self, commands: Six, applied: tuple[float, ...]) -> None:
+        joint, command, value = max(
+            zip(self._settings['joints'], commands, applied, strict=True),
             key=lambda leg: abs(leg[1] - leg[2]))
-        self._say('saturated', f'commands: {joint}: {command:.6g} N exceeds limits.force_max, '
-                  f'clipped to {force:.6g} N')
+        unit, limit = (('N m', 'drive.torque_max or drive.torque_speed') if self._torques
+                       else ('N', 'limits.force_max'))
+        self._say('saturated', f'commands: {joint}: {command:.6g} {unit} exceeds {limit}, '
+                  f'clipped to {value:.6g} {unit}')
 
     def _on_rejection(self, rejection: Rejection, details: str) -> None:
         self._say(rejection, rejection.words(details))

@@ -30,6 +30,9 @@ from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
 _POSE = 'X Y Z alpha beta gamma'
 
+FORCE, TORQUE = 'force', 'torque'
+"""Values of commands."""
+
 _OWN = (
     Parameter('initial_pose', 'double', 'X Y Z alpha beta gamma, where the brakes hold the '
               'platform until the first command', 'm, rad', required=True, sizes=(6,)),
@@ -41,6 +44,8 @@ _OWN = (
     Parameter('command_timeout', 'double', 'time without a command after which the brakes engage, '
               'as those of a drive; they release with the next command; if not set, the last '
               'command is held', 's', minimum=0.0, maximum=1e6, above=True),
+    Parameter('commands', 'string', 'quantity on ~/commands: forces of the legs [N], or torques '
+              'of the motors [N m], with drive.*', '', FORCE, choices=(FORCE, TORQUE)),
     Parameter('end_stops.frequency', 'double', 'natural frequency of the mass of a leg on its end '
               'stop: its reflected mass and a sixth of platform and pistons', 'Hz', 30.0,
               minimum=0.0, above=True),
@@ -91,11 +96,12 @@ _OWN = (
 )
 
 # Beginnings of names.
-_OF_THE_NODE = ('autostart', 'external_wrench.', 'geometry.base_joint_axes',
-                'geometry.platform_joint_axes', 'joint_states.', 'legs.cylinder.length',
-                'legs.cylinder.radius', 'legs.piston.radius', 'limits.base_joint_angle_max',
-                'limits.leg_clearance_min', 'limits.platform_joint_angle_max',
-                'limits.velocity_max', 'meshes.',
+_OF_THE_NODE = ('autostart', 'drive.resistance', 'drive.speed_max', 'drive.temperature_rise_max',
+                'drive.thermal_', 'drive.torque_constant', 'drive.torque_continuous',
+                'external_wrench.', 'geometry.base_joint_axes', 'geometry.platform_joint_axes',
+                'joint_states.', 'legs.cylinder.length', 'legs.cylinder.radius',
+                'legs.piston.radius', 'limits.base_joint_angle_max', 'limits.leg_clearance_min',
+                'limits.platform_joint_angle_max', 'limits.velocity_max', 'meshes.',
                 'platform_frame', 'publish_tf', 'setpoint.', 'singularity.', 'trajectory.',
                 'visualization_rate')
 
@@ -115,6 +121,14 @@ class SimulatorParameters(Parameters):
     def _check_together(self, source: str) -> None:
         """Check what one parameter demands of another."""
         super()._check_together(source)
+        if self['commands'] == TORQUE:
+            if not self.drives:
+                raise ParameterError(f'{source}: commands: {TORQUE}: needs drive.*')
+            least = self['drive.back_driving_efficiency'].min()
+            if least <= 0.0:
+                raise ParameterError(
+                    f'{source}: commands: {TORQUE}: drive.back_driving_efficiency {least:.3g}: '
+                    'a self-locking screw can be simulated with commanded forces only')
         steps = 1.0 / (self['rate'] * self['step'])
         if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=1e-9):
             raise ParameterError(

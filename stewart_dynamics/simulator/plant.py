@@ -37,6 +37,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
 from stewart_dynamics.mechanics.dynamics.forward_dynamics import WORK
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.limits import Limits
@@ -44,10 +45,11 @@ from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 from stewart_dynamics.simulator.end_stops import stiffness_and_damping, stops_of
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
 from stewart_dynamics.simulator.plant_dynamics import (
     advance, BASE_BEGIN, LARGEST_MOVE, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,
-    RESULT_RATES, RESULT_SOUND, SCRATCH, STATE, STATE_POSITION, STATE_QUATERNION, STATE_TWIST)
+    RESULT_MOTORS, RESULT_RATES, RESULT_SOUND, SCRATCH, STATE, STATE_POSITION, STATE_QUATERNION,
+    STATE_TWIST)
 
 # The Runge-Kutta method is stable for all modes s with |h s| below 2.6 that do not grow by
 # themselves; up to 1 their error is small as well, with a margin for nonlinear terms.
@@ -68,7 +70,8 @@ def substeps(parameters: Parameters) -> int:
     step = parameters['step']
     with np.errstate(all='ignore'):
         viscous = parameters['actuator.viscous_friction']
-        coulomb = parameters['actuator.coulomb_friction'] / parameters['actuator.coulomb_velocity']
+        coulomb = (parameters['actuator.coulomb_friction'] + screw_friction(parameters)
+                   ) / parameters['actuator.coulomb_velocity']
         stiffness, damping = stiffness_and_damping(parameters)
         fastest = max(largest_eigenvalue(parameters, viscous + coulomb + damping),
                       math.sqrt(largest_eigenvalue(parameters, stiffness)))
@@ -93,6 +96,17 @@ def substeps(parameters: Parameters) -> int:
         f'{name}: {text}: too large for a '
         f'platform of {parameters["platform.mass"]:g} kg: the integration would need steps of '
         f'{_REACH / fastest:.2g} s, the shortest possible are {step / _MOST_SUBSTEPS:.2g} s')
+
+
+def screw_friction(parameters: Parameters) -> Array:
+    """Return the largest losses in the screws (6,) as forces [N], where commands are torques."""
+    if parameters['commands'] != TORQUE:
+        return np.zeros(6)
+    weight = parameters['platform.mass'] * np.linalg.norm(parameters['gravity'])
+    most = parameters['drive.torque_max']
+    loads = weight if most is None else most * motor_ratio(parameters)
+    losses: Array = loads * (1.0 / parameters['drive.efficiency'] - 1.0)
+    return losses
 
 
 def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
@@ -122,7 +136,9 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
     return float(1.0 / (by_actuators + 1.0 / (of_legs @ mobility)))
 
 
-_NUMBERS = Struct(f'{STATE + RESULT}d')
+# With angles, speeds and torques of the motors.
+_OF_MOTORS = slice(RESULT_MOTORS.start, RESULT_MOTORS.start + 18)
+_NUMBERS = Struct(f'{STATE + _OF_MOTORS.stop}d')
 
 
 class PlantState(NamedTuple):
@@ -133,13 +149,16 @@ class PlantState(NamedTuple):
     rates: Six
     """[m/s]"""
     forces: Six
-    """Of the actuators in the period: the commands as they saturated, without end stops [N]."""
+    """Of the actuators, without end stops [N]: the commands as they saturated; under torques the
+    forces at the end of the period."""
     pose: tuple[float, ...]
     """Position and quaternion x y z w of the platform frame in the base frame."""
     twist: Six
     """Base axes [m/s, rad/s]."""
     acceleration: Six
     """Base axes [m/s^2, rad/s^2]."""
+    motors: tuple[float, ...] = ()
+    """Angles [rad], speeds [rad/s] and torques [N m] (18,); empty without ``drive.*``."""
 
 
 class Plant:
@@ -176,10 +195,14 @@ class Plant:
         pose = parameters['initial_pose']
         self._state[STATE_POSITION] = pose[:3]
         self._state[STATE_QUATERNION] = to_quaternion(from_euler(pose[3:]))
+        drives = Drives(parameters).arguments if parameters.drives else (
+            StewartPlatform(parameters).constants, np.empty((0, 15)), np.empty(0),
+            np.empty((0, 2)))
+        self._driven = bool(parameters.drives)
         self._take_none, self._take_steps = (advance.bound(
-            StewartPlatform(parameters).constants, stops_of(parameters), self._limits.force_max,
-            self._loads, self._state, self._result, steps, self._step, np.empty(SCRATCH),
-            np.empty(WORK)) for steps in (0, self.steps))
+            *drives, parameters['commands'] == TORQUE, stops_of(parameters),
+            self._limits.force_max, self._loads, self._state, self._result, steps, self._step,
+            np.empty(SCRATCH), np.empty(WORK)) for steps in (0, self.steps))
         self.state = self._run(0)._replace(acceleration=NO_WRENCH)
         """The present one."""
         self._check_lengths()
@@ -194,7 +217,8 @@ class Plant:
         Parameters
         ----------
         commands : (6,)
-            Forces of the actuators [N], + pushes; they saturate at limits.force_max.
+            Forces of the actuators [N], + pushes, that saturate at limits.force_max; or torques of
+            the motors [N m] that saturate at drive.torque_max and drive.torque_speed.
         wrench : (6,)
             External wrench on the platform at its origin, base axes [N, N m].
         base : (3, BASE), optional
@@ -245,7 +269,8 @@ class Plant:
                 f'{min(lengths):.3g} m')
         return PlantState(
             lengths, result[RESULT_RATES], result[RESULT_FORCES], state[:STATE_TWIST.start],
-            state[STATE_TWIST], result[RESULT_ACCELERATION])
+            state[STATE_TWIST], result[RESULT_ACCELERATION],
+            result[_OF_MOTORS] if self._driven else ())
 
     def _check_lengths(self) -> None:
         """Raise ParameterError where the hexapod does not fit between its end stops."""

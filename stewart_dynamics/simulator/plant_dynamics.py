@@ -30,6 +30,10 @@ import math
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
+from stewart_dynamics.mechanics.drives import torque_dynamics
+from stewart_dynamics.mechanics.drives.motors import (
+    COMMANDS as OF_MOTORS, MOTORS, put_motors, SPEEDS)
+from stewart_dynamics.mechanics.drives.torque_dynamics import torque_acceleration
 from stewart_dynamics.mechanics.dynamics.base_load import moves
 from stewart_dynamics.mechanics.dynamics.bodies import leg_line
 from stewart_dynamics.mechanics.dynamics.forward_dynamics import acceleration
@@ -48,14 +52,16 @@ _LINEAR, _ANGULAR = STATE_TWIST.start, STATE_TWIST.start + 3
 # computed.
 RESULT_LENGTHS, RESULT_RATES, RESULT_FORCES, RESULT_ACCELERATION = consecutive(6, 6, 6, 6)
 RESULT_SOUND = RESULT_ACCELERATION.stop
-RESULT = RESULT_SOUND + 1
+# A row of motors, the commands as they saturated; zero without drives.
+RESULT_MOTORS = slice(RESULT_SOUND + 1, RESULT_SOUND + 1 + MOTORS)
+RESULT = RESULT_MOTORS.stop
 # Six commands, the wrench on the platform, and rows of the base's motion at begin, middle and end.
 COMMANDS, WRENCH, BASE_BEGIN, BASE_MIDDLE, BASE_END = consecutive(6, 6, BASE, BASE, BASE)
 LOADS = BASE_END.stop
 # Scratch memory.
-_MOTION, _FORCES, _AFTER, _SLOPE, _MEAN, _BASE = consecutive(
-    MOTION, 6, STATE, STATE, STATE, BASE)
-SCRATCH = _BASE.stop
+_MOTION, _FORCES, _AFTER, _SLOPE, _MEAN, _BASE, _STOPS, _TORQUES, _DRIVES = consecutive(
+    MOTION, 6, STATE, STATE, STATE, BASE, 6, 6, torque_dynamics.SCRATCH)
+SCRATCH = _DRIVES.stop
 
 # In one step the platform may turn by at most this [rad], and a platform joint move by at most
 # this part of its leg's length: a larger move would not be resolved.
@@ -91,13 +97,12 @@ def _move_base(loads: Array, part: float, base: Array) -> None:
 
 
 @compiled
-def _slope(constants: Array, stops: Array, state: Array, loads: Array, base: Array,
-           motion: Array, forces: Array, work: Array, slope: Array) -> None:
-    """
-    Write a state's time derivative under its loads and a motion of the base.
-
-    motion, forces, work: scratch memory.
-    """
+def _slope(constants: Array, drives: Array, torque_max: Array, curve: Array, by_torques: bool,
+           stops: Array, state: Array, loads: Array, base: Array, scratch: Array, work: Array,
+           slope: Array) -> None:
+    """Write a state's time derivative under its loads and a motion of the base."""
+    motion, forces, of_stops = scratch[_MOTION], scratch[_FORCES], scratch[_STOPS]
+    torques = scratch[_TORQUES]
     position, rotation = read3(state, STATE_POSITION.start), _rotation(state)
     velocity, omega = _twist(state)
     for n in range(3):
@@ -109,8 +114,14 @@ def _slope(constants: Array, stops: Array, state: Array, loads: Array, base: Arr
     for leg in range(6):
         a, length, _, s = leg_line(constants, leg, position, rotation)
         rate = dot(s, add(velocity, cross(omega, a)))
-        forces[leg] = loads[COMMANDS.start + leg] + stop_force(stops, leg, length, rate)
-    acceleration(constants, motion, forces, loads[WRENCH], base, work)
+        of_stops[leg] = stop_force(stops, leg, length, rate)
+        torques[leg] = loads[COMMANDS.start + leg]
+        forces[leg] = torques[leg] + of_stops[leg]
+    if by_torques:
+        torque_acceleration(constants, drives, torque_max, curve, motion, torques, of_stops,
+                            loads[WRENCH], base, work, scratch[_DRIVES], forces)
+    else:
+        acceleration(constants, motion, forces, loads[WRENCH], base, work)
     at = STATE_QUATERNION.start
     vector, scalar = read3(state, at), state[at + 3]
     turning = add(scale(scalar, omega), cross(omega, vector))
@@ -144,30 +155,34 @@ def _write_legs(constants: Array, state: Array, result: Array) -> float:
 
 
 @compiled
-def _next_state(constants: Array, stops: Array, loads: Array, state: Array, step: int, steps: int,
-                h: float, base: Array, motion: Array, forces: Array, work: Array, slope: Array,
-                mean: Array, after: Array) -> bool:
+def _next_state(constants: Array, drives: Array, torque_max: Array, curve: Array, by_torques: bool,
+                stops: Array, loads: Array, state: Array, step: int, steps: int, h: float,
+                scratch: Array, work: Array) -> bool:
     """
-    Write the state after a step of a call; return whether it is finite.
+    Write the state after a step of a call to scratch memory; return whether it is finite.
 
-    base is the motion of the base at its begin, and becomes that at its end; the rest: scratch
-    memory.
+    The motion of the base in scratch memory is that at the begin, and becomes that at the end.
     """
-    _slope(constants, stops, state, loads, base, motion, forces, work, slope)
+    after, slope, mean, base = scratch[_AFTER], scratch[_SLOPE], scratch[_MEAN], scratch[_BASE]
+    _slope(constants, drives, torque_max, curve, by_torques, stops, state, loads, base, scratch,
+           work, slope)
     for n in range(STATE):
         mean[n] = slope[n]
         after[n] = state[n] + 0.5 * h * slope[n]
     _move_base(loads, (step + 0.5) / steps, base)
-    _slope(constants, stops, after, loads, base, motion, forces, work, slope)
+    _slope(constants, drives, torque_max, curve, by_torques, stops, after, loads, base, scratch,
+           work, slope)
     for n in range(STATE):
         mean[n] += 2.0 * slope[n]
         after[n] = state[n] + 0.5 * h * slope[n]
-    _slope(constants, stops, after, loads, base, motion, forces, work, slope)
+    _slope(constants, drives, torque_max, curve, by_torques, stops, after, loads, base, scratch,
+           work, slope)
     for n in range(STATE):
         mean[n] += 2.0 * slope[n]
         after[n] = state[n] + h * slope[n]
     _move_base(loads, (step + 1.0) / steps, base)
-    _slope(constants, stops, after, loads, base, motion, forces, work, slope)
+    _slope(constants, drives, torque_max, curve, by_torques, stops, after, loads, base, scratch,
+           work, slope)
     finite = True
     square = 0.0
     for n in range(STATE):
@@ -180,10 +195,11 @@ def _next_state(constants: Array, stops: Array, loads: Array, state: Array, step
     return finite
 
 
-@entry_point('f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'i8', 'f8',
-             'f8[::1]', 'f8[:,::1]')
-def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array, state: Array,
-            result: Array, steps: int, h: float, scratch: Array, work: Array) -> None:
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[::1]', 'f8[:,::1]', 'b1', 'f8[::1]', 'f8[::1]',
+             'f8[::1]', 'f8[::1]', 'f8[::1]', 'i8', 'f8', 'f8[::1]', 'f8[:,::1]')
+def advance(constants: Array, drives: Array, torque_max: Array, curve: Array, by_torques: bool,
+            stops: Array, largest_forces: Array, loads: Array, state: Array, result: Array,
+            steps: int, h: float, scratch: Array, work: Array) -> None:
     """
     Take steps of h [s] and write the state and the result.
 
@@ -191,13 +207,17 @@ def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array,
     ----------
     constants : (CONSTANTS,)
         Constants of the hexapod, see ``hexapod_constants``.
+    drives, torque_max, curve
+        As in ``motor_rows``; without motors ``drives`` is (0, n).
+    by_torques : bool
+        Whether commands are torques of the motors [N m]; else they are forces.
     stops : (STOPS,)
         The end stops, see ``end_stops``.
     largest_forces : (6,)
-        To which the commands are clipped [N].
+        To which commanded forces are clipped [N].
     loads : (LOADS,)
-        Commands [N], force and moment on the platform [N, N m], rows of the base's motion at
-        begin, middle and end of the call, of nan where it is still; commands are clipped in
+        Commands, force and moment on the platform [N, N m], rows of the base's motion at
+        begin, middle and end of the call, of nan where it is still; forces are clipped in
         place.
     state : (STATE,)
         The initial state, overwritten with the final one. Where a step cannot be computed: the
@@ -210,31 +230,42 @@ def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array,
         Scratch memory.
 
     """
-    motion, forces, after = scratch[_MOTION], scratch[_FORCES], scratch[_AFTER]
-    slope, mean, base = scratch[_SLOPE], scratch[_MEAN], scratch[_BASE]
+    after, slope, base = scratch[_AFTER], scratch[_SLOPE], scratch[_BASE]
+    forces = result[RESULT_FORCES]
     for n in range(BASE):
         base[n] = loads[BASE_BEGIN.start + n]
     for leg in range(6):
-        most = largest_forces[leg]
-        force = min(max(loads[COMMANDS.start + leg], -most), most)
-        loads[COMMANDS.start + leg] = result[RESULT_FORCES.start + leg] = force
+        force, most = loads[COMMANDS.start + leg], largest_forces[leg]
+        if not by_torques:
+            loads[COMMANDS.start + leg] = forces[leg] = min(max(force, -most), most)
     sound = h * _write_legs(constants, state, result) <= LARGEST_MOVE
     for step in range(steps):
-        finite = _next_state(constants, stops, loads, state, step, steps, h, base, motion,
-                             forces, work, slope, mean, after)
+        finite = _next_state(constants, drives, torque_max, curve, by_torques, stops, loads,
+                             state, step, steps, h, scratch, work)
         sound = (sound and finite
                  and h * _write_legs(constants, after, result) <= LARGEST_MOVE)
         if not sound:
             break
         for n in range(STATE):
             state[n] = after[n]
-    _slope(constants, stops, state, loads, base, motion, forces, work, slope)
+    _slope(constants, drives, torque_max, curve, by_torques, stops, state, loads, base, scratch,
+           work, slope)
     for n in range(6):
         sound = sound and math.isfinite(slope[STATE_TWIST.start + n])
+        if by_torques:
+            forces[n] = scratch[_FORCES.start + n]
+    if len(drives):
+        motors = result[RESULT_MOTORS]
+        put_motors(constants, drives, torque_max, curve, scratch[_MOTION], forces, forces, motors)
+        for n in range(6):
+            if by_torques:
+                motors[OF_MOTORS.start + n] = scratch[_TORQUES.start + n]
     for n in range(6):
         if not sound:
             state[STATE_TWIST.start + n] = 0.0
-            result[RESULT_FORCES.start + n] = 0.0
+            forces[n] = 0.0
+            result[RESULT_MOTORS.start + SPEEDS.start + n] = 0.0
+            result[RESULT_MOTORS.start + OF_MOTORS.start + n] = 0.0
         result[RESULT_ACCELERATION.start + n] = (
             slope[STATE_TWIST.start + n] if sound else 0.0)
     _write_legs(constants, state, result)

@@ -133,12 +133,24 @@ class Motors(NamedTuple):
 
 
 @inlined
-def screw_torque(drive: Array, load: float, rate: float) -> float:
-    """Return the torque at the motor that holds a load [N] of the screw at a rate of the leg."""
+def torque_factor(drive: Array, power: float, rate: float) -> float:
+    """Return c for a rate of the leg and the sign of the power that its load takes."""
     slip = abs(rate) / drive[_SLOW]
-    loss: float = drive[_DRIVING] if load * rate > 0.0 else drive[_DRIVEN]
-    torque: float = load / drive[_RATIO] * (1.0 + loss * (1.0 if slip > 1.0 else slip))
+    loss: float = drive[_DRIVING] if power > 0.0 else drive[_DRIVEN]
+    return 1.0 + loss * (1.0 if slip > 1.0 else slip)
+
+
+@inlined
+def screw_torque(drive: Array, load: float, rate: float) -> float:
+    """Return the torque at the motor for a load [N] of the screw at a rate of the leg."""
+    torque: float = load / drive[_RATIO] * torque_factor(drive, load * rate, rate)
     return torque
+
+
+@inlined
+def ratio_and_mass(drive: Array) -> tuple[float, float]:
+    """Return k [rad/m] and the reflected mass [kg] of a drive."""
+    return drive[_RATIO], drive[_MASS]
 
 
 @inlined
@@ -157,37 +169,51 @@ def curve_torque(curve: Array, speed: float) -> float:
 
 
 @inlined
-def put_motors(constants: Array, drives: Array, torque_max: Array, curve: Array, motion: Array,
-               result: Array, forces: Array, row: Array) -> None:
-    """Write the motors of a motion, with commands for forces (6,); see ``motor_rows``."""
+def clipped(torque: float, available: float) -> float:
+    """Return a torque limited to +- available; nan stays nan."""
+    return (available if torque > available else -available if torque < -available else torque)
+
+
+@inlined
+def motor_motion(constants: Array, drive: Array, leg: int, motion: Array,
+                 ) -> tuple[float, float, float, float, float]:
+    """Return angle, speed and acceleration of a motor, and rate and acceleration of its leg."""
     rotation = read9(motion, ROTATION.start)
     omega = read3(motion, ANGULAR_VELOCITY.start)
     alpha = read3(motion, ANGULAR_ACCELERATION.start)
+    a, length, inverse_length, s = leg_line(
+        constants, leg, read3(motion, POSITION.start), rotation)
+    a_rate, a_acc = turned(a, omega, alpha)
+    x_rate = add(read3(motion, LINEAR_VELOCITY.start), a_rate)
+    x_acc = add(read3(motion, LINEAR_ACCELERATION.start), a_acc)
+    rate = dot(s, x_rate)
+    s_rate = scale(inverse_length, subtract(x_rate, scale(rate, s)))
+    acc = dot(s, x_acc) + length * dot(s_rate, s_rate)
+    ratio = drive[_RATIO]
+    angle, speed, speed_rate = ratio * (length - drive[_ZERO]), ratio * rate, ratio * acc
+    if drive[TWIST] != 0.0:
+        s_acc = scale(inverse_length, subtract(
+            subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate)))
+        w = rotate(rotation, read3(drive, PLATFORM_AXIS))
+        w_rate, w_acc = turned(w, omega, alpha)
+        twist, twist_rate, twist_acc = leg_twist(
+            read3(drive, BASE_AXIS), w, w_rate, w_acc, s, s_rate, s_acc)
+        angle += drive[TWIST] * twist
+        speed += drive[TWIST] * twist_rate
+        speed_rate += drive[TWIST] * twist_acc
+    return angle, speed, speed_rate, rate, acc
+
+
+@inlined
+def put_motors(constants: Array, drives: Array, torque_max: Array, curve: Array, motion: Array,
+               demanded: Array, forces: Array, row: Array) -> None:
+    """Write the motors of a motion and its demanded forces (6,); see ``motor_rows``."""
     for leg in range(6):
         drive = drives[leg]
-        a, length, inverse_length, s = leg_line(
-            constants, leg, read3(motion, POSITION.start), rotation)
-        a_rate, a_acc = turned(a, omega, alpha)
-        x_rate = add(read3(motion, LINEAR_VELOCITY.start), a_rate)
-        x_acc = add(read3(motion, LINEAR_ACCELERATION.start), a_acc)
-        rate = dot(s, x_rate)
-        s_rate = scale(inverse_length, subtract(x_rate, scale(rate, s)))
-        acc = dot(s, x_acc) + length * dot(s_rate, s_rate)
-        ratio = drive[_RATIO]
-        angle, speed, speed_rate = ratio * (length - drive[_ZERO]), ratio * rate, ratio * acc
-        if drive[TWIST] != 0.0:
-            s_acc = scale(inverse_length, subtract(
-                subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate)))
-            w = rotate(rotation, read3(drive, PLATFORM_AXIS))
-            w_rate, w_acc = turned(w, omega, alpha)
-            twist, twist_rate, twist_acc = leg_twist(
-                read3(drive, BASE_AXIS), w, w_rate, w_acc, s, s_rate, s_acc)
-            angle += drive[TWIST] * twist
-            speed += drive[TWIST] * twist_rate
-            speed_rate += drive[TWIST] * twist_acc
-        inertial = drive[_MASS] * acc
-        own = drive[_MASS] / ratio / ratio * speed_rate
-        load = result[FORCES.start + leg] - inertial
+        angle, speed, speed_rate, rate, acc = motor_motion(constants, drive, leg, motion)
+        ratio, mass = ratio_and_mass(drive)
+        own = mass / ratio / ratio * speed_rate
+        load = demanded[leg] - mass * acc
         torque = own + screw_torque(drive, load, rate)
         breakaway = torque
         if abs(rate) < drive[_SLOW]:
@@ -196,13 +222,12 @@ def put_motors(constants: Array, drives: Array, torque_max: Array, curve: Array,
             if abs(other) > abs(breakaway):
                 breakaway = other
         available = min(torque_max[leg], curve_torque(curve, speed))
-        command = own + screw_torque(drive, forces[leg] - inertial, rate)
+        command = own + screw_torque(drive, forces[leg] - mass * acc, rate)
         current = torque / drive[_TORQUE_CONSTANT]
         heat = drive[_RESISTANCE] * current * current
         row[ANGLES.start + leg] = angle
         row[SPEEDS.start + leg] = speed
-        row[COMMANDS.start + leg] = (available if command > available
-                                     else -available if command < -available else command)
+        row[COMMANDS.start + leg] = clipped(command, available)
         row[BREAKAWAY_TORQUES.start + leg] = breakaway
         row[TORQUES.start + leg] = torque
         row[ACCELERATIONS.start + leg] = speed_rate
@@ -238,8 +263,8 @@ def motor_rows(constants: Array, drives: Array, torque_max: Array, curve: Array,
 
     """
     for n in range(len(motions)):
-        put_motors(constants, drives, torque_max, curve, motions[n], results[n], forces[n],
-                   rows[n])
+        put_motors(constants, drives, torque_max, curve, motions[n], results[n, FORCES],
+                   forces[n], rows[n])
 
 
 class Drives:

@@ -124,6 +124,12 @@ def leg_of(constants: Array, leg: int) -> Leg:
 
 
 @inlined
+def put_reflected_mass(constants: Array, leg: int, mass: float) -> None:
+    """Write the reflected mass of a leg's actuator [kg]."""
+    constants[_FIRST_LEG + leg * _LEG + _REFLECTED_MASS] = mass
+
+
+@inlined
 def coulomb_velocity_of(constants: Array, leg: int) -> float:
     """Return the rate of a leg below which its Coulomb friction is linear [m/s]."""
     velocity: float = constants[_FIRST_LEG + leg * _LEG + _COULOMB_VELOCITY]

@@ -1,0 +1,107 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Likely mistakes in ``drive.*``: units, shafts, and ratios that other parameters contradict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+
+import numpy as np
+
+from stewart_dynamics.mechanics.drives.motors import motor_ratio
+from stewart_dynamics.parameters.table import MOTOR_INERTIA, Parameters, SCREW_INERTIA
+
+# Screws and belts of legs have leads of 0.5 to 100 mm; in mm the number is at least this.
+_LONGEST_LEAD = 0.5  # [m]
+# 19,000 rpm: motors of legs have 300 to 1000 rad/s, and in rpm ten times the number.
+_FASTEST_MOTOR = 2000.0  # [rad/s]
+# Motors reach their speed in 5 to 200 ms under their peak torque; in kg cm^2 the number of the
+# inertia is 1e4 times larger, in kg mm^2 1e6 times; in tonnes m^2 it is 1e3 times smaller.
+_SLOWEST_START, _FASTEST_START = 5.0, 1e-4  # [s]
+# The inertia of a screw at the motor's shaft is 0.05 to 5 times that of the rotor.
+_LARGEST_SCREW = 20.0
+# How far drive and legs may miss each other's limits, and how well they must fit if corrected.
+_MISSED, _FITS = 1.5, 1.2
+
+
+def likely_mistakes(p: Parameters) -> Iterator[str]:
+    """Yield likely mistakes in the drives, each in one line."""
+    if not p.drives:
+        return
+    lead, ratio = p['actuator.screw_lead'], p['drive.gear_ratio']
+    speed, curve = p['drive.speed_max'], p['drive.torque_speed']
+    if lead.max() >= _LONGEST_LEAD:
+        yield f'actuator.screw_lead: {lead.max():g} m for one turn of the screw: in mm?'
+        return
+    for name, fastest in (('drive.speed_max', speed),
+                          ('drive.torque_speed', None if curve is None else curve[-1:, 0])):
+        if fastest is not None and fastest.max() > _FASTEST_MOTOR:
+            yield (f'{name}: {fastest.max():g} rad/s, {fastest.max() * 30.0 / math.pi:.0f} rpm: '
+                   'in rpm?')
+            return
+    yield from _inertia(p)
+    if speed is None and curve is not None:
+        speed = np.full(6, curve[-1, 0])
+    torque = p['drive.torque_max']
+    if torque is None and curve is not None:
+        torque = np.full(6, curve[:, 1].max())
+    rate, force = p['limits.velocity_max'], p['limits.force_max']
+    if torque is None:
+        return
+    k = motor_ratio(p)
+    most = torque * k * p['drive.efficiency']
+    weight = p['platform.mass'] * float(np.linalg.norm(p['gravity'])) / 6.0
+    force = np.full(6, weight) if force is None else force
+    # The reserve of both: above one, the drive cannot reach the limit of the leg.
+    loads = force / most
+    speeds = np.zeros(6) if rate is None or speed is None else rate * k / speed
+    if max(loads.max(), speeds.max()) <= _MISSED:
+        return
+    said = (f'the motors can push {most.min():.3g} N' + (
+        f' and move a leg at {float((speed / k).min()):.3g} m/s' if speeds.any() else '')
+        + f', the legs need {force.max():.3g} N' + (
+        f' and {rate.max():.3g} m/s' if speeds.any() else ''))
+    for factor, name, words in (
+            (2.0 * math.pi * np.ones(6), 'actuator.screw_lead',
+             f'{lead[0]:g} m: {said}: the travel for one radian? It is that of one turn'),
+            (ratio ** 2, 'drive.gear_ratio', f'{ratio[0]:g}: {said}: inverted? It is the turns of '
+             'the motor in one turn of the screw')):
+        if max((loads * factor).max(), (speeds / factor).max()) <= _FITS and factor[0] != 1.0:
+            yield f'{name}: {words}'
+            return
+    if weight > most.min():
+        yield (f'drive.torque_max: {torque.min():g} N m: {said}: less than a sixth of the weight')
+
+
+def _inertia(p: Parameters) -> Iterator[str]:
+    ratio, torque, speed = p['drive.gear_ratio'], p['drive.torque_max'], p['drive.speed_max']
+    motor, screw = p[MOTOR_INERTIA], p[SCREW_INERTIA]
+    if SCREW_INERTIA in p.given and MOTOR_INERTIA not in p.given:
+        yield (f'{MOTOR_INERTIA}: missing, but {SCREW_INERTIA} is given: is that the inertia of '
+               'the rotor, at the wrong shaft? Write 0.0 for a rotor without inertia')
+    elif np.any(screw / ratio ** 2 > _LARGEST_SCREW * motor) and motor.any():
+        at = int(np.argmax(screw / ratio ** 2 / np.where(motor > 0.0, motor, np.inf)))
+        yield (f'{SCREW_INERTIA}: {screw[at]:g} kg m^2 is {screw[at] / ratio[at] ** 2:.3g} kg m^2 '
+               f'at the motor, whose rotor has {motor[at]:g}: other units, or at another shaft?')
+    if torque is None or speed is None or not motor.any():
+        return
+    start = motor * speed / torque
+    if start.max() > _SLOWEST_START or start.min() < _FASTEST_START:
+        at = int(np.argmax(start)) if start.max() > _SLOWEST_START else int(np.argmin(start))
+        yield (f'{MOTOR_INERTIA}: {motor[at]:g} kg m^2 reaches drive.speed_max under '
+               f'drive.torque_max in {start[at]:.2g} s: in other units than kg m^2, or at the '
+               'screw?')
