@@ -32,7 +32,7 @@ from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_consta
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
-from stewart_dynamics.mechanics.limits import JUMP, LIMITS
+from stewart_dynamics.mechanics.limits import JUMP, LIMITS, OF_MOTORS
 from stewart_dynamics.mechanics.rows import BASE, FORCES, MOTION, POSE, RESULT, WRENCH
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
@@ -84,7 +84,9 @@ COLUMNS = [name for names in PARTS.values() for name in names]
 
 def golden_vectors(parameters: Parameters) -> Array:
     """Return the vectors (N, len(COLUMNS)); samples whose numbers overflow are left out."""
-    step, constants = Step(parameters), hexapod_constants(parameters)
+    # The C source checks no limits of motors.
+    step = Step(parameters.replaced(dict.fromkeys(OF_MOTORS)))
+    constants = hexapod_constants(parameters)
     drives = None if parameters['actuator.screw_lead'] is None else Drives(parameters)
     motions = _motions(parameters)
     weight = parameters['platform.mass'] * 10.0 + 1.0

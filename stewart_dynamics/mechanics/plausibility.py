@@ -30,8 +30,8 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.drives import likely_mistakes as drives
+from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
