@@ -34,7 +34,7 @@ from trajectories import Array, FREE
 
 
 def dense(times: Array, motion: Motion, samples: int = 10_000) -> tuple[Array, Motion]:
-    """Return times and motion at about so many samples between the points."""
+    """Return times and motion at about 10,000 samples between the points."""
     between = Interpolation(np.diff(times), motion.rows)
     part = np.linspace(0.0, 1.0, samples // (len(times) - 1) + 1)
     rows = np.concatenate([

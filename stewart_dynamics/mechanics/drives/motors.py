@@ -66,7 +66,7 @@ from stewart_dynamics.parameters.table import Parameters, RIGHT, UNIVERSAL
 (ANGLES, SPEEDS, COMMANDS, BREAKAWAY_TORQUES, TORQUES, ACCELERATIONS, CURRENTS, POWER, COPPER_HEAT,
  AVAILABLE_TORQUES) = consecutive(*[6] * 10)
 MOTORS = 60
-# Of them, as in the C source.
+# Columns in the order of the C source.
 MECHANICAL = np.r_[ANGLES, SPEEDS, ACCELERATIONS, TORQUES]
 
 # Constants of one drive.
@@ -255,7 +255,7 @@ def motor_rows(constants: Array, drives: Array, torque_max: Array, curve: Array,
     curve : (n, 2)
         Speed and torque at the points of the torque-speed curve [rad/s, N m].
     motions, results : (N, MOTION), (N, RESULT)
-        Motions and what ``inverse_dynamics`` gives for them.
+        Motions, and their results of ``inverse_dynamics``.
     forces : (N, 6)
         Forces of the legs for which commands are written [N].
     rows : (N, MOTORS)

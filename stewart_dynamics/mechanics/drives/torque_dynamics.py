@@ -59,7 +59,7 @@ def torque_acceleration(
     constants, motion, wrench, base, work
         As in ``forward_dynamics.acceleration``.
     drives, torque_max, curve
-        As in ``motor_rows``; torques are clipped in place to what is available.
+        As in ``motor_rows``; torques are clipped in place to those available.
     torques : (6,)
         [N m], + extends.
     others : (6,)
