@@ -389,6 +389,15 @@ def test_a_reflected_mass_that_agrees_is_accepted_and_rounding_too() -> None:
     assert not HEXAPOD.drives
 
 
+def test_a_file_has_no_reflected_mass_that_follows(tmp_path: Path) -> None:
+    p = HEXAPOD.replaced({**PUBLISHED, 'actuator.reflected_mass': None})
+    p.to_yaml(tmp_path / 'drives.yaml')
+    assert Parameters.from_yaml(tmp_path / 'drives.yaml') == p
+    assert 'reflected_mass' not in (tmp_path / 'drives.yaml').read_text()
+    HEXAPOD.to_yaml(tmp_path / 'no_drives.yaml')
+    assert Parameters.from_yaml(tmp_path / 'no_drives.yaml').drives == ()
+
+
 def test_axes_along_a_leg_are_rejected() -> None:
     p = HEXAPOD
     p = p.replaced({**PUBLISHED, 'actuator.reflected_mass': None,
