@@ -59,7 +59,7 @@ def test_the_node_publishes_the_motors_and_checks_their_limits(
     for n, sample in enumerate((MOVING, LEAPING, FAST), start=1):
         stamp = node.send(sample)
         node.until(lambda n=n: len(torques) >= n, 'torques have come')  # type: ignore[misc]
-        motors = platform.motors(sample.motion)
+        motors = platform.motors(sample.motion())
         state = deserialize_message(states[-1], JointState)
         assert state.header.stamp.sec == stamp // 10 ** 9
         assert state.name == [f'leg_{leg}_motor' for leg in range(1, 7)]
