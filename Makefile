@@ -5,8 +5,8 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
-  bench-replay clean demo demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment export-demo \
+.PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
+  bench-replay clean demo demo-calibrate demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment export-demo \
   lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
@@ -87,6 +87,9 @@ demo-mujoco: $(INSTALLED)
 demo-ship: $(INSTALLED)
 	@$(VENV)/bin/python demo/ship.py
 
+demo-calibrate: $(INSTALLED)
+	@$(VENV)/bin/python demo/calibrate.py
+
 demo-identify: $(INSTALLED)
 	@$(VENV)/bin/python demo/identify.py
 
@@ -111,6 +114,9 @@ bench-node: $(INSTALLED)
 
 bench-identify: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/identification.py --write
+
+bench-calibrate: $(INSTALLED)
+	$(VENV)/bin/python benchmarks/calibration.py --write
 
 bench-coverage: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/interval_coverage.py --write
