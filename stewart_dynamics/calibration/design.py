@@ -15,7 +15,7 @@
 """
 Poses that identify the geometry best, within the limits of the hexapod.
 
-Of random poses within the limits the N are chosen whose information has the largest determinant
+From random poses within the limits, the N with the largest determinant of information are chosen
 (D-optimal), leg by leg: the exchange of one chosen pose for another that increases it most is
 repeated (V. V. Fedorov, Theory of Optimal Experiments, Academic Press, 1972). Equal seeds give
 equal poses.
