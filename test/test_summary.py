@@ -326,7 +326,7 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'restarts': sum(s.restarts.tolist()), 'base_unknown': len(unknown),
             'base_unknown_first_at_s': t[unknown[0]] if len(unknown) else None,
             'jumps': 0, 'jumps_first_at_s': None},
-        'legs': legs, 'limits': limits, 'limits_not_checked': not_checked,
+        'legs': legs, 'motors': None, 'limits': limits, 'limits_not_checked': not_checked,
         'singularity': {
             'determinant_nearest_m3': s.det[nearest], 'determinant_nearest_at_s': t[nearest],
             'crossings': len(crossings), 'crossings_at_s': crossings[:LISTED],
@@ -493,7 +493,7 @@ def test_every_key_is_documented() -> None:
     assert found <= documented
     parts = ('setpoints.', 'legs.', 'limits[]', 'singularity.', 'force_breakdown.')
     assert {key for key in documented if key.startswith(parts)} == found - {
-        'limit_met', 'limits_not_checked', 'quasi_static'}
+        'limit_met', 'limits_not_checked', 'motors', 'quasi_static'}
     assert set(SOURCES) <= documented
 
 

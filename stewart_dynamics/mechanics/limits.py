@@ -37,7 +37,7 @@ CLEARANCE_MIN = 'limits.leg_clearance_min'
 TORQUE_MAX, TORQUE_SPEED, SPEED_MAX, TEMPERATURE_RISE_MAX = OF_MOTORS = (
     'drive.torque_max', 'drive.torque_speed', 'drive.speed_max', 'drive.temperature_rise_max')
 LIMITS = (*OF_RESULTS, *OF_JOINTS, CLEARANCE_MIN)
-_MINIMA = LENGTH_MIN, CLEARANCE_MIN
+MINIMA = LENGTH_MIN, CLEARANCE_MIN
 # Not a limit with a parameter of its own: a setpoint too far from the last one for VELOCITY_MAX.
 JUMP = 'jump'
 
@@ -81,13 +81,13 @@ class Exceedance(NamedTuple):
     @property
     def excess(self) -> float:
         """Return by how much the limit is exceeded."""
-        return (self.bound - self.value if self.limit in _MINIMA
+        return (self.bound - self.value if self.limit in MINIMA
                 else abs(self.value) - self.bound)
 
     def words(self, joints: Sequence[str]) -> str:
         """Return which leg exceeds the limit, and by how much."""
         quantity, unit = QUANTITIES[self.limit]
-        how = 'below' if self.limit in _MINIMA else 'above'
+        how = 'below' if self.limit in MINIMA else 'above'
         limit = VELOCITY_MAX if self.limit == JUMP else self.limit
         if self.other >= 0:
             quantity += f' to {(*joints, *OUTLINES)[self.other]},'
@@ -122,9 +122,9 @@ class Limits:
             name: np.broadcast_to(parameters[name], 6)
             for name in LIMITS if parameters[name] is not None}
         self.thresholds = np.array([
-            np.full(6, -math.inf if name in _MINIMA else math.inf)
+            np.full(6, -math.inf if name in MINIMA else math.inf)
             if name not in self.bounds else self.bounds[name] * (
-                1.0 - TOLERANCE if name in _MINIMA else 1.0 + TOLERANCE) for name in LIMITS])
+                1.0 - TOLERANCE if name in MINIMA else 1.0 + TOLERANCE) for name in LIMITS])
         self.of_joints = tuple(name for name in OF_JOINTS if name in self.bounds)
         self.force_max: Array = self.bounds.get(FORCE_MAX, np.full(6, math.inf))
         self._of_samples = [
@@ -184,7 +184,7 @@ def _add_exceeding(found: list[Exceedance], limit: str, values: Sequence[float],
 
 def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
     """Return whether a value, or where an array, is past the threshold of a limit."""
-    return value < threshold if limit in _MINIMA else abs(value) > threshold
+    return value < threshold if limit in MINIMA else abs(value) > threshold
 
 
 @inlined

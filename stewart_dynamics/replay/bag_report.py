@@ -34,12 +34,14 @@ from urllib.parse import quote
 import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND
+from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, LIMITS, OF_JOINTS, QUANTITIES
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE, POSITION,
     ROTATION)
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
+from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.reporting import plots as channels
 from stewart_dynamics.reporting.colors import LEG_COLORS
@@ -48,6 +50,7 @@ from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
 from stewart_dynamics.reporting.plots import (
     base_wrench_plots, measured_plots, motion_plots, PLOT_OF, spectrum_plots)
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
+from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
 from stewart_dynamics.setpoints.step import Batch, Outputs
 from stewart_dynamics.whole_file import write_files
 
@@ -84,6 +87,7 @@ class Report:
         self._frames = Frames(_FRAME)
         self._compared = Curves(channels.COMPARED, timeout) if measured else None
         self._angles: Array = np.zeros((1, 3))
+        self._operating = OperatingPoints() if parameters.drives else None
 
     def add(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
             breakdown: Array) -> None:
@@ -124,6 +128,13 @@ class Report:
         parts[:] = breakdown.reshape(len(seconds), -1).T[:len(parts)]
         rows[channels.joint_angles_of(self._parameters)] = np.degrees(outputs.joint_angles).T
         rows[channels.clearances_of(self._parameters)] = outputs.clearances.T
+        if self._operating is not None:
+            motors = Motors.of_rows(outputs.motors[:, OF_DRIVES])
+            with np.errstate(invalid='ignore'):
+                rows[channels.motors_of(self._parameters)] = np.concatenate([
+                    motors.torques, motors.speeds, outputs.motors[:, RISES],
+                    motors.power.sum(axis=1, keepdims=True)], axis=1).T
+            self._operating.add(outputs.motors)
         self._curves.add(seconds, rows)
         self._spectrum.add(seconds, rows[channels.BASE_WRENCH])
         self._frames.add(seconds, np.concatenate(
@@ -166,6 +177,7 @@ class Report:
 
         """
         script = plotly_script() if plotly is None else ''
+        known = not summary['quasi_static']
         text = page(
             FOLDER, 'report', [script] if script else [], plotly is not None, True, s=summary,
             p=self._parameters, legs=list(self._legs),
@@ -176,7 +188,9 @@ class Report:
             cards=cards(summary), margins=smallest_margins(summary),
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
             date=date(summary['setpoints']['first_stamp_ns']), units=units(), plot_of=PLOT_OF,
-            most_times=_MOST_TIMES)
+            most_times=_MOST_TIMES,
+            charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
+            if self._operating and known else {})
         write_files({path: text})
 
     def _continued(self, angles: Array) -> Array:

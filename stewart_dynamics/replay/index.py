@@ -28,8 +28,9 @@ from urllib.parse import quote
 
 from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
+from stewart_dynamics.replay.motor_loads import needed
 from stewart_dynamics.replay.replay_options import LIMIT_MET
-from stewart_dynamics.replay.statements import MEASURED, MISSING, statements
+from stewart_dynamics.replay.statements import MEASURED, MISSING, needed_words, statements
 from stewart_dynamics.reporting.pages import page
 from stewart_dynamics.reporting.spreadsheet import harmless
 from stewart_dynamics.whole_file import write_files
@@ -109,6 +110,24 @@ def _largest_of_legs(key: str) -> Callable[[dict[str, Any]], Cell]:
     return _measured(of)
 
 
+def _motors(key: str, choose: Callable[..., Any] = _largest) -> Callable[[dict[str, Any]], Cell]:
+    """Return a function for a value of the motors: the largest of all, by default."""
+    def of(summary: dict[str, Any]) -> Cell:
+        motors = summary['motors'] or {'legs': {}}
+        values = [leg[key] for leg in motors['legs'].values() if leg[key] is not None]
+        return choose(values) if values else None
+
+    return of
+
+
+def _bus(key: str) -> Callable[[dict[str, Any]], Cell]:
+    def of(summary: dict[str, Any]) -> Cell:
+        bus = (summary['motors'] or {}).get('bus')
+        return bus[key] if bus else None
+
+    return of
+
+
 def _exceeded(summary: dict[str, Any]) -> str:
     legs: dict[str, list[str]] = {}
     for each in summary['limits']:
@@ -151,6 +170,19 @@ COLUMNS = (
     Column('limits_exceeded', 'limits exceeded', '', _exceeded, number=False),
     Column('force_rms_n', 'RMS force', 'N', _legs('force_rms_n', max)),
     Column('power_peak_w', 'peak power', 'W', _legs('power_peak_w', _largest), size=True),
+    *(Column(key, head, unit, _motors(key, min if 'margin' in key else _largest),
+             size='peak' in key, optional=True) for key, head, unit in (
+        ('torque_rms_n_m', 'RMS motor torque', 'N m'),
+        ('torque_peak_n_m', 'peak motor torque', 'N m'),
+        ('speed_peak_rad_s', 'peak motor speed', 'rad/s'),
+        ('torque_margin_n_m', 'torque margin', 'N m'),
+        ('torque_continuous_margin_n_m', 'continuous torque margin', 'N m'),
+        ('speed_margin_rad_s', 'speed margin', 'rad/s'),
+        ('temperature_rise_max_k', 'temperature rise', 'K'))),
+    *(Column(f'bus_{key}', head, unit, _bus(key), optional=True) for key, head, unit in (
+        ('power_peak_w', 'bus power', 'W'),
+        ('regenerated_peak_w', 'power flowing back', 'W'),
+        ('energy_per_cycle_j', 'energy of a cycle', 'J'))),
     Column('determinant_nearest_m3', 'det(J) nearest 0', 'm³',
            _singularity('determinant_nearest_m3'), size=True),
     Column('crossings', 'crossings', '', _singularity('crossings')),
@@ -251,6 +283,8 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
         # The colour of a row.
         'codes': [LIMIT_MET if row['result'] == REJECTED else row['code'] for row in rows],
         'severity': SEVERITY,
+        'motor': needed_words(needed(row for row in rows if 'torque_peak_n_m' in row
+                                     and not row['warnings'])),
         'links': [_link(output, row) for row in rows],
         'rows': [[_shown(row.get(column.key)) for column in shown] for row in rows],
     }

@@ -25,15 +25,16 @@ from collections.abc import Iterator, Mapping
 import math
 from typing import Any, NamedTuple
 
-from stewart_dynamics.mechanics.limits import Exceedance, FORCE_MAX, QUANTITIES
+from stewart_dynamics.mechanics.limits import CLIPPED, Exceedance, QUANTITIES, TORQUE_SPEED
 from stewart_dynamics.reporting.plots import PLOT_OF
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
 
 Summary = Mapping[str, Any]
 """The content of summary.json."""
 
-READING, MISSING, REJECTED, LIMITS, JOINTS, LOADS, SINGULARITY, MEASURED = (
-    'reading', 'missing', 'rejected', 'limits', 'joints', 'loads', 'singularity', 'measured')
+READING, MISSING, REJECTED, LIMITS, JOINTS, LOADS, MOTORS, SINGULARITY, MEASURED = (
+    'reading', 'missing', 'rejected', 'limits', 'joints', 'loads', 'motors', 'singularity',
+    'measured')
 LEVELS = ('none', 'good', 'warn', 'bad')
 """The levels, the worst last; none: information."""
 _CARDS = {
@@ -44,6 +45,7 @@ _CARDS = {
                 'warn': 'Not all limits could be checked', 'bad': 'Limits are exceeded'},
     (SINGULARITY,): {'none': 'Singularity', 'good': 'Clear of singularities',
                      'warn': 'A singularity is near', 'bad': 'A singularity is reached'},
+    (MOTORS,): {'none': 'Motors', 'warn': 'Motors are too small for continuous duty'},
     (MEASURED,): {'none': 'Measured forces', 'good': 'Measured forces',
                   'warn': 'Measured forces differ'}}
 # Maximum number of reasons of rejection.
@@ -80,8 +82,9 @@ def statements(summary: Summary) -> list[Statement]:
 def motion_statements(summary: Summary) -> list[Statement]:
     """Return the statements about the answered setpoints, for which no bag is needed."""
     points = summary['setpoints']
-    found = [*_limits(summary), *_joints(summary['legs']), *_loads(summary['base_wrench']),
-             *_singularity(summary['singularity'])] if points['answered'] else []
+    found = [
+        *_limits(summary), *_joints(summary['legs']), *_loads(summary['base_wrench']),
+        *_motors(summary), *_singularity(summary['singularity'])] if points['answered'] else []
     return [*found, *_answered(points)]
 
 
@@ -145,9 +148,10 @@ def _limits(summary: Summary) -> Iterator[Statement]:
             name, 0, each['worst'], each['bound']).excess)
         others = f' and {plural(len(of_legs) - 1, "other leg")}' if len(of_legs) > 1 else ''
         unit = QUANTITIES[name][1]
+        at_worst = ' at that speed' if name == TORQUE_SPEED else ''
         yield Statement(
-            LIMITS, 'bad', f'{name}, {most["bound"]:g} {unit}, exceeded by {most["leg"]}{others}: '
-            f'{most["worst"]:.6g} {unit} at worst, first',
+            LIMITS, 'bad', f'{name}, {most["bound"]:g} {unit}{at_worst}, exceeded by '
+            f'{most["leg"]}{others}: {most["worst"]:.6g} {unit} at worst, first',
             min(each['first_at_s'] for each in of_legs), PLOT_OF[name])
     if points['jumps']:
         yield Statement(
@@ -156,9 +160,9 @@ def _limits(summary: Summary) -> Iterator[Statement]:
             ': the legs cannot follow within limits.velocity_max')
     for name in summary['limits_not_checked']:
         why = ': velocities are not known; --differentiate computes them from the poses'
-        if name == FORCE_MAX:
-            causes = ((summary['singularity']['unsolved'], 'J_inv cannot be solved'),
-                      (points['base_unknown'], BASE_NOT_KNOWN))
+        causes = ((summary['singularity']['unsolved'], 'J_inv cannot be solved'),
+                  (points['base_unknown'], BASE_NOT_KNOWN))
+        if name in CLIPPED and any(number for number, _ in causes):
             why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
                                   for number, cause in causes if number)
         yield Statement(LIMITS, 'warn', f'{name} could not be checked{why}')
@@ -203,6 +207,48 @@ def _loads(found: Summary) -> Iterator[Statement]:
             rms = '-' if each[f'rms_{key}'] is None else f'{each[f"rms_{key}"]:.1f}'
             yield Statement(LOADS, 'none', f'{name} on the base: {each[f"peak_{key}"]:.1f} {unit} '
                             'at most', each['peak_at_s'], f'base_{name}', f' (RMS {rms})')
+
+
+def _motors(summary: Summary) -> Iterator[Statement]:
+    motors = summary['motors']
+    if not motors:
+        return
+    legs = motors['legs']
+    continuous = {name: leg['torque_continuous_margin_n_m'] for name, leg in legs.items()
+                  if leg['torque_continuous_margin_n_m'] is not None}
+    over = [name for name, margin in continuous.items() if margin < 0.0]
+    if over:
+        worst = min(over, key=lambda name: continuous[name])
+        others = f' and {plural(len(over) - 1, "other motor")}' if len(over) > 1 else ''
+        yield Statement(
+            MOTORS, 'warn', f'drive.torque_continuous, exceeded by the RMS torque of {worst}'
+            f'{others}: {legs[worst]["torque_rms_n_m"]:.4g} N m, by {-continuous[worst]:.4g} N m')
+    for key, at, plot, text, unit in (
+            ('torque_peak_n_m', 'torque_peak_at_s', 'motor_torques', 'motor torque', 'N m'),
+            ('speed_peak_rad_s', 'speed_peak_at_s', 'motor_speeds', 'motor speed', 'rad/s'),
+            ('temperature_rise_max_k', 'temperature_rise_max_at_s', 'temperature_rises',
+             'temperature rise of the windings', 'K')):
+        known = [name for name in legs if legs[name][key] is not None]
+        if known:
+            most = max(known, key=lambda name: abs(legs[name][key]))
+            yield Statement(MOTORS, 'none', f'{text}: {legs[most][key]:.4g} {unit} at most, '
+                            f'{most},', legs[most][at], plot)
+    if bus := motors['bus']:
+        yield Statement(MOTORS, 'none', f'power of the bus: {bus["power_peak_w"]:.4g} W at most,',
+                        bus['power_peak_at_s'], 'bus_power',
+                        f'; {bus["regenerated_peak_w"]:.4g} W back to it at most')
+    # Near a singularity peaks depend on the sampling.
+    if not summary['singularity']['warnings'] and (text := needed_words(motors['needed'])):
+        yield Statement(MOTORS, 'none', f'motor needed: {text}')
+
+
+def needed_words(needed: Summary) -> str:
+    """Return the motor that is needed in words; empty if it is not known."""
+    words = [f'{needed[key]:.4g} {unit}' for key, unit in (
+        ('torque_continuous_n_m', 'N m continuous'), ('torque_peak_n_m', 'N m peak'),
+        ('speed_rad_s', 'rad/s')) if needed[key] is not None]
+    return f'{", ".join(words)}, with a margin of {100.0 * (needed["margin"] - 1.0):.3g} %' * bool(
+        words)
 
 
 def _singularity(found: Summary) -> Iterator[Statement]:

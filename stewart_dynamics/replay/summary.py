@@ -27,15 +27,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, QUANTITIES,
+    ANGLES, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA, QUANTITIES,
     VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.motor_loads import MotorLoads
 from stewart_dynamics.reporting.block_statistics import (
-    Crossings, Extreme, FIRST, Integral, longest_step, Warnings, with_nan)
+    Crossings, Exceeded, Extreme, finite, FIRST, Integral, longest_step, Warnings, with_nan)
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
 # Values of a leg that are not known from poses alone.
@@ -57,19 +58,6 @@ class _Block(NamedTuple):
     breakdown: Array | None
 
 
-class _Exceeded(NamedTuple):
-    """Number of setpoints that exceed a limit, of each leg, and the time of the first."""
-
-    setpoints: Integers
-    first_at: Array
-
-    def add(self, seconds: Array, exceeding: Flags) -> None:
-        if exceeding.any():
-            new = exceeding.any(axis=0) & (self.setpoints == 0)
-            self.first_at[new] = seconds[exceeding.argmax(axis=0)][new]
-            self.setpoints[:] += exceeding.sum(axis=0)
-
-
 class Summary:
     """
     The summary of a motion of a hexapod with given parameters.
@@ -89,7 +77,7 @@ class Summary:
         self._timeout: float = parameters['setpoint.timeout']
         self._limits = Limits(parameters)
         self._exceeded = {
-            name: _Exceeded(np.zeros(6, dtype=np.int64), np.full(6, np.nan))
+            name: Exceeded(name in MINIMA)
             for name in self._limits.bounds if not (quasi_static and name == VELOCITY_MAX)}
         self._held: list[_Block] = []
         self._gap: float | None = None
@@ -115,6 +103,7 @@ class Summary:
         self._crossings = Crossings()
         self._warnings = Warnings()
         self._base_wrench = _BaseWrench()
+        self._motors = MotorLoads(parameters, quasi_static) if parameters.drives else None
         self._sources = sources_of(parameters)
         # one source at a time: numpy is far slower along many columns at once
         self._source_peaks = [Extreme(6, np.abs) for _ in self._sources]
@@ -199,7 +188,10 @@ class Summary:
             values[CLEARANCE_MIN] = outputs.clearances
             self._clearance.add(seconds, outputs.clearances)
         for name, exceeded in self._exceeded.items():
-            exceeded.add(seconds, self._limits.exceeds(name, values[name]))
+            exceeded.add(seconds, self._limits.exceeds(name, values[name]), values[name],
+                         self._limits.bounds[name])
+        if self._motors is not None:
+            self._motors.add(seconds, steps, outputs.motors)
         self._nearest.add(seconds, outputs.determinants[:, None])
         self._condition.add(seconds, outputs.conditions[:, None])
         self._time_to_crossing.add(seconds, outputs.times_to_crossing[:, None])
@@ -232,9 +224,15 @@ class Summary:
     def values(self) -> dict[str, Any]:
         """Return the parts of summary.json that depend on the motion, with finite numbers."""
         self._release()
-        limits = self._exceeded_limits()
+        limits = [entry for name, exceeded in self._exceeded.items()
+                  for entry in exceeded.entries(name, self._legs)]
         not_checked = [name for name in self._limits.bounds if name not in self._exceeded
                        or name == FORCE_MAX and self._without_force]
+        motors = None
+        if self._motors is not None:
+            limits += self._motors.exceeded(self._legs)
+            not_checked += self._motors.not_checked(self._without_force > 0)
+            motors = self._motors.values(self._legs, self._restarts + 1)
         return {
             'quasi_static': self._quasi_static,
             'setpoints': {
@@ -247,6 +245,7 @@ class Summary:
                 'base_unknown_first_at_s': self._base_unknown_at,
                 'jumps': self._jumps, 'jumps_first_at_s': self._jumped_at},
             'legs': {name: self._leg(n) for n, name in enumerate(self._legs)},
+            'motors': motors,
             'limits': limits,
             'limits_not_checked': not_checked,
             'singularity': self._singularity(),
@@ -268,41 +267,31 @@ class Summary:
         length_margins = [*([] if least is None else [shortest - least]),
                           *([] if most is None else [most - longest])]
         found = {
-            'length_min_m': _number(shortest), 'length_max_m': _number(longest),
-            'rate_peak_m_s': _number(rate), 'rate_peak_at_s': _number(self._rate.at[leg]),
-            'force_peak_n': _number(force), 'force_peak_at_s': _number(self._force.at[leg]),
-            'force_rms_n': _number(math.sqrt(squares)),
-            'force_published_peak_n': _number(self._published.values[leg]),
-            'power_peak_w': _number(self._power.values[leg]),
-            'power_peak_at_s': _number(self._power.at[leg]),
-            'power_mean_w': _number(driving - braking),
-            'energy_driving_j': _number(energy_driving) if solved else None,
-            'energy_braking_j': _number(energy_braking) if solved else None,
-            'length_margin_m': _number(min(length_margins)) if length_margins else None,
-            'rate_margin_m_s': None if fastest is None else _number(fastest - abs(rate)),
-            'force_margin_n': None if strongest is None else _number(strongest - abs(force)),
+            'length_min_m': finite(shortest), 'length_max_m': finite(longest),
+            'rate_peak_m_s': finite(rate), 'rate_peak_at_s': finite(self._rate.at[leg]),
+            'force_peak_n': finite(force), 'force_peak_at_s': finite(self._force.at[leg]),
+            'force_rms_n': finite(math.sqrt(squares)),
+            'force_published_peak_n': finite(self._published.values[leg]),
+            'power_peak_w': finite(self._power.values[leg]),
+            'power_peak_at_s': finite(self._power.at[leg]),
+            'power_mean_w': finite(driving - braking),
+            'energy_driving_j': finite(energy_driving) if solved else None,
+            'energy_braking_j': finite(energy_braking) if solved else None,
+            'length_margin_m': finite(min(length_margins)) if length_margins else None,
+            'rate_margin_m_s': None if fastest is None else finite(fastest - abs(rate)),
+            'force_margin_n': None if strongest is None else finite(strongest - abs(force)),
         }
         for (name, angles), bound in zip(self._angles.items(), widest, strict=True):
             key, angle = QUANTITIES[name][0].replace(' ', '_'), angles.values[leg]
-            found |= {f'{key}_max_rad': _number(angle),
-                      f'{key}_max_at_s': _number(angles.at[leg]),
-                      f'{key}_margin_rad': None if bound is None else _number(bound - angle)}
+            found |= {f'{key}_max_rad': finite(angle),
+                      f'{key}_max_at_s': finite(angles.at[leg]),
+                      f'{key}_margin_rad': None if bound is None else finite(bound - angle)}
         clearance = self._clearance.values[leg]
         found |= {
-            'clearance_min_m': _number(clearance),
-            'clearance_min_at_s': _number(self._clearance.at[leg]),
-            'clearance_margin_m': None if nearest is None else _number(clearance - nearest)}
+            'clearance_min_m': finite(clearance),
+            'clearance_min_at_s': finite(self._clearance.at[leg]),
+            'clearance_margin_m': None if nearest is None else finite(clearance - nearest)}
         return found | (dict.fromkeys(_OF_VELOCITY) if self._quasi_static else {})
-
-    def _exceeded_limits(self) -> list[dict[str, Any]]:
-        farthest = dict(zip(LIMITS, (self._shortest, self._longest, self._rate, self._force,
-                                     *self._angles.values(), self._clearance), strict=True))
-        return [{'limit': name, 'leg': self._legs[leg], 'setpoints': int(limit.setpoints[leg]),
-                 'worst': _number(farthest[name].values[leg]),
-                 'bound': float(self._limits.bounds[name][leg]),
-                 'first_at_s': float(limit.first_at[leg])}
-                for name, limit in self._exceeded.items()
-                for leg in np.flatnonzero(limit.setpoints)]
 
     def _singularity(self) -> dict[str, Any]:
         # the leg with the largest force under a unit load
@@ -310,18 +299,18 @@ class Summary:
                         self._unit_load_force.values)
         leg = int(most.argmax())
         return {
-            'determinant_nearest_m3': _number(self._nearest.values[0]),
-            'determinant_nearest_at_s': _number(self._nearest.at[0]),
+            'determinant_nearest_m3': finite(self._nearest.values[0]),
+            'determinant_nearest_at_s': finite(self._nearest.at[0]),
             'crossings': self._crossings.count,
             'crossings_at_s': list(self._crossings.first),
-            'condition_max': _number(self._condition.values[0]),
-            'condition_max_at_s': _number(self._condition.at[0]),
+            'condition_max': finite(self._condition.values[0]),
+            'condition_max_at_s': finite(self._condition.at[0]),
             'unsolved': self._unsolved, 'suppressed': self._suppressed,
-            'time_to_crossing_min_s': None if self._quasi_static else _number(
+            'time_to_crossing_min_s': None if self._quasi_static else finite(
                 self._time_to_crossing.values[0]),
-            'time_to_crossing_min_at_s': None if self._quasi_static else _number(
+            'time_to_crossing_min_at_s': None if self._quasi_static else finite(
                 self._time_to_crossing.at[0]),
-            'unit_load_force_max': _number(most[leg]),
+            'unit_load_force_max': finite(most[leg]),
             'unit_load_force_leg': self._legs[leg] if most[leg] > -np.inf else None,
             'warnings': self._warnings.count,
             'warnings_from_to_s': [list(span) for span in self._warnings.first],
@@ -334,14 +323,9 @@ class Summary:
         rms = np.sqrt(self._source_squares.mean).reshape(-1, 6)
         unknown: dict[str, float | None] = {'peak_n': None, 'rms_n': None}
         return {name: {source: unknown if self._quasi_static and source not in _AT_REST else {
-            'peak_n': _number(self._source_peaks[n].values[leg]), 'rms_n': _number(rms[n, leg])}
+            'peak_n': finite(self._source_peaks[n].values[leg]), 'rms_n': finite(rms[n, leg])}
             for n, source in enumerate(self._sources)}
             for leg, name in enumerate(self._legs)}
-
-
-def _number(value: float) -> float | None:
-    """Return a plain number, None if it is not finite."""
-    return float(value) if math.isfinite(value) else None
 
 
 class _BaseWrench:
@@ -380,6 +364,6 @@ class _BaseWrench:
         numbers = zip(np.sqrt(squares).tolist(), means, self._peaks.values.tolist(),
                       self._peaks.at.tolist(), strict=True)
         return {name: dict(zip(
-            (f'rms_{unit}', f'mean_{unit}', f'peak_{unit}', 'peak_at_s'), map(_number, each),
+            (f'rms_{unit}', f'mean_{unit}', f'peak_{unit}', 'peak_at_s'), map(finite, each),
             strict=True)) for name, unit, each in zip(
                 _BASE_WRENCH, _BASE_UNITS, numbers, strict=True)}

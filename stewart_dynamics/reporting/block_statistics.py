@@ -21,7 +21,9 @@ Apart from rounding, the results do not depend on how the samples are split into
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+import math
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +70,46 @@ class Extreme:
         self._measured = np.where(new, greatest, self._measured)
         self.values = np.where(new, values[row, self._columns], self.values)
         self.at = np.where(new, seconds[row], self.at)
+
+
+class Exceeded:
+    """
+    Number of samples that exceed a limit, the first and the worst of them, of each leg.
+
+    Parameters
+    ----------
+    minimum : bool
+        Values below the limit exceed it; else larger magnitudes do.
+
+    """
+
+    def __init__(self, minimum: bool = False) -> None:
+        self._minimum = minimum
+        self._samples = np.zeros(6, dtype=np.int64)
+        self._excess: Array = np.full(6, -np.inf)
+        self._first_at, self._worst, self._bounds = (np.full(6, np.nan) for _ in range(3))
+
+    def add(self, seconds: Array, exceeding: Flags, values: Array, bounds: Array) -> None:
+        """Add values (N, 6) at times (N,) [s], where they exceed, and bounds (N, 6) or (6,)."""
+        if not exceeding.any():
+            return
+        new = exceeding.any(axis=0) & (self._samples == 0)
+        self._first_at[new] = seconds[exceeding.argmax(axis=0)][new]
+        self._samples += exceeding.sum(axis=0)
+        excess = np.where(
+            exceeding, bounds - values if self._minimum else np.abs(values) - bounds, -np.inf)
+        worst = excess.argmax(axis=0), np.arange(6)
+        more = excess[worst] > self._excess
+        for kept, found in ((self._excess, excess), (self._worst, values),
+                            (self._bounds, np.broadcast_to(bounds, values.shape))):
+            kept[more] = found[worst][more]
+
+    def entries(self, limit: str, legs: Sequence[str]) -> list[dict[str, Any]]:
+        """Return the legs that exceed the limit, for summary.json."""
+        return [{'limit': limit, 'leg': legs[leg], 'setpoints': int(self._samples[leg]),
+                 'worst': finite(self._worst[leg]), 'bound': float(self._bounds[leg]),
+                 'first_at_s': float(self._first_at[leg])}
+                for leg in np.flatnonzero(self._samples)]
 
 
 class Integral:
@@ -161,6 +203,11 @@ class Warnings:
             elif not warnings[at] and self.first[-1][1] is None:
                 self.first[-1][1] = float(seconds[at])
         self._on = bool(warnings[-1])
+
+
+def finite(value: float | None) -> float | None:
+    """Return a plain number, None if it is not known or not finite."""
+    return float(value) if value is not None and math.isfinite(value) else None
 
 
 def with_nan(values: Array) -> Flags:

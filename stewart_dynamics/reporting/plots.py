@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
 from stewart_dynamics.mechanics.limits import (
     ANGLES as ANGLES_OF, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN,
-    OF_JOINTS, VELOCITY_MAX)
+    OF_JOINTS, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import JOINT_ANGLES
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.colors import AXIS_COLORS, LEG_COLORS, ROLES
@@ -51,7 +51,9 @@ BASE_SECTION = 'base_wrench'
 PLOT_OF = {
     CLEARANCE_MIN: 'clearance',
     LENGTH_MIN: 'lengths', LENGTH_MAX: 'lengths', VELOCITY_MAX: 'rates', FORCE_MAX: 'forces',
-    **{name: name.removeprefix('limits.').removesuffix('_max') for name in OF_JOINTS}}
+    **{name: name.removeprefix('limits.').removesuffix('_max') for name in OF_JOINTS},
+    TORQUE_MAX: 'motor_torques', TORQUE_SPEED: 'motor_torques', SPEED_MAX: 'motor_speeds',
+    TEMPERATURE_RISE_MAX: 'temperature_rises'}
 
 # The channels of a comparison with measured forces, after those of the motion.
 MEASURED, COMPUTED, RESIDUAL, WRENCH = (slice(n, n + 6) for n in range(0, 24, 6))
@@ -60,7 +62,7 @@ COMPARED = 24
 
 def channels_of(parameters: Parameters) -> int:
     """Return the number of channels of a sample."""
-    stop: int = clearances_of(parameters).stop
+    stop: int = motors_of(parameters).stop
     return stop
 
 
@@ -75,6 +77,17 @@ def clearances_of(parameters: Parameters) -> slice:
     """Return the channels of the clearances between the legs; empty without limit."""
     first: int = joint_angles_of(parameters).stop
     return slice(first, first + 6 * (parameters[CLEARANCE_MIN] is not None))
+
+
+# Channels of the motors: torques, speeds, temperature rises, power of the bus.
+_TORQUES, _SPEEDS, _RISES = range(0, 18, 6)
+_BUS_POWER, _OF_MOTORS = 18, 19
+
+
+def motors_of(parameters: Parameters) -> slice:
+    """Return the channels of the motors; empty without ``drive.*``."""
+    first: int = clearances_of(parameters).stop
+    return slice(first, first + _OF_MOTORS * bool(parameters.drives))
 
 
 class Curve(NamedTuple):
@@ -168,6 +181,7 @@ def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
              'demanded by the motion, + pushes',
              _bounds('force_max', p['limits.force_max'], both=True), spikes=True),
         *(of_rates if velocities_known else ()),
+        *(_of_motors(p, velocities_known) if p.drives else ()),
         Plot('force_breakdown', '', 'Leg force by source', 'N', {
             leg: [Curve('sum', ROLES['zero'], FORCES.start + n, width=4.5),
                   *(Curve(source, _SOURCE_COLORS[source], BREAKDOWN.start + 6 * k + n)
@@ -244,6 +258,26 @@ def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
         Plot('external_moment', '', 'External moment', 'N m',
              _of_axes(_last(wrench), 'M x', 'M y', 'M z'),
              "about the platform's origin, base axes", contacts=True, spikes=True)]
+
+
+def _of_motors(p: Parameters, velocities_known: bool) -> Iterator[Plot]:
+    first, joints = motors_of(p).start, p['joints']
+    torques, speeds, rises = (
+        _of_legs(joints, slice(first + n, first + n + 6)) for n in (_TORQUES, _SPEEDS, _RISES))
+    yield Plot(PLOT_OF[TORQUE_MAX], '', 'Torques of the motors', 'N m', torques,
+               'demanded by the motion, + extends',
+               _bounds('torque_max', p[TORQUE_MAX], both=True), spikes=True)
+    if velocities_known:
+        yield Plot(PLOT_OF[SPEED_MAX], '', 'Speeds of the motors', 'rad/s', speeds, '+ extends',
+                   _bounds('speed_max', p[SPEED_MAX], both=True))
+        if p['drive.resistance'] is not None:
+            yield Plot('bus_power', '', 'Power of the bus', 'W', {
+                '': [Curve('bus', _BLACK, first + _BUS_POWER)]},
+                'electrical, of all motors; − flows back', spikes=True)
+    if p['drive.thermal_resistance'] is not None:
+        yield Plot(PLOT_OF[TEMPERATURE_RISE_MAX], '', 'Temperature rises of the windings', 'K',
+                   rises, 'above ambient, from ambient at the beginning',
+                   _bounds('temperature_rise_max', p[TEMPERATURE_RISE_MAX]))
 
 
 def _of_legs(joints: Sequence[str], channels: slice) -> dict[str, list[Curve]]:

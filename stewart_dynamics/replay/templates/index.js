@@ -51,7 +51,7 @@ const rows = fleet.rows.map((cells, n) => ({
 // Names without the folder that all of them are in; a narrow column cuts their beginnings.
 const bags = fleet.rows.map((cells) => cells[at.bag]);
 let folder = bags.length > 1 ? bags[0].slice(0, bags[0].lastIndexOf('/') + 1) : '';
-while (folder && !bags.every((bag) => bag.startsWith(folder))) folder = folder.slice(0, folder.lastIndexOf('/', folder.length - 2) + 1);
+while (folder && !bags.every((bag) => bag.startsWith(folder))) folder = folder.slice(0, folder.slice(0, -1).lastIndexOf('/') + 1);
 const nameOf = (cells) => cells[at.bag].slice(folder.length);
 
 function lineOf(row) {
@@ -193,4 +193,5 @@ const force = most('force_worst_n', (a, b) => a > b);
 if (force) total('worst force', `${cellText(force.value, at.force_worst_n)} N`, `${force.row.cells[at.force_worst_leg]}, ${nameOf(force.row.cells)}`);
 const nearest = most('determinant_nearest_m3', (a, b) => a < b);
 if (nearest) total('det(J) nearest 0', `${cellText(nearest.value, at.determinant_nearest_m3)} m³`, nameOf(nearest.row.cells));
+if (fleet.motor) total('motor needed', fleet.motor, 'without bags with singularity warnings');
 show();

@@ -1,0 +1,194 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Speed and torque of the motors in a bag, drawn against what the motors can deliver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.mechanics.drives.motors import Motors
+from stewart_dynamics.mechanics.limits import SPEED_MAX, TORQUE_MAX, TORQUE_SPEED
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.motor_loads import CONTINUOUS
+from stewart_dynamics.reporting.vector_picture import Chart, Picture
+from stewart_dynamics.setpoints.motor_step import OF_DRIVES
+
+# Cells of each motor: magnitude of the speed, torque.
+_CELLS = 128
+_FINEST = -40  # exponent of two of the smallest cell
+_WIDTH, _HEIGHT = 400.0, 280.0
+_FRAME = (46.0, 26.0, 344.0, 212.0)
+# Opacities of cells with few and many samples.
+_SHADES = (0.35, 0.6, 0.85)
+
+
+class OperatingPoints:
+    """
+    How often each motor is at each speed and torque, counted in a grid that grows with them.
+
+    Torque is positive where the motor drives its leg, negative where it brakes. The sizes of the
+    cells are powers of two: the result does not depend on how samples are split into blocks.
+    """
+
+    def __init__(self) -> None:
+        self._counts: Integers = np.zeros((6, _CELLS, _CELLS), dtype=np.int64)
+        self._exponents = [_FINEST, _FINEST]
+
+    def add(self, rows: Array) -> None:
+        """Add rows of motors (N, MOTOR_ROW)."""
+        motors = Motors.of_rows(rows[:, OF_DRIVES])
+        torques, speeds = motors.breakaway_torques, np.abs(motors.speeds)
+        torques = np.where(motors.speeds == 0.0, np.abs(torques),
+                           torques * np.sign(motors.speeds))
+        known = np.isfinite(torques) & np.isfinite(speeds)
+        if not known.any():
+            return
+        self._grow(0, float(speeds[known].max()) / _CELLS)
+        self._grow(1, float(np.abs(torques[known]).max()) / (_CELLS // 2))
+        cells = [np.floor(np.ldexp(each, -exponent)[known]).astype(np.int64)
+                 for each, exponent in zip((speeds, torques), self._exponents, strict=True)]
+        legs = np.nonzero(known)[1]
+        flat = (legs * _CELLS + cells[0]) * _CELLS + cells[1] + _CELLS // 2
+        self._counts += np.bincount(flat, minlength=self._counts.size).reshape(self._counts.shape)
+
+    def _grow(self, axis: int, size: float) -> None:
+        """Merge cells in pairs until they are larger than a size."""
+        wanted = max(math.frexp(size)[1], _FINEST)
+        while self._exponents[axis] < wanted:
+            counts = np.moveaxis(self._counts, axis + 1, 2)
+            pairs = counts[..., ::2] + counts[..., 1::2]
+            first = 0 if axis == 0 else _CELLS // 4
+            counts[...] = 0
+            counts[..., first:first + _CELLS // 2] = pairs
+            self._exponents[axis] += 1
+
+    def cells(self, leg: int) -> tuple[Array, Integers]:
+        """Return lower corners and sizes (K, 4) [rad/s, N m] of a motor's cells, and counts."""
+        at = np.argwhere(self._counts[leg])
+        sizes = np.ldexp(1.0, self._exponents)
+        corners = (at - [0, _CELLS // 2]) * sizes
+        return (np.concatenate([corners, np.broadcast_to(sizes, corners.shape)], axis=1),
+                self._counts[leg][tuple(at.T)])
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Return the largest speed and torque of all cells [rad/s, N m]."""
+        corners = np.concatenate([self.cells(leg)[0] for leg in range(6)])
+        if not len(corners):
+            return 0.0, 0.0
+        far = np.maximum(np.abs(corners[:, :2]), np.abs(corners[:, :2] + corners[:, 2:]))
+        speed, torque = far.max(axis=0).tolist()
+        return speed, torque
+
+
+class Deliverable:
+    """Largest torque of a motor over its speed, by ``drive.*``."""
+
+    def __init__(self, parameters: Parameters, leg: int) -> None:
+        self._curve = parameters[TORQUE_SPEED]
+        self.torque = _of_leg(parameters, TORQUE_MAX, leg)
+        self.speed = _of_leg(parameters, SPEED_MAX, leg)
+        if self._curve is not None:
+            self.torque = min(self.torque, float(self._curve[:, 1].max()))
+            self.speed = min(self.speed, float(self._curve[-1, 0]))
+
+    def at(self, speeds: Array) -> Array:
+        """Return the largest torques at speeds (N,); zero beyond the largest speed."""
+        torques = np.full(speeds.shape, self.torque)
+        if self._curve is not None:
+            torques = np.minimum(torques, np.interp(speeds, *self._curve.T))
+        return np.where(speeds > self.speed, 0.0, torques)
+
+    def outline(self, end: float) -> Array:
+        """Return the points (N, 2) of its curve up to a speed, and down to zero at its end."""
+        last = min(self.speed, end)
+        speeds: Array = np.linspace(0.0, last, 257, dtype=np.float64)
+        if self._curve is not None:
+            speeds = np.union1d(speeds, self._curve[self._curve[:, 0] < last, 0])
+        points: Array = np.column_stack([speeds, self.at(speeds)])
+        return points if last < self.speed else np.vstack([points, [last, 0.0]])
+
+
+def _of_leg(parameters: Parameters, name: str, leg: int) -> float:
+    return math.inf if parameters[name] is None else float(parameters[name][leg])
+
+
+def motor_charts(points: OperatingPoints, parameters: Parameters,
+                 loads: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """
+    Return a picture (SVG) of each motor, all with the same axes.
+
+    Parameters
+    ----------
+    points : OperatingPoints
+        Where the motors have been.
+    parameters : Parameters
+        Parameters of the hexapod.
+    loads : mapping
+        ``motors.legs`` of summary.json.
+
+    """
+    limits = [Deliverable(parameters, leg) for leg in range(6)]
+    speed, torque = points.extent
+    speed = 1.06 * _largest([speed, *(limit.speed for limit in limits)])
+    torque = 1.08 * _largest([torque, *(limit.torque for limit in limits)])
+    return {name: _chart(points, leg, name, limits[leg], parameters, load, (speed, torque)).svg()
+            for leg, (name, load) in enumerate(loads.items())}
+
+
+def _largest(values: Sequence[float]) -> float:
+    return max(each for each in values if math.isfinite(each)) or 1.0
+
+
+def _chart(points: OperatingPoints, leg: int, name: str, limit: Deliverable,
+           parameters: Parameters, load: Mapping[str, Any], largest: tuple[float, float],
+           ) -> Picture:
+    picture = Picture(_WIDTH, _HEIGHT, f'Torque over speed of {name}')
+    speed, torque = largest
+    chart = Chart(picture, _FRAME, (0.0, speed), (-torque, torque))
+    outline = limit.outline(speed)
+    mirrored = outline[::-1] * [1.0, -1.0]
+    picture.path(chart.at(np.clip(np.vstack([outline, mirrored]), -torque, np.inf).clip(
+        None, [speed, torque])), closed=True, css='deliverable')
+    chart.draw_axes('speed [rad/s]', 'torque [N m]')
+    cells, counts = points.cells(leg)
+    # A cell is beyond if all of it is.
+    lower = np.where(cells[:, 1] < 0.0, -cells[:, 1] - cells[:, 3], cells[:, 1])
+    beyond = lower > limit.at(cells[:, 0]) * (1.0 + 1e-9)
+    shade = np.minimum(len(_SHADES) * np.log1p(counts) / np.log1p(counts.max(initial=1)),
+                       len(_SHADES) - 1).astype(int)
+    for n, opacity in enumerate(_SHADES):
+        for which, css in ((~beyond, f'points leg{leg}'), (beyond, 'points beyond')):
+            _draw_cells(picture, chart, cells[which & (shade == n)], css, opacity)
+    picture.path(chart.at(outline), chart.at(mirrored), css='curve')
+    continuous = parameters[CONTINUOUS]
+    if continuous is not None:
+        for level in (continuous[leg], -continuous[leg]):
+            picture.line(*chart.at([[0.0, level], [speed, level]]), css='continuous')
+    if load['speed_mean_rad_s'] is not None and load['torque_rms_n_m'] is not None:
+        at = chart.at([load['speed_mean_rad_s'], load['torque_rms_n_m']])
+        picture.path(at + [[0.0, -6.0], [6.0, 0.0], [0.0, 6.0], [-6.0, 0.0]], closed=True,
+                     css='rms')
+    return picture
+
+
+def _draw_cells(picture: Picture, chart: Chart, cells: Array, css: str, opacity: float) -> None:
+    corners = cells[:, None, :2] + cells[:, None, 2:] * [[0, 0], [1, 0], [1, 1], [0, 1]]
+    picture.path(*chart.at(corners), closed=True, css=css, fill_opacity=opacity)

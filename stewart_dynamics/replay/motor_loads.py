@@ -1,0 +1,180 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The loads of the motors in a bag: peaks, RMS, heat, power of their common bus, and limits.
+
+Samples are added block by block and are not kept. docs/summary.md defines each number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+import math
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
+from stewart_dynamics.mechanics.drives.motors import Motors
+from stewart_dynamics.mechanics.limits import (
+    CLIPPED, OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reporting.block_statistics import Exceeded, Extreme, finite, Integral
+from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
+
+MARGIN = 1.2
+"""Factor on torques and speed of the motor that is needed."""
+CONTINUOUS = 'drive.torque_continuous'
+_OF_VELOCITY = TORQUE_SPEED, SPEED_MAX
+# Loads that a motor must bear, by the key of the motor that is needed.
+_NEEDED = {'torque_continuous_n_m': 'torque_rms_n_m', 'torque_peak_n_m': 'torque_peak_n_m',
+           'speed_rad_s': 'speed_peak_rad_s'}
+
+
+class MotorLoads:
+    """
+    The loads of the motors of a hexapod.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        With ``drive.*``.
+    quasi_static : bool
+        Only poses are known: values that depend on velocities are None, not zero.
+
+    """
+
+    def __init__(self, parameters: Parameters, quasi_static: bool) -> None:
+        self._parameters, self._quasi_static = parameters, quasi_static
+        self._limits = MotorLimits(parameters)
+        self._exceeded = {limit: Exceeded() for limit in OF_MOTORS if parameters[limit] is not None
+                          and not (quasi_static and limit in _OF_VELOCITY)}
+        self._torque, self._speed, self._current = (Extreme(6, np.abs) for _ in range(3))
+        self._margin = Extreme(6, np.negative)
+        self._rise = Extreme(6, np.positive)
+        self._drawn, self._regenerated = Extreme(1, np.positive), Extreme(1, np.negative)
+        # squares of the torques; magnitudes of the speeds
+        self._means = Integral(12)
+        # copper heat; power drawn; power regenerated
+        self._electrical = Integral(8)
+
+    def add(self, seconds: Array, steps: Array, rows: Array) -> None:
+        """
+        Add a block of samples.
+
+        Parameters
+        ----------
+        seconds, steps : (N,)
+            Time since the first setpoint of the bag, and since the sample before [s].
+        rows : (N, MOTOR_ROW)
+            Their motors.
+
+        """
+        motors, rises = Motors.of_rows(rows[:, OF_DRIVES]), rows[:, RISES]
+        with np.errstate(over='ignore', invalid='ignore'):
+            power = motors.power.sum(axis=1, keepdims=True)
+            self._means.add(steps, np.concatenate(
+                [motors.torques ** 2, np.abs(motors.speeds)], axis=1))
+            self._electrical.add(steps, np.concatenate(
+                [motors.copper_heat, np.maximum(power, 0.0), np.maximum(-power, 0.0)], axis=1))
+            self._margin.add(seconds, motors.margins)
+        self._torque.add(seconds, motors.breakaway_torques)
+        self._speed.add(seconds, motors.speeds)
+        self._current.add(seconds, motors.currents)
+        self._rise.add(seconds, rises)
+        self._drawn.add(seconds, power)
+        self._regenerated.add(seconds, power)
+        checked = self._limits.excesses(rows[:, OF_DRIVES], rises)
+        for limit, exceeded in self._exceeded.items():
+            values, bounds = checked[limit]
+            exceeded.add(seconds, exceeds(values, bounds), values, bounds)
+
+    def not_checked(self, without_forces: bool) -> list[str]:
+        """Return the limits that need velocities, or forces where some are not known."""
+        return [limit for limit in OF_MOTORS if self._parameters[limit] is not None and (
+            limit not in self._exceeded or without_forces and limit in CLIPPED)]
+
+    def exceeded(self, legs: Sequence[str]) -> list[dict[str, Any]]:
+        """Return the entries of ``limits`` in summary.json."""
+        return [entry for limit, exceeded in self._exceeded.items()
+                for entry in exceeded.entries(limit, legs)]
+
+    def values(self, legs: Sequence[str], cycles: int) -> dict[str, Any]:
+        """Return the part of summary.json, for a motion of a number of cycles."""
+        loads = {name: self._motor(leg) for leg, name in enumerate(legs)}
+        return {'legs': loads, 'bus': self._bus(cycles), 'needed': needed(
+            {key: load[key] for key in _NEEDED.values()} for load in loads.values())}
+
+    def _motor(self, leg: int) -> dict[str, float | None]:
+        p = self._parameters
+        limited = p[TORQUE_MAX] is not None or p[TORQUE_SPEED] is not None
+        continuous, fastest = (None if p[name] is None else float(p[name][leg])
+                               for name in (CONTINUOUS, SPEED_MAX))
+        rms, heat = math.sqrt(self._means.mean[leg]), self._electrical.mean[leg]
+        speed, constant = self._speed.values[leg], p['drive.torque_constant']
+        steady = math.nan if p['drive.thermal_resistance'] is None else (
+            heat * p['drive.thermal_resistance'][leg])
+        found = {
+            'torque_peak_n_m': self._torque.values[leg], 'torque_peak_at_s': self._torque.at[leg],
+            'torque_rms_n_m': rms,
+            'torque_margin_n_m': self._margin.values[leg] if limited else None,
+            'torque_margin_at_s': self._margin.at[leg] if limited else None,
+            'torque_continuous_margin_n_m': None if continuous is None else continuous - rms,
+            'speed_peak_rad_s': speed, 'speed_peak_at_s': self._speed.at[leg],
+            'speed_mean_rad_s': self._means.mean[6 + leg],
+            'speed_margin_rad_s': None if fastest is None else fastest - abs(speed),
+            'current_peak_a': self._current.values[leg],
+            'current_rms_a': None if constant is None else rms / constant[leg],
+            'temperature_rise_max_k': self._rise.values[leg],
+            'temperature_rise_max_at_s': self._rise.at[leg],
+            'temperature_rise_steady_k': steady,
+            'temperature_rise_margin_k': (
+                None if p[TEMPERATURE_RISE_MAX] is None
+                else p[TEMPERATURE_RISE_MAX][leg] - self._rise.values[leg])}
+        if self._quasi_static:
+            found |= {key: None for key in found if 'speed' in key}
+        return {key: finite(value) for key, value in found.items()}
+
+    def _bus(self, cycles: int) -> dict[str, float | None] | None:
+        if self._quasi_static or not math.isfinite(self._drawn.values[0]):
+            return None
+        *_, drawn, regenerated = self._electrical.values.tolist()
+        *_, mean_drawn, mean_regenerated = self._electrical.mean.tolist()
+        back = self._regenerated.values[0] < 0.0
+        return {
+            'power_peak_w': finite(self._drawn.values[0]),
+            'power_peak_at_s': finite(self._drawn.at[0]),
+            'regenerated_peak_w': finite(-self._regenerated.values[0]) if back else 0.0,
+            'regenerated_peak_at_s': finite(self._regenerated.at[0]) if back else None,
+            'power_mean_w': finite(mean_drawn - mean_regenerated),
+            'energy_drawn_j': drawn, 'energy_regenerated_j': regenerated,
+            'cycles': cycles, 'energy_per_cycle_j': (drawn - regenerated) / cycles}
+
+
+def needed(loads: Iterable[Mapping[str, Any]]) -> dict[str, float | None]:
+    """
+    Return the smallest motor that bears loads with MARGIN.
+
+    Parameters
+    ----------
+    loads : iterable of mapping
+        ``torque_rms_n_m``, ``torque_peak_n_m`` and ``speed_peak_rad_s`` of each; None: not known.
+
+    """
+    every = list(loads)
+    return {'margin': MARGIN, **{
+        key: max((MARGIN * abs(load[of]) for load in every if load[of] is not None), default=None)
+        for key, of in _NEEDED.items()}}
