@@ -29,7 +29,7 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Parameters, StewartPlatform
 from test_dynamics_node import ERROR, MOVING, OK
-from test_simulator_node import begin, SIMULATOR, STEPPED  # noqa: F401
+from test_simulator_node import begin, SIMULATOR, stamp_of, STEPPED  # noqa: F401
 
 DRIVES = {
     'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01, 'drive.gear_ratio': 2.0,
@@ -93,8 +93,8 @@ def test_the_simulator_takes_torques_and_gives_motor_states(
     from stewart_dynamics import Motion
     torques = platform.motors(Motion([home.x, home.y, home.z], np.eye(3))).torques
     simulator.step(torques)
-    simulator.step(2.0 * torques)
-    simulator.until(lambda: states, 'motor states have come')
+    stamp = simulator.step(2.0 * torques)
+    simulator.until(lambda: states and stamp_of(states[-1]) == stamp, 'motor states have come')
     state = deserialize_message(states[-1], JointState)
     assert state.name[0] == 'leg_1_motor'
     np.testing.assert_allclose(state.effort, 2.0 * torques, rtol=1e-12)
