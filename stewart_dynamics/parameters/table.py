@@ -361,16 +361,22 @@ class Parameters(ParameterSet):
 
     def _check_drives(self, source: str) -> None:
         """Check drive.*, and complete it and actuator.reflected_mass."""
-        self.drives = tuple(name for name in self.given
-                            if name.startswith('drive.') and self[name] is not None)
         lead, ratio = self['actuator.screw_lead'], self['drive.gear_ratio']
-        if self.drives and lead is None:
-            raise ParameterError(
-                f'{source}: actuator.screw_lead: not set: needed by {self.drives[0]}')
+        with np.errstate(over='ignore'):
+            driven_back = 2.0 - 1.0 / self['drive.efficiency']
+        given = tuple(name for name in self.given
+                      if name.startswith('drive.') and self[name] is not None)
+        self.drives = () if lead is None else given
+        # A whole set of parameters, as dict(parameters), gives the defaults, too.
+        defaults = {'drive.back_driving_efficiency': driven_back}
+        for name in given if lead is None else ():
+            default = defaults.get(name, self.table[name].default)
+            if np.size(default) == 0 or not np.all(self[name] == default):
+                raise ParameterError(
+                    f'{source}: actuator.screw_lead: not set: needed by {name}')
         if self['drive.back_driving_efficiency'] is None:
-            with np.errstate(over='ignore'):
-                self._set('drive.back_driving_efficiency', 2.0 - 1.0 / self['drive.efficiency'])
-        if any(name in self.given for name in DRIVE_INERTIAS):
+            self._set('drive.back_driving_efficiency', driven_back)
+        if any(np.any(self[name] > 0.0) for name in DRIVE_INERTIAS):
             with np.errstate(all='ignore'):
                 follows = (2.0 * math.pi * ratio / lead) ** 2 * (
                     self[MOTOR_INERTIA] + self[SCREW_INERTIA] / ratio ** 2)
