@@ -22,6 +22,7 @@ from html.parser import HTMLParser
 import json
 import math
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -33,11 +34,13 @@ from referees import random_direction, rng, rotation_about
 
 from stewart_dynamics import (
     BaseMotion, Capability, Motion, Parameters, Pose, PoseError, StewartPlatform)
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import main
 from stewart_dynamics.datasheet.datasheet import soft_legs
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, motion_verdict, rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.figures import both_ways, down, LINEAR
+from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
 from stewart_dynamics.datasheet.payloads import Payloads
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS
@@ -92,6 +95,8 @@ def test_the_files_are_there_and_name_what_limits(sheet: Path, figures: dict[str
     assert figures['motion']['factor'] > 1.0
     assert figures['payload']['any_orientation'] < figures['payload']['value']
     assert figures['stiffness']['worst']['frequencies'][0] < figures['stiffness']['frequencies'][0]
+    page = (sheet / 'datasheet.html').read_text()
+    assert page.count(f'smallest at {figures["worst"]["poses"]} poses') == 2
 
 
 def test_travel_is_about_the_pivot_and_the_table_ends_at_the_limits(
@@ -455,6 +460,51 @@ def test_ranges_that_look_equal_are_written_once() -> None:
         {'x-': {'value': low}, 'x+': {'value': high}}, 'x', unit)
     assert write(0.1, 0.10001) == '±100.0'
     assert write(0.1, 0.2) == '−100.0\u00a0… +200.0'
+
+
+@pytest.mark.parametrize('gravity', [
+    (0.0, 0.0, -9.8), (0.0, 0.0, 9.8), (5.0, 0.0, -8.0), (0.0, 9.8, 0.0), (-9.8, 0.0, 0.0),
+    (1.0, 2.0, 3.0)])
+def test_up_in_a_drawing_is_opposite_to_gravity(gravity: tuple[float, float, float]) -> None:
+    axes = upright(np.array(gravity))
+    assert np.allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert np.allclose(axes @ gravity, [0.0, 0.0, -np.linalg.norm(gravity)])
+
+
+def _corners(svg: str, plate: str) -> Array:
+    """Return the corners (N, 2) of a plate in a picture, from its upper left corner [px]."""
+    (path,) = re.findall(rf'<path d="([^"]*)" class="plate {plate}"', svg)
+    return np.array(re.findall(r'-?[\d.]+', path), dtype=float).reshape(-1, 2)
+
+
+def test_a_hanging_hexapod_is_drawn_below_its_base_and_seen_from_below() -> None:
+    home = StewartPlatform(PARAMETERS).home_pose()
+    hanging = PARAMETERS.replaced({'gravity': [0.0, 0.0, 9.80665]})
+    for p, name in ((PARAMETERS, 'Top view'), (hanging, 'View from below')):
+        drawing = Drawing(p, home)
+        front, plan = drawing.front().svg(), drawing.top().svg()
+        below = _corners(front, 'moving')[:, 1].min() > _corners(front, 'base')[:, 1].max()
+        assert below is np.True_ if p is hanging else np.False_
+        assert name in plan
+        assert plan.index('class="plate base"') < plan.index('class="plate moving"')
+        assert '>1181<' in front
+    tilted = PARAMETERS.replaced({'gravity': [9.80665, 0.0, 0.0]})
+    assert '>1181<' not in Drawing(tilted, home).front().svg()  # z is horizontal
+
+
+def test_plates_are_drawn_with_their_outlines_to_scale() -> None:
+    def square(half: float) -> list[float]:
+        return [half, half, 0.0, -half, half, 0.0, -half, -half, 0.0, half, -half, 0.0]
+
+    p = PARAMETERS.replaced({
+        'geometry.base_outline': square(1.5), 'geometry.platform_outline': square(0.5)})
+    plan = Drawing(p, StewartPlatform(p).home_pose()).top().svg()
+    base, moving = (np.ptp(_corners(plan, name), axis=0) for name in ('base', 'moving'))
+    assert base[0] == pytest.approx(base[1], abs=0.1)
+    assert base == pytest.approx(3.0 * moving, abs=0.2)
+    front = Drawing(p, StewartPlatform(p).home_pose()).front().svg()
+    assert np.ptp(_corners(front, 'base')[:, 0]) == pytest.approx(3.0 * moving[0], rel=0.2)
 
 
 def test_hull_and_ticks() -> None:

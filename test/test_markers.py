@@ -244,6 +244,18 @@ def test_plates_and_balls_are_at_the_joints(parameters: Parameters, to: Setpoint
         assert np.allclose(areas.sum(axis=0), 0.0, atol=1e-12 * np.abs(areas).sum())
 
 
+def test_plates_have_their_outlines() -> None:
+    outline = np.array([[1.0, 1.0, 0.1], [-1.0, 1.0, 0.1], [-2.0, -1.0, 0.1], [1.0, -1.0, 0.1]])
+    drawn = picture(HEXAPOD.replaced({
+        'geometry.base_outline': outline, 'geometry.platform_outline': 0.5 * outline}), HOME)
+    for name, corners in (('base', outline), ('platform', 0.5 * outline + HOME.motion[:3])):
+        at = points(drawn[name, 0])
+        assert len(at) == 12 * len(corners)
+        distances = np.linalg.norm((at[:, None] - corners)[..., :2], axis=-1)
+        assert (np.isclose(distances, 0.0, atol=1e-12).sum(axis=0) >= 2).all()
+        assert at.mean(axis=0)[2] == pytest.approx(corners[0, 2])
+
+
 def test_the_platforms_axes_are_those_of_its_frame() -> None:
     axes = points(picture(HEXAPOD, SINGULAR)['platform', 2]).reshape(3, 2, 3)
     assert np.allclose(axes[:, 0], SINGULAR.motion[:3])

@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Drawings of the hexapod to scale: front, top and oblique view."""
+"""
+Drawings of the hexapod to scale: from the front, from above or below, and oblique.
+
+It is drawn as it stands or hangs: up is opposite to gravity.
+"""
 
 from __future__ import annotations
 
@@ -23,17 +27,24 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
+from stewart_dynamics.parameters.table import BASE_OUTLINE, Parameters, PLATFORM_OUTLINE
 from stewart_dynamics.reporting.vector_picture import hull, Picture, ticks
 
 # Radii of parts without a given one, relative to the hexapod's size, and the part of a retracted
 # leg that its cylinder takes.
 _CYLINDER, _PISTON, _OF_LEG = 0.028, 0.017, 0.62
 _PLATE = 0.022  # half of a plate's thickness, relative to the size
+# Plates through joints are larger than these; plates with an outline are drawn as given.
+_RIM = 1.06
+_TRIAD = 22.0  # length of an axis [px]
+_VERTICAL = 0.9999  # cosine of the largest angle of an axis that counts as vertical
+# Axes that are shorter in a view, as parts of their length, are not drawn.
+_SEEN = 0.72
 
 
 class View(NamedTuple):
-    """Directions in the base frame that are to the right and upward in a drawing."""
+    """Directions, in axes whose third is up, that are to the right and upward in a drawing."""
 
     right: tuple[float, float, float]
     up: tuple[float, float, float]
@@ -58,7 +69,8 @@ class Margins(NamedTuple):
     left: float = 16.0
 
 
-FRONT, TOP = View((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), View((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+FRONT = View((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+TOP, BOTTOM = View((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), View((1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 _TURN, _TILT = np.radians(28.0), np.radians(20.0)
 OBLIQUE = View(
     (np.cos(_TURN), np.sin(_TURN), 0.0),
@@ -81,43 +93,53 @@ class Drawing:
     """
 
     def __init__(self, parameters: Parameters, pose: Pose, ends: tuple[Pose, ...] = ()) -> None:
-        self._p, self._pose, self._ends = parameters, pose, ends
-        self._base = np.asarray(parameters['geometry.base_joints'])
+        self._p, self._poses = parameters, (pose, *ends)
+        self._upright = upright(parameters['gravity'])
         self._arms = np.asarray(parameters['geometry.platform_joints'])
-        self._platform = self._placed(pose)
+        self._base = np.asarray(parameters['geometry.base_joints']) @ self._upright.T
+        self._platform = self._placed(pose, self._arms)
         everything = np.concatenate([self._base, self._platform])
         self._size = float(np.linalg.norm(np.ptp(everything, axis=0))) / 2.0
+        base = parameters[BASE_OUTLINE]
+        self._base_plate = (self._plate(self._base) if base is None else base @ self._upright.T)
+        below = self._platform[:, 2].mean() < self._base[:, 2].mean() - _PLATE * self._size
+        self._plan = BOTTOM if below else TOP
 
     def front(self) -> Picture:
-        """Return the front view, along y, with heights."""
+        """Return the front view, with heights along z where that is vertical."""
         picture = Picture(340.0, 360.0, 'Front view of the hexapod, to scale')
         place = self._fitted(FRONT, picture, (FRONT, TOP), Margins())
-        for end in self._ends:
-            outline = place(FRONT.of(self._plate(self._placed(end), end.rotation)))
-            picture.path(hull(outline), closed=True, css='ghost')
+        for end in self._poses[1:]:
+            picture.path(hull(place(FRONT.of(self._moving_plate(end)))), closed=True, css='ghost')
         self._draw(picture, FRONT, place)
-        self._heights(picture, place)
+        if abs(self._upright[2, 2]) > _VERTICAL:
+            self._heights(picture, place)
         picture.text([8, 18], 'Front view', css='view')
-        _axes(picture, [30.0, picture.height - 22.0], 'X', 'Z')
+        self._axes(picture, FRONT)
         return picture
 
     def top(self) -> Picture:
-        """Return the view from above, with the numbers of the legs."""
-        picture = Picture(340.0, 360.0, 'Top view of the hexapod, to scale')
-        place = self._fitted(TOP, picture, (FRONT, TOP), Margins(left=48.0))
+        """Return the view from the platform's side, with the numbers of the legs."""
+        name = 'View from below' if self._plan is BOTTOM else 'Top view'
+        picture = Picture(340.0, 360.0, f'{name} of the hexapod, to scale')
+        place = self._fitted(self._plan, picture, (FRONT, TOP), Margins(left=48.0))
         for joints in (self._base, self._platform):
             diameter = circle_of(joints)
             if diameter is not None:
-                picture.circle(place(TOP.of(joints.mean(axis=0))), diameter / 2.0 * place.scale,
-                               css='pitch')
-        self._draw(picture, TOP, place)
-        center = place(TOP.of(self._base.mean(axis=0)))
-        for n, joint in enumerate(place(TOP.of(self._base))):
+                center = joints.mean(axis=0)
+                around = np.linspace(0.0, 2.0 * np.pi, 73)[:-1]
+                circle = np.stack([np.cos(around), np.sin(around)], axis=1) @ level_axes(
+                    joints - center)[:2]
+                picture.path(place(self._plan.of(center + diameter / 2.0 * circle)), closed=True,
+                             css='pitch')
+        self._draw(picture, self._plan, place)
+        center = place(self._plan.of(self._base.mean(axis=0)))
+        for n, joint in enumerate(place(self._plan.of(self._base))):
             out = joint - center
             at = joint + 16.0 * out / max(float(np.linalg.norm(out)), 1e-9)
             picture.text(at + [0, 4], str(n + 1), 'middle', css=f'number leg{n}')
-        picture.text([8, 18], 'Top view', css='view')
-        _axes(picture, [30.0, picture.height - 22.0], 'X', 'Y')
+        picture.text([8, 18], name, css='view')
+        self._axes(picture, self._plan)
         self._scale_bar(picture, place)
         return picture
 
@@ -128,17 +150,25 @@ class Drawing:
             OBLIQUE, picture, (OBLIQUE,), Margins(6.0, 6.0, 12.0, 6.0)))
         return picture
 
-    def _placed(self, pose: Pose) -> Array:
-        placed: Array = pose.position + self._arms @ pose.rotation.T
+    def _placed(self, pose: Pose, arms: Array) -> Array:
+        """Return where points (N, 3) of the platform frame are, upright [m]."""
+        placed: Array = (pose.position + arms @ pose.rotation.T) @ self._upright.T
         return placed
+
+    def _moving_plate(self, pose: Pose) -> Array:
+        """Return the corners of the platform's plate at a pose."""
+        outline = self._p[PLATFORM_OUTLINE]
+        return (self._plate(self._placed(pose, self._arms)) if outline is None
+                else self._placed(pose, outline))
 
     def _fitted(self, view: View, picture: Picture, views: Sequence[View], margins: Margins,
                 ) -> _Place:
         """Return the place of a view, at the largest scale at which some views fit."""
-        points = np.concatenate([self._base, self._platform, *map(self._placed, self._ends)])
+        points = np.concatenate([
+            self._base, self._base_plate, self._platform, *map(self._moving_plate, self._poses)])
         room = np.array([picture.width - margins.sides, picture.height - margins.top
                          - margins.bottom])
-        spans = [np.ptp(each.of(points), axis=0) + 3.0 * _PLATE * self._size for each in views]
+        spans = [np.ptp(each.of(points), axis=0) + _PLATE * self._size for each in views]
         scale = float(np.min(room / np.array(spans)))
         drawn = view.of(points)
         middle = np.array([(picture.width - margins.sides) / 2.0 + margins.left,
@@ -149,10 +179,9 @@ class Drawing:
         p = self._p
         legs = [(float(view.depth((self._base[n] + self._platform[n]) / 2.0)), n)
                 for n in range(6)]
-        plates = [(float(view.depth(joints.mean(axis=0))), self._plate(joints, rotation), css)
-                  for joints, rotation, css in (
-                      (self._base, np.eye(3), 'plate base'),
-                      (self._platform, self._pose.rotation, 'plate moving'))]
+        plates = [(float(view.depth(plate.mean(axis=0))), plate, css) for plate, css in (
+            (self._base_plate, 'plate base'),
+            (self._moving_plate(self._poses[0]), 'plate moving'))]
         plates.sort(key=lambda each: each[0])
         for _, points, css in plates[:1]:
             picture.path(hull(place(view.of(points))), closed=True, css=css)
@@ -174,20 +203,20 @@ class Drawing:
         for _, points, css in plates[1:]:
             picture.path(hull(place(view.of(points))), closed=True, css=css)
 
-    def _plate(self, joints: Array, rotation: Array) -> Array:
+    def _plate(self, joints: Array) -> Array:
         """Return corners of a plate through joints, a little larger than they are."""
-        center = joints.mean(axis=0)
-        wide = center + 1.06 * (joints - center)
-        normal = rotation[:, 2] * _PLATE * self._size
+        arms = joints - joints.mean(axis=0)
+        wide = joints.mean(axis=0) + _RIM * arms
+        normal = level_axes(arms)[2] * _PLATE * self._size
         return np.concatenate([wide - normal, wide + normal])
 
     def _heights(self, picture: Picture, place: _Place) -> None:
-        """Draw the height of the platform's origin above the base's, at the pose and its ends."""
+        """Draw z of the platform's origin, at the pose and its ends."""
         right = picture.width - 44.0
         zero = float(place(FRONT.of(np.zeros(3)))[1])
         picture.line([right - 60.0, zero], [right + 8.0, zero], css='extension')
-        for n, pose in enumerate((self._pose, *self._ends)):
-            height = float(place(FRONT.of(pose.position))[1])
+        for n, pose in enumerate(self._poses):
+            height = float(place(FRONT.of(self._upright @ pose.position))[1])
             picture.line([right - 60.0, height], [right + 8.0, height], css='extension')
             text = f'{1e3 * float(pose.position[2]):.0f}'.replace('-', '−')
             if n == 0:
@@ -196,6 +225,18 @@ class Drawing:
                              css='dimension')
             else:
                 picture.text([right + 11.0, height + 4.0], text, css='dimension soft')
+
+    def _axes(self, picture: Picture, view: View) -> None:
+        """Draw the base axes in the lower left corner, as far as they are seen."""
+        tips = _TRIAD * view.of(self._upright.T) * [1.0, -1.0]
+        (left, _), (_, low) = tips.min(axis=0), tips.max(axis=0)
+        origin = np.array([30.0 - min(left, 0.0), picture.height - 22.0 - max(low, 0.0)])
+        for name, tip in zip('XYZ', tips, strict=True):
+            length = float(np.linalg.norm(tip))
+            if length > _SEEN * _TRIAD:
+                picture.line(origin, origin + tip, css=f'triad axis-{name.lower()}')
+                picture.text(origin + tip * (1.0 + 9.0 / length) + [0.0, 3.5], name, 'middle',
+                             css='tick')
 
     def _scale_bar(self, picture: Picture, place: _Place) -> None:
         length = ticks(0.0, 110.0 / place.scale, 2)[1]
@@ -214,6 +255,17 @@ class _Place:
     def __call__(self, points: Array) -> Array:
         placed: Array = self._middle + (points - self._center) * self.scale * [1.0, -1.0]
         return placed
+
+
+def upright(gravity: Array) -> Array:
+    """Return the axes (3, 3), base frame, row by row, whose third is opposite to gravity."""
+    weight = float(np.linalg.norm(gravity))
+    up = -np.asarray(gravity) / weight if weight else np.array([0.0, 0.0, 1.0])
+    # To the right is x or, on a wall, z: a front view from behind the base would show only that.
+    right = np.eye(3)[0 if abs(up[2]) > 0.5 else 2]
+    right = right - right @ up * up
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(up, right), up])
 
 
 def circle_of(joints: Array) -> float | None:
@@ -236,10 +288,3 @@ def _dimension(picture: Picture, begin: list[float], end: list[float]) -> None:
     for tip, way in ((a, along), (b, -along)):
         picture.path([tip, tip + 7.0 * way + 2.0 * across, tip + 7.0 * way - 2.0 * across],
                      closed=True, css='arrow')
-
-
-def _axes(picture: Picture, origin: list[float], right: str, up: str) -> None:
-    o = np.array(origin)
-    for tip, name, css in ((o + [22.0, 0.0], right, 'x'), (o + [0.0, -22.0], up, up.lower())):
-        picture.line(o, tip, css=f'triad axis-{css}')
-        picture.text(tip + ([4.0, 3.5] if name == right else [-3.5, -3.0]), name, css='tick')

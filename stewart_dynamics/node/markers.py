@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
 from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
 from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, WARN
 from stewart_dynamics.node.diagnostics.singularity import singularity_state
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import BASE_OUTLINE, Parameters, PLATFORM_OUTLINE
 from stewart_dynamics.setpoints.step import Output
 from visualization_msgs.msg import Marker
 
@@ -117,14 +117,18 @@ class Markers:
         self._stamps: list[int] = []
         self._body = bytearray(LITTLE_ENDIAN)
         self._put(4, 'I', 0)  # how many there are
-        self._marker('base', 0, Marker.TRIANGLE_LIST, _BASE, points=_plate(self._base, thickness))
+        self._marker('base', 0, Marker.TRIANGLE_LIST, _BASE, points=_plate(
+            self._base if parameters[BASE_OUTLINE] is None else parameters[BASE_OUTLINE],
+            thickness))
         self._marker('base', 1, Marker.SPHERE_LIST, _JOINT, ball, self._base)
         outside = self._base + _NAME_OUTSIDE * (self._base - self._base.mean(axis=0))
         for n, name in enumerate(self._names):
             self._marker('names', n, Marker.TEXT_VIEW_FACING, _WHITE, text_size,
                          position=outside[n], text=name)
         self._plate = self._marker('platform', 0, Marker.TRIANGLE_LIST, PLATFORM[OK],
-                                   points=_plate(self._platform, thickness))
+                                   points=_plate(
+            self._platform if parameters[PLATFORM_OUTLINE] is None
+            else parameters[PLATFORM_OUTLINE], thickness))
         self._with_platform = [
             self._plate,
             self._marker('platform', 1, Marker.SPHERE_LIST, _JOINT, ball, self._platform),
@@ -277,13 +281,13 @@ def _between(first: Color, last: Color, share: float) -> Color:
     return r, g, b, a
 
 
-def _plate(joints: Array, thickness: float) -> Array:
-    """Return the corners (72, 3) of the triangles of a plate through joints (6, 3), outside up."""
-    center = joints.mean(axis=0)
-    first, second, normal = level_axes(joints - center)
-    around = np.argsort(np.arctan2((joints - center) @ second, (joints - center) @ first))
+def _plate(corners: Array, thickness: float) -> Array:
+    """Return the triangles (12 N, 3) of a convex plate through corners (N, 3), outside up."""
+    center = corners.mean(axis=0)
+    first, second, normal = level_axes(corners - center)
+    around = np.argsort(np.arctan2((corners - center) @ second, (corners - center) @ first))
     up = 0.5 * thickness * normal
-    rim = joints[around]  # counterclockwise as seen from the normal's end
+    rim = corners[around]  # counterclockwise as seen from the normal's end
     triangles = []
     for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
         triangles += [center + up, a + up, b + up, center - up, b - up, a - up,
