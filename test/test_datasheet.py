@@ -27,6 +27,7 @@ import shutil
 import subprocess
 import sys
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -45,6 +46,7 @@ from stewart_dynamics.datasheet.payloads import Payloads
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS
 from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, RecordedMotion, uses
+from stewart_dynamics.replay import main as replay
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.vector_picture import hull, ticks
 
@@ -416,6 +418,24 @@ def test_legs_that_are_too_near_reject_a_pose_and_make_a_motion_impossible(
     assert RatedHexapod(PARAMETERS).clearance() is None
     with pytest.raises(PoseError, match='clearance .* below limits.leg_clearance_min'):
         RatedHexapod(p.replaced({'limits.leg_clearance_min': 1.0}))
+
+
+def test_report_and_datasheet_of_a_motion_link_to_each_other(tmp_path: Path) -> None:
+    def linked(page: Path) -> list[Path]:
+        found = re.findall(r'<a href="([^"#]+html)"', page.read_text())
+        return [(page.parent / unquote(each)).resolve() for each in found]
+
+    bag, given = ROOT / 'bags' / 'clear', ('--params', PLATFORM)
+    report = tmp_path / 'replayed' / 'clear' / 'report.html'
+    assert replay([str(each) for each in (
+        bag, *given, '--plotly', 'shared', '--output', report.parents[1])]) == 0
+    assert not linked(report)
+    sheet = tmp_path / 'datasheet' / 'datasheet.html'
+    assert run(*given, '--motion', bag, '--output', sheet.parent) == 0
+    assert linked(sheet) == [report]
+    assert replay([str(each) for each in (
+        bag, *given, '--plotly', 'shared', '--output', report.parents[1], '--force')]) == 0
+    assert linked(report) == [sheet]
 
 
 def test_rejected_messages_of_a_motion_are_counted() -> None:

@@ -40,12 +40,12 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.fingerprint import plain_parameters, software
 from stewart_dynamics.replay.replay_options import Options
-from stewart_dynamics.reporting.results_folder import DATASHEET, whole_folder
+from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, whole_folder
 from stewart_dynamics.whole_file import write_files, write_json
 
 VERSION = 1
 """Version of datasheet.json; increased when the meaning of a key changes."""
-PAGE, TABLE = 'datasheet.html', 'workspace.csv'
+TABLE = 'workspace.csv'
 
 # Heights of the tilt chart, as parts of the travel along z both ways.
 _HEIGHTS = {'at the pose': 0.0, 'half way up': 0.5, 'half way down': -0.5}
@@ -133,7 +133,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     with whole_folder(folder, options, DATASHEET) as partial:
         write_json(partial / DATASHEET, sheet)
         write_files({partial / TABLE: workspace.table(sections, tilts, hexapod)})
-        write_page(partial / PAGE, sheet, hexapod, pictures)
+        write_page(partial / DATASHEET_PAGE, sheet, hexapod, pictures)
     return sheet
 
 

@@ -26,6 +26,7 @@ from typing import Any
 from stewart_dynamics.program import (
     add_results, DONE, frequency, interrupt_on_signals, node_name, PARTLY_READ, Program)
 from stewart_dynamics.replay.replay_options import NODE, Options
+from stewart_dynamics.reporting.results_folder import DATASHEETS
 
 NOT_POSSIBLE = 1
 _PROGRAM = Program('stewart_capability')
@@ -63,7 +64,7 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--box', type=Path, metavar='FILE',
                         help='YAML file of a claimed set of ranges, x y z [m] rx ry rz [rad] from '
                              'the pose: is all of it reachable?')
-    add_results(parser, 'datasheet', 'the motion or the box is not possible')
+    add_results(parser, DATASHEETS, 'the motion or the box is not possible')
     parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
                         help='node whose parameters are read, and name before the usual topics '
                              f'(default: {NODE})')

@@ -36,7 +36,8 @@ from stewart_dynamics.datasheet.ratings import AXES, grid, poses_of
 from stewart_dynamics.datasheet.workspace import (
     Boundary, PLANES, rotations_over_height)
 from stewart_dynamics.parameters.table import inertia_matrix
-from stewart_dynamics.reporting.pages import page
+from stewart_dynamics.reporting.pages import link_to_other, page
+from stewart_dynamics.reporting.results_folder import REPLAYS, REPORT_PAGE
 from stewart_dynamics.reporting.vector_picture import Picture
 from stewart_dynamics.whole_file import write_files
 
@@ -116,6 +117,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
                ) -> None:
     """Write datasheet.html, with the content of datasheet.json."""
     drawing = pictures.drawing()
+    bag = Path(sheet['motion']['bag']) if sheet['motion'] else Path()
+    name = (bag if bag.is_dir() else bag.with_suffix('')).name
     text = page(
         _FOLDER, 'datasheet', document=True, s=sheet, key_figures=_key_figures(sheet, hexapod),
         summary=_summary(hexapod), legs=hexapod.joints, travel=_travel(sheet, hexapod),
@@ -123,6 +126,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         joints=_joints(hexapod), properties=_properties(sheet, hexapod),
         verdicts=[(name.capitalize(), found, words(found)) for name, words in (
             ('motion', motion_verdict), ('box', box_verdict)) if (found := sheet[name])],
+        report=link_to_other(path, [
+            Path(name, REPORT_PAGE), Path(REPLAYS, name, REPORT_PAGE)]) if name else None,
         oblique=drawing.oblique().svg(), front=drawing.front().svg(), top=drawing.top().svg(),
         workspace=[each.svg() for each in pictures.workspace()],
         motion=(chart.svg() if (chart := pictures.motion()) else None),

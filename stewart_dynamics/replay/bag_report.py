@@ -25,11 +25,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime, timezone
 import hashlib
-import os
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
-from urllib.parse import quote
 
 import numpy as np
 
@@ -46,9 +44,11 @@ from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.reporting import plots as channels
 from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
-from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
+from stewart_dynamics.reporting.pages import (
+    base64_of, link, link_to_other, page, plotly_script)
 from stewart_dynamics.reporting.plots import (
     base_wrench_plots, measured_plots, motion_plots, PLOT_OF, spectrum_plots)
+from stewart_dynamics.reporting.results_folder import DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
 from stewart_dynamics.setpoints.step import Batch, Outputs
@@ -182,8 +182,9 @@ class Report:
             FOLDER, 'report', [script] if script else [], plotly is not None, True, s=summary,
             p=self._parameters, legs=list(self._legs),
             name=Path(summary['bag']).name or summary['bag'], plotly=script,
-            plotly_file=None if plotly is None else quote(Path(
-                os.path.relpath(plotly, path.parent)).as_posix()),
+            plotly_file=None if plotly is None else link(path, plotly),
+            datasheet=link_to_other(
+                path, [Path(DATASHEET_PAGE), Path(DATASHEETS, DATASHEET_PAGE)]),
             data=self._data(summary), sources=sources_of(self._parameters),
             cards=cards(summary), margins=smallest_margins(summary),
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),

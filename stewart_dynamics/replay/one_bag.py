@@ -52,7 +52,7 @@ from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.replay.writer_thread import WriterThread
-from stewart_dynamics.reporting.results_folder import check_free, whole_folder
+from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
 from stewart_dynamics.setpoints import base_wrench, inputs, step
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
@@ -130,7 +130,7 @@ def replay(
             summary = run.summary() | {'fingerprint': made_of}
             write_json(partial / 'summary.json', summary)
             if run.report is not None:
-                run.report.write(partial / 'report.html', summary, options.plotly)
+                run.report.write(partial / REPORT_PAGE, summary, options.plotly)
     return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
 
 

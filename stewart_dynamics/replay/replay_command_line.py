@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 from stewart_dynamics.program import (
     add_results, DONE, frequency, interrupt_on_signals, node_name, Program)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE, Options
+from stewart_dynamics.reporting.results_folder import REPLAYS
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -65,7 +66,7 @@ def _arguments() -> argparse.ArgumentParser:
                              'with bags in it')
     parser.add_argument('--params', required=True, type=Path, metavar='FILE',
                         help='parameters of the hexapod, the file that the node takes')
-    add_results(parser, 'replayed', 'a limit or singularity warning was met')
+    add_results(parser, REPLAYS, 'a limit or singularity warning was met')
     topics = parser.add_argument_group(
         'topics', 'Inputs are looked for under the usual names, then by their type.')
     topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,

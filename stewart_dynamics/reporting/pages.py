@@ -28,8 +28,10 @@ import functools
 import hashlib
 import importlib.util
 import math
+import os
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 import numpy as np
@@ -116,6 +118,22 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
 
 def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def link(path: Path, to: Path) -> str:
+    """Return the relative address of a file in the page at a path."""
+    return quote(os.fsencode(Path(os.path.relpath(to, path.parent)).as_posix()))
+
+
+def link_to_other(path: Path, names: Sequence[Path]) -> str | None:
+    """
+    Return the relative address of the page of another program, if it exists.
+
+    It is searched beside the folder of the page at a path, and beside the folder around that.
+    """
+    folders = path.absolute().parents[1:3]
+    return next((link(path.absolute(), found) for folder in folders for name in names
+                 if (found := folder / name).is_file()), None)
 
 
 def base64_of(numbers: ArrayLike, kind: str) -> str:

@@ -44,6 +44,11 @@ DATASHEET = 'datasheet.json'
 CALIBRATION = 'calibration.json'
 """The same of a calibration."""
 
+DATASHEET_PAGE, REPORT_PAGE = 'datasheet.html', 'report.html'
+"""Pages of a datasheet and of a replay, which link to each other."""
+DATASHEETS, REPLAYS = 'datasheet', 'replayed'
+"""Folders of their results if no other is given."""
+
 _KINDS = {RESULT: 'replay results', IDENTIFICATION: 'results of an identification',
           DATASHEET: 'a datasheet', CALIBRATION: 'results of a calibration'}
 
