@@ -505,7 +505,7 @@ def test_a_hanging_hexapod_is_drawn_below_its_base_and_seen_from_below() -> None
         drawing = Drawing(p, home)
         front, plan = drawing.front().svg(), drawing.top().svg()
         below = _corners(front, 'moving')[:, 1].min() > _corners(front, 'base')[:, 1].max()
-        assert below is np.True_ if p is hanging else np.False_
+        assert below == (p is hanging)
         assert name in plan
         assert plan.index('class="plate base"') < plan.index('class="plate moving"')
         assert '>1181<' in front
