@@ -49,6 +49,7 @@ from stewart_dynamics.mechanics.limits import JUMP, LIMITS
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, DETERMINANT, FORCES, LENGTHS, MOTION, NO_BASE, RESULT, UNIT_LOAD_FORCES,
     WRENCH)
+from stewart_dynamics.parameters.table import OUTLINES
 from stewart_dynamics.setpoints.step import Setpoint, Step
 from test_drives import driven
 
@@ -527,7 +528,7 @@ def test_existing_files_are_kept_unless_replacement_is_requested(
 
 @pytest.mark.parametrize('name', [
     '', '2nd', 'a b', '_reserved', 'int', 'class', 'sqrt', 'stewart_dynamics', 'Stewart_Export',
-    'test_golden', 'all', 'größe', '../hexapod', 'a' * 64])
+    'test_golden', 'all', 'NULL', 'linux', 'größe', '../hexapod', 'a' * 64])
 def test_names_that_c_cannot_have(
         name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run('--params', PLATFORM_FILE, '--output', tmp_path, '--name', name) == 2
@@ -576,3 +577,13 @@ def test_hexapods_without_a_home_pose_are_exported_unless_axes_need_one() -> Non
     with pytest.raises(StewartError, match='home pose'):
         c_project(p.replaced({'limits.base_joint_angle_max': 0.5}), 'rig')
     assert check_name('rig_2') == 'rig_2'
+
+
+@pytest.mark.parametrize('outline', OUTLINES)
+def test_plates_that_limit_the_clearance_are_rejected(outline: str) -> None:
+    p = Parameters.from_yaml(PLATFORM_FILE).replaced({
+        'legs.cylinder.radius': 0.05, 'legs.cylinder.length': 0.9, 'legs.piston.radius': 0.03,
+        outline: [-0.7, -0.7, 0.0, 0.7, -0.7, 0.0, 0.0, 0.7, 0.0]})
+    assert 'golden.csv' in c_project(p, 'rig')  # nothing is checked without a limit
+    with pytest.raises(StewartError, match=f'{outline}: must not be set with limits.leg_clear'):
+        c_project(p.replaced({'limits.leg_clearance_min': 0.01}), 'rig')

@@ -215,7 +215,7 @@ def _checked(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion
         raise MotionError(f'lengths {given.shape}, poses {pose.shape}: must be (N, 6) and (N,)')
     if len(given) < FEWEST:
         raise StewartError(f'{len(given)} poses: at least {FEWEST} are needed, each leg has 7 '
-                           'unknowns; 30 or more are advisable')
+                           'unknowns; 40 are advisable')
     return Equations(given, pose)
 
 

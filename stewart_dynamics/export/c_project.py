@@ -37,9 +37,10 @@ noexcept not not_eq nullptr operator or or_eq private protected public register 
 restrict return short signed sizeof static static_assert static_cast struct switch template this
 thread_local throw true try typedef typeid typename union unsigned using virtual void volatile
 wchar_t while xor xor_eq""".split())
-# Targets of CMake, names in test_golden.c, and functions of math.h.
-_TAKEN = frozenset(['all', 'clean', 'compare', 'golden', 'help', 'install', 'main', 'package',
-                    'printf', 'test', 'test_golden', *vars(math)])
+# Targets of CMake, names in test_golden.c, functions of math.h, and macros of C and of compilers.
+_TAKEN = frozenset(['all', 'clean', 'compare', 'eof', 'golden', 'help', 'huge_val', 'infinity',
+                    'install', 'linux', 'main', 'null', 'package', 'printf', 'stderr', 'stdin',
+                    'stdout', 'test', 'test_golden', 'unix', *vars(math)])
 _LONGEST = 63  # significant characters of an identifier in C99
 
 
@@ -65,8 +66,8 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
     Raises
     ------
     StewartError
-        The name cannot be used in C; or a limit of joint angles is set, its axes are not, and
-        there is no home pose.
+        The name cannot be used in C; a limit of joint angles is set, its axes are not, and there
+        is no home pose; or plates limit the clearance of the legs.
 
     """
     check_name(name)

@@ -23,11 +23,12 @@ from typing import Any
 
 import numpy as np
 
+from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.drives.motors import (
     BASE_AXIS, drive_constants, PLATFORM_AXIS, TWIST)
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.limits import Limits
-from stewart_dynamics.parameters.table import LEG_SHAPE, PARAMETERS, Parameters
+from stewart_dynamics.parameters.table import LEG_SHAPE, OUTLINES, PARAMETERS, Parameters
 
 # Fields of stewart_leg and stewart_platform in their order, with the parameters that they hold.
 LEG_FIELDS = (
@@ -61,9 +62,15 @@ def field_values(parameters: Parameters) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        Axes that are needed are not given, and there is no home pose.
+        Axes that are needed are not given, and there is no home pose; or the clearance of the legs
+        is limited, and a plate is given, which the C source does not know.
 
     """
+    plates = [name for name in OUTLINES if parameters[name] is not None]
+    if plates and parameters['limits.leg_clearance_min'] is not None:
+        raise ParameterError(
+            f'{", ".join(plates)}: must not be set with limits.leg_clearance_min: the exported '
+            'source has the clearance between legs, not that from plates')
     values: dict[str, Any] = {}
     for name in (*FIELDS_BEFORE_LEGS, *LEG_FIELDS, *FIELDS_AFTER_LEGS):
         value = parameters[name]
