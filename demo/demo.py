@@ -150,7 +150,8 @@ def report(demo: Demo, parameters: Parameters) -> str:
         Batch(stamps, np.full((many, MOTION), np.nan), np.zeros((1, 6)), none,
               stamps),
         Outputs(every, stamps, results, forces, states, none, none,
-                none, np.full((many, JOINT_ANGLES), np.nan), np.empty((many, 0))),
+                none, np.full((many, JOINT_ANGLES), np.nan), np.empty((many, 0)),
+                np.empty((many, 0))),
         np.full((many, 6), np.nan))
     return '\n'.join(summary_lines(summary.values()))
 

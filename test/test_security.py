@@ -120,6 +120,9 @@ def done_beside(peer: Peer) -> dict[str, set[str]]:
     return done
 
 
+DRIVES = 'actuator.screw_lead:=0.005', 'drive.torque_max:=100.0'
+
+
 def test_the_policy_is_one_of_sros2() -> None:
     """No element or attribute that its schema does not have, and nothing but ALLOW."""
     assert policy().tag == 'policy'
@@ -139,9 +142,10 @@ def test_the_policy_is_one_of_sros2() -> None:
 def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
     """Each name that the node has with any source of setpoints or base is in it, and no other."""
     union: dict[str, set[str]] = {}
-    for begin, overrides in ((fresh, ('setpoint.source:=separate', 'base.source:=motion')),
-                             (fresh, ('setpoint.source:=combined', 'base.source:=imu')),
-                             (start, ('setpoint.source:=pose', 'use_sim_time:=true'))):
+    for begin, overrides in (
+            (fresh, ('setpoint.source:=separate', 'base.source:=motion', *DRIVES)),
+            (fresh, ('setpoint.source:=combined', 'base.source:=imu')),
+            (start, ('setpoint.source:=pose', 'use_sim_time:=true'))):
         node = begin(*overrides)
         node.until_active()
         of_inputs = {f'{NODE}/{topic}' for topic in (
@@ -162,7 +166,7 @@ def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
         (['output:=separate', 'start_timeout:=1000.0'], 5),
         (['output:=combined', 'start_timeout:=1000.0', 'use_sim_time:=true'], 3)]),
     ('stewart_simulator', ['platform.yaml', 'simulator.yaml'], [
-        (['use_sim_time:=false'], 6), (['use_sim_time:=true'], 7)])])
+        (['use_sim_time:=false', *DRIVES], 7), (['use_sim_time:=true'], 7)])])
 def test_the_policy_is_what_the_other_programs_do(
         domain: int, tmp_path: Path, name: str, files: list[str],
         runs: list[tuple[list[str], int]]) -> None:
