@@ -58,7 +58,8 @@ def test_the_node_publishes_the_motors_and_checks_their_limits(
     platform = StewartPlatform.from_yaml(file)
     for n, sample in enumerate((MOVING, LEAPING, FAST), start=1):
         stamp = node.send(sample)
-        node.until(lambda n=n: len(torques) >= n, 'torques have come')  # type: ignore[misc]
+        node.until(  # type: ignore[misc]
+            lambda n=n: min(len(torques), len(states)) >= n, 'torques and states have come')
         motors = platform.motors(sample.motion())
         state = deserialize_message(states[-1], JointState)
         assert state.header.stamp.sec == stamp // 10 ** 9
