@@ -175,12 +175,12 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
                          directions=what.directions[:GEOMETRY])
     states = tuple(FIXED if each else state for each, state in zip(
         held, states_of(what), strict=True))
+    far = list(mistakes_of_result(p, found.values, found.lin.residuals, size))
+    _refuse(far, accept_mistakes)
     missing = not_identified(p['joints'], what.shares, LARGEST_SHARE, used, size)
     if IDENTIFIED not in states and not accept_mistakes:
         raise StewartError(f'no number is identifiable by itself: {missing}; nothing is '
                            'calibrated (--accept-mistakes does)')
-    far = list(mistakes_of_result(p, found.values, found.lin.residuals, size))
-    _refuse(far, accept_mistakes)
     validation = _validated(p, used, unknowns, found, hold_out)
     if validation is not None:
         before, after = (math.hypot(each.rms[0], size * each.rms[1]) for each in validation)
