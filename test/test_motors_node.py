@@ -70,6 +70,8 @@ def test_the_node_publishes_the_motors_and_checks_their_limits(
         assert tuple(state.effort) == tuple(clipped)
         assert tuple(deserialize_message(torques[-1], Float64MultiArray).data) == tuple(clipped)
         if sample is MOVING:
+            node.until(lambda: 'leg_1: motor speed (rad/s)' in node.values('limits'),
+                       'diagnostics have the motors')
             node.until_status('limits', OK, '')
             values = node.values('limits')
             assert values['leg_1: motor speed (rad/s)'] == f'{motors.speeds[0]:.6g}'

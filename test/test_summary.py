@@ -709,13 +709,14 @@ def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
         'reading': ('warn', 'Not all messages could be used'),
         'limits': ('bad', 'Limits are exceeded'),
         'singularity': ('bad', 'A singularity is reached'),
+        'motors': ('none', 'Motors'),
         'measured': ('none', 'Measured forces')}
     assert shown(missing=['a chunk'])['reading'][0] == 'bad'
     assert shown(rejected=[])['reading'] == ('good', 'The whole bag was read')
     assert shown(limits=[])['limits'] == ('good', 'All limits are held')
     assert shown(limits=[], limits_not_checked=['limits.velocity_max'])['limits'][0] == 'warn'
     empty = {**Summary(hexapod()).values(), 'missing': [], 'rejected': [], 'measured': None}
-    assert [card.level for card in cards(empty).values()] == ['good', 'none', 'none', 'none']
+    assert [card.level for card in cards(empty).values()] == ['good', *['none'] * 4]
     lines = [each.line for each in cards(found)['reading'].statements]
     assert lines == ['2 setpoints in 1.00 s', '5: 5 rejected: late', '4: 4 rejected: late',
                      '3: 3 rejected: late', '3 rejected for other reasons']
