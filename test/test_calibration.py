@@ -297,6 +297,15 @@ def test_likely_mistakes_are_named(what: str, words: str) -> None:
     assert words in str(caught.value) and 'nothing is calibrated' in str(caught.value)
 
 
+def test_all_poses_are_used_where_none_is_held_out_and_some_noise_is_needed() -> None:
+    rng = np.random.default_rng(9)
+    lengths, seen = measured(rng, true_values(rng), random_poses(rng, 30), Noise(1e-5, 1e-5, 1e-5))
+    assert calibrate(HEXAPOD, lengths, seen, hold_out=0.0).validation is None
+    assert calibrate(HEXAPOD, lengths, seen).validation is not None
+    with pytest.raises(StewartError, match='^noise: 0, 0, 0: one of them must be above 0$'):
+        calibrate(HEXAPOD, lengths, seen, noise=(0.0, 0.0, 0.0))
+
+
 @pytest.mark.parametrize(('what', 'words'), [
     ('play', 'play, a loose joint or encoder: leg_3 (residuals of'),
     ('scale', 'positions off by scale, from the lead of the screw or the encoder: leg_3 (+0.2'),

@@ -151,6 +151,8 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     measured = _checked(platform, lengths, poses)
     if frames not in ('known', 'unknown'):
         raise ParameterError(f"frames: {frames!r}: must be 'known' or 'unknown'")
+    if noise is not None and not any(noise):
+        raise ParameterError('noise: 0, 0, 0: one of them must be above 0')
     unknown = frames == 'unknown'
     held: Flags = np.zeros(GEOMETRY, dtype=bool)
     for name in fixed:
@@ -235,9 +237,9 @@ def _with_frames(equations: Equations, unknowns: Unknowns, unknown: bool) -> Arr
 def _validated(parameters: Parameters, equations: Equations, unknowns: Unknowns, found: Fit,
                hold_out: float) -> Validation | None:
     """Return the validation: every n-th pose is predicted by a fit to the others."""
-    count = len(equations.lengths)
-    every = round(1.0 / hold_out) if hold_out > 0.0 else count + 1
-    held = np.arange(count) % every == every // 2
+    every = round(1.0 / hold_out) if hold_out > 0.0 else 0
+    index = np.arange(len(equations.lengths))
+    held = index % every == every // 2 if every else index < 0
     if not held.any() or np.count_nonzero(~held) < _FEWEST_OTHERS:
         return None
     others = equations.part(~held)
