@@ -99,8 +99,6 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.calibration.one_run import FUNCTIONS, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
     from stewart_dynamics.calibration.results import result_text
-    from stewart_dynamics.compilation.functions import prepare
-    from stewart_dynamics.compilation.machine_code import HINT
     from stewart_dynamics.mechanics.plausibility import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
@@ -118,11 +116,7 @@ def _run(given: argparse.Namespace) -> int:
             given.poses, parameters, given.node, given.measured, given.pose)
     else:
         measured = read_poses(given.poses, parameters['joints'], given.mm, given.degrees)
-    if HINT:
-        _PROGRAM.complain(HINT)
-    prepare(FUNCTIONS)
-    for mistake in likely_mistakes(parameters):
-        _PROGRAM.complain(f'warning: {mistake}')
+    _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))
     result = run(measured, str(given.poses), parameters, given.output, options)
     for each in result['likely_mistakes']:
         _PROGRAM.complain(f'warning: {each["text"]}')
