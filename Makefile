@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
   bench-replay clean demo demo-calibrate demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment export-demo \
-  lint test
+  lint lint-flake8 lint-layers lint-mypy lint-ruff test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -69,11 +69,21 @@ INSTALLED := $(VENV)/installed-$(ROS)
 test: lint
 	$(VENV)/bin/python -m pytest --numprocesses $(TESTERS) --dist loadfile --no-loadscope-reorder
 
+# Beside one another: mypy and flake8 take the same time.
 lint: $(INSTALLED)
-	$(VENV)/bin/python -m ruff check --quiet .
+	@$(MAKE) --no-print-directory --jobs --output-sync lint-mypy lint-flake8 lint-ruff lint-layers
+
+lint-flake8: $(INSTALLED)
 	$(VENV)/bin/python -m flake8
-	$(VENV)/bin/python -m mypy
+
+lint-layers: $(INSTALLED)
 	$(VENV)/bin/lint-imports --no-logo --cache-dir $(CACHE)/import_linter
+
+lint-mypy: $(INSTALLED)
+	$(VENV)/bin/python -m mypy
+
+lint-ruff: $(INSTALLED)
+	$(VENV)/bin/python -m ruff check --quiet .
 
 demo: $(INSTALLED)
 	@$(VENV)/bin/python demo/demo.py

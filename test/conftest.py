@@ -41,10 +41,13 @@ settings.load_profile('repeatable')
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Before several processes run the tests, compile what each of them would compile."""
+    """Before several processes run the tests, compile once what each of them would compile."""
     is_worker = hasattr(session.config, 'workerinput')
     if not is_worker and getattr(session.config.option, 'numprocesses', None):
-        subprocess.run([sys.executable, '-c', COMPILE_ALL], check=True, stdin=DEVNULL)
+        # Meanwhile, as bytecode, the test modules: their errors are reported by the processes.
+        with subprocess.Popen([sys.executable, '-m', 'pytest', '--collect-only', '-qq',
+                               Path(__file__).parent], stdin=DEVNULL, stdout=DEVNULL):
+            subprocess.run([sys.executable, '-c', COMPILE_ALL], check=True, stdin=DEVNULL)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -958,16 +958,18 @@ class Planner:
         """Send these bytes in the place of a message."""
         self._writer.publish(message)
 
-    def send_long(self, points: int, stamp: int = STEP, leap: float = 0.0) -> None:
-        """Send a trajectory of points at home, 1 ms apart, and a leap to the last."""
+    def send_long(self, points: int, stamp: int = STEP, leap: float = 0.0, step: int = 1,
+                  swing: float = 0.0) -> None:
+        """Send points at home, ``step`` ms apart: every second one higher, the last one, too."""
         point, = HOME.combined(0).points
         two = raw(MultiDOFJointTrajectory(header=header(stamp, ''), points=[point, point]))
         # Points are of 184 bytes, their times in the last eight.
         head, each = two[:-2 * 184], two[-184:]
         assert head[-4:] == b'\x02\0\0\0'
         many = np.tile(np.frombuffer(each, np.uint8), (points, 1))
-        times = np.arange(points)
+        times = step * np.arange(points)
         many[:, 176:].view('<i4')[:] = np.column_stack([times // 1000, times % 1000 * 1_000_000])
+        many[1::2, 24:32].view('<f8')[:] += swing
         many[-1, 24:32].view('<f8')[:] += leap
         self._writer.publish(head[:-4] + points.to_bytes(4, 'little') + many.tobytes())
 

@@ -23,7 +23,7 @@ what stops it is taken away.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from itertools import count
 import json
 import os
 from pathlib import Path
@@ -521,24 +521,21 @@ NO_CERTIFICATE = 'private_key_file|cert_chain_file|verify_mode|verify_file'
 
 
 @pytest.fixture
-def keys(tmp_path: Path) -> Callable[..., Path]:
+def keys(domain: int, tmp_path: Path) -> Callable[..., Path]:
     """Return a function that makes keys for the node and named processes, and says where."""
     if not shutil.which('openssl'):
         pytest.skip('there is no openssl: keys cannot be made')
-    return partial(make_keys, tmp_path)
+    # Only this test has these: above those that the kernel gives, and of this domain.
+    ports = count(61_000 + 10 * domain)
 
+    def make(*names: str) -> Path:
+        made = tmp_path / f'keys_{names[0]}'
+        subprocess.run([SECURITY / 'make_keys.sh', made, *(
+            f'{name}=127.0.0.1:{next(ports)}' for name in names)], check=True,
+            capture_output=True)
+        return made
 
-def make_keys(folder: Path, *names: str) -> Path:
-    """Make keys, each of the processes on a port that is free."""
-    sockets = [socket.create_server(('127.0.0.1', 0)) for _ in names]
-    ports = [each.getsockname()[1] for each in sockets]
-    for each in sockets:
-        each.close()
-    made = folder / f'keys_{names[0]}'
-    subprocess.run([SECURITY / 'make_keys.sh', made, *(
-        f'{name}=127.0.0.1:{port}' for name, port in zip(names, ports, strict=True))],
-        check=True, capture_output=True)
-    return made
+    return make
 
 
 def self_signed(keys: Path) -> Path:
