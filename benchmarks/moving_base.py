@@ -33,7 +33,7 @@ from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
 from stewart_dynamics.mechanics.dynamics import forward_dynamics, inverse_dynamics
 from stewart_dynamics.mechanics.rows import FORCES, RESULT
 from stewart_dynamics.messages.setpoint import StampedWriter
-from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import Rejections
 

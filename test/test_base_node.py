@@ -28,7 +28,7 @@ from rclpy.serialization import deserialize_message
 from running import DynamicsNode, nanoseconds, NODE, Sample
 from sensor_msgs.msg import Imu, JointState
 from stewart_dynamics import BaseMotion, StewartPlatform
-from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST)
 from stewart_dynamics.setpoints.rejections import (

@@ -38,7 +38,7 @@ from stewart_dynamics.external_wrench.measured_legs import (
     MEASURED_LEGS, MeasuredLegs, NOT_CONVERGED, SINGULAR, UNSTAMPED)
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS, UNEVEN
 from stewart_dynamics.parameters.yaml_file import read_yaml
-from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import BASE_IMU
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, MALFORMED, NOT_FINITE, OUT_OF_RANGE, Rejection, Rejections, TOO_OLD, TWICE)

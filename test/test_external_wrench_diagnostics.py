@@ -28,7 +28,7 @@ from stewart_dynamics.messages.joint_state import MISSING_JOINTS
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.external_wrench import ExternalWrenchDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, STALE, Status, WARN
-from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import NOT_MEASURED, Rejection, Rejections
 from stewart_dynamics.setpoints.step import Setpoint

@@ -33,11 +33,11 @@ from referees import ROOT, rotation_about
 from scipy.spatial.transform import Rotation
 import stewart_dynamics
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
-from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import PARAMETERS
 from stewart_dynamics.reference_motion.motion import motion_at, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
-from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import BASE_SOURCES
 from stewart_dynamics.setpoints.output_messages import MOTOR_STATES, MOTOR_TYPES
 from stewart_dynamics.setpoints.rejections import Rejections

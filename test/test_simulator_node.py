@@ -45,9 +45,9 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics import BaseMotion, Motion, Pose, StewartError, StewartPlatform
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.yaml_file import read_yaml
-from stewart_dynamics.simulator.base import GeneratedBase, GeneratedBaseMotion
 from stewart_dynamics.simulator.messages import (
     BASE_TYPES, BaseMessages, IMU, IMU_TYPE, OUTPUT_TYPES, StateMessages)
+from stewart_dynamics.simulator.moving_base import GeneratedBase, GeneratedBaseMotion
 from stewart_dynamics.simulator.node import SimulatorNode
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant

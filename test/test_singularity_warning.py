@@ -30,7 +30,7 @@ from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import (
     Cause, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
-from stewart_dynamics.parameters.table import HYSTERESIS
+from stewart_dynamics.parameters.tolerances import HYSTERESIS
 
 PARAMETERS = symmetric_parameters().replaced({
     'singularity.warn_condition': 50.0, 'singularity.stop_condition': 500.0,

@@ -99,7 +99,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.calibration.one_run import FUNCTIONS, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
     from stewart_dynamics.calibration.results import result_text
-    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()

@@ -125,7 +125,7 @@ def _read(given: argparse.Namespace) -> int:
 
 def _judge(parameters: Parameters, given: argparse.Namespace) -> int:
     """Print likely mistakes and return the exit code."""
-    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 
     mistakes = likely_mistakes(parameters)
     for mistake in mistakes:

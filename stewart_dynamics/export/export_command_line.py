@@ -63,7 +63,7 @@ def _export(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.export.c_project import c_project, check_name
     from stewart_dynamics.export.fmu import find_compiler, fmu, has_binaries
-    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
     name = check_name(given.name)

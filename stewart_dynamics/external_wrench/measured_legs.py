@@ -33,7 +33,7 @@ from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, NO_BASE, 
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, MALFORMED, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
 

@@ -100,7 +100,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.bags.find import find_bags
     from stewart_dynamics.identification.one_run import FUNCTIONS, run
     from stewart_dynamics.identification.text import result_text
-    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()

@@ -31,7 +31,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import inlined
-from stewart_dynamics.parameters.table import HYSTERESIS, Parameters
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.tolerances import HYSTERESIS
 
 # At this condition number a solution of J_inv^T f = wrench has fewer than four valid digits of
 # sixteen: forces are neither computed nor published.

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
-from stewart_dynamics.mechanics import batch, plausibility, stiffness
+from stewart_dynamics.mechanics import batch, stiffness
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL, MOTORS, Motors
@@ -42,6 +42,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
 from stewart_dynamics.mechanics.kinematics.inverse_kinematics import leg_lengths
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
+from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.platform_arguments import (
     base_rows, check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
 from stewart_dynamics.mechanics.rows import (
@@ -521,7 +522,7 @@ class StewartPlatform:
 
     def check(self) -> tuple[str, ...]:
         """Return likely mistakes in the parameters, each in one line."""
-        return plausibility.likely_mistakes(self.parameters)
+        return likely_mistakes(self.parameters)
 
     def _legs(self, pose: Pose | Motion) -> lagrange.Legs:
         check_kind(pose, Pose, Motion)

@@ -37,7 +37,7 @@ from stewart_dynamics.external_wrench import estimate as external_wrench, payloa
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH, ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
-from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, TICK, WARN

@@ -30,15 +30,10 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters.tolerances import (
+    HYSTERESIS, QUATERNION_TOLERANCE, REFLECTED_MASS_TOLERANCE, unit_rule)
 
 
-# The length of a given quaternion may differ from one by this; the quaternion is normalized.
-QUATERNION_TOLERANCE = 1e-3
-# A singularity warning or stop ends below this part of the condition number at which it began, or
-# when the predicted time to the crossing exceeds warn_time divided by it.
-HYSTERESIS = 0.8
-# Relative tolerance of actuator.reflected_mass if drive.* gives the inertias: both may be rounded.
-REFLECTED_MASS_TOLERANCE = 0.01
 # Corners of a plate are in a plane to this part of its size.
 _FLAT = 1e-6
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
@@ -437,8 +432,3 @@ def inertia_matrix(six: ArrayLike) -> Any:
     """Return the matrix (3, 3) of ixx ixy ixz iyy iyz izz [kg m^2]."""
     ixx, ixy, ixz, iyy, iyz, izz = np.asarray(six, dtype=float)
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-
-
-def unit_rule(length: float) -> str:
-    """Return the rule that a quaternion of this length breaks, as text of an error."""
-    return f'length {length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1'

@@ -39,7 +39,8 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
-from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters, unit_rule
+from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
+from stewart_dynamics.parameters.tolerances import unit_rule
 from stewart_dynamics.planned.approach import approach_in_pieces
 from stewart_dynamics.planned.trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)

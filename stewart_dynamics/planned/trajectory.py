@@ -256,7 +256,7 @@ class _Work:
         self._warms = self._parameters[TEMPERATURE_RISE_MAX] is not None
 
     def check(self) -> Iterator[None]:
-        """Compute motion and forces of the legs; raise _RejectedError at a violation."""
+        """Compute motion and forces of the legs; raise _ViolationError at a violation."""
         last = len(self._times) - 1
         for first in range(0, max(last, 1), self._piece):
             yield from self._check_block(first, min(first + self._piece, last))

@@ -35,8 +35,8 @@ from stewart_dynamics.arrays import Array, Flags, SECOND, Stamps
 from stewart_dynamics.bags import blocks, mcap_scan
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
+from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
-from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.bag_report import Report

@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 import textwrap
 from typing import Any
 
-from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
     JOINTS, LIMITS, LOADS, motion_statements, MOTORS, READING, SINGULARITY)

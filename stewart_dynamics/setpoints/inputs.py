@@ -33,7 +33,8 @@ from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
-from stewart_dynamics.parameters.table import Parameters, unit_rule
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.tolerances import unit_rule
 from stewart_dynamics.setpoints.rejections import (
     frame_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
     Rejections, WRONG_FRAME)

@@ -33,7 +33,7 @@ from stewart_dynamics.arrays import Six
 from stewart_dynamics.mechanics.rows import BASE, MOTION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import SOURCES, TopicSamples, WRENCH, WrenchInput
 from stewart_dynamics.setpoints.rejections import Rejection, Rejections
 from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining

@@ -47,7 +47,7 @@ from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.motor_step import (
     EXCEEDING, MotorStep, RUNNING, times_followed, TORQUES)
-from stewart_dynamics.setpoints.result_checks import (
+from stewart_dynamics.setpoints.published_forces import (
     check, check_many, FORCE_MAX, LIMITS, LIMITS_SUPPRESS, OF_WARNING, SUPPRESS)
 
 
@@ -343,34 +343,29 @@ class Step:
             lengths, rates, demanded if solved else None) if written[_EXCEEDING.start] else ()
         if jumped and followed:
             exceedances += self._limits.jumps(lengths, followed, elapsed)
+        of_pose: tuple[Exceedance, ...] = ()
         angles: tuple[float, ...] = ()
         if self._angles_of_one is not None:
             angles = self._angles_of_one()
-            exceeded = self._limits.exceeded_angles(angles)
-            exceedances += exceeded
-            if exceeded and self._limits_suppress:
-                forces = None
+            of_pose = self._limits.exceeded_angles(angles)
         clearances: tuple[float, ...] = ()
         if self._clearance_of_one is not None:
             clearances, nearest = self._clearance_of_one()
-            exceeded = self._limits.exceeded_clearance(clearances, nearest)
-            exceedances += exceeded
-            if exceeded and self._limits_suppress:
-                forces = None
+            of_pose += self._limits.exceeded_clearance(clearances, nearest)
         motors: tuple[float, ...] = ()
+        of_motors: tuple[Exceedance, ...] = ()
         if self._motors is not None:
             since = 0.0 if elapsed == math.inf else (stamp - followed_at) * 1e-9
-            motors, exceeded, after_it = self._motors(since, windings)
-            exceedances += exceeded
-            if exceeded and self._limits_suppress and motors[RUNNING.start]:
-                forces = None
+            motors, of_motors, after_it = self._motors(since, windings)
             windings = windings if jumped else after_it
+        if self._limits_suppress and (of_pose or of_motors and motors[RUNNING.start]):
+            forces = None
         return Output(
             stamp, lengths, rates, demanded if solved else None, forces,
             written[UNIT_LOAD_FORCES], written[DETERMINANT], written[DETERMINANT_RATE],
             written[CONDITION], after,
-            singularity is None or after.warning != singularity.warning, exceedances, angles,
-            clearances, motors,
+            singularity is None or after.warning != singularity.warning,
+            exceedances + of_pose + of_motors, angles, clearances, motors,
             State(after, followed_at, followed, windings) if jumped
             else State(after, stamp, lengths, windings))
 

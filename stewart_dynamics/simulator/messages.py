@@ -25,8 +25,8 @@ from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.setpoints.output_messages import MOTOR_STATES, motor_states_writer
-from stewart_dynamics.simulator.base import BasePeriod
 from stewart_dynamics.simulator.imu import ImuWriter, SimulatedImu
+from stewart_dynamics.simulator.moving_base import BasePeriod
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import PlantState
 

@@ -34,7 +34,7 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import SECOND, Six
 from stewart_dynamics.compilation import machine_code
-from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
@@ -45,9 +45,9 @@ from stewart_dynamics.ros.signals import SIGNALS
 from stewart_dynamics.setpoints.inputs import WrenchInput
 from stewart_dynamics.setpoints.output_messages import MOTOR_STATES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
-from stewart_dynamics.simulator.base import BaseOfTopics, BasePeriod, GeneratedBase
 from stewart_dynamics.simulator.messages import (
     BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)
+from stewart_dynamics.simulator.moving_base import BaseOfTopics, BasePeriod, GeneratedBase
 from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
 from stewart_dynamics.simulator.plant import Plant, PlantState
 

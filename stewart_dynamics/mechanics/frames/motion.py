@@ -29,7 +29,7 @@ from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION)
-from stewart_dynamics.parameters.table import unit_rule
+from stewart_dynamics.parameters.tolerances import unit_rule
 
 Self = TypeVar('Self', bound='RowSamples')
 

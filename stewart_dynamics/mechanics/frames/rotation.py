@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.parameters.table import QUATERNION_TOLERANCE
+from stewart_dynamics.parameters.tolerances import QUATERNION_TOLERANCE
 
 
 def from_euler(angles: ArrayLike) -> Array:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
-from stewart_dynamics.node.diagnostics.base import BaseDiagnostics
+from stewart_dynamics.node.diagnostics.base_motion import BaseDiagnostics
 from stewart_dynamics.node.diagnostics.external_wrench import ExternalWrenchDiagnostics
 from stewart_dynamics.node.diagnostics.limits import LimitsDiagnostics
 from stewart_dynamics.node.diagnostics.outcomes import (

@@ -20,7 +20,8 @@ from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.periodic_report import (
     Answers, ERROR, Level, LogLine, OK_LEVEL, PERIOD, StatusPart, WARN)
-from stewart_dynamics.parameters.table import HYSTERESIS, Parameters
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.tolerances import HYSTERESIS
 from stewart_dynamics.setpoints.step import Output
 
 _CROSSING, _NEARNESS = 'crossing', 'nearness'

@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.node.diagnostics.periodic_report import (
     ERROR, last_heard, Level, LogLine, NEVER, OK, silent_topics, StatusPart)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import Rejection
 from stewart_dynamics.setpoints.step import Setpoint
 
