@@ -151,12 +151,12 @@ def one_seed(given: tuple[int, Array]) -> tuple[Array, Array]:
     made = recorded(TRUE, fourier(SEED), SECONDS, RATE, seed, NOISE, forces)
     window = Window(0, 1.0 / RATE, made.positions, made.rates, made.efforts,
                     np.zeros(made.efforts.shape, dtype=bool))
-    extract = Extraction(platform, unknowns, 1.0 / RATE, 10.0)(window, platform.home_pose())
+    read = Extraction(platform, unknowns, 1.0 / RATE, 10.0)(window, platform.home_pose())
     extracts = Extracts()
-    extracts.add(0, 0.0, extract)
-    sums = sums_of(extracts, 1, lambda block: block.sound)
+    extracts.add(0, 0.0, read.extract)
+    sums = sums_of(extracts)
     found = fit(sums, unknowns, cutoffs=np.array([10.0]))
-    spread = errors_of(extracts, sums, unknowns, found, [extract.sound])
+    spread = errors_of(extracts, sums, unknowns, found)
     extracts.close()
     return (np.append(found.values, found.delays[0]),
             np.append(np.sqrt(np.diag(spread.covariance)), spread.delays[0]))

@@ -26,8 +26,7 @@ from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.kinematics import pose_near
 from stewart_dynamics.identification.lack_of_fit import deviations
-from stewart_dynamics.identification.results import document
-from stewart_dynamics.identification.text import result_text
+from stewart_dynamics.identification.results import document, result_text
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 import wrong_models

@@ -23,14 +23,14 @@ low rate from the filtered motion.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.identification.extraction import Block, SLIP
+from stewart_dynamics.identification.extraction import Extract, SLIP
 from stewart_dynamics.identification.fit import Fit
 from stewart_dynamics.identification.kinematics import motions
 from stewart_dynamics.identification.tilt import Tilt
@@ -75,44 +75,34 @@ class Cause(NamedTuple):
 
 class Causes:
     """
-    Columns of all possible causes.
+    Columns of all possible causes in some extracts, with the parameters of a fit.
 
-    Parameters
-    ----------
-    platform : StewartPlatform
-        Hexapod with the parameters of the file.
-    unknowns : Unknowns
-        Unknowns of the fit.
-    fit : Fit
-        Result of the fit.
-    samples : int
-        Number of samples of all blocks.
-    bag_starts : sequence of float
-        Fraction of all samples before each bag except the first.
-    largest : float
-        Largest effort [N].
-    geometry : bool
-        Whether joints and zero lengths are tested as well, which takes longer.
-
+    ``geometry`` adds the joints and zero lengths, which take longer.
     """
 
-    def __init__(self, platform: StewartPlatform, unknowns: Unknowns, fit: Fit, samples: int,
-                 bag_starts: Sequence[float], largest: float, geometry: bool) -> None:
+    def __init__(self, platform: StewartPlatform, unknowns: Unknowns, fit: Fit,
+                 extracts: Iterable[Extract], geometry: bool) -> None:
         p = platform.parameters
-        self._platform, self._unknowns, self._fit = platform, unknowns, fit
-        self._samples, self._largest, self._geometry = samples, largest, geometry
-        self._changes = sorted({*_CHANGES, *(bag_starts if len(bag_starts) < _MOST_BAGS else ())})
+        self._platform, self._geometry = platform, geometry
         self._theta = unknowns.theta(fit.values)
+        self._samples, self._largest = 0, 0.0
+        begins: dict[int, int] = {}  # samples before each bag
+        for extract in extracts:
+            begins.setdefault(extract.bag, self._samples)
+            self._samples += len(extract.times)
+            self._largest = max(self._largest, float(
+                np.abs(extract.efforts[..., 0]).max(initial=0.0)))
+        between = [begin / self._samples for begin in begins.values() if begin]
+        self._changes = sorted({*_CHANGES, *(between if len(between) < _MOST_BAGS else ())})
         self._tilt = Tilt(p['gravity'])
         self._size = float(p['singularity.characteristic_length'])
-        whole = linear_parameters(p)
-        whole[unknowns.linear] = self._theta[:len(unknowns.linear)]
-        self._whole = whole
+        self._whole = linear_parameters(p)
+        self._whole[unknowns.linear] = self._theta[:len(unknowns.linear)]
         self.all: tuple[Cause, ...] = ()
 
-    def columns(self, block: Block, first: int) -> Array:
-        """Return an array (N, 6, m) for a block that begins with the sample ``first``."""
-        parts = dict(self._parts(block, first))
+    def columns(self, extract: Extract, first: int) -> Array:
+        """Return an array (N, 6, m) for an extract that begins with the sample ``first``."""
+        parts = dict(self._parts(extract, first))
         if not self.all:
             starts = np.cumsum([0, *(each.shape[-1] for each in parts.values())])
             places = {name: np.arange(a, b) for name, (a, b) in zip(
@@ -120,15 +110,13 @@ class Causes:
             self.all = tuple(self._causes(places))
         return np.concatenate(list(parts.values()), axis=-1)
 
-    def _parts(self, block: Block, first: int) -> Iterator[tuple[str, Array]]:
-        platform = self._platform
-        lengths, rates, accelerations = np.moveaxis(block.legs, -1, 0)
-        poses = platform.forward_kinematics(lengths, Pose.of_rows(block.poses))
+    def _parts(self, extract: Extract, first: int) -> Iterator[tuple[str, Array]]:
+        platform, whole = self._platform, self._whole
+        lengths, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
+        poses = platform.forward_kinematics(lengths, Pose.of_rows(extract.poses))
         rows = motions(platform, poses, rates, accelerations)
         matrix = platform.regressors(rows)
-        many = len(self._theta)
-        predicted = block.columns[..., :many] @ self._theta + block.columns[..., many]
-        whole = self._whole
+        predicted = extract.regressor @ self._theta + extract.known
 
         yield 'offset', _by_leg(np.ones((len(rows), 6, 1)))
         gravity = self._tilt.derivative(np.zeros(2))
@@ -140,7 +128,7 @@ class Causes:
             for parts in ((CYLINDER_FIRST, CYLINDER_SECOND),
                           (PISTON_MASS, PISTON_FIRST, PISTON_SECOND))], axis=-1)
         yield 'viscous_friction', matrix[..., VISCOUS_FRICTION]
-        slip = _by_leg(block.slip)
+        slip = _by_leg(extract.slip)
         yield 'coulomb_friction', slip[..., :6]
         for n in range(1, SLIP):
             yield f'stribeck_friction {n}', slip[..., 6 * n:6 * n + 6]
@@ -148,7 +136,7 @@ class Causes:
         yield 'quadratic_friction', _by_leg((rates * np.abs(rates))[..., None])
         yield 'gain', _by_leg(predicted[..., None])
         yield 'scale', predicted[..., None]
-        yield 'delay', _by_leg(block.columns[..., many + 2, None])
+        yield 'delay', _by_leg(extract.efforts[..., 1:2])
         beyond = np.maximum(np.abs(predicted) - _SATURATED * self._largest, 0.0)
         yield 'saturation', (-np.sign(predicted) * beyond)[..., None]
         at = (first + np.arange(len(rows))) / self._samples
@@ -165,38 +153,27 @@ class Causes:
         yield f'{UNKNOWN} pose', _by_leg(np.stack([x, x ** 2, x ** 3], axis=-1))
         yield f'{UNKNOWN} rate', _by_leg(np.stack([np.abs(v), x * v, v ** 3], axis=-1))
         if self._geometry:
-            yield 'zero_length', self._by_geometry(block, poses)
-            for end in ('base', 'platform'):
-                yield f'{end}_joint', self._by_joint(block, poses, end)
+            yield from self._by_geometry(extract, poses)
 
-    def _by_geometry(self, block: Block, poses: Pose) -> Array:
-        """Return the derivative of the forces with respect to zero lengths, (N, 6, 6) [N/m]."""
-        step = _STEP * self._size
-        return np.stack([self._difference(self._platform, block, poses, change, step)
-                         for change in step * np.eye(6)], axis=-1)
-
-    def _by_joint(self, block: Block, poses: Pose, end: str) -> Array:
-        """Return the derivative with respect to joint coordinates, (N, 6, 18) [N/m]."""
+    def _by_geometry(self, extract: Extract, poses: Pose) -> Iterator[tuple[str, Array]]:
+        """Yield derivatives of the forces by zero lengths and joint coordinates [N/m]."""
         p, step = self._platform.parameters, _STEP * self._size
-        name = f'geometry.{end}_joints'
-        found = []
-        for n in range(18):
-            moved = p[name].copy()
-            moved.reshape(-1)[n] += step
-            platform = StewartPlatform(p.replaced({name: moved}))
-            found.append(self._difference(platform, block, poses, np.zeros(6), step))
-        return np.stack(found, axis=-1)
+        lengths, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
 
-    def _difference(self, platform: StewartPlatform, block: Block, poses: Pose, change: Array,
-                    step: float) -> Array:
-        forces = []
-        lengths, rates, accelerations = np.moveaxis(block.legs, -1, 0)
-        for each, by in ((self._platform, np.zeros(6)), (platform, change)):
-            found = each.forward_kinematics(lengths + by, poses)
-            forces.append(each.regressors(motions(each, found, rates, accelerations))
-                          @ self._whole)
-        difference: Array = (forces[1] - forces[0]) / step
-        return difference
+        def forces(platform: StewartPlatform, lengths: Array) -> Array:
+            found = platform.forward_kinematics(lengths, poses)
+            return platform.regressors(
+                motions(platform, found, rates, accelerations)) @ self._whole
+
+        there = forces(self._platform, lengths)
+        yield 'zero_length', np.stack([
+            (forces(self._platform, lengths + change) - there) / step
+            for change in step * np.eye(6)], axis=-1)
+        for end in ('base', 'platform'):
+            name = f'geometry.{end}_joints'
+            yield f'{end}_joint', np.stack([
+                (forces(StewartPlatform(p.replaced({name: p[name] + change})), lengths) - there)
+                / step for change in step * np.eye(18).reshape(18, 6, 3)], axis=-1)
 
     def _causes(self, places: dict[str, Integers]) -> Iterator[Cause]:
         joints = self._platform.parameters['joints']

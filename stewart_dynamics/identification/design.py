@@ -57,26 +57,14 @@ _DIGITS = 7
 
 
 class Design(NamedTuple):
-    """
-    A designed motion.
-
-    Attributes
-    ----------
-    trajectory : ReferenceMotionParameters
-        Parameters for stewart_trajectory.
-    unknowns : Unknowns
-        Parameters to be identified.
-    half_widths : (k,)
-        Predicted 95 % intervals of the unknowns, for white noise in the efforts.
-    use : dict of str to float
-        Fraction of each limit that the motion uses.
-
-    """
+    """A designed motion."""
 
     trajectory: ReferenceMotionParameters
     unknowns: Unknowns
     half_widths: Array
+    """(k,) predicted 95 % intervals of the unknowns, for white noise in the efforts"""
     use: dict[str, float]
+    """Fraction of each limit that the motion uses."""
 
 
 def design(parameters: Parameters, options: DesignOptions,
@@ -84,24 +72,9 @@ def design(parameters: Parameters, options: DesignOptions,
     """
     Return a motion from which the parameters are identifiable, and its predicted intervals.
 
-    The same parameters, options and seed give the same motion.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Known or estimated parameters of the hexapod, and its limits.
-    options : DesignOptions
-        Parameters to be identified, and settings of the motion.
-    progress : callable
-        Called with the number of generations done.
-
-    Raises
-    ------
-    ParameterError
-        A limit is missing, or home is not within the limits.
-    StewartError
-        A requested parameter is not identifiable from any motion.
-
+    ``progress`` is called with the number of generations done. Raises StewartError if a requested
+    parameter is not identifiable from any motion, a limit is missing, or the center is not within
+    the limits.
     """
     search = _Search(parameters, options)
     best = _evolution(search.costs, search.size, options, progress)

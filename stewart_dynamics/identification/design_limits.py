@@ -44,21 +44,10 @@ class DesignLimits:
     """
     The limits of a hexapod with their margins, and the center of the motion.
 
-    Parameters
-    ----------
-    platform : StewartPlatform
-        The hexapod.
-    amplitude : float, optional
-        Largest displacement of the origin [m]; rotations are limited to it divided by the
-        characteristic length. If it is given, limits may be missing.
-    center : six numbers, optional
-        X Y Z alpha beta gamma of the center [m, rad]; home by default.
-
-    Raises
-    ------
-    ParameterError
-        A limit is missing, or the center is not within the limits.
-
+    ``amplitude`` is the largest displacement of the origin [m]; rotations are limited to it
+    divided by the characteristic length. If it is given, limits may be missing. ``center`` is
+    X Y Z alpha beta gamma [m, rad], home by default. Raises ParameterError if a limit is missing,
+    or the center is not within the limits.
     """
 
     def __init__(self, platform: StewartPlatform, amplitude: float | None = None,
@@ -76,14 +65,12 @@ class DesignLimits:
             center = [*platform.home_pose().position.round(digits).tolist(), 0.0, 0.0, 0.0]
         self.center: Array = np.array(center, dtype=float)
         """X Y Z alpha beta gamma."""
-        low, high = p[LENGTH_MIN], p[LENGTH_MAX]
-        stroke = 0.0 if low is None or high is None else high - low
-        self._low = np.full(6, -np.inf) if low is None else low + _STROKE * stroke
-        self._high = np.full(6, np.inf) if high is None else high - _STROKE * stroke
-        self._rate = np.full(6, np.inf) if p[VELOCITY_MAX] is None else (
-            (1.0 - _RATE) * p[VELOCITY_MAX])
-        self._force = np.full(6, np.inf) if p[FORCE_MAX] is None else (
-            (1.0 - _FORCE) * p[FORCE_MAX])
+        low, high, rate, force = (
+            np.full(6, -np.inf if name == LENGTH_MIN else np.inf) if p[name] is None else p[name]
+            for name in (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX))
+        stroke = np.where(np.isfinite(high - low), high - low, 0.0)
+        self._low, self._high = low + _STROKE * stroke, high - _STROKE * stroke
+        self._rate, self._force = (1.0 - _RATE) * rate, (1.0 - _FORCE) * force
         self._condition = _CONDITION * p['singularity.warn_condition']
         row = np.zeros((1, MOTION))
         self._rotation = from_euler(self.center[3:]).ravel()

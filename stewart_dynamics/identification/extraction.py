@@ -67,24 +67,40 @@ SLIP = 1 + len(_STRIBECK)
 
 
 class Extract(NamedTuple):
-    """Regressor and efforts of N samples, filtered and at a lower rate."""
+    """Regressor and efforts of the N samples of a window, filtered and at a lower rate."""
 
     times: Array
-    """(N,) since the start of the window [s]"""
-    regressor: Array
-    """(N, 6, n) of ``Unknowns.theta``"""
-    known: Array
-    """(N, 6) force of all other parameters [N]"""
-    efforts: Array
-    """(N, 6, ORDERS) efforts and their time derivatives [N, N/s, ...]"""
-    sound: Flags
-    """(N, 6) whether all samples that contribute to an effort are valid"""
+    """(N,) since the start of the window, in ``Extracts`` since the start of the bag [s]"""
+    columns: Array
+    """(N, 6, n + 1 + ORDERS): the regressor of ``Unknowns.theta``, the force of all other
+    parameters [N], and the effort with its time derivatives [N, N/s, ...]"""
+    used: Flags
+    """(N, 6) whether an effort is fitted: all samples that contribute to it are valid"""
     legs: Array
     """(N, 6, 3) length, rate and acceleration [m, m/s, m/s^2]"""
     slip: Array
     """(N, 6, SLIP) shapes of friction over the rate"""
     poses: Array
     """(N, POSE) platform poses at the output times, guesses for forward kinematics"""
+    bag: int = 0
+
+    @property
+    def regressor(self) -> Array:
+        return self.columns[..., :-1 - ORDERS]
+
+    @property
+    def known(self) -> Array:
+        return self.columns[..., -1 - ORDERS]
+
+    @property
+    def efforts(self) -> Array:
+        return self.columns[..., -ORDERS:]
+
+
+class WindowRead(NamedTuple):
+    """The extract of a window, and what else was found in it."""
+
+    extract: Extract
     deviations: tuple[float, float]
     """Standard deviations of the white noise of lengths [m] and rates [m/s]; nan: no rates."""
     stops: int
@@ -92,53 +108,35 @@ class Extract(NamedTuple):
     end: Pose
     """Last pose."""
 
-    @property
-    def columns(self) -> Array:
-        """Return regressor, known force, effort and its derivatives, (N, 6, n + 1 + ORDERS)."""
-        return np.concatenate([self.regressor, self.known[..., None], self.efforts], axis=-1)
-
-
-class Block(NamedTuple):
-    """Data of one window of N samples for the fit."""
-
-    number: int
-    bag: int
-    times: Array
-    """(N,) since the start of the bag [s]"""
-    columns: Array
-    """(N, 6, n + 1 + ORDERS): regressor, known force, effort and its derivatives"""
-    sound: Flags
-    """(N, 6)"""
-    legs: Array
-    slip: Array
-    poses: Array
-    """Legs, slip and poses as in ``Extract``."""
-
 
 class Extracts:
-    """Extracts in the order of addition; can be iterated over repeatedly."""
+    """Extracts of B bags in the order of addition; can be iterated over repeatedly."""
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile()
         self._bags: list[int] = []
         self.samples = 0
+        self.used: list[Flags] = []
+        """(N, 6) of each extract; may be changed."""
 
     def add(self, bag: int, begin: float, extract: Extract) -> None:
         """Add the extract of a window of a bag that begins at a time [s]."""
-        for array in (begin + extract.times, extract.columns, extract.sound, extract.legs,
-                      extract.slip, extract.poses):
+        for array in (begin + extract.times, extract.columns, extract.legs, extract.slip,
+                      extract.poses):
             np.save(self._file, array)
         self._bags.append(bag)
+        self.used.append(extract.used)
         self.samples += len(extract.times)
 
-    def __iter__(self) -> Iterator[Block]:
+    def __iter__(self) -> Iterator[Extract]:
         """Read the extracts from the file."""
         self._file.seek(0)
-        for number, bag in enumerate(self._bags):
-            yield Block(number, bag, *(np.load(self._file) for _ in range(6)))
+        for bag, used in zip(self._bags, self.used, strict=True):
+            times, columns, legs, slip, poses = (np.load(self._file) for _ in range(5))
+            yield Extract(times, columns, used, legs, slip, poses, bag)
 
     def __len__(self) -> int:
-        """Return the number of windows."""
+        """Return the number of extracts."""
         return len(self._bags)
 
     def close(self) -> None:
@@ -148,21 +146,11 @@ class Extracts:
 
 class Extraction:
     """
-    Computes the extracts of windows.
+    Computes the extracts of windows with a sampling period [s].
 
-    Parameters
-    ----------
-    platform : StewartPlatform
-        Hexapod with the parameters of the file.
-    unknowns : Unknowns
-        Parameters to be identified.
-    period : float
-        Sampling period of the windows [s].
-    cutoff : float
-        Cut-off frequency of the narrow band [Hz].
-    speeds : tuple of float, optional
-        Rates of the friction shapes [m/s]; derived from the first window by default.
-
+    ``platform`` has the parameters of the file; ``cutoff`` is the frequency of the narrow band
+    [Hz]. ``speeds`` are the rates of the friction shapes [m/s], by default those of the first
+    window.
     """
 
     def __init__(self, platform: StewartPlatform, unknowns: Unknowns, period: float,
@@ -177,30 +165,23 @@ class Extraction:
         """Number of samples at each end of a window without an output."""
 
     def __call__(self, window: Window, guess: Pose, noise: np.random.Generator | None = None,
-                 ) -> Extract:
+                 ) -> WindowRead:
         """
-        Return the extract of a window.
+        Return the extract of a window that is longer than twice the margin.
 
-        Parameters
-        ----------
-        window : Window
-            Longer than twice the margin.
-        guess : Pose
-            Pose near the first one.
-        noise : Generator, optional
-            Add noise to lengths and rates, as large as the noise they contain.
-
+        ``guess`` is near the first pose; ``noise`` adds noise to lengths and rates, as large as
+        the noise that they contain.
         """
         deviations = self._deviations(window)
         lengths, rates, accelerations = self._filtered(window, deviations, noise)
         found = poses(self.platform, lengths, guess)
         rows = motions(self.platform, found, rates, accelerations)
-        regressor, known = self._decimated(rows)
-        many, half = len(known), self._narrow.half
         efforts = np.stack([decimated(
             window.efforts[self._wide.half:-self._wide.half], self._narrow.taps(order), self.step)
             for order in range(ORDERS)], axis=-1)
+        columns = np.concatenate([self._decimated(rows), efforts], axis=-1)
         wrong, stops = self._wrong(window)
+        many = len(columns)
         times = self._period * (self.margin + self.step * np.arange(many)).astype(float)
         if self.speeds is None:
             band = self.platform.parameters['actuator.coulomb_velocity']
@@ -210,10 +191,10 @@ class Extraction:
         taps = self._narrow.taps()
         legs = np.stack([decimated(each, taps, self.step)
                          for each in (lengths, rates, accelerations)], axis=-1)
-        at = half + self.step * np.arange(many)
-        return Extract(times, regressor, known, efforts, ~wrong[:many], legs,
-                       decimated(self._slip(rates), taps, self.step), found.rows[at][:, POSE],
-                       deviations, stops, Pose.of_rows(found.rows[-1]))
+        at = self._narrow.half + self.step * np.arange(many)
+        extract = Extract(times, columns, ~wrong[:many], legs,
+                          decimated(self._slip(rates), taps, self.step), found.rows[at][:, POSE])
+        return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]))
 
     def lag(self, window: Window, guess: Pose, longest: float) -> tuple[int, float]:
         """
@@ -223,16 +204,16 @@ class Extraction:
         period; 0 unless the residual is much smaller than without a lag. The misfit is relative
         to the efforts, whatever the values of the linear parameters.
         """
-        extract = self(window, guess)
+        extract = self(window, guess).extract
         efforts = convolved(window.efforts[self._wide.half:-self._wide.half], self._narrow.taps())
         steps = max(1, round(_LAG_STEP / (self.cutoff * self._period)))
         lags = np.arange(0, round(longest / self._period) + steps, steps)
-        at = self.step * np.arange(len(extract.known))
+        at = self.step * np.arange(len(extract.times))
         used = at + lags[-1] < len(efforts)
         at = at[used]
         if len(at) < extract.regressor.shape[-1]:
             return 0, 1.0
-        sound = extract.sound[used].reshape(-1)
+        sound = extract.used[used].reshape(-1)
         columns = extract.regressor[used].reshape(len(sound), -1)[sound]
         sizes = np.linalg.norm(columns, axis=0)
         basis = np.linalg.qr(columns[:, sizes > 0.0] / sizes[sizes > 0.0])[0]
@@ -286,20 +267,21 @@ class Extraction:
             derivatives.append(convolved(positions, of_positions) + convolved(rates, of_rates))
         return derivatives[0], derivatives[1], derivatives[2]
 
-    def _decimated(self, rows: Array) -> tuple[Array, Array]:
-        """Return the decimated regressor and known forces of rows of motion."""
+    def _decimated(self, rows: Array) -> Array:
+        """Return the decimated regressor and known forces (N, 6, n + 1) of rows of motion."""
         taps = self._narrow.taps()
-        parts, known = [], []
+        parts = []
         # Each part begins at the input of its first output.
         stride = max(1, _TOGETHER // self.step) * self.step
         last = len(rows) - len(taps)
         for first in range(0, last + 1, stride):
             end = min(first + stride - self.step, (last - first) // self.step * self.step + first)
-            regressor, forces = regression(
+            regressor, known = regression(
                 self.platform, self._unknowns, rows[first:end + len(taps)])
-            parts.append(decimated(regressor, taps, self.step))
-            known.append(decimated(forces, taps, self.step))
-        return np.concatenate(parts), np.concatenate(known)
+            parts.append(np.concatenate([
+                decimated(regressor, taps, self.step),
+                decimated(known[..., None], taps, self.step)], axis=-1))
+        return np.concatenate(parts)
 
     def _wrong(self, window: Window) -> tuple[Flags, int]:
         """Return outputs (N, 6) affected by invalid samples, and the count of samples at stops."""

@@ -39,42 +39,23 @@ _TRANSITION = 5.5
 
 
 class LowPass(NamedTuple):
-    """
-    A low-pass filter for a sampling period.
-
-    Attributes
-    ----------
-    period : float
-        Sampling period [s].
-    cutoff : float
-        Frequency at which the amplitude is one half [Hz].
-    half : int
-        Number of samples before and after an output on which it depends.
-
-    """
+    """A low-pass filter for a sampling period."""
 
     period: float
+    """[s]"""
     cutoff: float
+    """Frequency at which the amplitude is one half [Hz]."""
     half: int
+    """Number of samples before and after an output on which it depends."""
 
     @classmethod
     def of(cls, period: float, cutoff: float, transition: float) -> LowPass:
         """Return a filter whose amplitude falls from 1 to 0 over a transition width [Hz]."""
         return cls(period, cutoff, math.ceil(0.5 * _TRANSITION / (transition * period)))
 
-    def taps(self, order: int = 0, delay: float = 0.0) -> Array:
-        """
-        Return the filter coefficients, shape (2 half + 1,), the newest sample last.
-
-        Parameters
-        ----------
-        order : int
-            Order of the derivative.
-        delay : float
-            The output belongs to a time later by this [s]; less than a tenth of the filter.
-
-        """
-        return self._sampled(lambda w: (1j * w) ** order * np.exp(1j * w * delay))
+    def taps(self, order: int = 0) -> Array:
+        """Return the coefficients (2 half + 1,) of a derivative, the newest sample last."""
+        return self._sampled(lambda w: (1j * w) ** order)
 
     def fused(self, order: int, deviation: float, rate_deviation: float) -> tuple[Array, Array]:
         """Return the taps for positions and for rates, given their standard deviations."""

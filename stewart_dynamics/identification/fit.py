@@ -32,7 +32,7 @@ from stewart_dynamics.identification.physical import consistent
 from stewart_dynamics.identification.sums import delayed_by, residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import (
-    Identifiability, Information, LARGEST_ERROR, LEAST_SHARE, no_information, solve)
+    Identifiability, Information, LEAST_SHARE, no_information, solve)
 
 _STEPS = 30
 _DONE = 1e-10
@@ -47,81 +47,51 @@ _SMALLEST_DEVIATION = 1e-8
 
 
 class Fit(NamedTuple):
-    """
-    Unknowns that fit the samples.
-
-    Attributes
-    ----------
-    values : (k,)
-        Values of the unknowns.
-    covariance : (k, k)
-        Covariance of the unknowns for white noise.
-    delays : (B,)
-        Delay of the efforts of each bag [s], + later than the positions.
-    delay_errors : (B,)
-        Standard errors of the delays for white noise; 0: the delay is not identifiable.
-    variances : (B, 6)
-        Variances of the residuals [N^2].
-    identifiability : Identifiability
-        Identifiability of the unknowns.
-    matrix : (k, k)
-        Information matrix of the unknowns, delays eliminated.
-    at_bound : tuple of str
-        Names of parameters that would be inconsistent or negative without the bounds.
-
-    """
+    """Unknowns (k,) that fit the samples of B bags."""
 
     values: Array
     covariance: Array
+    """(k, k) for white noise"""
     delays: Array
+    """(B,) of the efforts [s], + later than the positions"""
     delay_errors: Array
+    """(B,) standard errors for white noise [s]; 0: the delay is not identifiable"""
     variances: Array
+    """(B, 6) of the residuals [N^2]"""
     identifiability: Identifiability
     matrix: Array
+    """(k, k) information of the unknowns, delays eliminated"""
     at_bound: tuple[str, ...]
+    """Names of parameters that would be inconsistent or negative without the bounds."""
 
 
 def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None, prior: float | None = None,
-        cutoffs: Array | None = None, largest_error: float = LARGEST_ERROR) -> Fit:
+        cutoffs: Array | None = None) -> Fit:
     """
-    Return the unknowns that fit the samples best.
+    Return the unknowns that fit the samples of B bags best.
 
-    Parameters
-    ----------
-    sums : Sums
-        Sums of B bags.
-    unknowns : Unknowns
-        Parameters to be identified, with their values in the file.
-    noise : (6, n, n), optional
-        Sums of the noise in the regressor alone.
-    prior : float, optional
-        Standard error of the file's values as a fraction of the scales; by default they do not
-        count.
-    cutoffs : (B,), optional
-        Cut-off frequency of each bag [Hz], to estimate delays. By default delays are zero.
-    largest_error : float
-        Largest standard error of an identifiable direction, see ``least_squares``.
-
+    ``noise`` (6, n, n) are the sums of the noise in the regressor alone. ``prior`` is the standard
+    error of the file's values as a fraction of the scales; without it they do not count. Delays
+    are estimated if the cut-off frequencies of the bags (B,) [Hz] are given, else zero.
     """
-    found = _fit(sums, unknowns, unknowns.scales, noise, prior, cutoffs, largest_error)
+    found = _fit(sums, unknowns, unknowns.scales, noise, prior, cutoffs)
     unknown = found.identifiability.known_shares < LEAST_SHARE
     if not unknown.any():
         return found
     # Weakly identifiable parameters keep the value from the file.
     found = _fit(sums, unknowns, np.where(unknown, _HELD, 1.0) * unknowns.scales, noise, prior,
-                 cutoffs, largest_error)
+                 cutoffs)
     return found._replace(values=np.where(unknown, unknowns.start, found.values))
 
 
 def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, prior: float | None,
-         cutoffs: Array | None, largest_error: float) -> Fit:
+         cutoffs: Array | None) -> Fit:
     values = unknowns.start.copy()
     bags = len(sums.counts)
     delays: Array = np.zeros(bags)
     longest: Array = np.zeros(bags) if cutoffs is None else _LONGEST_DELAY / cutoffs
     errors: Array = np.zeros(bags)
     variances = _variances(sums, unknowns, values, delays)
-    solution = None
     for _ in range(_STEPS):
         information, steps, of_noise = _information(
             sums, unknowns, values, delays, variances, noise, cutoffs)
@@ -130,7 +100,7 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
             information = information._replace(
                 matrix=information.matrix + strength,
                 vector=information.vector + strength @ unknowns.start)
-        solution = solve(information, unknowns.start, scales, of_noise, largest_error)
+        solution = solve(information, unknowns.start, scales, of_noise)
         change = solution.values - values
         largest = float(np.max(np.abs(change) / unknowns.scales, initial=0.0))
         # Limit the step if the mass is far from the file's: its products are nonlinear.
@@ -147,11 +117,10 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
         variances = _variances(sums, unknowns, values, delays)
         if largest < _DONE:
             break
-    assert solution is not None
-    information, steps, of_noise = _information(
+    information, _, of_noise = _information(
         sums, unknowns, values, delays, variances, noise, cutoffs)
-    final = solve(information, unknowns.start, scales, of_noise, largest_error)
-    bounded, at_bound = consistent(unknowns, values, information, final.identifiability)
+    final = solve(information, unknowns.start, scales, of_noise)
+    bounded, at_bound = consistent(unknowns, values, information.matrix)
     return Fit(bounded, final.covariance, delays, errors, variances, final.identifiability,
                information.matrix, at_bound)
 
@@ -170,18 +139,7 @@ def shift_of_noise(clean: Sums, noisy: Sums, unknowns: Unknowns, found: Fit,
     Noise in the regressor rounds the friction law where the rate changes its sign, and more noise
     does so again: the bias is estimated by the change of the unknowns with as much noise added
     (simulation extrapolation: Cook and Stefanski 1994, doi:10.1080/01621459.1994.10476871).
-
-    Parameters
-    ----------
-    clean, noisy : Sums
-        Sums of the same samples as recorded and with noise added.
-    unknowns : Unknowns
-        Unknowns of the fit.
-    found : Fit
-        Result of the fit.
-    cutoffs, prior
-        As in ``fit``.
-
+    ``noisy`` are the sums of the same samples with noise added.
     """
     known, steps = found.identifiability.known, []
     for sums in (clean, noisy):

@@ -28,8 +28,9 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.identification.identify import Identification, Identified
-from stewart_dynamics.identification.sums import residual_of
+from stewart_dynamics.identification.extraction import Extracts
+from stewart_dynamics.identification.identify import Identified
+from stewart_dynamics.identification.sums import residual_of, shifted_by
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.estimates import page_values
@@ -42,61 +43,46 @@ _FOLDER = Path(__file__).with_name('templates')
 _MOST = 12_000
 
 
-class IdentificationReport:
-    """
-    The page of an identification.
+def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapping[str, Any],
+                 ) -> None:
+    """Write the page of a result, with the content of identification.json."""
+    legs = list(found.parameters['joints'])
+    curves, spectra = _curves(extracts, found)
+    data = {'legs': legs, 'colors': LEG_COLORS,
+            'curves': [base64_of(column, '<f4') for column in curves.T], 'spectra': spectra}
+    script = plotly_script()
+    bag = result['bags'][0]['bag']
+    text = page(
+        _FOLDER, 'identification', [script], document=True, r=result, name=Path(bag).name or bag,
+        **page_values(result), legs=legs, plotly=script, data=data, two_sided=TWO_SIDED,
+        samples=len(curves), most=_MOST)
+    write_files({path: text})
 
-    Parameters
-    ----------
-    work : Identification
-        Identification with its extracts.
-    found : Identified
-        Result of the identification.
 
-    """
-
-    def __init__(self, work: Identification, found: Identified) -> None:
-        self._found = found
-        u = found.unknowns
-        before, after = u.theta(u.start), u.theta(found.fit.values)
-        timeout = found.parameters['setpoint.timeout']
-        spectrum = Spectrum(12, timeout)
-        curves: list[Array] = []
-        drawn_samples, elapsed = 0, 0.0
-        for block in work.extracts:
-            delay = found.fit.delays[block.bag]
-            shifts = residual_of(np.zeros(0), delay)[1:]
-            effort = block.columns[..., -len(shifts):] @ shifts
-            residuals = [block.columns @ residual_of(theta, delay) for theta in (before, after)]
-            both = np.concatenate(residuals, axis=1)
-            times = elapsed + block.times - block.times[0]
-            spectrum.add(times, both.T)
-            elapsed = float(times[-1]) + 10.0 * timeout  # no step between bags
-            if drawn_samples < _MOST:
-                rows = np.concatenate(
-                    [block.times[:, None], effort, effort - residuals[0], effort - residuals[1]],
-                    axis=1)[:_MOST - drawn_samples]
-                curves.append(np.concatenate([rows, np.full((1, 19), np.nan)]))
-                drawn_samples += len(rows)
-        self._curves = np.concatenate(curves)
-        self._density = spectrum.density()
-
-    def write(self, path: Path, result: Mapping[str, Any]) -> None:
-        """Write the page, with the content of identification.json."""
-        script = plotly_script()
-        text = page(
-            _FOLDER, 'identification', [script], document=True, r=result,
-            name=Path(result['bags'][0]['bag']).name or result['bags'][0]['bag'],
-            **page_values(result),
-            legs=list(self._found.parameters['joints']), plotly=script, data=self._data(),
-            two_sided=TWO_SIDED, samples=len(self._curves), most=_MOST)
-        write_files({path: text})
-
-    def _data(self) -> dict[str, Any]:
-        spectra = [] if self._density is None else [
-            dict(zip(('frequencies', 'values'), (
-                base64_of(each, '<f4') for each in drawn(self._density.frequencies, amplitudes)),
-                strict=True)) for amplitudes in self._density.amplitudes]
-        return {'legs': list(self._found.parameters['joints']), 'colors': LEG_COLORS,
-                'curves': [base64_of(column, '<f4') for column in self._curves.T],
-                'spectra': spectra}
+def _curves(extracts: Extracts, found: Identified) -> tuple[Array, list[dict[str, str]]]:
+    """Return times, efforts and forces before and after (M, 19), and spectra of residuals."""
+    u = found.unknowns
+    before, after = u.theta(u.start), u.theta(found.fit.values)
+    timeout = found.parameters['setpoint.timeout']
+    spectrum = Spectrum(12, timeout)
+    curves: list[Array] = []
+    count, elapsed = 0, 0.0
+    for extract in extracts:
+        delay = found.fit.delays[extract.bag]
+        effort = extract.efforts @ shifted_by(delay)
+        residuals = [extract.columns @ residual_of(theta, delay) for theta in (before, after)]
+        times = elapsed + extract.times - extract.times[0]
+        spectrum.add(times, np.concatenate(residuals, axis=1).T)
+        elapsed = float(times[-1]) + 10.0 * timeout  # no step between bags
+        if count < _MOST:
+            rows = np.concatenate(
+                [extract.times[:, None], effort, effort - residuals[0], effort - residuals[1]],
+                axis=1)[:_MOST - count]
+            curves.append(np.concatenate([rows, np.full((1, 19), np.nan)]))
+            count += len(rows)
+    density = spectrum.density()
+    spectra = [] if density is None else [
+        dict(zip(('frequencies', 'values'), (
+            base64_of(each, '<f4') for each in drawn(density.frequencies, amplitudes)),
+            strict=True)) for amplitudes in density.amplitudes]
+    return np.concatenate(curves), spectra

@@ -22,22 +22,23 @@ the end of each bag by a fit to the rest.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import closing
+from collections import Counter
+from collections.abc import Callable, Iterable
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, ParameterError, PoseError, SingularityError
-from stewart_dynamics.identification.extraction import Block, Extract, Extraction, Extracts
+from stewart_dynamics.identification.extraction import Extraction, Extracts, WindowRead
 from stewart_dynamics.identification.filters import LowPass
 from stewart_dynamics.identification.fit import Fit, fit, shift_of_noise
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.intervals import Errors, errors_of
-from stewart_dynamics.identification.kinematics import pose_near
+from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (
     LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
@@ -70,7 +71,7 @@ _SEED = 20221
 
 
 class BagRead(NamedTuple):
-    """Metadata of a bag that was read."""
+    """Data of a bag that was read, besides its extracts."""
 
     path: Path
     topics: Topics
@@ -91,13 +92,22 @@ class BagRead(NamedTuple):
     notices: list[str]
 
 
-class Validation(NamedTuple):
-    """Residuals on held-out time, RMS per leg (6,) [N], with the file's and fitted values."""
+class Residuals(NamedTuple):
+    """Residuals by the file's and by fitted parameters, and efforts: RMS per leg (6,) [N]."""
 
     before: Array
     after: Array
     measured: Array
     samples: int
+
+    @classmethod
+    def of(cls, sums: Sums, unknowns: Unknowns, found: Fit) -> Residuals:
+        """Return the residuals of the efforts in some sums."""
+        counts = np.maximum(sums.counts.sum(axis=0), 1)
+        before, after, measured = (np.sqrt(squares.sum(axis=0) / counts) for squares in (
+            sums.squares(unknowns.theta(unknowns.start), found.delays),
+            sums.squares(unknowns.theta(found.values), found.delays), sums.effort_squares()))
+        return cls(before, after, measured, int(sums.counts.sum()) // 6)
 
 
 class Identified(NamedTuple):
@@ -115,33 +125,16 @@ class Identified(NamedTuple):
     """Number of filtered efforts left out after the first fit."""
     unsound: int
     """Number left out before it: outliers in samples, end stops, force limits."""
-    before: Array
-    """Residuals with the file's parameters, RMS (6,) [N]."""
-    after: Array
-    """Residuals with the identified parameters, RMS (6,) [N]."""
-    measured: Array
-    """Measured efforts, RMS (6,) [N]."""
-    validation: Validation | None
+    residuals: Residuals
+    validation: Residuals | None
+    """Residuals on held-out time, by a fit to the rest."""
     likely: tuple[LikelyMistake, ...]
     lack_of_fit: LackOfFit | None
     """None if the residuals are noise."""
 
 
-Progress = Callable[[int], None]
-
-
 class Identification:
-    """
-    Reads bags and identifies parameters.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Known or estimated parameters of the hexapod.
-    options : IdentificationOptions
-        IdentificationOptions of the identification.
-
-    """
+    """Reads bags and identifies parameters, beginning with those of the file."""
 
     def __init__(self, parameters: Parameters, options: IdentificationOptions) -> None:
         if parameters['base.source'] != 'fixed':
@@ -163,23 +156,14 @@ class Identification:
         self.unknowns = Unknowns(parameters, options.kinds)
         self.extracts = Extracts()
         self.bags: list[BagRead] = []
-        self.chosen: list[Flags] = []
         self._first: tuple[Extraction, Window] | None = None
-        self._noise: Array | None = None
-        self._with_noise: list[tuple[Sums, Sums]] = []
-        self._of_noise = 0
+        # Of the first window of each bag: sums without and with more noise, the Gram matrix of
+        # that noise in the regressor, and the number of samples.
+        self._noises: list[tuple[Sums, Sums, Array, int]] = []
         self._speeds: tuple[float, ...] | None = None
 
-    def read(self, path: Path, progress: Progress | None = None) -> None:
-        """
-        Read a bag.
-
-        Raises
-        ------
-        BagError
-            The bag cannot be read, or contains no usable data.
-
-        """
+    def read(self, path: Path, progress: Callable[[int], None] | None = None) -> None:
+        """Read a bag; raise BagError if it cannot be read, or contains no usable data."""
         options = self._options
         with closing(Recording(path)) as recording:
             topics = find_topics(recording, options.node, options.measured, options.efforts)
@@ -200,13 +184,12 @@ class Identification:
 
     def add(self, path: Path, windows: Iterable[Window]) -> BagRead | None:
         """Add the windows of a bag; return None if none of them is usable."""
-        options, p = self._options, self.parameters
-        number, left_out, stops, outliers, samples, lag = len(self.bags), 0, 0, 0, 0, 0
-        inside = rows = 0.0
+        options = self._options
+        lag = begin = end = 0
+        counts: Counter[str] = Counter()
         notices: list[str] = []
         extraction: Extraction | None = None
-        last: Extract | None = None
-        begin = end = 0
+        last: WindowRead | None = None
         before = self.extracts.samples
         for window in windows:
             if extraction is None:
@@ -215,7 +198,7 @@ class Identification:
                 window = window._replace(efforts=window.efforts * self._per_effort)
             fewest = 2 * extraction.margin + 2 * extraction.step
             if len(window.positions) < fewest + lag:
-                left_out += 1
+                counts['left out'] += 1
                 continue
             if last is None and not self.bags and self._is_on_other_side(window):
                 notices.append('geometry.platform_side: the efforts are those of a platform on '
@@ -226,19 +209,21 @@ class Identification:
                 if len(window.positions) < fewest + lag:
                     lag = 0
             window = window.with_lag(lag)
-            last = self._extract(path, number, extraction, window, (
-                window.begin - begin) * 1e-9, last)
+            is_first, last = last is None, self._read_window(path, extraction, window, last)
+            self.extracts.add(len(self.bags), (window.begin - begin) * 1e-9, last.extract)
+            if is_first:
+                self._add_noise(extraction, window, last)
             self._speeds = extraction.speeds
-            stops, outliers = stops + last.stops, outliers + int(
-                np.count_nonzero(window.outliers))
-            samples += len(window.positions)
-            inside += float(np.count_nonzero(
-                np.abs(last.legs[..., 1]) < p['actuator.coulomb_velocity']))
-            rows += last.known.size
+            rates = np.abs(last.extract.legs[..., 1])
+            counts.update({
+                'samples': len(window.positions), 'stops': last.stops,
+                'outliers': int(np.count_nonzero(window.outliers)), 'rates': rates.size,
+                'slow rates': int(np.count_nonzero(
+                    rates < self.parameters['actuator.coulomb_velocity']))})
             end = window.begin + round(len(window.positions) * window.period * 1e9)
-            rates, period = window.rates is not None, window.period
-        if extraction is None or last is None or self.extracts.samples == before:
+        if extraction is None or last is None:
             return None
+        period = window.period
         if extraction.cutoff < options.cutoff:
             notices.append(f'sampled at {1.0 / period:.4g} Hz: the cut-off frequency is '
                            f'{extraction.cutoff:.3g} Hz')
@@ -246,14 +231,16 @@ class Identification:
         if (self.extracts.samples - before) * extraction.step * period < short:
             notices.append(f'less than {short:.3g} s are left by the filters: intervals are too '
                            'narrow for so short a recording')
-        if inside > _MOST_INSIDE * rows and any(
+        inside = counts['slow rates'] / counts['rates']
+        if inside > _MOST_INSIDE and any(
                 'coulomb_friction' in name for name in self.unknowns.names):
             notices.append(
-                f'{100.0 * inside / rows:.0f} % of the rates are below actuator.coulomb_velocity: '
+                f'{100.0 * inside:.0f} % of the rates are below actuator.coulomb_velocity: '
                 'Coulomb friction is linear there, and its value depends on that parameter')
         self.bags.append(BagRead(
-            path, Topics('', ''), samples, (end - begin) * 1e-9, period, extraction.cutoff,
-            rates, lag * period, {}, left_out, stops, outliers, last.deviations, [], notices))
+            path, Topics('', ''), counts['samples'], (end - begin) * 1e-9, period,
+            extraction.cutoff, window.rates is not None, lag * period, {}, counts['left out'],
+            counts['stops'], counts['outliers'], last.deviations, [], notices))
         return self.bags[-1]
 
     def _extraction(self, window: Window) -> Extraction:
@@ -262,10 +249,9 @@ class Identification:
 
     def _lag(self, extraction: Extraction, window: Window) -> tuple[int, float]:
         """Return the lag of the efforts in samples, and the squared misfit."""
-        piece, platform = most_motion(window, extraction), extraction.platform
-        lengths = piece.positions[0] + platform.parameters['geometry.zero_length']
+        piece = most_motion(window, extraction)
         try:
-            return extraction.lag(piece, pose_near(platform, lengths),
+            return extraction.lag(piece, first_pose(extraction.platform, piece),
                                   LONGEST_LAG if self._options.delay else 0.0)
         except (PoseError, SingularityError):
             return 0, 1.0
@@ -290,121 +276,101 @@ class Identification:
         self.parameters, self.platform = parameters, platform
         return False
 
-    def _extract(self, path: Path, number: int, extraction: Extraction, window: Window,
-                 begin: float, last: Extract | None) -> Extract:
+    def _read_window(self, path: Path, extraction: Extraction, window: Window,
+                     last: WindowRead | None) -> WindowRead:
+        if last is not None:
+            with suppress(PoseError, SingularityError):
+                return extraction(window, last.end)
         try:
-            lengths = window.positions[0] + self.parameters['geometry.zero_length']
-            guess = last.end if last is not None else pose_near(self.platform, lengths)
-            try:
-                extract = extraction(window, guess)
-            except (PoseError, SingularityError):
-                if last is None:
-                    raise
-                guess = pose_near(self.platform, lengths)
-                extract = extraction(window, guess)
+            return extraction(window, first_pose(self.platform, window))
         except (PoseError, SingularityError) as exc:
             raise BagError(f'{path}: {of_no_pose(self.parameters, window.positions)}') from exc
-        self.extracts.add(number, begin, extract)
-        self.chosen.append(extract.sound)
-        if last is None:  # once for each bag
-            noisy = extraction(window, guess, np.random.default_rng(_SEED))
-            change = noisy.regressor - extract.regressor
-            found = np.einsum('nla,nlb->lab', change, change)
-            self._noise = found if self._noise is None else self._noise + found
-            self._with_noise.append((Sums.of(extract.columns, extract.sound),
-                                     Sums.of(noisy.columns, extract.sound)))
-            self._of_noise += len(change)
-            if self._first is None:
-                self._first = extraction, window
-        return extract
+
+    def _add_noise(self, extraction: Extraction, window: Window, read: WindowRead) -> None:
+        """Determine the information due to noise alone in a window."""
+        extract = read.extract
+        noisy = extraction(window, first_pose(self.platform, window),
+                           np.random.default_rng(_SEED)).extract
+        change = noisy.regressor - extract.regressor
+        self._noises.append((
+            Sums.of(extract.columns, extract.used), Sums.of(noisy.columns, extract.used),
+            np.einsum('nla,nlb->lab', change, change), len(change)))
+        if self._first is None:
+            self._first = extraction, window
 
     def result(self) -> Identified:
         """Fit all bags and return the result."""
-        options, unknowns = self._options, self.unknowns
-        if self.extracts.samples < _FEWEST:
-            raise BagError(f'{self.bags[0].path}: {self.extracts.samples} samples are left after '
+        options, unknowns, extracts = self._options, self.unknowns, self.extracts
+        if extracts.samples < _FEWEST:
+            raise BagError(f'{self.bags[0].path}: {extracts.samples} samples are left after '
                            f'the filters: must be at least {_FEWEST}')
-        assert self._noise is not None
-        noise = self._noise * (self.extracts.samples / self._of_noise)
-        left = sum(np.count_nonzero(each, axis=0) for each in self.chosen)
-        if np.min(left) < _FEWEST:
+        sums = sums_of(extracts)
+        if sums.counts.sum(axis=0).min() < _FEWEST:
             raise BagError(f'{self.bags[0].path}: nothing to identify from: '
                            f'{sum(bag.stops for bag in self.bags)} samples are at an end stop or '
                            'at limits.force_max')
-        unsound = sum(int(np.count_nonzero(~each)) for each in self.chosen)
-        sums = self._sums()
-        found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
+        unsound = 6 * extracts.samples - int(sums.counts.sum())
+        clean, noisy, grams, samples = zip(*self._noises, strict=True)
+        noise = sum(grams) * (extracts.samples / sum(samples))
+        found = fit(sums, unknowns, noise, options.prior, self._cutoffs)
         outliers = self._leave_out_outliers(found)
         if outliers:
-            sums = self._sums()
-            found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
+            sums = sums_of(extracts)
+            found = fit(sums, unknowns, noise, options.prior, self._cutoffs)
         likely = [*of_delay(bag.lag + delay for bag, delay in zip(
                       self.bags, found.delays, strict=True)),
                   *of_efforts(sums, unknowns, self.parameters, self._per_effort is not None)]
-        errors = errors_of(self.extracts, sums, unknowns, found, self.chosen, options.prior)
-        clean, noisy = (Sums.stacked(each) for each in zip(*self._with_noise, strict=True))
-        shift = shift_of_noise(clean, noisy, unknowns, found, self._cutoffs(), options.prior)
+        errors = errors_of(extracts, sums, unknowns, found, options.prior)
+        shift = shift_of_noise(Sums.stacked(clean), Sums.stacked(noisy), unknowns, found,
+                               self._cutoffs, options.prior)
         errors = errors._replace(covariance=errors.covariance + np.outer(shift, shift))
-        after = _rms(sums, unknowns, found.values, found.delays)
-        measured = _measured(sums)
-        lack = lack_of_fit(self.platform, self.extracts, unknowns, found, self.chosen)
+        residuals = Residuals.of(sums, unknowns, found)
+        lack = lack_of_fit(self.platform, extracts, unknowns, found)
         if not likely:
             assert self._first is not None
-            likely += of_fit(self.parameters, unknowns, *self._first, found, lack, float(
-                np.sqrt(np.mean(after ** 2) / (np.mean(measured ** 2) + 1e-300))))
+            likely += of_fit(self.parameters, *self._first, found, lack, float(np.sqrt(
+                np.mean(residuals.after ** 2) / (np.mean(residuals.measured ** 2) + 1e-300))))
         return Identified(
             unknowns.parameters(found.values), unknowns, found, errors, tuple(self.bags),
-            self.extracts.samples, outliers, unsound,
-            _rms(sums, unknowns, unknowns.start, found.delays), after, measured,
+            extracts.samples, outliers, unsound, residuals,
             self._validation(noise) if options.hold_out else None, tuple(likely), lack)
 
-    def _sums(self, chosen: Callable[[Block], Flags] | None = None) -> Sums:
-        return sums_of(self.extracts, len(self.bags),
-                       chosen or (lambda block: self.chosen[block.number]))
-
+    @property
     def _cutoffs(self) -> Array | None:
         return np.array([bag.cutoff for bag in self.bags]) if self._options.delay else None
 
-    def residuals(self, found: Fit) -> Sequence[Array]:
-        """Return the residuals of each block, (N, 6) [N]."""
-        theta = self.unknowns.theta(found.values)
-        return [block.columns @ residual_of(theta, found.delays[block.bag])
-                for block in self.extracts]
-
     def _leave_out_outliers(self, found: Fit) -> int:
         """Deselect efforts with outlying residuals; return their number."""
-        residuals = self.residuals(found)
-        used = np.concatenate([np.where(which, each, np.nan) for which, each in zip(
-            self.chosen, residuals, strict=True)])
-        if np.isnan(used).all(axis=0).any():
+        theta = self.unknowns.theta(found.values)
+        residuals = [
+            np.where(each.used, each.columns @ residual_of(theta, found.delays[each.bag]), np.nan)
+            for each in self.extracts]
+        whole = np.concatenate(residuals)
+        if np.isnan(whole).all(axis=0).any():
             return 0
-        deviation = np.nanmedian(np.abs(used), axis=0) / 0.6745
-        far = [(np.abs(each) > _OUTLIER * deviation) & which
-               for which, each in zip(self.chosen, residuals, strict=True)]
-        number = sum(int(np.count_nonzero(each)) for each in far)
-        if not number or number > _MOST_OUTLIERS * used.size:
+        deviation = np.nanmedian(np.abs(whole), axis=0) / 0.6745
+        far = [np.abs(each) > _OUTLIER * deviation for each in residuals]
+        number = sum(map(np.count_nonzero, far))
+        if number > _MOST_OUTLIERS * whole.size:
             return 0
-        self.chosen = [which & ~each for which, each in zip(self.chosen, far, strict=True)]
+        self.extracts.used = [
+            used & ~each for used, each in zip(self.extracts.used, far, strict=True)]
         return number
 
-    def _validation(self, noise: Array) -> Validation | None:
+    def _validation(self, noise: Array) -> Residuals | None:
         """Return the residuals at the end of each bag with a fit to the rest."""
         part, options = self._options.hold_out, self._options
         ends = [bag.seconds * (1.0 - part) for bag in self.bags]
 
-        def held_out(block: Block) -> Flags:
-            held: Flags = self.chosen[block.number] & (block.times >= ends[block.bag])[:, None]
-            return held
+        def part_of(held_out: bool) -> Sums:
+            return sums_of(self.extracts, lambda each: each.used & (
+                (each.times >= ends[each.bag]) == held_out)[:, None])
 
-        test = self._sums(held_out)
-        train = self._sums(lambda block: self.chosen[block.number] & ~held_out(block))
+        test, train = part_of(True), part_of(False)
         if min(test.counts.sum(axis=0)) < _FEWEST or min(train.counts.sum(axis=0)) < _FEWEST:
             return None
-        found = fit(train, self.unknowns, noise * (1.0 - part), options.prior, self._cutoffs())
-        return Validation(
-            _rms(test, self.unknowns, self.unknowns.start, found.delays),
-            _rms(test, self.unknowns, found.values, found.delays), _measured(test),
-            int(test.counts.sum()) // 6)
+        found = fit(train, self.unknowns, noise * (1.0 - part), options.prior, self._cutoffs)
+        return Residuals.of(test, self.unknowns, found)
 
     def close(self) -> None:
         """Remove the temporary file."""
@@ -415,15 +381,3 @@ def _margin(cutoff: float) -> float:
     """Return the time at each end that the filters need for a cut-off [s]."""
     fine = 1e-4
     return 2.0 * LowPass.of(fine, cutoff, cutoff).half * fine
-
-
-def _rms(sums: Sums, unknowns: Unknowns, values: Array, delays: Array) -> Array:
-    squares = sums.squares(unknowns.theta(values), delays).sum(axis=0)
-    rms: Array = np.sqrt(squares / np.maximum(sums.counts.sum(axis=0), 1))
-    return rms
-
-
-def _measured(sums: Sums) -> Array:
-    squares = sums.effort_squares().sum(axis=0)
-    rms: Array = np.sqrt(squares / np.maximum(sums.counts.sum(axis=0), 1))
-    return rms

@@ -29,12 +29,11 @@ For each parameter the larger estimate is used.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.extraction import Extracts
 from stewart_dynamics.identification.fit import directions, Fit, strength_of, without_delay
 from stewart_dynamics.identification.sums import residual_of, Sums
@@ -55,26 +54,8 @@ class Errors(NamedTuple):
 
 
 def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit,
-              chosen: Sequence[Flags], prior: float | None = None) -> Errors:
-    """
-    Return the standard errors of a fit.
-
-    Parameters
-    ----------
-    extracts : Extracts
-        Extracts of B bags.
-    sums : Sums
-        Sums of the efforts that were used.
-    unknowns : Unknowns
-        Unknowns of the fit.
-    fit : Fit
-        Result of the fit.
-    chosen : sequence of (N, 6)
-        Whether each effort of a block was used.
-    prior : float, optional
-        Standard error of the file's values, as in the fit.
-
-    """
+              prior: float | None = None) -> Errors:
+    """Return the standard errors of a fit to the sums of extracts, with the prior of the fit."""
     theta, many = unknowns.theta(fit.values), len(fit.values)
     e_of_bags, alongs, alone = [], [], []
     for bag, delay in enumerate(fit.delays):
@@ -86,10 +67,9 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit,
         e_of_bags.append(e)
     by_frequency = np.zeros((many, many))
     scores, own = [], np.zeros((len(fit.delays), many + 1))
-    for block in extracts:
-        bag = block.bag
-        which = chosen[block.number]
-        columns = block.columns * which[..., None]
+    for extract in extracts:
+        bag = extract.bag
+        columns = extract.columns * extract.used[..., None]
         residuals = columns @ residual_of(theta, fit.delays[bag])
         weighted = columns @ e_of_bags[bag] / fit.variances[bag][:, None]
         # The delay depends on the unknowns; its own error comes from its own column.

@@ -16,10 +16,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
+from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, ROTATION, TWIST
@@ -35,11 +38,7 @@ def pose_near(platform: StewartPlatform, lengths: Array) -> Pose:
     """
     Return the pose of lengths (6,), starting from home and level poses on both sides.
 
-    Raises
-    ------
-    PoseError, SingularityError
-        Forward kinematics converges from no initial guess.
-
+    Raises the errors of ``forward_kinematics`` if it converges from none of them.
     """
     p = platform.parameters
     positions, rotations = homes(p)  # both sides of the base, the more likely one first
@@ -51,31 +50,22 @@ def pose_near(platform: StewartPlatform, lengths: Array) -> Pose:
     guesses += [Pose.from_euler([0.0, 0.0, up * height - across[:, 2].mean()], [0.0, 0.0, turn])
                 for up in (side, -side) for turn in _TURNS]
     for guess in guesses[:-1]:
-        try:
+        with suppress(PoseError, SingularityError):
             return platform.forward_kinematics(lengths, guess)
-        except (PoseError, SingularityError):
-            continue
     return platform.forward_kinematics(lengths, guesses[-1])
+
+
+def first_pose(platform: StewartPlatform, window: Window) -> Pose:
+    """Return the pose at the begin of a window; raises the errors of ``pose_near``."""
+    return pose_near(
+        platform, window.positions[0] + platform.parameters['geometry.zero_length'])
 
 
 def poses(platform: StewartPlatform, lengths: Array, guess: Pose) -> Pose:
     """
-    Return the poses of lengths (N, 6) that change little between samples.
+    Return the poses of lengths (N, 6) [m] that change little between samples.
 
-    Parameters
-    ----------
-    platform : StewartPlatform
-        The hexapod.
-    lengths : (N, 6)
-        Leg lengths [m].
-    guess : Pose
-        Pose near the first one.
-
-    Raises
-    ------
-    PoseError, SingularityError
-        As ``forward_kinematics``.
-
+    ``guess`` is near the first one. Raises the errors of ``forward_kinematics``.
     """
     anchors = []
     for each in lengths[::_STRIDE]:

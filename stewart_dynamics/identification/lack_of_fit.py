@@ -33,17 +33,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.causes import Cause, Causes, UNKNOWN
-from stewart_dynamics.identification.extraction import Block, Extracts, SAMPLES
+from stewart_dynamics.identification.extraction import Extract, Extracts, SAMPLES
 from stewart_dynamics.identification.fit import directions, Fit
 from stewart_dynamics.identification.sums import residual_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Maximum number of blocks that are tested, evenly spread.
-_BLOCKS = 16
+# Maximum number of extracts that are tested.
+_MOST = 16
 # Significance for a notice, in standard deviations of a normal distribution.
 _NOTICE = 7.0
 # Maximum number of causes that are named.
@@ -152,39 +152,17 @@ class _Scores(NamedTuple):
 
 
 def lack_of_fit(platform: StewartPlatform, extracts: Extracts, unknowns: Unknowns, fit: Fit,
-                chosen: Sequence[Flags]) -> LackOfFit | None:
-    """
-    Return the lack of fit with its likeliest causes; None if nothing significant is left.
-
-    Parameters
-    ----------
-    platform : StewartPlatform
-        Hexapod with the parameters of the file.
-    extracts : Extracts
-        Samples of B bags.
-    unknowns : Unknowns
-        Unknowns of the fit.
-    fit : Fit
-        Result of the fit.
-    chosen : sequence of (N, 6)
-        Whether each effort of a block was used.
-
-    """
-    numbers = np.unique(np.linspace(0, len(extracts) - 1, min(_BLOCKS, len(extracts))).astype(int))
+                ) -> LackOfFit | None:
+    """Return the lack of fit with its likeliest causes; None if nothing significant is left."""
     try:
-        return _lack_of_fit(platform, extracts, unknowns, fit, chosen, numbers)
+        for geometry in (False, True):
+            causes = Causes(platform, unknowns, fit, _selected(extracts), geometry)
+            scores, follow, squares = _scores(causes, extracts, unknowns, fit)
+            if not geometry and max(each.deviations for each in _tested(causes.all, scores)) < (
+                    _SUSPICIOUS):
+                return None
     except (PoseError, SingularityError):
         return None
-
-
-def _lack_of_fit(platform: StewartPlatform, extracts: Extracts, unknowns: Unknowns, fit: Fit,
-                 chosen: Sequence[Flags], numbers: Integers) -> LackOfFit | None:
-    for geometry in (False, True):
-        causes = _causes(platform, extracts, unknowns, fit, numbers, geometry)
-        scores, follow, squares = _scores(causes, extracts, unknowns, fit, chosen, numbers)
-        if not geometry and max(each.deviations for each in _tested(causes.all, scores)) < (
-                _SUSPICIOUS):
-            return None
     found: list[Found] = []
     others: tuple[Found, ...] = ()
     taken: Integers = np.zeros(0, dtype=np.int64)
@@ -228,63 +206,48 @@ def deviations(statistic: float, freedom: int) -> float:
     return float((np.cbrt(statistic / freedom) - 1.0 + part) / math.sqrt(part))
 
 
-def _causes(platform: StewartPlatform, extracts: Extracts, unknowns: Unknowns, fit: Fit,
-            numbers: Integers, geometry: bool) -> Causes:
-    sizes, bags, largest = [], [], 0.0
-    for block in _selected(extracts, numbers):
-        sizes.append(len(block.times))
-        bags.append(block.bag)
-        largest = max(largest, float(np.abs(block.columns[..., len(unknowns.theta(
-            fit.values)) + 1]).max(initial=0.0)))
-    samples = sum(sizes)
-    begins = np.cumsum([0, *sizes])[:-1]
-    starts = [begins[n] / samples for n in range(1, len(bags)) if bags[n] != bags[n - 1]]
-    return Causes(platform, unknowns, fit, samples, starts, largest, geometry)
-
-
-def _selected(extracts: Extracts, numbers: Integers) -> Iterator[Block]:
-    return (block for block in extracts if block.number in numbers)
+def _selected(extracts: Extracts) -> Iterator[Extract]:
+    """Yield the extracts that are tested, at most _MOST, evenly spread."""
+    tested = np.linspace(0, len(extracts) - 1, min(_MOST, len(extracts))).astype(int)
+    return (extract for n, extract in enumerate(extracts) if n in tested)
 
 
 def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
-            chosen: Sequence[Flags], numbers: Integers) -> tuple[_Scores, Array, _Scores]:
+            ) -> tuple[_Scores, Array, _Scores]:
     """Return weighted sums, derivatives of unknowns by columns (k, m), and plain sums."""
     theta, bags = unknowns.theta(fit.values), len(fit.delays)
     known = fit.identifiability.known
     inner = known.shape[1] + bags  # known directions, then the delays
     with tempfile.TemporaryFile() as file:
-        gram: Array | None = None
-        plain: Array | None = None
-        first = 0
-        for block in _selected(extracts, numbers):
-            which = chosen[block.number]
-            columns = block.columns * which[..., None]
-            e = columns @ directions(unknowns, fit.values, fit.delays[block.bag],
-                                     bool(fit.delay_errors[block.bag]))
-            delays = np.zeros((*which.shape, bags))
-            delays[..., block.bag] = e[..., -1]
-            residuals = columns @ residual_of(theta, fit.delays[block.bag])
-            whole = np.concatenate([e[..., :-1] @ known, delays, (
-                causes.columns(block, first) * which[..., None]), residuals[..., None]], axis=-1)
-            sizes = np.sqrt(fit.variances[block.bag])[:, None]
-            whole /= sizes
-            first += len(residuals)
-            spectra = _spectra(whole)
+        gram: Array = np.zeros(())
+        plain: Array = np.zeros(())
+        lengths: list[int] = []
+        for extract in _selected(extracts):
+            bag, used = extract.bag, extract.used[..., None]
+            columns = extract.columns * used
+            e = columns @ directions(unknowns, fit.values, fit.delays[bag],
+                                     bool(fit.delay_errors[bag]))
+            delays = np.zeros((*e.shape[:2], bags))
+            delays[..., bag] = e[..., -1]
+            residuals = columns @ residual_of(theta, fit.delays[bag])
+            of_causes = causes.columns(extract, sum(lengths)) * used
+            whole = np.concatenate(
+                [e[..., :-1] @ known, delays, of_causes, residuals[..., None]], axis=-1)
+            sizes = np.sqrt(fit.variances[bag])[:, None]
+            spectra = _spectra(whole / sizes)
             flat = spectra.reshape(-1, spectra.shape[-1])
-            gram = flat.T @ flat if gram is None else gram + flat.T @ flat
+            gram = gram + flat.T @ flat
             flat = (sizes * spectra).reshape(flat.shape)
-            plain = flat.T @ flat if plain is None else plain + flat.T @ flat
+            plain = plain + flat.T @ flat
             np.save(file, spectra)
-            np.save(file, len(whole))
-        assert gram is not None and plain is not None
+            lengths.append(len(whole))
         # First weight by leg alone, as in the fit, then by the spectra of the residuals.
         inverse = _inverse(gram[:-1, :-1])
         rest = inverse @ gram[:-1, -1]
         file.seek(0)
         weighted = np.zeros_like(gram)
-        for _ in numbers:
-            spectra, samples = np.load(file), int(np.load(file))
-            flat = _whitened(spectra, rest, inverse, samples).reshape(-1, len(gram))
+        for samples in lengths:
+            flat = _whitened(np.load(file), rest, inverse, samples).reshape(-1, len(gram))
             weighted += flat.T @ flat
     follow = -_inverse(gram[:inner, :inner]) @ gram[:inner, inner:-1]
 

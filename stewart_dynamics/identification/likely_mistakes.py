@@ -29,11 +29,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
-from stewart_dynamics.identification.extraction import Extract, Extraction
+from stewart_dynamics.identification.extraction import Extraction
 from stewart_dynamics.identification.fit import Fit
-from stewart_dynamics.identification.kinematics import pose_near
+from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import LackOfFit
-from stewart_dynamics.identification.sums import residual_of, Sums
+from stewart_dynamics.identification.sums import shifted_by, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
@@ -54,6 +54,8 @@ _SUSPICIOUS = 0.03
 _UNEXPLAINED = 0.3
 # A cause must reduce the residual to this fraction.
 _BETTER = 0.5
+# Largest standard error of a known direction, with columns of the regressor scaled to length 1.
+_LARGEST_ERROR = 1e4
 # Minimum fraction of valid samples for a comparison.
 _FEWEST = 0.5
 # Length of the part that is searched, in cut-off periods, longer if the filters need it.
@@ -144,48 +146,32 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, of_motors: bool,
             if scale < 0.05 else 'another unit, or a wrong platform.mass')))
 
 
-def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window,
-           fit: Fit, lack: LackOfFit | None, residual: float) -> Iterator[LikelyMistake]:
+def of_fit(p: Parameters, extraction: Extraction, window: Window, fit: Fit,
+           lack: LackOfFit | None, residual: float) -> Iterator[LikelyMistake]:
     """
     Yield a likely mistake if the residual is a large fraction of the efforts.
 
-    Parameters
-    ----------
-    p : Parameters
-        Parameters of the file.
-    unknowns : Unknowns
-        Unknowns of the fit.
-    extraction : Extraction
-        Extraction of the first window.
-    window : Window
-        The first window.
-    fit : Fit
-        Result of the fit.
-    lack : LackOfFit or None
-        Lack of fit of the result.
-    residual : float
-        RMS of the residuals divided by the RMS of the efforts.
-
+    Legs are swapped in the first window. ``residual`` is the RMS of the residuals divided by that
+    of the efforts.
     """
-    first = None if lack is None else lack.causes[0]
-    if lack is not None and first is not None and first.what == 'zero_length' and (
-            lack.left < _BETTER):
-        yield LikelyMistake(
-            first.what, f'geometry.zero_length looks wrong: {first.text}: the residual '
-            f'becomes {lack.left:.2f} times as large')
+    left, cause, text = (1.0, '', '') if lack is None else (
+        lack.left, lack.causes[0].what, lack.causes[0].text)
+    if cause == 'zero_length' and left < _BETTER:
+        yield LikelyMistake(cause, f'geometry.zero_length looks wrong: {text}: the residual '
+                            f'becomes {left:.2f} times as large')
         return
     if residual < _SUSPICIOUS:
         return
     piece, joints = most_motion(window, extraction), p['joints']
-    now = _tried(unknowns, extraction, piece, fit)
+    now = _tried(extraction, piece, fit)
     found = [(now, 'misfit', (
         f'the residual is {100.0 * residual:.0f} % of the efforts whatever the parameters: '
         'positions and efforts may not belong together, or the geometry is wrong'))]
-    if lack is not None and first is not None and first.what == 'tilt':
-        found.append((lack.left * now, first.what, (
-            f'gravity of the parameters looks wrong: {first.text}: tilt in --identify takes that '
-            'into account')))
-    best = _BETTER if lack is None else min(_BETTER, lack.left)
+    if cause == 'tilt':
+        found.append((left * now, cause, (
+            f'gravity of the parameters looks wrong: {text}: tilt in --identify takes that into '
+            'account')))
+    best = min(_BETTER, left)
     for a, b in combinations(range(6), 2):
         order = list(range(6))
         order[a], order[b] = b, a
@@ -197,7 +183,7 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
                     rates=None if piece.rates is None else piece.rates[:, order])
             if 'efforts' in which:
                 swapped = swapped._replace(efforts=piece.efforts[:, order])
-            misfit = _tried(unknowns, extraction, swapped, fit)
+            misfit = _tried(extraction, swapped, fit)
             if misfit < best * now:
                 found.append((misfit, 'swapped', f'the {which} of {joints[a]} and {joints[b]} '
                                                  'look swapped'))
@@ -237,15 +223,12 @@ def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, f
         weight = total.matrix[-1, -1]
         return (float(total.vector[-1] / weight) if weight > 0.0 else float('nan')), float('inf')
     sizes = np.sqrt(np.diag(total.matrix))
-    sizes = np.where(sizes > 1e-6 * sizes.max(), sizes, np.inf)
-    scaled = total._replace(matrix=total.matrix / np.outer(sizes, sizes),
-                            vector=total.vector / sizes)
-    found = solve(scaled, np.zeros(many + 1), np.ones(many + 1), largest_error=1e4)
-    values = found.values / sizes
-    if not np.isfinite(sizes[-1]) or not found.identifiability.identifiable[-1]:
+    scales = np.where(sizes > 1e-6 * sizes.max(), 1.0 / np.maximum(sizes, 1e-300), 0.0)
+    found = solve(total, np.zeros(many + 1), scales, largest_error=_LARGEST_ERROR)
+    if not scales[-1] or not found.identifiability.identifiable[-1]:
         return float('nan'), float('inf')
-    variance = scaled.residual_squares(found.values) / total.rows
-    return float(values[-1]), float(np.sqrt(variance * found.covariance[-1, -1]) / sizes[-1])
+    variance = total.residual_squares(found.values) / total.rows
+    return float(found.values[-1]), float(np.sqrt(variance * found.covariance[-1, -1]))
 
 
 def most_motion(window: Window, extraction: Extraction) -> Window:
@@ -262,25 +245,16 @@ def most_motion(window: Window, extraction: Extraction) -> Window:
         outliers=window.outliers[part])
 
 
-def _tried(unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit) -> float:
+def _tried(extraction: Extraction, window: Window, fit: Fit) -> float:
     """Return the RMS residual of a fit to a window [N]; infinite if no pose is found."""
     try:
-        guess = pose_near(extraction.platform, window.positions[0]
-                          + extraction.platform.parameters['geometry.zero_length'])
-        return _fitted(unknowns, extraction(window, guess), fit)
+        extract = extraction(window, first_pose(extraction.platform, window)).extract
     except (PoseError, SingularityError):
         return float('inf')
-
-
-def _fitted(unknowns: Unknowns, extract: Extract, fit: Fit) -> float:
-    """Return the RMS residual of a fit to an extract [N]."""
-    shifts = residual_of(np.zeros(0), float(fit.delays[0]))[1:]
-    efforts = extract.efforts @ shifts - extract.known
-    samples = information(extract.regressor, efforts, extract.sound.astype(float))
-    if samples.rows < _FEWEST * extract.sound.size:
+    efforts = extract.efforts @ shifted_by(fit.delays[0]) - extract.known
+    samples = information(extract.regressor, efforts, extract.used.astype(float))
+    if samples.rows < _FEWEST * extract.used.size:
         return float('inf')
-    sizes = np.sqrt(np.maximum(np.diag(samples.matrix), 1e-300))
-    scaled = samples._replace(matrix=samples.matrix / np.outer(sizes, sizes),
-                              vector=samples.vector / sizes)
-    found = solve(scaled, np.zeros(len(sizes)), np.ones(len(sizes)), largest_error=1e4)
-    return float(np.sqrt(scaled.residual_squares(found.values) / samples.rows))
+    scales = 1.0 / np.sqrt(np.maximum(np.diag(samples.matrix), 1e-300))
+    found = solve(samples, np.zeros(len(scales)), scales, largest_error=_LARGEST_ERROR)
+    return float(np.sqrt(samples.residual_squares(found.values) / samples.rows))

@@ -26,7 +26,7 @@ from stewart_dynamics.bags import blocks, mcap_scan
 from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification.identification_options import IdentificationOptions
-from stewart_dynamics.identification.identification_report import IdentificationReport
+from stewart_dynamics.identification.identification_report import write_report
 from stewart_dynamics.identification.identify import Identification, Identified
 from stewart_dynamics.identification.results import comments, document
 from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics, regressor
@@ -50,24 +50,8 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
     """
     Identify from bags into a folder; return the content of identification.json.
 
-    Parameters
-    ----------
-    bags : sequence of Path
-        Bags of one hexapod.
-    parameters : Parameters
-        Known or estimated parameters of the hexapod.
-    folder : Path
-        Results folder, created when complete; must not exist, unless ``options.force`` is set.
-    options : IdentificationOptions
-        IdentificationOptions of the identification.
-    warn : callable
-        Called with likely mistakes that were accepted.
-
-    Raises
-    ------
-    StewartError
-        A bag cannot be used, or a mistake is likely: nothing is written.
-
+    ``warn`` is called with likely mistakes that were accepted. Raises StewartError if a bag cannot
+    be used, or a mistake is likely: nothing is written.
     """
     check_free(folder, options, RESULT)
     remove_abandoned([folder])
@@ -88,7 +72,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
                 partial / PARAMETERS, comments(result, found.unknowns))
             write_json(partial / RESULT, result)
             if options.report:
-                IdentificationReport(work, found).write(partial / REPORT, result)
+                write_report(partial / REPORT, work.extracts, found, result)
     return result
 
 

@@ -28,32 +28,17 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
     from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue)
-from stewart_dynamics.mechanics.least_squares import Identifiability, Information
 
 # Relative distance to the bound below which a body is a point or a rod within rounding.
 SMALLEST = 1e-6
 _STEPS = 200
 
 
-def consistent(unknowns: Unknowns, values: Array, information: Information,
-               what: Identifiability) -> tuple[Array, tuple[str, ...]]:
-    """
-    Return values within all bounds, and the names of those that violated one.
-
-    Parameters
-    ----------
-    unknowns : Unknowns
-        Unknowns of the fit.
-    values : (k,)
-        Values of a fit without bounds.
-    information : Information
-        Information of the samples on the unknowns.
-    what : Identifiability
-        Identifiability of the unknowns.
-
-    """
+def consistent(unknowns: Unknowns, values: Array, information: Array,
+               ) -> tuple[Array, tuple[str, ...]]:
+    """Return values (k,) within all bounds, and the names of those that violated one."""
     # Unidentifiable parameters are held with a standard error of their scale.
-    matrix = information.matrix + np.diag(unknowns.scales ** -2.0)
+    matrix = information + np.diag(unknowns.scales ** -2.0)
     beyond: list[str] = []
     free: Flags = np.ones(len(values), dtype=bool)
     found = values

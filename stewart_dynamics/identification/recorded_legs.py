@@ -51,11 +51,7 @@ def find_topics(recording: Recording, node: str, measured: str | None, efforts: 
     """
     Return the topics: the given one, the one with the usual name, or the only one of its type.
 
-    Raises
-    ------
-    BagError
-        No such topic is found, or several.
-
+    Raises BagError if no such topic is found, or several.
     """
     usual, own = f'{node}/{MEASURED_LEGS}', f'{node}/leg_states'
     found = sorted(name for name, kind in recording.topics.items() if kind == JOINT_STATE)
@@ -78,41 +74,20 @@ def find_topics(recording: Recording, node: str, measured: str | None, efforts: 
 
 
 class RecordedLegs:
-    """
-    Reads the measured legs of a bag.
-
-    Parameters
-    ----------
-    recording : Recording
-        The bag.
-    topics : Topics
-        Topics in the bag.
-    joints : sequence of str
-        Names of the legs.
-    overlap : float
-        Overlap of consecutive windows [s].
-
-    Attributes
-    ----------
-    rejected : Counter
-        Number of rejected messages by reason.
-    samples : int
-        Number of positions used.
-    rates : bool
-        Whether rates are recorded.
-    period : float
-        Sampling period [s], known after the first window.
-
-    """
+    """Reads the measured legs of a bag in windows that overlap by a time [s]."""
 
     def __init__(self, recording: Recording, topics: Topics, joints: tuple[str, ...],
                  overlap: float) -> None:
         self._recording, self._topics, self._overlap = recording, topics, overlap
         self._joints = joints
         self.rejected: Counter[str] = Counter()
+        """Number of rejected messages by reason."""
         self.samples = 0
+        """Number of positions used."""
         self.rates: bool | None = None
+        """Whether rates are recorded."""
         self.period = 0.0
+        """Sampling period [s], known after the first window."""
         self._one = topics.legs == topics.efforts
         self._legs, self._efforts = _Buffer(), _Buffer()
         self._readers: dict[str, JointStateReader] = {}
@@ -187,7 +162,7 @@ class RecordedLegs:
                 continue
             pushes = efforts.between(
                 int(inner.stamps[0]) - SECOND, int(inner.stamps[-1]) + SECOND)
-            window = uniform(inner, pushes, self.period, bool(self.rates))
+            window = uniform(inner, pushes, self.period)
             if window is not None:
                 yield window
         keep = end if last else end - round(self._overlap * SECOND)

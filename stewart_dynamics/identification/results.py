@@ -12,34 +12,37 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Content of identification.json, see docs/identification.md."""
+"""Result of an identification: identification.json, comments of identified.yaml, terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 import math
+import textwrap
 from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.identification_options import IdentificationOptions
-from stewart_dynamics.identification.identify import Identified
+from stewart_dynamics.identification.identify import Identified, Residuals
 from stewart_dynamics.identification.lack_of_fit import Found
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.replay.fingerprint import plain_parameters, software
+from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.estimates import (
-    combined, estimate, IDENTIFIED, NOT_IDENTIFIABLE, states_of)
+    combined, estimate, IDENTIFIED, NOT_IDENTIFIABLE, not_identifiable_lines, states_of,
+    table_lines)
 
 # Version of identification.json; increased when the meaning of a key changes.
 VERSION = 1
 
 
 def document(found: Identified, options: IdentificationOptions) -> dict[str, Any]:
-    """Return the content of identification.json."""
-    what = found.fit.identifiability
+    """Return the content of identification.json, see docs/identification.md."""
+    what, joints = found.fit.identifiability, found.parameters['joints']
     u, lack = found.unknowns, found.lack_of_fit
     sure = lack is None or not lack.unexplained
     parameters = [
@@ -75,12 +78,9 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
             what, u.names, u.units, found.fit.values, found.errors.covariance),
         'rank': what.rank, 'unknowns': len(u.names),
         'singular_values': what.singular_values.tolist(),
-        'residuals': _residuals(found.parameters['joints'], found.before, found.after,
-                                found.measured),
+        'residuals': _residuals(joints, found.residuals),
         'validation': None if found.validation is None else {
-            'samples': found.validation.samples,
-            **_residuals(found.parameters['joints'], found.validation.before,
-                         found.validation.after, found.validation.measured)},
+            'samples': found.validation.samples, **_residuals(joints, found.validation)},
         'lack_of_fit': None if lack is None else {
             'cause': lack.causes[0].what, 'text': lack.text,
             'intervals': 'widened' if sure else 'none', 'residual_left': lack.left,
@@ -105,17 +105,13 @@ def _errors(found: Identified) -> Array:
         errors + found.lack_of_fit.shifts / TWO_SIDED)
 
 
-def _residuals(joints: Sequence[str], before: Array, after: Array, measured: Array,
-               ) -> dict[str, Any]:
-    return {'legs': {joint: {
-        'before_rms_n': float(b), 'after_rms_n': float(a), 'measured_rms_n': float(m)}
-        for joint, b, a, m in zip(joints, before, after, measured, strict=True)},
-        'before_rms_n': _mean(before), 'after_rms_n': _mean(after),
-        'measured_rms_n': _mean(measured)}
-
-
-def _mean(rms: Array) -> float:
-    return float(np.sqrt(np.mean(rms ** 2)))
+def _residuals(joints: Sequence[str], residuals: Residuals) -> dict[str, Any]:
+    """Return the residuals of each leg, and their RMS of all legs."""
+    rms = {'before_rms_n': residuals.before, 'after_rms_n': residuals.after,
+           'measured_rms_n': residuals.measured}
+    return {'legs': {joint: {key: float(values[leg]) for key, values in rms.items()}
+                     for leg, joint in enumerate(joints)},
+            **{key: float(np.sqrt(np.mean(values ** 2))) for key, values in rms.items()}}
 
 
 def _plain(value: float) -> float | None:
@@ -141,3 +137,55 @@ def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
             f'identified {result["date"][:10]}, 95 %: '
             + ', '.join(each if len(set(each)) > 1 else each[:1])
             for name, each in texts.items()}
+
+
+def result_text(result: Mapping[str, Any]) -> str:
+    """Return identification.json as text, at most 100 columns wide except for long names."""
+    lack = result['lack_of_fit']
+    notice = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
+    lines = [*notice, *_headline(result), '', *table_lines(result['parameters']),
+             *not_identifiable_lines(result, 'motion')]
+    lines += _bags(result)
+    return '\n'.join(lines)
+
+
+def _headline(result: Mapping[str, Any]) -> list[str]:
+    residuals = result['residuals']
+    lines = [f'residual RMS {residuals["before_rms_n"]:.4g} N by the file, '
+             f'{residuals["after_rms_n"]:.4g} N by the identified parameters '
+             f'({_percent(residuals["after_rms_n"], residuals["measured_rms_n"])} of the efforts)']
+    held = result['validation']
+    if held is None:
+        lines.append('not validated: too little data to hold some out')
+    else:
+        worst = max(held['legs'], key=lambda leg: held['legs'][leg]['after_rms_n'])
+        lines.append(
+            f'on held-out time: {held["before_rms_n"]:.4g} N by the file, '
+            f'{held["after_rms_n"]:.4g} N by a fit to the rest; worst leg {worst}, '
+            f'{held["legs"][worst]["after_rms_n"]:.4g} N')
+    return lines
+
+
+def _percent(part: float, whole: float) -> str:
+    return f'{100.0 * part / whole:.2g} %' if whole > 0.0 else '-'
+
+
+def _bags(result: Mapping[str, Any]) -> list[str]:
+    lines = ['']
+    for bag in result['bags']:
+        delay = '' if bag['delay_s'] is None else (
+            f', efforts {1e3 * bag["delay_s"]:.2f} +- '
+            f'{1e3 * TWO_SIDED * bag["delay_standard_error_s"]:.2f} ms later than positions')
+        lines.append(f'{bag["bag"]}: {plural(bag["samples"], "sample")} in '
+                     f'{bag["seconds"]:.1f} s of {bag["legs"]}{delay}')
+        left = [(bag['samples_outliers'], 'wild value', 'replaced'),
+                (bag['samples_at_stops'], 'sample', 'at an end stop or force limit left out'),
+                (bag['pieces_left_out'], 'piece', 'between gaps too short for the filters')]
+        lines += [f'  {plural(number, what)} {why}' for number, what, why in left if number]
+        lines += [f'  {plural(number, "message")} rejected: {why}'
+                  for why, number in bag['rejected'].items()]
+        lines += [f'  {notice}' for notice in bag['notices']]
+    if result['efforts_outliers']:
+        lines.append(f'{plural(result["efforts_outliers"], "filtered effort")} left out as '
+                     'outliers')
+    return lines

@@ -29,21 +29,11 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
-from stewart_dynamics.identification.extraction import Block, Extracts, ORDERS
+from stewart_dynamics.identification.extraction import Extract, Extracts, ORDERS
 
 
 class Sums(NamedTuple):
-    """
-    Gram matrices of B bags.
-
-    Attributes
-    ----------
-    grams : (B, 6, q, q)
-        Gram matrices of the columns.
-    counts : (B, 6)
-        Number of efforts in each sum.
-
-    """
+    """Gram matrices (B, 6, q, q) of the columns of B bags, and their numbers of efforts (B, 6)."""
 
     grams: Array
     counts: Integers
@@ -80,22 +70,27 @@ class Sums(NamedTuple):
         return squares
 
 
-def sums_of(extracts: Extracts, bags: int, chosen: Callable[[Block], Flags]) -> Sums:
-    """Return the sums of the efforts (N, 6) that a function chooses in each block."""
+def sums_of(extracts: Extracts,
+            chosen: Callable[[Extract], Flags] = lambda extract: extract.used) -> Sums:
+    """Return the sums of the efforts (N, 6) that are chosen of each extract."""
     of_bags: dict[int, Sums] = {}
-    for block in extracts:
-        found = Sums.of(block.columns, chosen(block))
-        of_bags[block.bag] = of_bags[block.bag].plus(found) if block.bag in of_bags else found
-    return Sums.stacked([of_bags[bag] for bag in range(bags)])
+    for extract in extracts:
+        found = Sums.of(extract.columns, chosen(extract))
+        bag = extract.bag
+        of_bags[bag] = of_bags[bag].plus(found) if bag in of_bags else found
+    return Sums.stacked(list(of_bags.values()))
+
+
+def shifted_by(delay: float) -> Array:
+    """Return the coefficients (ORDERS,) of an effort that is not delayed, by its derivatives."""
+    return np.array([delay ** order / math.factorial(order) for order in range(ORDERS)])
 
 
 def residual_of(theta: Array, delay: float) -> Array:
     """Return the coefficients (q,) of a residual by columns."""
-    return np.concatenate([-theta, [-1.0], [
-        delay ** order / math.factorial(order) for order in range(ORDERS)]])
+    return np.concatenate([-theta, [-1.0], shifted_by(delay)])
 
 
 def delayed_by(theta: Array, delay: float) -> Array:
     """Return the coefficients (q,) of the derivative of a residual by the delay."""
-    return np.concatenate([np.zeros(len(theta) + 2), [
-        delay ** order / math.factorial(order) for order in range(ORDERS - 1)]])
+    return np.concatenate([np.zeros(len(theta) + 2), shifted_by(delay)[:-1]])

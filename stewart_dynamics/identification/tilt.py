@@ -30,31 +30,17 @@ from stewart_dynamics.mechanics.kinematics.home_pose import turns_about
 
 class Tilt:
     """
-    Gravity rotated about two base axes.
+    Gravity of the parameter file (3,) [m/s^2], rotated about two base axes.
 
-    Parameters
-    ----------
-    gravity : (3,)
-        Gravity of the parameter file, base axes [m/s^2].
-
-    Attributes
-    ----------
-    axes : str
-        The two of x, y and z most perpendicular to gravity, which is rotated about the first
-        of them, then about the second.
-
+    These are the two of x, y and z most perpendicular to gravity, which is rotated about the first
+    of them, then about the second.
     """
 
     def __init__(self, gravity: Array) -> None:
-        self._gravity = np.array(gravity, dtype=np.float64)
-        along = int(np.argmax(np.abs(self._gravity)))
+        self._gravity = gravity
+        along = int(np.argmax(np.abs(gravity)))
         self._axes = [axis for axis in range(3) if axis != along]
-        self.axes = ''.join('xyz'[axis] for axis in self._axes)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of both angles."""
-        return tuple(f'gravity.tilt_{axis}' for axis in self.axes)
+        self.names = tuple(f'gravity.tilt_{"xyz"[axis]}' for axis in self._axes)
 
     def gravity(self, angles: Array) -> Array:
         """Return gravity, shape (3,), rotated by angles (2,) [rad]."""

@@ -71,14 +71,9 @@ _RATE = 0.1
 
 class Unknowns:
     """
-    The k parameters to be identified.
+    The k parameters to be identified: those of KINDS in ``kinds``.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the file, for scales and for the values of all other parameters.
-    kinds : sequence of str
-        Values from KINDS.
+    The file's parameters give the scales, and the values of all other parameters.
 
     Attributes
     ----------
@@ -105,8 +100,7 @@ class Unknowns:
         for kind in kinds:
             if kind not in KINDS:
                 raise ParameterError(f'{kind}: cannot be identified; known are {", ".join(KINDS)}')
-        self._parameters, self._kinds = parameters, tuple(kinds)
-        p = parameters
+        self._parameters = p = parameters
         self._theta = linear_parameters(p)
         of_platform = np.zeros(PLATFORM, dtype=bool)
         of_legs: Flags = np.zeros(LINEAR, dtype=bool)
@@ -142,10 +136,6 @@ class Unknowns:
     def many_of_platform(self) -> int:
         """Return the number of platform parameters; they come first."""
         return len(self._platform)
-
-    def with_tilt(self) -> Unknowns:
-        """Return the same unknowns with the tilt of gravity added."""
-        return Unknowns(self._parameters, (*self._kinds, TILT))
 
     @property
     def fixed(self) -> Array:
@@ -248,15 +238,7 @@ def regression(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> tu
     """
     Return the regressor (N, 6, n) of ``unknowns.theta`` and the known forces (N, 6) [N].
 
-    Parameters
-    ----------
-    platform : StewartPlatform
-        Hexapod with the parameters of the file.
-    unknowns : Unknowns
-        Parameters to be identified.
-    rows : (N, MOTION)
-        Rows of motion.
-
+    They are those of a platform with the parameters of the file, in motions (N, MOTION).
     """
     matrix, fixed = platform.regressors(rows), unknowns.fixed
     regressor: Array = matrix[..., unknowns.linear]
@@ -311,10 +293,9 @@ def _leg_scales(p: Parameters) -> Array:
     mass, length = p['platform.mass'] / 6.0, 2.0 * _size(p)
     weight, rate = _ACCELERATION * mass, _RATE * np.sqrt(_ACCELERATION * _size(p))
     scales: Array = np.empty(LINEAR)
-    for kind, scale in ((CYLINDER_FIRST, mass * length), (CYLINDER_SECOND, mass * length ** 2),
-                        (PISTON_MASS, mass), (PISTON_FIRST, mass * length),
-                        (PISTON_SECOND, mass * length ** 2), (REFLECTED_MASS, mass),
-                        (VISCOUS_FRICTION, weight / rate), (COULOMB_FRICTION, weight),
-                        (OFFSET, weight)):
-        scales[kind] = scale
+    scales[PISTON_MASS] = scales[REFLECTED_MASS] = mass
+    scales[CYLINDER_FIRST] = scales[PISTON_FIRST] = mass * length
+    scales[CYLINDER_SECOND] = scales[PISTON_SECOND] = mass * length ** 2
+    scales[VISCOUS_FRICTION] = weight / rate
+    scales[COULOMB_FRICTION] = scales[OFFSET] = weight
     return scales

@@ -90,21 +90,12 @@ def segments(stamps: Stamps, period: float) -> list[slice]:
     return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
 
 
-def uniform(legs: Signal, efforts: Signal, period: float, many_rates: bool) -> Window | None:
+def uniform(legs: Signal, efforts: Signal, period: float) -> Window | None:
     """
-    Return a window of samples without gaps; None if there are too few samples.
+    Return a window of samples with a period [s], without gaps; None if there are too few.
 
-    Parameters
-    ----------
-    legs : Signal
-        (N, 6) positions, or (N, 12) with rates.
-    efforts : Signal
-        (M, 6) efforts with their own stamps.
-    period : float
-        Sampling period of the window [s].
-    many_rates : bool
-        Whether ``legs`` contains rates.
-
+    ``legs`` are positions (N, 6), or (N, 12) with rates; ``efforts`` (M, 6) have stamps of their
+    own.
     """
     if len(legs.stamps) < 8 or len(efforts.stamps) < 8:
         return None
@@ -125,7 +116,7 @@ def uniform(legs: Signal, efforts: Signal, period: float, many_rates: bool) -> W
         period, period_of(efforts.stamps)))[:, None]
     return Window(
         begin, period, interpolated(of_legs, positions, at),
-        interpolated(of_legs, legs.values[:, 6:], at) if many_rates else None,
+        interpolated(of_legs, legs.values[:, 6:], at) if legs.values.shape[1] > 6 else None,
         interpolated(of_efforts, pushes, at), outliers)
 
 
@@ -150,13 +141,8 @@ def _without_outliers(values: Array, floor: float) -> tuple[Array, Flags]:
     """
     Return values (N, k) with single outliers replaced by their neighbours, and their flags.
 
-    Parameters
-    ----------
-    values : (N, k)
-        Samples, not necessarily uniform.
-    floor : float
-        Minimum deviation relative to the standard deviation of the values, for signals with jumps.
-
+    ``floor`` is the smallest deviation of an outlier relative to the standard deviation of the
+    values, for signals with jumps.
     """
     five = np.stack([np.roll(values, shift, axis=0) for shift in range(-2, 3)])
     off = np.abs(values - (4.0 * (five[1] + five[3]) - five[0] - five[4]) / 6.0)
