@@ -238,7 +238,7 @@ BAD = {
     'a tag of ours': ('mass: 150.0', 'mass: !plain 150.0', ['line 10', "a tag, '!plain'"]),
     'a merge of mappings': ('mass: 150.0', '<<: *m', ['alias']),
     'a list for a name': ('mass: 150.0', '? [a]\n      : 150.0', [
-        'not YAML: line 10, column 9: a list or a group in place of a name']),
+        'not YAML: line 10, column 9: a list, a group or an alias in place of a name']),
     'given twice in two spellings': ('visualization_rate: 25.0', 'platform.mass: 25.0', [
         'platform.mass: given twice under /**']),
     'a list in a list of another node': ('/**:', 'a: {ros__parameters: {b: [[1]]}}\n/**:', [

@@ -26,7 +26,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import shown, shown_name, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.mechanics.frames.rotation import is_unit
+from stewart_dynamics.parameters.tolerances import is_unit
 from stewart_dynamics.whole_file import read_text
 
 POSITION = ('x', 'y', 'z')

@@ -29,11 +29,11 @@ from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.mechanics.frames.rotation import is_unit
 from stewart_dynamics.messages import setpoint, type_names
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.tolerances import is_unit
 
 # Legs are at rest while no position changes by more than this part of the characteristic length,
 # for at least this time [s], of which this part at each end is left out: the platform settles.

@@ -271,18 +271,8 @@ class ParameterSet(Mapping[str, Any]):
         """
         Read a ROS parameter file, ``/**:`` or the node's name, then ``ros__parameters:``.
 
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-        node : str
-            The name of the node with its namespace, if it is not the default one.
-
-        Raises
-        ------
-        ParameterError
-            Names file, parameter, value and rule.
-
+        ``node`` is the name of the node with its namespace, if it is not the default one. Raises
+        ParameterError, which names file, parameter, value and rule.
         """
         return cls(read_yaml(path, node or cls.node), str(path), exact_types=True)
 
@@ -290,20 +280,8 @@ class ParameterSet(Mapping[str, Any]):
         """
         Write a complete ROS parameter file, for any node (``/**:``), that reads back equal.
 
-        An existing file is replaced.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-        comments : mapping of name to str, optional
-            Texts behind the units of parameters.
-
-        Raises
-        ------
-        ParameterError
-            The file cannot be written.
-
+        An existing file is replaced. Comments by name stand behind the units of parameters. Raises
+        ParameterError if the file cannot be written.
         """
         values = {name: self._given.get(name, parameter.default)
                   for name, parameter in self.table.items()

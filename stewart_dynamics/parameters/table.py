@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.tolerances import (
-    HYSTERESIS, QUATERNION_TOLERANCE, REFLECTED_MASS_TOLERANCE, unit_rule)
+    HYSTERESIS, is_unit, REFLECTED_MASS_TOLERANCE, unit_rule)
 
 
 # Corners of a plate are in a plane to this part of its size.
@@ -120,7 +120,14 @@ LEG_SHAPE = 'legs.cylinder.radius', 'legs.cylinder.length', 'legs.piston.radius'
 BASE_OUTLINE, PLATFORM_OUTLINE = OUTLINES = 'geometry.base_outline', 'geometry.platform_outline'
 """Parameters of the plates that the clearance counts for."""
 
+_RELATIONS = {'less than': np.less, 'at most': np.less_equal, 'at least': np.greater_equal}
+_RELATED = (
+    ('limits.length_min', 'less than', 'limits.length_max'),
+    ('legs.piston.radius', 'at most', 'legs.cylinder.radius'),
+    ('singularity.stop_condition', 'at least', 'singularity.warn_condition'),
+    ('drive.torque_continuous', 'at most', 'drive.torque_max'))
 _NEEDED_BY = {
+    'limits.leg_clearance_min': LEG_SHAPE,
     'drive.resistance': ('drive.torque_constant',),
     'drive.thermal_resistance': ('drive.resistance', 'drive.thermal_time_constant'),
     'drive.thermal_time_constant': ('drive.thermal_resistance',),
@@ -312,30 +319,21 @@ class Parameters(ParameterSet):
                 f'{source}: platform.inertia: {self["platform.inertia"].tolist()}: must be '
                 f'positive definite, but its smallest principal moment is {moments[0]:.6g} '
                 'kg m^2 (the order is ixx ixy ixz iyy iyz izz)')
-        low, high = self['limits.length_min'], self['limits.length_max']
-        if low is not None and high is not None and np.any(low >= high):
-            raise ParameterError(
-                f'{source}: limits.length_min: {low.tolist()}: must be less than '
-                f'limits.length_max, {high.tolist()}')
-        missing = [name for name in LEG_SHAPE if self[name] is None]
-        if self['limits.leg_clearance_min'] is not None and missing:
-            raise ParameterError(
-                f'{source}: {", ".join(missing)}: not set: needed by limits.leg_clearance_min')
+        for name, relation, other in _RELATED:
+            values = [np.asarray(self[each]).tolist() for each in (name, other)]
+            if None not in values and not np.all(_RELATIONS[relation](*values)):
+                raise ParameterError(
+                    f'{source}: {name}: {values[0]}: must be {relation} {other}, {values[1]}')
+        for name, needs in _NEEDED_BY.items():
+            missing = [each for each in needs if self[each] is None]
+            if self[name] is not None and missing:
+                raise ParameterError(
+                    f'{source}: {", ".join(missing)}: not set: needed by {name}')
         for name in OUTLINES:
             if self[name] is not None and (rule := _broken_rule_of_plate(self[name])):
                 raise ParameterError(f'{source}: {name}: {self[name].tolist()}: {rule}')
-        outer, inner = self['legs.cylinder.radius'], self['legs.piston.radius']
-        if outer is not None and inner is not None and np.any(inner > outer):
-            raise ParameterError(
-                f'{source}: legs.piston.radius: {inner.tolist()}: must be at most '
-                f'legs.cylinder.radius, {outer.tolist()}')
-        warn, stop = self['singularity.warn_condition'], self['singularity.stop_condition']
-        if stop < warn:
-            raise ParameterError(
-                f'{source}: singularity.stop_condition: {stop}: must be at least '
-                f'singularity.warn_condition, {warn}')
         length = float(np.linalg.norm(self['base.imu.orientation']))
-        if abs(length - 1.0) > QUATERNION_TOLERANCE:
+        if not is_unit(length):
             raise ParameterError(f'{source}: base.imu.orientation: '
                                  f'{self["base.imu.orientation"].tolist()}: {unit_rule(length)}')
         platform_joints = self['geometry.platform_joints']
@@ -386,21 +384,11 @@ class Parameters(ParameterSet):
                 raise ParameterError(f'{source}: actuator.reflected_mass: {follows.tolist()} kg '
                                      f'from {MOTOR_INERTIA} and {SCREW_INERTIA}: must be finite')
             self._set('actuator.reflected_mass', follows)
-        most, always = self['drive.torque_max'], self['drive.torque_continuous']
-        if most is not None and always is not None and np.any(always > most):
-            raise ParameterError(
-                f'{source}: drive.torque_continuous: {always.tolist()}: must be at most '
-                f'drive.torque_max, {most.tolist()}')
         curve = self['drive.torque_speed']
         if curve is not None and np.any(np.diff(curve[:, 0]) <= 0.0):
             raise ParameterError(
                 f'{source}: drive.torque_speed: speeds {curve[:, 0].tolist()} rad/s: must be '
                 'strictly increasing (the order is speed, torque, speed, torque, ...)')
-        for name, needs in _NEEDED_BY.items():
-            missing = [each for each in needs if self[each] is None]
-            if self[name] is not None and missing:
-                raise ParameterError(
-                    f'{source}: {", ".join(missing)}: not set: needed by {name}')
 
     def _set(self, name: str, value: Any) -> None:
         """Set the value of a parameter that follows from others."""

@@ -14,6 +14,8 @@
 
 """Tolerances that rules of parameters and the mechanics share."""
 
+from typing import Any
+
 QUATERNION_TOLERANCE = 1e-3
 """The length of a given quaternion may differ from one by this; the quaternion is normalized."""
 
@@ -27,6 +29,11 @@ REFLECTED_MASS_TOLERANCE = 0.01
 """
 Relative tolerance of actuator.reflected_mass if drive.* gives the inertias: both may be rounded.
 """
+
+
+def is_unit(length: Any) -> Any:
+    """Return whether a quaternion's length, or each of an array, is one within the tolerance."""
+    return abs(length - 1.0) <= QUATERNION_TOLERANCE
 
 
 def unit_rule(length: float) -> str:

@@ -24,6 +24,7 @@ safe loader follows YAML 1.1, but for rcl ``1e3`` is a double, ``y`` a bool, and
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import takewhile
 from pathlib import Path
 import re
 from typing import Any
@@ -44,8 +45,6 @@ class _Blank(str):
 BLANK = _Blank()
 """The value of a name without a value, which rcl rejects."""
 
-_SafeLoader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-
 _TRUE = frozenset('Y y yes Yes YES true True TRUE on On ON'.split())
 _FALSE = frozenset('N n no No NO false False FALSE off Off OFF'.split())
 _NULL = frozenset(['~', 'null', 'Null', 'NULL'])
@@ -54,11 +53,10 @@ _DOUBLE = re.compile(
     r'[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?\.?(inf|nan)|[+-]?infinity',
     re.ASCII | re.IGNORECASE)
 
-_TEXT = 'tag:yaml.org,2002:str'
-_LIST = 'tag:yaml.org,2002:seq'
-_TUPLE = 'tag:yaml.org,2002:python/tuple'  # as launch_ros writes a list
-_GROUP = 'tag:yaml.org,2002:map'
-_PLAIN = 'plain'  # a scalar without quotes
+# Tags without effect; launch_ros writes a list as a tuple.
+_TAGS = {kind: (None, '!', *(f'tag:yaml.org,2002:{tag}' for tag in tags)) for kind, tags in (
+    (yaml.ScalarEvent, ['str']), (yaml.SequenceStartEvent, ['seq', 'python/tuple']),
+    (yaml.MappingStartEvent, ['map']))}
 _NO_SPACE = re.compile(r'\s*(- )?(?P<name>[A-Za-z_/*][\w./*]*):[^\s:][^:]*')
 
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
@@ -92,13 +90,9 @@ def read_document(path: str | Path, largest: int = LARGEST) -> dict[str, Any]:
     """
     Return the content of a YAML file of at most ``largest`` bytes, a mapping by names.
 
-    Raises
-    ------
-    ParameterError
-        In one line: the file cannot be read, is not YAML, or has what rcl rejects or reads
-        differently from YAML (aliases, tags, a second document), a name given twice, or nesting
-        deeper than 20.
-
+    Raises ParameterError if the file cannot be read, is not YAML, or has what rcl rejects or reads
+    differently from YAML (aliases, tags, a second document), a name given twice, or nesting deeper
+    than 20.
     """
     document = read_value(read_text(path, largest, ParameterError), str(path))
     if not isinstance(document, dict):
@@ -110,43 +104,43 @@ def read_value(text: str, source: str) -> Any:
     """Return the value that ROS reads from a text, as on a command line."""
     data = text.encode('utf-8', 'surrogateescape')
     try:
-        depth = 0
-        for event in yaml.parse(data, Loader=_SafeLoader):  # its recursion is unbounded
-            if isinstance(event, yaml.AliasEvent):
-                raise _wrong(event, 'has a YAML alias (*): write the value out')
-            depth += isinstance(event, yaml.CollectionStartEvent)
-            depth -= isinstance(event, yaml.CollectionEndEvent)
-            if depth > _DEEPEST:
-                raise _wrong(event, f'nests deeper than {_DEEPEST}')
-        node = yaml.compose(data, Loader=_Loader)
-        return None if node is None else _value(node)
+        # By events: yaml.compose recurses without bound, and yaml.load follows YAML 1.1.
+        events = yaml.parse(data, Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
+        next(events)  # the stream begins
+        if isinstance(next(events), yaml.StreamEndEvent):
+            return None
+        value = _value(next(events), events)
+        next(events)  # the document ends
+        following = next(events)
+        if not isinstance(following, yaml.StreamEndEvent):
+            raise _wrong(following, 'expected a single document in the stream, but found another')
     except yaml.YAMLError as exc:
         raise ParameterError(f'{source}: not YAML: {_reason(exc, data)}') from exc
+    return value
 
 
-class _Loader(_SafeLoader):  # type: ignore[misc]
-    """The safe loader, without the types that YAML 1.1 gives plain scalars."""
-
-    yaml_implicit_resolvers = {None: [(_PLAIN, re.compile('(?!$)', re.DOTALL))]}
-
-
-def _value(node: Any) -> Any:
-    """Return the value of a node of the document."""
-    if isinstance(node, yaml.ScalarNode) and node.tag == _TEXT:
-        return node.value if node.value or node.style else BLANK
-    if isinstance(node, yaml.ScalarNode) and node.tag == _PLAIN:
-        return scalar(node.value)
-    if isinstance(node, yaml.SequenceNode) and node.tag in (_LIST, _TUPLE):
-        return [_value(each) for each in node.value]
-    if not isinstance(node, yaml.MappingNode) or node.tag != _GROUP:
-        raise _wrong(node, f'a tag, {shown(node.tag)}: ROS ignores it, write the value without')
+def _value(event: Any, events: Iterator[Any], depth: int = 1) -> Any:
+    """Return the value that begins with an event; takes the other events of it."""
+    if isinstance(event, yaml.AliasEvent):
+        raise _wrong(event, 'has a YAML alias (*): write the value out')
+    if isinstance(event, yaml.CollectionStartEvent) and depth > _DEEPEST:
+        raise _wrong(event, f'nests deeper than {_DEEPEST}')
+    if event.tag not in _TAGS[type(event)]:
+        raise _wrong(event, f'a tag, {shown(event.tag)}: ROS ignores it, write the value without')
+    if isinstance(event, yaml.ScalarEvent):
+        if not event.value and not event.style:
+            return BLANK
+        return scalar(event.value) if event.implicit[0] else event.value
+    inside = takewhile(lambda each: not isinstance(each, yaml.CollectionEndEvent), events)
+    if isinstance(event, yaml.SequenceStartEvent):
+        return [_value(each, events, depth + 1) for each in inside]
     found: dict[str, Any] = {}
-    for key, value in node.value:
-        if not isinstance(key, yaml.ScalarNode):
-            raise _wrong(key, 'a list or a group in place of a name')
+    for key in inside:
+        if not isinstance(key, yaml.ScalarEvent):
+            raise _wrong(key, 'a list, a group or an alias in place of a name')
         if key.value in found:
             raise _wrong(key, f'duplicate key {shown(key.value)}')
-        found[key.value] = _value(value)
+        found[key.value] = _value(next(events), events, depth + 1)
     return found
 
 
@@ -196,12 +190,7 @@ def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
     Return the values of a ROS parameter file for a node, under dotted names.
 
     Sections apply in the order of the file; a later one overrides an earlier one, as in ROS.
-
-    Raises
-    ------
-    ParameterError
-        The file cannot be read, breaks a rule, or holds no parameters for the node.
-
+    Raises ParameterError if the file breaks a rule, or holds no parameters for the node.
     """
     document = read_document(path)
     values = dict(parameters_of(document, node, str(path)))
@@ -319,24 +308,11 @@ def check_given(name: str, value: Any, source: str) -> None:
 def write_yaml(path: str | Path, values: Mapping[str, Any], comments: Mapping[str, str],
                head: str = '') -> None:
     """
-    Write a ROS parameter file for any node, with comments, complete or not at all.
+    Write a ROS parameter file for any node, complete or not at all; replaces an existing one.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file; an existing one is replaced.
-    values : mapping of dotted name to value
-        Texts, doubles, bools, or tuples of them; a tuple of length 1 is written as a single value.
-    comments : mapping of dotted name to str
-        Behind the values: units and more; may be empty.
-    head : str
-        Lines of comment before all others.
-
-    Raises
-    ------
-    ParameterError
-        The file cannot be written.
-
+    Values are texts, doubles, bools, or tuples of them, by dotted names; a tuple of length 1 is
+    written as a single value. Comments stand behind the values, ``head`` before all lines. Raises
+    ParameterError if the file cannot be written.
     """
     tree: dict[str, Any] = {}
     for name, value in values.items():

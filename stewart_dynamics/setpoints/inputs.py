@@ -28,13 +28,13 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, NO_WRENCH, Six, Stamps
-from stewart_dynamics.mechanics.frames.rotation import from_quaternion, is_unit, quaternion_length
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion, quaternion_length
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.parameters.tolerances import unit_rule
+from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
 from stewart_dynamics.setpoints.rejections import (
     frame_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
     Rejections, WRONG_FRAME)

@@ -29,7 +29,7 @@ from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION)
-from stewart_dynamics.parameters.tolerances import unit_rule
+from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
 
 Self = TypeVar('Self', bound='RowSamples')
 
@@ -306,7 +306,7 @@ def matrix_of_quaternion(quaternion: ArrayLike) -> Array:
     q = as_array('quaternion', quaternion, (4,))
     with np.errstate(over='ignore'):
         length = np.asarray(rotations.quaternion_length(*np.moveaxis(q, -1, 0)))
-    off = ~np.asarray(rotations.is_unit(length))
+    off = ~np.asarray(is_unit(length))
     if off.any():
         at = tuple(map(int, np.argwhere(off)[0]))
         raise MotionError(

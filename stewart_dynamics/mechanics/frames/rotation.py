@@ -18,13 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import math
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.parameters.tolerances import QUATERNION_TOLERANCE
 
 
 def from_euler(angles: ArrayLike) -> Array:
@@ -89,11 +88,6 @@ def quaternion_length(x: Number, y: Number, z: Number, w: Number) -> Number:
     """Return the length of a quaternion, or of arrays of them; the same bits either way."""
     square = x * x + y * y + z * z + w * w
     return math.sqrt(square) if isinstance(square, float) else np.sqrt(square)
-
-
-def is_unit(length: Any) -> Any:
-    """Return whether a quaternion's length, or each of an array, is one within the tolerance."""
-    return abs(length - 1.0) <= QUATERNION_TOLERANCE
 
 
 def from_quaternion(
