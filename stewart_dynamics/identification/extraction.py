@@ -98,7 +98,7 @@ class Extract(NamedTuple):
 
 
 class WindowRead(NamedTuple):
-    """The extract of a window, and what else was found in it."""
+    """The extract of a window, with its noise and end."""
 
     extract: Extract
     deviations: tuple[float, float]

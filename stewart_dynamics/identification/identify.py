@@ -157,7 +157,7 @@ class Identification:
         self.extracts = Extracts()
         self.bags: list[BagRead] = []
         self._first: tuple[Extraction, Window] | None = None
-        # Of the first window of each bag: sums without and with more noise, the Gram matrix of
+        # For the first window of each bag: sums without and with more noise, the Gram matrix of
         # that noise in the regressor, and the number of samples.
         self._noises: list[tuple[Sums, Sums, Array, int]] = []
         self._speeds: tuple[float, ...] | None = None
