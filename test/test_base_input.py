@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 import math
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import messages
 import numpy as np
@@ -191,7 +191,6 @@ def oracle(samples: Sequence[tuple[int, Any]], stamp: int, timeout: int = SECOND
     return np.asarray(row) + (np.asarray(row) - row_before) * part
 
 
-@settings(max_examples=200)
 @given(st.lists(st.integers(1, 60), min_size=0, max_size=8),
        st.lists(st.integers(-50, 400), min_size=1, max_size=6))
 def test_the_newest_usable_base_sample_is_used(
@@ -426,7 +425,6 @@ def recorded(source: str, fates: Sequence[str], period: int) -> list[tuple[str, 
     return found
 
 
-@settings(max_examples=60)
 @given(st.sampled_from(SOURCES), st.lists(st.sampled_from(FATES), max_size=60),
        st.integers(1, 40), st.lists(st.integers(0, 300), max_size=4))
 def test_many_are_what_they_are_one_by_one(

@@ -183,7 +183,7 @@ def test_invalid_base_samples_are_rejected_and_counted(fresh: Start) -> None:
         assert (NOT_MEASURED if source == 'imu' else NOT_UNIT) in {why for _, _, why in bad}
 
 
-@pytest.mark.parametrize('rate', [50, 200, 1000])
+@pytest.mark.parametrize('rate', [50, 1000])
 def test_a_stream_at_any_rate_is_followed(fresh: Start, rate: int) -> None:
     """A base that sways and rolls, setpoints at 1 kHz: all forces are near those of the truth."""
     on = OnBase(fresh, 'motion')

@@ -125,8 +125,8 @@ def bounds(descriptor: ParameterDescriptor) -> list[tuple[float, float, float]]:
 
 def test_the_node_describes_each_parameter(declared: Any) -> None:
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
-    for name, parameter in PARAMETERS.items():
-        (each,) = described(ask, name)
+    for name, parameter, each in zip(
+            PARAMETERS, PARAMETERS.values(), described(ask, *PARAMETERS), strict=True):
         assert each.name == name
         assert each.description == parameter.text + (
             f' [{parameter.unit}]' if parameter.unit else '')
@@ -160,8 +160,8 @@ FORMS: dict[str, Any] = {'one number': 1000.0, 'a list of one': [2000.0],
                          'a list': [3000.0, 4000.0, 5000.0, 6000.0, 7000.0, 8000.0]}
 
 
-@pytest.mark.parametrize('last', FORMS)
-@pytest.mark.parametrize('first', FORMS)
+@pytest.mark.parametrize('first, last', [
+    ('one number', 'a list'), ('a list of one', 'one number'), ('a list', 'a list of one')])
 def test_the_last_value_on_the_command_line_is_used(
         first: str, last: str, domain: int, tmp_path: Path) -> None:
     def source(value: Any, how: str) -> list[str]:
@@ -199,8 +199,8 @@ def force_max(arguments: list[str], domain: int) -> tuple[Any, Any]:
 
 def test_the_trajectory_s_parameters_are_read_once(declared: Any) -> None:
     ask = declared(Node, ReferenceMotionParameters, 'trajectory_sine.yaml')
-    for name, parameter in REFERENCE_MOTION_PARAMETERS.items():
-        (each,) = described(ask, name)
+    for parameter, each in zip(REFERENCE_MOTION_PARAMETERS.values(), described(
+            ask, *REFERENCE_MOTION_PARAMETERS), strict=True):
         assert each.read_only
         assert each.description.startswith(parameter.text)
         assert each.additional_constraints.endswith('set only when the node starts')

@@ -19,7 +19,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 import pytest
 from referees import symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
@@ -588,7 +588,6 @@ def _check_values(diagnostics: DynamicsDiagnostics, now: float) -> None:
             assert value
 
 
-@settings(max_examples=200)
 @given(st.lists(st.tuples(
     st.tuples(*[sizes] * 3), rotations | st.just(UPRIGHT), st.tuples(*[sizes] * 12),
     st.sampled_from([0.0, 0.01, 0.2, 2.0])), max_size=6))
@@ -673,7 +672,6 @@ def test_two_in_a_series_that_are_far_apart_are_both_logged() -> None:
     assert series.add('a', 'two', SECONDS) == 'two'
 
 
-@settings(max_examples=200)
 @given(st.lists(st.tuples(st.sampled_from('ab'), st.floats(0.0, 4.0)), min_size=1))
 def test_first_and_last_are_logged_and_none_is_lost(events: list[tuple[str, float]]) -> None:
     series, now = Series(), 0.0

@@ -720,7 +720,7 @@ def _messages(draw: st.DrawFn) -> list[tuple[str, Any]]:
     return sent
 
 
-@settings(max_examples=40, database=None,
+@settings(database=None,
           suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(st.lists(_messages(), min_size=1, max_size=6))
 def test_for_any_input_only_finite_numbers_are_published_and_a_setpoint_is_answered(

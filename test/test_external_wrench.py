@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from messages import imu, STORE
 import numpy as np
 from numpy.typing import NDArray
@@ -552,7 +552,6 @@ def test_measured_legs_are_rejected_until_the_base_is_known() -> None:
     assert last.wrench == pytest.approx(EXPECTED[-1].wrench, rel=1e-9)
 
 
-@settings(max_examples=50)
 @given(st.data())
 def test_any_order_of_names_with_others_among_them(data: st.DataObject) -> None:
     """Others' numbers may be anything; the layout may change from message to message."""
@@ -640,7 +639,6 @@ def test_a_hexapod_that_is_singular_everywhere_is_rejected() -> None:
     followed.rejects(message_of(REST[0]._replace(lengths=six(lengths))), SINGULAR, 'lengths [')
 
 
-@settings(max_examples=200)
 @given(st.binary(max_size=120), st.integers(0, 400), st.integers(0, 255))
 def test_for_any_input_a_wrench_is_finite(noise: bytes, at: int, byte: int) -> None:
     followed = Followed()

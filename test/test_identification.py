@@ -248,17 +248,17 @@ def _swapped(given: Recorded) -> Recorded:
                     given.efforts[:, order])
 
 
-@pytest.mark.parametrize('options', [(), WITH_TILT], ids=['level', 'tilt'])
-@pytest.mark.parametrize(('change', 'named'), [
-    (lambda given: given._replace(efforts=-given.efforts), r'opposite sign: \+ must push'),
-    (lambda given: given._replace(efforts=1e-3 * given.efforts), 'likely kN in place of N'),
+@pytest.mark.parametrize(('change', 'named', 'options'), [
+    (lambda given: given._replace(efforts=-given.efforts), r'opposite sign: \+ must push', ()),
+    (lambda given: given._replace(efforts=1e-3 * given.efforts), 'likely kN in place of N',
+     WITH_TILT),
     (lambda given: given._replace(efforts=given.efforts * 0.02 / (2.0 * np.pi)),
-     'likely torques of the motors'),
-    (_swapped, 'positions and efforts of leg_2 and leg_3 look swapped'),
+     'likely torques of the motors', ()),
+    (_swapped, 'positions and efforts of leg_2 and leg_3 look swapped', WITH_TILT),
     (lambda given: given._replace(positions=given.positions - 0.02),
-     r'geometry.zero_length looks wrong: another geometry.zero_length, (\+1[89]\S* ){6}mm'),
+     r'geometry.zero_length looks wrong: another geometry.zero_length, (\+1[89]\S* ){6}mm', ()),
     (lambda given: given._replace(positions=1e3 * given.positions),
-     'lengths belong to no pose of this hexapod'),
+     'lengths belong to no pose of this hexapod', ()),
 ], ids=['sign', 'kN', 'torque', 'swapped', 'zero length', 'mm'])
 def test_likely_mistakes_are_named_and_nothing_is_written(
         identified: Callable[..., Any], tmp_path: Path, change: Change, named: str,

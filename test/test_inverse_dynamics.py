@@ -27,7 +27,7 @@ import subprocess
 import sys
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 from numpy.random import Generator
@@ -537,7 +537,6 @@ def numbers(many: int) -> Any:
                        for each in (ordinary, finite, st.one_of(ordinary, finite))))
 
 
-@settings(max_examples=200)
 @given(st.lists(numbers(3), min_size=6, max_size=6), numbers(6))
 @np.errstate(all='ignore')
 def test_any_motion_gives_finite_results_or_an_error_of_the_package(
@@ -568,7 +567,6 @@ def _random_hexapods(amount: Any) -> Any:
             'gravity': numbers(3), 'platform.center_of_mass': numbers(3)})
 
 
-@settings(max_examples=200)
 @given(st.one_of(_random_hexapods(st.floats(0.01, 100.0)), _random_hexapods(positive)))
 @np.errstate(all='ignore')
 def test_any_hexapod_gives_finite_results_or_an_error_of_the_package(values: Any) -> None:

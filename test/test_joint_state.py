@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from messages import STORE
 import numpy as np
@@ -61,7 +61,6 @@ def significant(data: bytes, names: Sequence[str], numbers: int) -> list[bytes]:
     return fields
 
 
-@settings(max_examples=200)
 @given(stamps, st.lists(texts, min_size=6, max_size=6), sixes, sixes, st.none() | sixes)
 def test_a_joint_state_is_what_rclpy_and_rosbags_write(
         stamp: int, names: list[str], position: tuple[float, ...], velocity: tuple[float, ...],
@@ -121,7 +120,6 @@ def one_by_one(reader: JointStateReader, messages: Sequence[bytes],
     return found, values, dict(rejected)
 
 
-@settings(max_examples=150)
 @given(st.data(), st.lists(st.sampled_from(FIELDS), min_size=1, max_size=3, unique=True))
 def test_many_are_what_they_are_one_by_one(data: st.DataObject, fields: list[str]) -> None:
     """Messages of any layouts, some of them corrupted; readers have read others before."""

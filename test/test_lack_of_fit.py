@@ -19,11 +19,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-from recorded import fourier, HOME, MotionAt, recorded
+from recorded import fourier, HOME, MotionAt, Recorded, recorded
 from referees import rng
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.identification.identification_options import IdentificationOptions
+from stewart_dynamics.identification.identify import Identified
 from stewart_dynamics.identification.kinematics import pose_near
 from stewart_dynamics.identification.lack_of_fit import deviations
 from stewart_dynamics.identification.results import document, result_text
@@ -58,7 +59,7 @@ def test_a_wrong_model_is_noticed_and_its_cause_named(cause: str) -> None:
         assert np.mean(off < half + found.lack_of_fit.shifts) >= max(0.8, narrow.mean())
 
 
-@pytest.mark.parametrize('seed', [11, 12, 13])
+@pytest.mark.parametrize('seed', [11, 12])
 def test_a_right_model_gives_no_notice(seed: int) -> None:
     case = Case(true_hexapod(seed))
     found = identify(simulated(case, seed))
@@ -74,7 +75,7 @@ def test_identified_offsets_are_no_lack_of_fit() -> None:
     assert identify(simulated(case, 1), GIVEN, kinds).lack_of_fit is None
 
 
-@pytest.mark.parametrize('delay', [0.0, 0.015, 0.04, 0.09])
+@pytest.mark.parametrize('delay', [0.0, 0.09])
 def test_delays_of_the_efforts_up_to_a_tenth_of_a_second_are_found(
         delay: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wrong_models, 'NOISE', wrong_models.NOISE._replace(delay=delay))
@@ -103,10 +104,18 @@ def test_rates_inside_the_coulomb_friction_band_are_reported(velocity: float, sa
                for each in bag.notices) == said
 
 
-@pytest.mark.parametrize('size', [1e-3, 1e3])
-def test_hexapods_of_all_sizes_have_similar_results(size: float) -> None:
+@pytest.fixture(scope='module')
+def right() -> tuple[list[Recorded], Identified]:
+    """Return a recording of a right model, and the identification from it."""
     bags = simulated(Case(true_hexapod(1)), 1)
-    found = [identify(bags, size=each) for each in (1.0, size)]
+    return bags, identify(bags)
+
+
+@pytest.mark.parametrize('size', [1e-3, 1e3])
+def test_hexapods_of_all_sizes_have_similar_results(
+        size: float, right: tuple[list[Recorded], Identified]) -> None:
+    bags, of_one = right
+    found = [of_one, identify(bags, size=size)]
     one, other = (np.concatenate([
         each.fit.values, np.sqrt(np.diag(each.errors.covariance))]) / np.tile(
             each.unknowns.scales, 2) for each in found)

@@ -106,7 +106,7 @@ def nodes(peer: Peer) -> set[str]:
     return set(peer.node.get_node_names()) - {peer.node.get_name()}
 
 
-@pytest.mark.parametrize('factor', ['abc', '0.0', 'nan'])
+@pytest.mark.parametrize('factor', ['abc', 'nan'])
 def test_a_payload_that_is_no_number_ends_the_launch(
         launch: Launch, peer: Peer, factor: str) -> None:
     program = launch('demo.launch.py', f'payload_factor:={factor}')

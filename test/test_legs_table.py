@@ -22,7 +22,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
@@ -120,7 +120,6 @@ def test_the_tables_give_every_number_back(tmp_path: Path) -> None:
 
 
 @given(st.data())
-@settings(max_examples=60)
 def test_the_tables_give_any_number_back(
         tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     number = data.draw(st.integers(1, 4))

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hypothesis import assume, given, settings, strategies as st
+from hypothesis import assume, given, strategies as st
 import numpy as np
 import pytest
 from referees import random_parameters, rng, ROOT, scaled
@@ -116,7 +116,7 @@ def test_files_of_the_package_give_no_warning(file: str) -> None:
 
 
 def test_random_hexapods_give_no_warning() -> None:
-    for seed in range(100):
+    for seed in range(20):
         assert likely_mistakes(random_parameters(np.random.default_rng(seed))) == ()
 
 
@@ -130,7 +130,7 @@ def test_hexapods_of_any_size_give_no_warning(size: float, power: float) -> None
         name: PLATFORM[name] * size ** exponent for name, exponent in limits.items()
         if power == 3.0 or size <= 1.0 or name != 'limits.force_max'})
     assert likely_mistakes(found) == ()
-    for seed in range(10):
+    for seed in range(2):
         assert likely_mistakes(scaled(
             random_parameters(np.random.default_rng(seed)), 0.3 * size)) == ()
 
@@ -302,14 +302,23 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
 }
 
 
+# Slips that are reported by more than one line.
+SEVERAL = {'all joints in mm', 'all joints in mm of a hexapod as long as a street',
+           'the base joints in mm', 'one base joint in mm',
+           'the platform joints in cm and limits', 'limits in mm'}
+
+
 @pytest.mark.parametrize('name', SLIPS)
-def test_a_mistake_is_reported(name: str) -> None:
+def test_a_mistake_is_reported_once(name: str) -> None:
     changes, texts = SLIPS[name]
     found = likely_mistakes(PLATFORM.replaced({
         name: np.ravel(value) if np.ndim(value) else value for name, value in changes.items()}))
     for text in texts:
         assert any(text in mistake for mistake in found), found
     assert all(mistake.isprintable() for mistake in found)
+    assert len(found) == 1 or name in SEVERAL
+    # A wrong unit is not also an order of the joints.
+    assert name != 'one base joint in mm' or not any('another order' in each for each in found)
 
 
 # The platform joints of this hexapod are 0.6 m from their center, the base joints 0.9 m.
@@ -323,26 +332,8 @@ def test_the_radius_of_gyration_has_bounds(gyration: float, words: str) -> None:
         assert any(suspected in mistake for mistake in found) == (suspected == words), found
 
 
-def test_one_mistake_is_reported_once() -> None:
-    several = {'all joints in mm', 'all joints in mm of a hexapod as long as a street',
-               'the base joints in mm', 'one base joint in mm',
-               'the platform joints in cm and limits', 'limits in mm'}
-    assert several <= set(SLIPS)
-    for name in set(SLIPS) - several:
-        changes = {key: np.ravel(value) if np.ndim(value) else value
-                   for key, value in SLIPS[name][0].items()}
-        assert len(likely_mistakes(PLATFORM.replaced(changes))) == 1, name
-
-
-def test_a_wrong_unit_is_not_also_an_order_of_the_joints() -> None:
-    changes, _ = SLIPS['one base joint in mm']
-    found = likely_mistakes(PLATFORM.replaced({
-        name: value.ravel() for name, value in changes.items()}))
-    assert not any('another order' in mistake for mistake in found), found
-
-
-@pytest.mark.parametrize('spread', [8.0, 12.0, 20.0, 25.0])
-@pytest.mark.parametrize('by', [1, 2, 3, 4, 5])
+@pytest.mark.parametrize(('by', 'spread'), [
+    (1, 8.0), (2, 8.0), (3, 12.0), (4, 12.0), (5, 25.0), (2, 25.0)])
 def test_platform_joints_that_begin_with_another_leg_are_reported(
         by: int, spread: float) -> None:
     platform = np.roll(ring(0.6, spread, 60.0), 1, axis=0)
@@ -444,7 +435,6 @@ def test_home_on_the_given_side_must_be_within_the_limits() -> None:
 NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(allow_nan=False, allow_infinity=False))
 
 
-@settings(max_examples=150)
 @given(st.lists(NUMBERS, min_size=18, max_size=18), st.lists(NUMBERS, min_size=18, max_size=18),
        st.dictionaries(st.sampled_from([
            'geometry.zero_length', 'limits.length_min', 'limits.length_max', 'platform.mass',
@@ -506,7 +496,7 @@ def test_a_swapped_digit_is_found():
 def test_a_wrong_digit_that_moves_a_joint_a_little_is_found(table, off):
     """The other five fit far better: by the four digits of the file."""
     good = PLATFORM[table]
-    for seed in range(30):
+    for seed in range(10):
         random, joints = rng(seed), good.copy()
         joint, axis = random.integers(6), random.integers(2)
         joints[joint, axis] += off
@@ -515,18 +505,18 @@ def test_a_wrong_digit_that_moves_a_joint_a_little_is_found(table, off):
         assert odd.expected == pytest.approx(good[joint], abs=3e-4)
 
 
-@pytest.mark.parametrize('error', [0.0, 1e-9, 1e-5, 1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize('error', [0.0, 1e-9, 1e-4, 1e-2])
 @pytest.mark.parametrize('table', TABLES)
 def test_symmetric_and_calibrated_hexapods_have_no_odd_joint(table, error):
     good = PLATFORM[table]
-    for seed in range(100):
+    for seed in range(25 if error else 1):
         assert odd_joint(good + rng(seed).normal(size=(6, 3)) * error) is None
 
 
-@pytest.mark.parametrize('digits', [3, 4, 5, 12])
+@pytest.mark.parametrize('digits', [3, 5, 12])
 def test_rounded_hexapods_have_no_odd_joint(digits):
     random = rng()
-    for _ in range(100):
+    for _ in range(30):
         radius, half, begin = random.uniform([0.2, 0.1, 0.0], [1.5, 0.5, 2.0])
         angles = begin + half * np.tile([-1.0, 1.0], 3) + np.repeat(np.arange(3), 2) * 2.0944
         joints = radius * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
@@ -534,7 +524,7 @@ def test_rounded_hexapods_have_no_odd_joint(digits):
 
 
 def test_irregular_hexapods_have_no_odd_joint():
-    for seed in range(50):
+    for seed in range(15):
         p = random_parameters(rng(seed))
         assert [odd_joint(p[table]) for table in TABLES] == [None, None]
 

@@ -123,10 +123,10 @@ def hexapods() -> list[tuple[Parameters, Setpoint]]:
     random = rng()
     cases = [(HEXAPOD, HOME), (HEXAPOD, setpoint((0.0, 0.0, -1.1))),
              (HEXAPOD, setpoint((0.0, 0.0, 0.0))), (HEXAPOD, SINGULAR)]
-    for _ in range(20):
+    for _ in range(8):
         parameters = random_parameters(random)
         cases += [(parameters, Setpoint(STAMP, tuple(row)))
-                  for row in random_motion(parameters, random, 3).rows.tolist()]
+                  for row in random_motion(parameters, random, 1).rows.tolist()]
     return cases
 
 
@@ -135,11 +135,10 @@ CASES = hexapods()
 
 # The message
 
-@pytest.mark.parametrize('joints', [
-    tuple('abcdef'), ('ab', 'abc', 'abcd', 'abcde', 'abcdef', 'ä\u4e2d'),
-    tuple(f'leg_{n}' * 20 for n in range(6))], ids=['short', 'of all lengths', 'long'])
-@pytest.mark.parametrize('frame', ['', 'b', 'ba', 'bas', 'base', 'base\u00e4'])
-@pytest.mark.parametrize('to', [HOME, NEAR, SINGULAR], ids=['home', 'near', 'singular'])
+@pytest.mark.parametrize('frame, joints, to', [
+    ('', tuple('abcdef'), HOME), ('b', tuple(f'leg_{n}' * 20 for n in range(6)), NEAR), *(
+        (frame, ('ab', 'abc', 'abcd', 'abcde', 'abcdef', 'ä\u4e2d'), SINGULAR)
+        for frame in ('ba', 'bas', 'base', 'base\u00e4'))], ids=range(6))
 def test_bytes_are_those_of_a_typed_message(joints: Any, frame: str, to: Setpoint) -> None:
     parameters = HEXAPOD.replaced({'joints': joints, 'base_frame': frame})
     data = Markers(parameters).write(to.motion, answer(parameters, to))
@@ -377,7 +376,7 @@ def test_for_any_answer_markers_have_only_finite_numbers() -> None:
     random = rng()
     step, writer = Step(symmetric_parameters()), Markers(symmetric_parameters())
     drawn = 0
-    for exponent in np.linspace(-300.0, 300.0, 301):
+    for exponent in np.linspace(-300.0, 300.0, 61):
         position = tuple((10.0 ** exponent * random.uniform(-1.0, 1.0, 3)).tolist())
         output = step(setpoint(position), None)
         if output is None:
@@ -390,7 +389,7 @@ def test_for_any_answer_markers_have_only_finite_numbers() -> None:
                 pose.position.x, pose.position.y, pose.position.z, scale.x, scale.y, scale.z,
                 pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w,
                 *color(marker)]))
-    assert drawn > 100
+    assert drawn > 20
 
 
 @pytest.mark.filterwarnings('error')

@@ -21,7 +21,7 @@ import json
 import math
 from typing import Any, NamedTuple
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
@@ -418,7 +418,6 @@ def reference(stamps: list[int], at: list[int], gap: int) -> list[int]:
     return found
 
 
-@settings(max_examples=80)
 @given(st.lists(st.integers(1, 150), min_size=1, max_size=60),
        st.lists(st.integers(1, 150), min_size=1, max_size=60), st.integers(-100, 2000),
        st.lists(st.tuples(st.booleans(), st.integers(0, 20)), max_size=30))

@@ -22,7 +22,7 @@ import pickle
 import re
 from typing import Any
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -125,7 +125,6 @@ def test_the_quaternion_of_one_matrix_is_that_of_many() -> None:
         assert np.array_equal(np.abs(exact), [*axis, 0.0])
 
 
-@settings(max_examples=200)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(
     lambda q: np.linalg.norm(q) > 1e-3))
 def test_any_quaternion_is_converted_both_ways_up_to_its_sign(numbers: list[float]) -> None:

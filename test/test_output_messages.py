@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from messages import STORE
 import numpy as np
@@ -178,7 +178,6 @@ def _check_finite(step: Step, setpoint: Setpoint, wrench: Six) -> None:
         assert of.condition >= 1.0
 
 
-@settings(max_examples=400)
 @given(st.tuples(sizes, sizes, sizes), rotations, st.tuples(*[sizes] * 12),
        st.tuples(*[sizes] * 6))
 @example((0.0, 0.0, 0.0), UPRIGHT, REST, NO_WRENCH)
@@ -197,7 +196,6 @@ _LIMITED = Step(PARAMETERS.replaced({
     'singularity.action': 'suppress_forces', 'geometry.zero_length': 1.79e308}))
 
 
-@settings(max_examples=150)
 @given(st.floats(5e-324, 1.79e308), st.floats(0.0, 1.79e308), st.floats(0.0, 1.79e308),
        st.tuples(*[st.floats(-2.0, 2.0)] * 3), rotations, st.tuples(*[sizes] * 12))
 def test_only_finite_numbers_are_published_for_any_hexapod(

@@ -384,7 +384,6 @@ values = st.recursive(plain, lambda inner: st.one_of(
     st.dictionaries(st.text(max_size=5), inner, max_size=3)), max_leaves=12)
 
 
-@settings(max_examples=200)
 @given(st.dictionaries(st.one_of(st.sampled_from(NAMES), st.text(max_size=8)), values,
                        max_size=4))
 @np.errstate(all='ignore')
@@ -428,8 +427,7 @@ scalars = st.sampled_from([
     '"\\0"'])
 
 
-@settings(max_examples=150,
-          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.one_of(
     st.text(max_size=60), st.text(alphabet=f'/*:rosparmet_{SPECIAL}', max_size=60),
     st.tuples(cuts, st.text(alphabet=SPECIAL, max_size=6)).map(
@@ -441,8 +439,7 @@ def test_any_text_is_accepted_or_rejected_in_one_line(tmp_path: Path, text: str)
     check_any(file)
 
 
-@settings(max_examples=150,
-          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.one_of(
     st.binary(max_size=60), st.tuples(cuts, st.binary(max_size=4)).map(
         lambda cut: GOOD.encode()[:cut[0][0]] + cut[1] + GOOD.encode()[sum(cut[0]):])))
@@ -453,8 +450,7 @@ def test_any_bytes_are_accepted_or_rejected_in_one_line(tmp_path: Path, data: by
     check_any(file)
 
 
-@settings(max_examples=150,
-          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.dictionaries(
     st.one_of(st.sampled_from(NAMES), st.text(alphabet='aA.*/: \n', max_size=5)),
     st.one_of(scalars, st.floats().map(repr), st.lists(
@@ -632,8 +628,7 @@ def test_a_written_file_has_units_and_short_lines(tmp_path: Path) -> None:
 TEXTS = st.text(st.characters(codec='utf-8'), min_size=1, max_size=8).filter(str.isprintable)
 
 
-@settings(max_examples=100,
-          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.one_of(TEXTS, st.sampled_from([
     'null', '~', 'yes', 'n', '1e3', '0x1F', '- a', 'a: b', '#', "'", '"', ' a ', '!!str', '*a',
     'nan', '1_000', '2020-01-01', '010', '=', '<<', '%', '@', '`', '|', '>'])), min_size=6,

@@ -49,14 +49,14 @@ def rejected_for(p: Parameters, times: Array, motion: Motion) -> str:
     return check_planned_trajectory(StewartPlatform(p), times, motion).limit
 
 
-@pytest.mark.parametrize('seed', range(6))
+@pytest.mark.parametrize('seed', range(4))
 def test_no_torque_or_speed_is_missed_by_a_hundredth(seed: int) -> None:
     """The referee are 10,000 samples; half of the screws turn with their legs."""
     random = rng(seed)
     p = driven(random_parameters(random), random, **{
         'drive.screw_rotation': 'universal' if seed % 2 else 'guided',
         'singularity.stop_condition': 1e11, 'singularity.warn_condition': 1e11})
-    for _ in range(6):
+    for _ in range(3):
         times, motion = random_trajectory(p, random)
         motors = StewartPlatform(p).motors(dense(times, motion)[1])
         torques, speeds = np.abs(motors.breakaway_torques), np.abs(motors.speeds)

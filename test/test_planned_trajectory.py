@@ -104,12 +104,12 @@ def legs_of(parameters: Parameters, rows: Array) -> Array:
     return StewartPlatform(parameters).solve(rows)
 
 
-def between_points(times: Sequence[int], rows: Array) -> tuple[Array, Array]:
+def between_points(times: Sequence[int], rows: Array, count: int = 4001) -> tuple[Array, Array]:
     """Return times and rows of the motion of the platform, sampled densely between points."""
     seconds = np.array(times) * 1e-9
     motion = motion_of(rows)
     between = Interpolation(np.diff(seconds), motion.rows)
-    part = np.linspace(0.0, 1.0, 4001)
+    part = np.linspace(0.0, 1.0, count)
     both = [(begin + part * (end - begin), between.at(np.full(len(part), n), part))
             for n, (begin, end) in enumerate(pairwise(seconds))]
     return np.concatenate([each[0] for each in both]), np.concatenate([each[1] for each in both])
@@ -209,9 +209,8 @@ def random_trajectory(parameters: Parameters, random: np.random.Generator) -> tu
                          *derivatives)
 
 
-@pytest.mark.parametrize('size', [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize(('reflected', 'weightless'), [
-    (0.0, False), (1.0, False), (70.0, False), (1.0, True)])
+@pytest.mark.parametrize(('size', 'reflected', 'weightless'), [
+    (1.0, 0.0, False), (1e-3, 1.0, False), (1e3, 70.0, False), (1.0, 1.0, True)])
 def test_no_force_or_rate_is_missed_by_a_hundredth(
         size: float, reflected: float, weightless: bool) -> None:
     """The referee are 10,000 samples; reflected masses are up to 70 times the platform's."""
@@ -291,12 +290,12 @@ def test_the_clear_trajectory_is_accepted(step: int) -> None:
     assert check((times, rows)).lengths.shape == (len(times), 6)
 
 
-@pytest.mark.parametrize('step', [SECOND // 1000, SECOND // 100, SECOND // 10, SECOND])
+@pytest.mark.parametrize('step', [SECOND // 1000, SECOND // 10, SECOND])
 def test_the_singular_trajectory_is_rejected(step: int) -> None:
     times, rows = sampled('singular', step)
     data = (times, rows)
-    fine, motions = between_points(times[::max(1, SECOND // 10 // step)],
-                                   rows[::max(1, SECOND // 10 // step)])
+    every = max(1, SECOND // 10 // step)
+    fine, motions = between_points(times[::every], rows[::every], 401 if step < SECOND else 4001)
     results = legs_of(FREE, motions)
     crossing = fine[np.argmax(results[:, DETERMINANT] * results[0, DETERMINANT] < 0.0)]
     forces = fine[np.argmax(np.abs(results[:, FORCES]).max(axis=1) > 6000.0)]
@@ -339,8 +338,8 @@ def test_a_double_crossing_between_two_points_is_found(
     """There and back: det(J) has the same sign, and the same value, at both points."""
     seconds = duration * 1e-9
 
-    def leap(top: float, ways: int = 1) -> tuple[Trajectory, Array, Array]:
-        times, rows = parabola(start, top, duration, ways)
+    def leap(top: float) -> tuple[Trajectory, Array, Array]:
+        times, rows = parabola(start, top, duration, 1)
         dense, motions = between_points(times, rows)
         return ((times, rows), dense,
                 legs_of(UNBOUND, motions)[:, DETERMINANT])
@@ -360,7 +359,7 @@ def test_a_double_crossing_between_two_points_is_found(
     assert np.all(det * det[0] > 0.0)
     assert 'det(J) crosses zero' not in check(data, UNBOUND).message
     # With points so near to each other the legs lead the platform where it is meant to be.
-    assert check(leap(short_of, 200)[0], UNBOUND).accepted
+    assert check(parabola(start, short_of, duration, 200), UNBOUND).accepted
 
 
 def test_a_singularity_of_the_legs_on_a_wide_way_is_found() -> None:

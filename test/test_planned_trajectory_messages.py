@@ -21,7 +21,7 @@ from functools import partial
 import math
 from typing import Any
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 import messages
 import numpy as np
 import pytest
@@ -63,9 +63,9 @@ def decoded(outcome: PlannedOutcome) -> Any:
 
 # Accepted
 
-@pytest.mark.parametrize('points', [1, 2, PIECE, PIECE + 1, 1000])
-@pytest.mark.parametrize(('frame', 'names'), [
-    ('', ()), ('base', ('platform',)), ('', ('p',)), ('base', ('moving',)), ('', ('',))])
+@pytest.mark.parametrize(('points', 'frame', 'names'), [
+    (1, '', ()), (2, 'base', ('platform',)), (PIECE, '', ('p',)), (PIECE + 1, 'base', ('moving',)),
+    (1000, '', ('',))])
 def test_points_are_answered_with_the_bits_of_the_library(
         points: int, frame: str, names: tuple[str, ...]) -> None:
     times, rows = some(points)
@@ -128,9 +128,8 @@ def on_base(many: int) -> tuple[list[list[float]], BaseMotion]:
         PARAMETERS['gravity'])
 
 
-@pytest.mark.parametrize('points', [1, 2, PIECE + 1])
-@pytest.mark.parametrize('names', [('platform', 'base'), ('p', 'base'), ('', 'base')])
-@pytest.mark.parametrize('little_endian', [True, False])
+@pytest.mark.parametrize('points, names, little_endian', [
+    (1, ('platform', 'base'), False), (2, ('p', 'base'), True), (PIECE + 1, ('', 'base'), False)])
 def test_the_second_joint_is_the_base(
         points: int, names: tuple[str, str], little_endian: bool) -> None:
     times, rows = some(points)
@@ -252,7 +251,7 @@ def test_no_piece_is_larger_than_its_bound(monkeypatch: pytest.MonkeyPatch) -> N
         return solve(constants, rows, *loads)
 
     monkeypatch.setattr(batch, 'solve', counted)
-    for step in (SECOND, SECOND // 1000):
+    for step in (SECOND, SECOND // 100):
         times, rows = sampled('clear', step)
         total = 0
         for _ in planned.answer(PARAMETERS, NO_WRENCH, messages.trajectory(STAMP, times, rows)):
@@ -263,9 +262,9 @@ def test_no_piece_is_larger_than_its_bound(monkeypatch: pytest.MonkeyPatch) -> N
         assert total > len(times)
 
 
-@pytest.mark.parametrize('piece', [1, 2, 7, 100, 10**6])
-@pytest.mark.parametrize(('name', 'step'), [
-    ('clear', SECOND), ('clear', SECOND // 10), ('singular', SECOND // 2)])
+@pytest.mark.parametrize(('piece', 'name', 'step'), [
+    (1, 'clear', SECOND), (1, 'singular', SECOND // 2), (7, 'clear', SECOND // 10),
+    (100, 'singular', SECOND // 2), (10**6, 'clear', SECOND // 10)])
 def test_the_outcome_does_not_depend_on_the_pieces(
         monkeypatch: pytest.MonkeyPatch, piece: int, name: str, step: int) -> None:
     times, rows = sampled(name, step)
@@ -347,8 +346,7 @@ BAD: dict[str, tuple[bytes, str, str]] = {
 
 
 @pytest.mark.parametrize('case', BAD)
-@pytest.mark.parametrize('names', [('platform',), ('p',)])
-def test_bad_input_is_rejected_with_its_reason(case: str, names: tuple[str, ...]) -> None:
+def test_bad_input_is_rejected_with_its_reason(case: str) -> None:
     data, reason, words = BAD[case]
     outcome = outcome_of(data)
     assert outcome.reason.startswith(reason)
@@ -374,7 +372,6 @@ def test_more_samples_than_allowed_are_not_taken(monkeypatch: pytest.MonkeyPatch
     assert 'more than 100 samples' in outcome.message
 
 
-@settings(max_examples=300)
 @given(st.data())
 def test_any_trajectory_is_accepted_or_rejected(data: st.DataObject) -> None:
     times, rows = some(data.draw(st.integers(1, 6)))
@@ -392,13 +389,11 @@ def test_any_trajectory_is_accepted_or_rejected(data: st.DataObject) -> None:
             assert np.isfinite([*point.positions, *point.velocities, *point.effort]).all()
 
 
-@settings(max_examples=200)
 @given(st.binary(max_size=600))
 def test_any_bytes_are_rejected(data: bytes) -> None:
     assert outcome_of(data).reason
 
 
-@settings(max_examples=100)
 @given(st.lists(st.tuples(st.integers(1, 10**12), st.lists(st.floats(
     allow_nan=False, allow_infinity=False), min_size=15, max_size=15)), min_size=1, max_size=5))
 def test_any_numbers_are_accepted_or_rejected(points: list[tuple[int, list[float]]]) -> None:

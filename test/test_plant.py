@@ -200,7 +200,7 @@ def test_end_stops_hold_a_hexapod_that_falls_on_them() -> None:
     assert deepest < 0.02
 
 
-@pytest.mark.parametrize('ratio', [0.0, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize('ratio', [0.0, 0.3, 3.0])
 def test_end_stops_only_push_back_and_add_no_energy(ratio: float) -> None:
     """Their force is what the balance of forces leaves: outward where short, never inward."""
     parameters = simulated(end_stops__damping_ratio=ratio, rate=1000.0, **FRICTIONLESS)
@@ -243,7 +243,7 @@ def test_brakes_stop_it_where_it_is() -> None:
 
 # Stiff hexapods
 
-@pytest.mark.parametrize('seed', range(12))
+@pytest.mark.parametrize('seed', range(6))
 def test_the_energy_of_a_released_stiff_hexapod_never_increases(seed: int) -> None:
     """Friction from zero to far too much, stops from soft to hard, with reflected mass or none."""
     random = rng(seed)
@@ -271,7 +271,7 @@ def test_the_energy_of_a_released_stiff_hexapod_never_increases(seed: int) -> No
         return energy_of(plant) + 0.5 * float(stiffness @ deep ** 2)
 
     kinetic, last = float(energies(plant.parameters, motion_of(plant.state))[0]), energy()
-    for _ in range(min(1000, 20_000 // plant.substeps)):
+    for _ in range(min(400, 20_000 // plant.substeps)):
         plant.advance(ZERO, ZERO)
         now = energy()
         assert now < last + 1e-12 * (kinetic + abs(last))
@@ -368,13 +368,19 @@ plant = Plant(simulated(initial_pose=[0.0, 0.0, 0.79, 0.0, 0.0, 0.0]))
 for n in range(60):
     state = plant.advance((-100.0, 0.0, 0.0, 0.0, 0.0, 9.0), ZERO)
 print([number.hex() for part in state for number in part])
+plant = Plant(simulated(rate=200.0))
+base = base_motion(plant.parameters, 9)
+for n in range(30):
+    state = plant.advance((900.0, 800.0, 700.0, 600.0, 500.0, 9e3), ZERO,
+                          rows_at(base, n * 5e-3, 5e-3))
+print([number.hex() for part in state for number in part])
 """
 
 
 def test_compiled_and_not_gives_the_same_bits() -> None:
     printed = printed_compiled_and_not(CODE)
     assert len(printed) == 1
-    assert len(printed.pop()) > 1000
+    assert len(printed.pop()) > 1500
 
 
 # Parameters
@@ -423,7 +429,7 @@ def test_the_files_of_the_package_fit_together() -> None:
 
 # How short steps must be: a bound that holds in every pose, and rejections
 
-@pytest.mark.parametrize('seed', range(20))
+@pytest.mark.parametrize('seed', range(8))
 def test_the_bound_of_stiffness_holds_in_every_pose(seed: int) -> None:
     random = rng(seed)
     reflected = random.uniform(0.0, 30.0, 6) * (seed % 2)
@@ -586,20 +592,3 @@ def test_the_accelerations_on_a_base_require_the_forces_that_acted(seed: int) ->
     result = StewartPlatform(plant.parameters).inverse_dynamics(
         motion_of(state), wrench, base=base[2])
     assert relative(result.forces, commands) < 1e-9
-
-
-CODE_ON_BASE = """
-from test_plant import *
-plant = Plant(simulated(rate=200.0))
-base = base_motion(plant.parameters, 9)
-for n in range(30):
-    state = plant.advance((900.0, 800.0, 700.0, 600.0, 500.0, 9e3), ZERO,
-                          rows_at(base, n * 5e-3, 5e-3))
-print([number.hex() for part in state for number in part])
-"""
-
-
-def test_compiled_and_not_gives_the_same_bits_on_a_base() -> None:
-    printed = printed_compiled_and_not(CODE_ON_BASE)
-    assert len(printed) == 1
-    assert len(printed.pop()) > 500

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,6 @@ def same(a: Array, b: Array) -> bool:
     return np.array_equal(a, b, equal_nan=True)
 
 
-@settings(max_examples=150)
 @given(samples(), st.sampled_from([2, 4, 8, 64]))
 @pytest.mark.slow
 def test_every_extreme_of_every_bucket_is_drawn_at_its_time(
@@ -84,7 +83,6 @@ def test_every_extreme_of_every_bucket_is_drawn_at_its_time(
                 assert (times[best], truth[best]) in points
 
 
-@settings(max_examples=100)
 @given(samples(), st.sampled_from([2, 8]))
 def test_blocks_change_nothing(
         given_samples: tuple[Array, Array, list[int]], buckets: int) -> None:
@@ -95,7 +93,6 @@ def test_blocks_change_nothing(
             assert same(a, b)
 
 
-@settings(max_examples=100)
 @given(samples(), st.sampled_from([2, 8, 64]))
 def test_no_line_is_drawn_across_what_is_missing(
         given_samples: tuple[Array, Array, list[int]], buckets: int) -> None:
@@ -152,7 +149,6 @@ def test_without_samples_nothing_is_drawn() -> None:
     assert not len(Frames(3).chosen()[0])
 
 
-@settings(max_examples=150)
 @given(samples(), st.integers(2, 40))
 def test_frames_are_true_samples_and_do_not_depend_on_blocks(
         given_samples: tuple[Array, Array, list[int]], most: int) -> None:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,6 @@ def body_of_points(seed: int) -> Array:
     return ten
 
 
-@settings(max_examples=50)
 @given(st.integers(0, 10 ** 6))
 def test_points_of_mass_are_a_body(seed: int) -> None:
     ten = body_of_points(seed)
@@ -54,7 +53,6 @@ def test_points_of_mass_are_a_body(seed: int) -> None:
     np.testing.assert_allclose(from_log_cholesky(eta), ten, rtol=1e-9, atol=1e-9)
 
 
-@settings(max_examples=50)
 @given(st.lists(st.floats(-1.5, 1.5), min_size=10, max_size=10))
 def test_any_log_cholesky_parameters_are_a_body(eta: list[float]) -> None:
     ten = from_log_cholesky(np.array(eta))

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from messages import STORE
 import numpy as np
@@ -57,7 +57,6 @@ def joined(messages: Sequence[bytes]) -> tuple[bytes, list[int], list[int]]:
     return data, starts, [len(message) for message in messages]
 
 
-@settings(max_examples=60)
 @given(st.data())
 def test_efforts_are_what_rosbags_wrote(data: st.DataObject) -> None:
     text = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=12)

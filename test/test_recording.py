@@ -30,7 +30,7 @@ import tracemalloc
 from typing import Any, NamedTuple
 import zlib
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import lz4.frame
 from mcap.data_stream import RecordBuilder
@@ -227,15 +227,15 @@ def test_a_damaged_bag_gives_no_wrong_messages_and_reports_missing_ones(
     file.write_bytes(content)
     assert read(file) == (given_, [], [])
     chance = random.Random(f'{spoil.__name__} {kind}')
-    for _ in range(200):
+    for _ in range(60):
         file.write_bytes(spoil(content, chance))
         check(file, given_)
 
 
 @pytest.mark.parametrize('kind', ['plain', 'without a summary'])
 def test_a_flipped_bit_in_the_records_gives_no_wrong_messages(kind: str, tmp_path: Path) -> None:
-    given_ = motion(16)
-    content = mcap(given_, chunk_size=1000, **KINDS[kind])
+    given_ = motion(6)
+    content = mcap(given_, chunk_size=700, **KINDS[kind])
     file = tmp_path / 'bag.mcap'
     whole = 0
     for at, _ in records_of(content):
@@ -245,7 +245,7 @@ def test_a_flipped_bit_in_the_records_gives_no_wrong_messages(kind: str, tmp_pat
             file.write_bytes(spoiled)
             whole += check(file, given_)
     # without an index the chain is read up to where it breaks
-    assert whole > (300 if kind == 'plain' else 150)
+    assert whole > (300 if kind == 'plain' else 100)
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -429,7 +429,6 @@ def test_empty_bags(tmp_path: Path) -> None:
 
 @given(st.lists(st.tuples(st.sampled_from('abc'), st.integers(0, 12), st.integers(1, 300)),
                 min_size=1, max_size=60))
-@settings(max_examples=100)
 def test_messages_come_in_the_order_in_which_rosbags_has_them(
         tmp_path_factory: pytest.TempPathFactory, of: list[tuple[str, int, int]]) -> None:
     # chunks overlap in any way, and are not in order, nor are the messages in them
@@ -485,11 +484,11 @@ def test_large_messages_of_other_topics_are_not_kept_in_memory(tmp_path: Path) -
 def test_long_bags_are_not_kept_in_memory(tmp_path: Path) -> None:
     file = tmp_path / 'bag.mcap'
     peaks = []
-    for number in (40_000, 160_000):
+    for number in (20_000, 80_000):
         of = [(topic, n, bytes(92)) for topic in ('/a', '/b') for n in range(number)]
-        file.write_bytes(mcap(of, chunk_size=100_000, index_types=IndexType.CHUNK))
+        file.write_bytes(mcap(of, chunk_size=50_000, index_types=IndexType.CHUNK))
         peaks.append(peak_of(file))
-    assert file.stat().st_size > 30_000_000
+    assert file.stat().st_size > 15_000_000
     assert peaks[1] < 1.2 * peaks[0] < 8_000_000
 
 
@@ -630,7 +629,6 @@ def test_a_compressed_file_is_unpacked_up_to_a_limit(
 
 @given(st.binary(max_size=300), st.sampled_from([MAGIC, b'SQLite format 3\0', b'']),
        st.sampled_from(['.mcap', '.db3', '.mcap.zstd']))
-@settings(max_examples=300)
 def test_random_bytes_never_raise(
         tmp_path_factory: pytest.TempPathFactory, content: bytes, begin: bytes, suffix: str,
         ) -> None:
@@ -658,7 +656,6 @@ RECORDS = st.one_of(
 @given(st.lists(st.one_of(RECORDS, st.builds(
     lambda of, start, name: chunk(b''.join(of), start, compression=name),
     st.lists(RECORDS, max_size=6), st.integers(0, 9), st.sampled_from(['', '', '', 'lz4'])))))
-@settings(max_examples=300)
 def test_random_records_never_raise(
         tmp_path_factory: pytest.TempPathFactory, of: list[bytes]) -> None:
     file = tmp_path_factory.mktemp('records') / 'bag.mcap'

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,6 @@ Array = NDArray[np.float64]
 MANY = 20
 
 
-@settings(max_examples=60)
 @given(st.integers(0, 10 ** 6), st.booleans(), st.booleans())
 def test_times_the_parameters_it_is_the_inverse_dynamics(
         seed: int, moving: bool, actuators: bool) -> None:

@@ -90,9 +90,10 @@ class Outputs(NamedTuple):
     folder: Path
 
 
-def run(bag: Path, folder: Path, *options: str) -> int:
+def run(bag: Path, folder: Path, *options: str, report: bool = False) -> int:
     """Run the program in this process."""
-    return main([str(bag), '--params', str(PARAMS), '--output', str(folder), *options])
+    return main([str(bag), '--params', str(PARAMS), '--output', str(folder),
+                 *([] if report else ['--no-report']), *options])
 
 
 def run_apart(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
@@ -497,7 +498,7 @@ def test_control_characters_in_names_are_escaped(
     hostile = '/a\x1b[2J\rb'
     bag = write_bag(tmp_path / 'bag', [*motion(3), (hostile, RECORDED, messages.wrench(0))],
                     **{hostile[1:]: INPUT_TYPES[WRENCH]})
-    assert run(bag, tmp_path / 'out', '--no-report') == DONE
+    assert run(bag, tmp_path / 'out') == DONE
     text = capsys.readouterr().out
     assert '/a\\x1b[2J\\rb' in text
     assert not set(text) & {'\x1b', '\r'}
@@ -605,7 +606,7 @@ def test_a_bag_without_answers_is_reported(
 
 
 @pytest.mark.parametrize(('name', 'options', 'code'), [
-    ('clear', (), DONE), ('clear', ('--strict',), DONE), ('singular', (), DONE),
+    ('clear', ('--strict',), DONE), ('singular', (), DONE),
     ('singular', ('--strict',), LIMIT_MET)])
 def test_strict_exits_with_1_at_limits_and_warnings(
         name: str, options: tuple[str, ...], code: int, tmp_path: Path,
@@ -853,20 +854,15 @@ def test_a_damaged_bag_never_crashes_the_replay(
 @pytest.mark.slow
 def test_it_runs_as_a_program(tmp_path: Path, replayed: dict[str, Outputs]) -> None:
     done = run_apart(*(ROOT / 'bags' / name for name in BAGS), '--params', PARAMS, '--output',
-                     tmp_path / 'out', '--strict')
+                     tmp_path / 'out', '--strict', '--no-report')
     assert (done.returncode, done.stderr) == (LIMIT_MET, '')
     assert done.stdout.count('setpoints in') == 3
     for name in BAGS:
-        again = outputs_of(tmp_path / 'out' / name)
-        assert again.rows == replayed[name].rows
-        assert (again.folder / 'legs.csv').read_bytes() == (
+        assert (tmp_path / 'out' / name / 'legs.csv').read_bytes() == (
             replayed[name].folder / 'legs.csv').read_bytes()
     rejection = run_apart(tmp_path / 'none', '--params', PARAMS)
     assert (rejection.returncode, rejection.stdout) == (BAD_INPUT, '')
     assert rejection.stderr.count('\n') == 1
-    partly = run_apart(damaged_bag(tmp_path / 'damaged.mcap'), '--params', PARAMS, '--output',
-                       tmp_path / 'out')
-    assert partly.returncode == PARTLY_READ
 
 
 def test_the_results_are_readable_by_all(tmp_path: Path) -> None:
@@ -920,12 +916,11 @@ def test_a_killed_replay_leaves_nothing_under_the_final_name(
     assert not list((tmp_path / 'out').glob('.*'))
 
 
-@pytest.mark.parametrize('sent', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.slow
-def test_an_interrupted_replay_leaves_nothing(
-        sent: signal.Signals, long_bag: Path, tmp_path: Path) -> None:
+def test_an_interrupted_replay_leaves_nothing(long_bag: Path, tmp_path: Path) -> None:
+    """By SIGTERM; by SIGINT in test_fleet.py."""
     with begun(long_bag, tmp_path / 'out') as process:
-        process.send_signal(sent)
+        process.send_signal(signal.SIGTERM)
         _, text = process.communicate(timeout=30)
         # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
         assert process.returncode in (130, -signal.SIGINT)
@@ -935,11 +930,11 @@ def test_an_interrupted_replay_leaves_nothing(
     assert not list((tmp_path / 'out').iterdir())
 
 
-@pytest.mark.parametrize('size', [0, 100, 20_000, 100_000])
+@pytest.mark.parametrize('size', [0, 100_000])
 def test_a_full_disk_leaves_nothing(size: int, tmp_path: Path) -> None:
     # writing a file beyond this size fails, as on a disk without room
     done = run_apart(
-        ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path / 'out',
+        ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path / 'out', '--no-report',
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
     assert done.returncode == BAD_INPUT
     assert 'Traceback' not in done.stderr
@@ -995,7 +990,7 @@ def test_exceeded_limits_are_named(
     for params, text in ((PARAMS, 'all limits held'),
                          (file, 'limits.force_max, 500 N, exceeded by leg_4')):
         assert main([str(ROOT / 'bags' / 'clear'), '--params', str(params),
-                     '--output', str(tmp_path / params.stem)]) == 0
+                     '--output', str(tmp_path / params.stem), '--no-report']) == 0
         assert text in capsys.readouterr().out
 
 
@@ -1066,7 +1061,7 @@ def rows_of(folder: Path) -> list[dict[str, str]]:
 def test_remapped_topics_are_found_by_their_type(tmp_path: Path) -> None:
     bag = write_named(tmp_path / 'bag', motion(20), pose='/cmd/where', twist='/cmd/speed',
                       accel='/cmd/push')
-    assert run(bag, tmp_path / 'out', '--no-report') == DONE
+    assert run(bag, tmp_path / 'out') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
     inputs = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['inputs']
     assert inputs['topics'] == {POSE: '/cmd/where', TWIST: '/cmd/speed', ACCEL: '/cmd/push'}
@@ -1078,7 +1073,7 @@ def test_a_namespace_is_found_by_the_end_of_the_name(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', [*of, ('/elsewhere', RECORDED, messages.pose(0))],
                     elsewhere=INPUT_TYPES[POSE], pose=INPUT_TYPES[POSE],
                     twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
-    assert run(bag, tmp_path / 'out', '--no-report') == DONE
+    assert run(bag, tmp_path / 'out') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
 
 
@@ -1090,7 +1085,7 @@ def test_ambiguous_topics_are_listed_and_can_be_selected(
                     twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
     text = rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
     assert '/a/where, /b/where2: select one by --pose' in text
-    assert run(bag, tmp_path / 'out', '--pose', '/a/where', '--no-report') == DONE
+    assert run(bag, tmp_path / 'out', '--pose', '/a/where') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
     capsys.readouterr()
     for topic, words in (('/none', 'has no topic /none; it contains /a/where (geometry'),
@@ -1105,7 +1100,7 @@ def test_a_wrench_is_never_found_by_its_type(tmp_path: Path) -> None:
     of.insert(0, ('/cell/load', RECORDED, messages.wrench(0, (0.0, 0.0, -1000.0, 0, 0, 0))))
     bag = write_bag(tmp_path / 'bag', of, load=INPUT_TYPES[WRENCH], pose=INPUT_TYPES[POSE],
                     twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
-    assert run(bag, tmp_path / 'free', '--no-report') == DONE
+    assert run(bag, tmp_path / 'free') == DONE
     assert run(bag, tmp_path / 'loaded', '--no-report', '--wrench', '/cell/load') == DONE
     free, loaded = (rows_of(tmp_path / name / 'bag')[0]['leg_1_force_n'] for name in (
         'free', 'loaded'))
@@ -1118,14 +1113,14 @@ def test_combined_by_its_option(tmp_path: Path, capsys: pytest.CaptureFixture[st
         all=INPUT_TYPES[COMBINED])
     assert '--combined reads' in rejected(
         capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
-    assert run(bag, tmp_path / 'out', '--combined', '/cmd/all', '--no-report') == DONE
+    assert run(bag, tmp_path / 'out', '--combined', '/cmd/all') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 8
 
 
 # Other files
 
 def test_summary_and_report_are_written(tmp_path: Path) -> None:
-    assert run(ROOT / 'bags' / 'flawed', tmp_path) == DONE
+    assert run(ROOT / 'bags' / 'flawed', tmp_path, report=True) == DONE
     folder = tmp_path / 'flawed'
     assert sorted(path.name for path in folder.iterdir()) == [
         'bag', 'legs.csv', 'report.html', 'summary.json']
@@ -1155,14 +1150,14 @@ def keys_of(value: Any, prefix: str = '') -> set[str]:
 
 
 def test_without_a_report(tmp_path: Path) -> None:
-    assert run(ROOT / 'bags' / 'clear', tmp_path, '--no-report') == DONE
+    assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
     assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
         'bag', 'legs.csv', 'summary.json']
     assert json.loads((tmp_path / 'clear' / 'summary.json').read_text())['force_breakdown'] is None
 
 
 def test_parquet_has_the_columns_and_numbers_of_csv(tmp_path: Path) -> None:
-    assert run(ROOT / 'bags' / 'singular', tmp_path, '--no-report') == DONE
+    assert run(ROOT / 'bags' / 'singular', tmp_path) == DONE
     assert run(ROOT / 'bags' / 'singular', tmp_path / 'p', '--no-report', '--parquet') == DONE
     folder = tmp_path / 'p' / 'singular'
     assert not (folder / 'legs.csv').exists()
@@ -1177,12 +1172,12 @@ def test_parquet_has_the_columns_and_numbers_of_csv(tmp_path: Path) -> None:
 
 def test_force_replaces_results_and_nothing_else(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
+    assert run(ROOT / 'bags' / 'clear', tmp_path, report=True) == DONE
     capsys.readouterr()
     assert '--force replaces results' in rejected(
         capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path)
     (tmp_path / 'clear' / 'of before').touch()
-    assert run(ROOT / 'bags' / 'clear', tmp_path, '--force', '--no-report') == DONE
+    assert run(ROOT / 'bags' / 'clear', tmp_path, '--force') == DONE
     assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
         'bag', 'legs.csv', 'summary.json']
     assert [path.name for path in tmp_path.iterdir()] == ['clear']
@@ -1213,19 +1208,18 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
         of += [(topic, RECORDED + n, write(stamp)) for topic, write in (
             (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))]
     bag = write_bag(tmp_path / 'bag', of)
-    assert run(bag, tmp_path / 'out', '--no-report') == DONE
+    assert run(bag, tmp_path / 'out') == DONE
     found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['setpoints']
     assert found['answered'] == 20
     assert found['duration_s'] == pytest.approx(9 * 1_700_000_000.0, rel=1e-6)
 
 
 # A signal when the module that reads the arguments is looked for, and when the process ends.
-@pytest.mark.parametrize('when, code, text', [
-    ("sys.meta_path.insert(0, type('Finder', (), {'find_spec': staticmethod(lambda name, *_: "
-     "end() if name.endswith('replay_command_line') else None)}))", 130, 'interrupted'),
-    ('atexit.register(end)', BAD_INPUT,
+@pytest.mark.parametrize('sent, when, code, text', [
+    ('SIGTERM', "sys.meta_path.insert(0, type('Finder', (), {'find_spec': staticmethod(lambda "
+     "name, *_: end() if name.endswith('replay_command_line') else None)}))", 130, 'interrupted'),
+    ('SIGINT', 'atexit.register(end)', BAD_INPUT,
      'nowhere: not a bag that can be read: no such file or folder')])
-@pytest.mark.parametrize('sent', ['SIGINT', 'SIGTERM'])
 def test_a_signal_at_the_start_or_end_is_no_traceback(
         sent: str, when: str, code: int, text: str) -> None:
     done = subprocess.run(
@@ -1280,10 +1274,10 @@ def test_poses_are_differentiated(tmp_path: Path, capsys: pytest.CaptureFixture[
     bag = write_bag(tmp_path / 'bag', of[::3])
     assert '--differentiate computes' in rejected(
         capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
-    assert run(bag, tmp_path / 'out', '--differentiate', '--cutoff', '5', '--no-report') == DONE
+    assert run(bag, tmp_path / 'out', '--differentiate', '--cutoff', '5') == DONE
     printed = capsys.readouterr().out
     assert 'smoothing splines through the poses, cut-off frequency 5 Hz' in printed
-    assert run(write_bag(tmp_path / 'whole', of), tmp_path / 'out', '--no-report') == DONE
+    assert run(write_bag(tmp_path / 'whole', of), tmp_path / 'out') == DONE
     made, whole = (rows_of(tmp_path / 'out' / name) for name in ('bag', 'whole'))
     assert [row['stamp_ns'] for row in made] == [row['stamp_ns'] for row in whole]
     # away from the ends as the twist and acceleration that were recorded

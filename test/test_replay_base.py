@@ -129,8 +129,8 @@ TYPES = {'deck_pose': INPUT_TYPES[BASE_POSE], 'deck_twist': INPUT_TYPES[BASE_TWI
 # The numbers
 
 @pytest.mark.parametrize('source', MOVING)
-def test_a_replay_gives_the_bits_of_the_step_message_by_message(
-        source: str, tmp_path: Path) -> None:
+def test_a_replay_gives_the_bits_of_the_step_and_states_where_the_base_is_not_known(
+        source: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     parameters, of = parameters_of(source), at_sea(source)
     outputs = replayed(of, parameters, tmp_path)
     expected = answers(parameters, of)
@@ -175,13 +175,6 @@ def test_a_replay_gives_the_bits_of_the_step_message_by_message(
         assert base_wrench is not None
         assert written.of_wrench(setpoint.stamp, base_wrench) in content
 
-
-@pytest.mark.parametrize('source', MOVING)
-def test_the_summary_states_where_the_base_is_not_known(
-        source: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    parameters = parameters_of(source)
-    of = at_sea(source)
-    outputs = replayed(of, parameters, tmp_path)
     found, text = summary_of(tmp_path), ' '.join(capsys.readouterr().out.split())
     lacking = [row['time_s'] for row in outputs.rows if not row['base_force_z_n']]
     assert found['setpoints']['base_unknown'] == len(lacking)
@@ -191,9 +184,8 @@ def test_the_summary_states_where_the_base_is_not_known(
     assert (f"the base's motion is not known in {len(lacking)} setpoints, first at t = 0.00 s: "
             'they have no forces') in text
     assert set(found['inputs']['topics']) == {POSE, TWIST, ACCEL, *BASE_SOURCES[source]}
-    forces = np.array([[float(row[f'base_force_{axis}_n'] or 'nan') for axis in 'xyz']
-                       for row in outputs.rows])
-    sizes = np.linalg.norm(forces, axis=1)
+    sizes = np.linalg.norm([[float(row[f'base_force_{axis}_n'] or 'nan') for axis in 'xyz']
+                            for row in outputs.rows], axis=1)
     assert found['base_wrench']['force']['peak_n'] == pytest.approx(np.nanmax(sizes))
     assert found['base_wrench']['force']['peak_at_s'] == float(
         outputs.rows[int(np.nanargmax(sizes))]['time_s'])
@@ -274,22 +266,21 @@ def renamed(of: list[Recorded], **names: str) -> list[Recorded]:
 
 
 @pytest.mark.parametrize('source', MOVING)
-@pytest.mark.parametrize('way', ['ending', 'option'])
 def test_topics_of_other_names_are_found_by_their_end_or_option(
-        source: str, way: str, tmp_path: Path) -> None:
+        source: str, tmp_path: Path) -> None:
     of, parameters = at_sea(source, 50), parameters_of(source)
     expected = replayed(of, parameters, tmp_path / 'usual', '--no-report').rows
-    options, names = [], {}
-    for key in BASE_SOURCES[source]:
-        name = key.replace('/', '_')
-        names[name] = f'/ship/{key}' if way == 'ending' else f'/deck_{key.rpartition("/")[2]}'
-        if way == 'option':
-            options += [f'--{name.replace("_", "-")}', names[name]]
-    outputs = replayed(renamed(of, **names), parameters, tmp_path / 'other', '--no-report',
-                       *options)
-    assert outputs.rows == expected
-    topics = summary_of(tmp_path / 'other')['inputs']['topics']
-    assert [topics[key] for key in BASE_SOURCES[source]] == list(names.values())
+    keys = BASE_SOURCES[source]
+    for way, names in (('ending', [f'/ship/{key}' for key in keys]),
+                       ('option', [f'/deck_{key.rpartition("/")[2]}' for key in keys])):
+        options = [part for key, name in zip(keys, names, strict=True) for part in (
+            f'--{key.replace("/", "-")}', name)] if way == 'option' else []
+        others = renamed(of, **{key.replace('/', '_'): name
+                                for key, name in zip(keys, names, strict=True)})
+        outputs = replayed(others, parameters, tmp_path / way, '--no-report', *options)
+        assert outputs.rows == expected
+        topics = summary_of(tmp_path / way)['inputs']['topics']
+        assert [topics[key] for key in keys] == names
 
 
 def test_a_setpoint_is_not_taken_from_what_is_named_as_the_base(tmp_path: Path) -> None:

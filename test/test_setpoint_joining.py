@@ -23,7 +23,7 @@ import math
 import re
 from typing import Any
 
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 import messages
 from messages import HOME, REST, UPRIGHT
@@ -207,9 +207,9 @@ def _spoilt() -> list[tuple[str, bytes, str, str]]:
                 at_byte = first - 16 + 8 * at + (0 if at < 7 else 8 if at < 13 else 16)
             else:
                 at_byte = first + 8 * at
-            for value in (NAN, INF, -INF):
-                bad = good[:at_byte] + np.float64(value).tobytes() + good[at_byte + 8:]
-                found.append((topic, bad, NOT_FINITE, 'nan|inf'))
+            value = np.float64((NAN, INF, -INF)[at % 3])
+            bad = good[:at_byte] + value.tobytes() + good[at_byte + 8:]
+            found.append((topic, bad, NOT_FINITE, 'nan|inf'))
         for length in (1 - 1.1e-3, 1 + 1.1e-3, 0.0, 2.0, 1e150):
             if topic in (POSE, COMBINED):
                 quaternion = (0.0, 0.0, 0.6 * length, 0.8 * length)
@@ -242,8 +242,8 @@ def test_a_bad_message_is_rejected_and_the_good_one_used(
     assert topic == WRENCH or feed.sample(topic, SECOND)
 
 
-@pytest.mark.parametrize('topic', [*TOPICS, COMBINED, WRENCH])
 @pytest.mark.parametrize('frame', ['', 'base'])
+@pytest.mark.parametrize('topic', [*TOPICS, COMBINED, WRENCH])
 def test_the_base_frame_and_an_empty_one_are_accepted(topic: str, frame: str) -> None:
     feed = Feed(source='combined' if topic == COMBINED else 'separate')
     data = WRITERS[topic](SECOND, frame=frame)
@@ -508,7 +508,6 @@ def test_the_number_of_waiting_samples_is_bounded(silent: str) -> None:
 
 # Quaternions
 
-@settings(max_examples=200)
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 1e-3),
        st.floats(1 - 0.999e-3, 1 + 0.999e-3))
 @example((1.0, 0.0, 0.0, 0.0), 1.0)
@@ -573,7 +572,6 @@ def _drained(feed: Feed, answers: list[Setpoint]) -> None:
     answers += final
 
 
-@settings(max_examples=250)
 @given(samples, st.sampled_from([0.0, 0.005, 0.02]))
 def test_every_message_is_answered_or_counted(
         sequence: list[tuple[str, int, str]], tolerance: float) -> None:
@@ -599,7 +597,6 @@ def test_every_message_is_answered_or_counted(
         assert feed.given[topic] == len(answers) + rejected
 
 
-@settings(max_examples=150)
 @given(samples, st.sampled_from([0, 5, 20]))
 def test_only_stamps_within_the_tolerance_are_joined(
         sequence: list[tuple[str, int, str]], tolerance: int) -> None:
@@ -613,7 +610,6 @@ def test_only_stamps_within_the_tolerance_are_joined(
             assert answer.stamp != NOW or marks == [0.0, 0.0, 0.0]
 
 
-@settings(max_examples=200)
 @given(st.lists(st.tuples(st.sampled_from([POSE, COMBINED]), st.binary(max_size=240)),
                 max_size=20))
 def test_random_bytes_are_rejected_without_an_exception(sequence: list[tuple[str, bytes]]) -> None:
@@ -737,7 +733,6 @@ FATES = ['as it is'] * 12 + [
     'lost', 'twice', 'late', 'nan', 'cut', 'zero', 'frame', 'back', 'big-endian', 'quaternion']
 
 
-@settings(max_examples=150)
 @given(st.lists(st.sampled_from(FATES), max_size=90), st.lists(st.integers(0, 90), max_size=6),
        st.randoms(use_true_random=False), st.booleans())
 def test_many_of_any_kind_are_what_they_are_one_by_one(

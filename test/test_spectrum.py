@@ -19,7 +19,7 @@ from __future__ import annotations
 import tracemalloc
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -83,7 +83,6 @@ def test_the_power_of_a_sine_is_under_its_peak() -> None:
     assert found.amplitudes[0, far].max() < 1e-3 * found.amplitudes.max()
 
 
-@settings(max_examples=30)
 @given(st.data(), st.integers(1, 3000), st.booleans(), st.booleans())
 def test_blocks_change_nothing(data: st.DataObject, many: int, uneven: bool, spoiled: bool,
                                ) -> None:

@@ -21,7 +21,7 @@ import inspect
 import sys
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
@@ -311,7 +311,6 @@ def base_motions() -> st.SearchStrategy[Any]:
 
 
 @pytest.mark.parametrize('name', CALLS)
-@settings(max_examples=60)
 @given(st.data())
 def test_any_arguments_give_finite_numbers_or_one_line(name: str, data: st.DataObject) -> None:
     platform = StewartPlatform(symmetric_parameters().replaced(DRIVES))

@@ -25,7 +25,7 @@ import statistics
 import tracemalloc
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
@@ -371,7 +371,6 @@ def assert_same(found: Any, truth: Any, at: str = '') -> None:
         assert found == truth, at
 
 
-@settings(max_examples=150)
 @given(st.integers(0, 10 ** 6), st.integers(1, 50))
 def test_the_summary_agrees_with_its_definitions(seed: int, many: int) -> None:
     samples, parameters = random_samples(seed, many), hexapod(**LIMITS)
@@ -379,7 +378,6 @@ def test_the_summary_agrees_with_its_definitions(seed: int, many: int) -> None:
     assert_same(found, json.loads(json.dumps(plain(parameters, samples))))
 
 
-@settings(max_examples=150)
 @given(st.data(), st.integers(0, 10 ** 6), st.integers(1, 60))
 def test_any_split_gives_the_same(data: st.DataObject, seed: int, many: int) -> None:
     edges = sorted(data.draw(st.lists(st.integers(0, many), max_size=many)))
@@ -653,7 +651,6 @@ def test_a_small_example() -> None:
         'condition number of J_inv: 3 at most, at t = 2.00 s']
 
 
-@settings(max_examples=100)
 @given(st.integers(0, 10 ** 6), st.integers(0, 60), st.floats(1e-3, 1e9), st.booleans())
 def test_the_table_is_no_wider_than_100_columns(
         seed: int, many: int, scale: float, limited: bool) -> None:
