@@ -239,13 +239,13 @@ def test_a_flipped_bit_in_the_records_gives_no_wrong_messages(kind: str, tmp_pat
     file = tmp_path / 'bag.mcap'
     whole = 0
     for at, _ in records_of(content):
-        for bit in range(32):
+        for bit in (*range(8), *range(8, 32, 3)):  # of the kind, of the length
             spoiled = bytearray(content)
             spoiled[at + bit // 8] ^= 1 << bit % 8
             file.write_bytes(spoiled)
             whole += check(file, given_)
     # without an index the chain is read up to where it breaks
-    assert whole > (300 if kind == 'plain' else 100)
+    assert whole > (150 if kind == 'plain' else 50)
 
 
 @pytest.mark.parametrize('kind', KINDS)
