@@ -61,7 +61,7 @@ WARNINGS = ['-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wdouble-promotio
             '-Werror']
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason='needs a C compiler')
 
-SAMPLES = 30_000
+SAMPLES = 100_000
 HAS_WRENCH, HAS_BASE = 1, 2
 OK, OUT_OF_RANGE, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = 0, 5, 6, 7, 8, 9
 
