@@ -260,9 +260,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(len(
             os.sched_getaffinity(0))) as pool:
         suites = {compiled: Suite(Path(folder), compiled) for compiled in (False, True)}
-        list(pool.map(lambda compiled: suites[compiled].measure(sorted({
-            name for path, names in modules.items() for name in names
-            if is_compiled(path) == compiled})), suites))
+        named = {compiled: sorted({name for path, names in modules.items() for name in names
+                                   if is_compiled(path) == compiled}) for compiled in suites}
+        list(pool.map(lambda compiled: named[compiled] and suites[compiled].measure(
+            named[compiled]), suites))
         fates = pool.map(lambda mutant: fate(mutant, suites[is_compiled(
             mutant.path)], modules[mutant.path], given.seconds), sample)
         for mutant, end in zip(sample, fates, strict=True):

@@ -1337,7 +1337,7 @@ def test_measured_forces_give_the_external_load(
             stamp, ['other', *names], [0.0, *forces[n][::-1]])))
     of.sort(key=lambda each: each[1])
     bag = write_bag(tmp_path / 'bag', of, state='sensor_msgs/msg/JointState')
-    assert run(bag, tmp_path / 'out', '--measured', '/hexapod/state') == DONE
+    assert run(bag, tmp_path / 'out', '--measured', '/hexapod/state', report=True) == DONE
     found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['measured']
     assert found['setpoints_compared'] == 200
     without = PLATFORM.inverse_dynamics(heave).forces
