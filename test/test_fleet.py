@@ -44,7 +44,6 @@ import termios
 import time
 from typing import Any
 
-import dask
 from distributed import LocalCluster
 import messages
 import numpy as np
@@ -561,15 +560,14 @@ def test_every_bag_is_replayed_once_when_a_worker_is_killed(
 
 @pytest.mark.slow
 def test_a_bag_that_kills_its_workers_does_not_affect_others(
-        bags: Path, tmp_path: Path) -> None:
+        bags: Path, tmp_path: Path, cluster: LocalCluster,
+        monkeypatch: pytest.MonkeyPatch) -> None:
     output = tmp_path / 'out'
     pairs = folders_of_results([bags], output)
     # With one death Dask fails all bags that wait for the same worker.
-    with dask.config.set({'distributed.scheduler.allowed-failures': 0,
-                          'distributed.scheduler.worker-saturation': 3.0}), LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address='127.0.0.1:0',
-            silence_logs=logging.CRITICAL, local_directory=f'{tmp_path}') as cluster, \
-            ThreadPoolExecutor() as apart:
+    monkeypatch.setattr(cluster.scheduler, 'allowed_failures', 0)
+    monkeypatch.setattr(cluster.scheduler, 'WORKER_SATURATION', 3.0)
+    with ThreadPoolExecutor() as apart:
         running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN,
                                scheduler=cluster.scheduler_address)
         killed: set[int] = set()

@@ -69,8 +69,7 @@ def requests() -> Iterator[tuple[str, Any]]:
         for type_ in TYPES:
             message = Parameter(name=name, value=ParameterValue(type=type_, **VALUES))
             for service in ('set_parameters', 'set_parameters_atomically'):
-                for messages in ([message], [message, message]):
-                    yield service, SERVICES[service].Request(parameters=messages)
+                yield service, SERVICES[service].Request(parameters=[message] * (1 + type_ % 2))
     for count in (0, 3000):
         for service in ('set_parameters', 'set_parameters_atomically'):
             yield service, SERVICES[service].Request(parameters=[
