@@ -150,10 +150,17 @@ def node_name(text: str) -> str:
     return name
 
 
-def add_results(parser: argparse.ArgumentParser, folder: str, strict: str) -> None:
+def folder(text: str) -> Path:
+    """Return the folder that an option gives; an empty text would be the current folder."""
+    if not text:
+        raise argparse.ArgumentTypeError("'': must name a folder")
+    return Path(text)
+
+
+def add_results(parser: argparse.ArgumentParser, default: str, strict: str) -> None:
     """Add the options of the results: their folder, and when ``--strict`` gives exit code 1."""
-    parser.add_argument('--output', type=Path, default=Path(folder), metavar='DIR',
-                        help=f'folder of the results (default: {folder})')
+    parser.add_argument('--output', type=folder, default=Path(default), metavar='DIR',
+                        help=f'folder of the results (default: {default})')
     parser.add_argument('--force', action='store_true', help='replace results that exist')
     parser.add_argument('--strict', action='store_true', help=f'exit code 1 when {strict}')
 

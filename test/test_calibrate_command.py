@@ -103,6 +103,10 @@ def test_units_and_angles(table: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(found.poses.position, given.poses.position, atol=1e-15)
     np.testing.assert_allclose(found.poses.rotation, from_euler(angles), atol=1e-15)
     assert found.names[:2] == ('row 2', 'row 3')
+    # Lines can end in any way.
+    path.write_bytes(path.read_bytes().replace(b'\r\n', b'\r'))
+    np.testing.assert_array_equal(
+        read_poses(path, JOINTS, millimeters=True, degrees=True).lengths, found.lengths)
 
 
 def edited(change: Callable[[list[str]], list[str]], table: Path, tmp_path: Path) -> Path:
@@ -114,8 +118,15 @@ def edited(change: Callable[[list[str]], list[str]], table: Path, tmp_path: Path
 @pytest.mark.parametrize(('change', 'words'), [
     (lambda rows: [], 'is empty: row 1 must name the columns'),
     (lambda rows: rows[:1], '0 poses: at least 8 are needed'),
-    (lambda rows: [rows[0].replace('leg_2', 'leg2'), *rows[1:]], 'has no column leg_2; it has'),
-    (lambda rows: [rows[0].replace('qw', 'q4'), *rows[1:]], 'has no column qw'),
+    (lambda rows: [rows[0].replace('leg_2', 'leg2'), *rows[1:]],
+     'has no column leg_2; row 1 has leg_1, leg2, leg_3'),
+    (lambda rows: [rows[0].replace('qw', 'q4'), *rows[1:]], 'has no column qw; row 1'),
+    (lambda rows: [row.partition('q')[0] for row in rows],
+     'has no column qx, qy, qz, qw (or alpha, beta, gamma); row 1'),
+    (lambda rows: [','.join(f'column_{n}' for n in range(999)), *rows[1:]],
+     'column_6, column_...\n'),
+    (lambda rows: [*rows[:3], rows[3].replace(',', '\r', 1), *rows[4:]],
+     'row 4: has 1 cells, row 1 has 13'),
     (lambda rows: [rows[0].replace('leg_2', 'leg_1'), *rows[1:]], 'has no column leg_2'),
     (lambda rows: [f'{rows[0]},x', *(f'{row},1' for row in rows[1:])],
      'column x: is there 2 times'),
@@ -127,7 +138,7 @@ def edited(change: Callable[[list[str]], list[str]], table: Path, tmp_path: Path
      "row 4: leg_1: 'long': must be a number"),
     (lambda rows: [*rows[:3], rows[3].rpartition(',')[0] + ',3.0', *rows[4:]],
      'row 4: quaternion of length 3'),
-    (lambda rows: [rows[0], *[rows[1]] * 20], 'no number is identifiable by itself')])
+    (lambda rows: [rows[0], *[rows[1]] * 20], 'itself, with residuals of')])
 def test_bad_files_are_rejected_in_one_line(
         change: Callable[[list[str]], list[str]], words: str, table: Path, tmp_path: Path,
         capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,7 +26,7 @@ from stewart_dynamics.calibration.equations import (
     ALL, Equations, Frames, GEOMETRY, inverse, product, values_of, with_geometry)
 from stewart_dynamics.calibration.fit import fit, Unknowns
 from stewart_dynamics.calibration.frames import find_frames, target_in_platform
-from stewart_dynamics.calibration.noise import Noise
+from stewart_dynamics.calibration.noise import covariances, Noise
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 
 # M. J. Nategh, M. M. Agheli, "A total solution to kinematic calibration of hexapod machine tools
@@ -214,21 +214,51 @@ def test_the_kind_of_motion_gives_what_is_identifiable(
         1e-12 if not noise.position else 1.5e-3)
 
 
-def test_intervals_hold_the_truth() -> None:
-    """Seeds enough for 95 % +- 3 %; benchmarks/calibration.py has 500."""
-    noise, unknowns = Noise(2e-6, 1e-5, 1e-5), Unknowns.of(
+@pytest.mark.parametrize(('count', 'noise'), [
+    (40, Noise(2e-6, 1e-5, 1e-5)), (20, Noise(1e-5, 1e-5, 1e-5))])
+def test_intervals_hold_the_truth(count: int, noise: Noise) -> None:
+    """Seeds enough for 95 % +- 3 %; benchmarks/calibration.py has 2,000."""
+    unknowns = Unknowns.of(
         values_of(HEXAPOD.parameters), 0.6, np.zeros(GEOMETRY, dtype=bool), False)
-    inside, estimates = [], []
-    for seed in range(12):
+    inside, variances = [], []
+    for seed in range(40):
         rng = np.random.default_rng(seed)
         values = true_values(rng)
-        lengths, seen = measured(rng, values, random_poses(rng, 40), noise)
+        lengths, seen = measured(rng, values, random_poses(rng, count), noise)
         found = fit(Equations(lengths, seen), unknowns)
-        errors = np.sqrt(np.diag(found.covariance))[:GEOMETRY]
+        errors = np.sqrt(np.diag(found.covariance) + (
+            found.identifiability.shares * unknowns.scales) ** 2)[:GEOMETRY]
         inside.append(np.abs(found.values - values)[:GEOMETRY] < 1.96 * errors)
-        estimates.append(found.noise)
-    assert 0.91 < np.mean(inside) < 0.98
-    assert_allclose(np.mean(estimates, axis=0)[1:], noise[1:], rtol=0.1)
+        variances.append(np.square(found.noise))
+    assert 0.92 < np.mean(inside) < 0.98
+    assert_allclose(np.mean(variances, axis=0)[1:], np.square(noise)[1:], rtol=0.25)
+
+
+def test_the_estimated_noise_has_the_largest_restricted_likelihood() -> None:
+    """By the dense likelihood of all residuals, less the directions of the 42 unknowns."""
+    rng = np.random.default_rng(12)
+    lengths, seen = measured(rng, true_values(rng), random_poses(rng, 20),
+                             Noise(1e-5, 1e-5, 1e-5))
+    found = fit(Equations(lengths, seen), Unknowns.of(
+        values_of(HEXAPOD.parameters), 0.6, np.zeros(GEOMETRY, dtype=bool), False))
+    x = found.lin.derivatives[..., :GEOMETRY].reshape(120, GEOMETRY)
+    r = found.lin.residuals.ravel()
+
+    def likelihood(noise: np.ndarray) -> float:
+        inverse = np.zeros((120, 120))
+        for n, each in enumerate(covariances(Noise(*noise), 0.6, found.lin)):
+            inverse[6 * n:6 * n + 6, 6 * n:6 * n + 6] = np.linalg.inv(each)
+        information = x.T @ inverse @ x
+        projected = inverse - inverse @ x @ np.linalg.solve(information, x.T @ inverse)
+        return float(np.linalg.slogdet(inverse)[1] - np.linalg.slogdet(information)[1]
+                     - r @ projected @ r)
+
+    best = likelihood(np.array(found.noise))
+    for which in range(3):
+        for factor in (0.9, 1.1):
+            other = np.array(found.noise)
+            other[which] *= factor
+            assert likelihood(other) < best
 
 
 def test_outliers_are_named_and_do_not_matter() -> None:
@@ -253,6 +283,11 @@ def test_outliers_are_named_and_do_not_matter() -> None:
     ('swapped', 'leg_2 and leg_5 are swapped'),
     ('another order', 'the legs are in another order: leg_6, leg_1'),
     ('degrees', 'the angles are in degrees, not in radians: --degrees'),
+    ('all in mm and degrees', 'positions and leg positions are in mm, not in m: --mm reads '
+     'millimeters; the angles are in degrees, not in radians: --degrees'),
+    ('read as mm and degrees', 'positions and leg positions are in m, not in mm: without --mm '
+     'they are in m; the angles are in radians, not in degrees: without --degrees'),
+    ('outliers', '20 of 40 poses do not fit the geometry that fits all others'),
     ('inverse', 'the inverse is needed'), ('transposed', 'the rotations are those of the base'),
     ('sign', 'leg positions have the opposite sign'),
     ('quaternion', 'quaternions have w first'),
@@ -266,15 +301,20 @@ def test_likely_mistakes_are_named(what: str, words: str) -> None:
     poses = Pose(poses.position, from_euler(angles))
     lengths, seen = measured(rng, true_values(rng), poses, Noise(2e-6, 1e-5, 1e-5))
     position, rotation, given = seen.position, seen.rotation, None
-    if what in ('positions in mm', 'all in mm'):
+    if what in ('positions in mm', 'all in mm', 'all in mm and degrees'):
         position = 1e3 * position
-    if what in ('legs in mm', 'all in mm'):
+    if what in ('legs in mm', 'all in mm', 'all in mm and degrees'):
         lengths = 1e3 * lengths
+    if what == 'read as mm and degrees':
+        position, lengths, given = 1e-3 * position, 1e-3 * lengths, angles
+        rotation = from_euler(np.radians(angles))
+    if what == 'outliers':
+        position = position + rng.normal(0.0, 0.05, (40, 3)) * (np.arange(40) % 2)[:, None]
     if what == 'swapped':
         lengths = lengths[:, [0, 4, 2, 3, 1, 5]]
     if what == 'another order':
         lengths = lengths[:, [1, 2, 3, 4, 5, 0]]
-    if what == 'degrees':
+    if what in ('degrees', 'all in mm and degrees'):
         given = np.degrees(angles)
         rotation = from_euler(given)
     if what == 'inverse':
@@ -293,7 +333,7 @@ def test_likely_mistakes_are_named(what: str, words: str) -> None:
     if what == 'frames':
         pose = Equations(lengths, pose).as_measured(pose, FRAMES)
     with pytest.raises(StewartError) as caught:
-        calibrate(HEXAPOD, lengths, pose, angles=given)
+        calibrate(HEXAPOD, lengths, pose, angles=given, degrees=what.startswith('read'))
     assert words in str(caught.value) and 'nothing is calibrated' in str(caught.value)
 
 
@@ -336,7 +376,7 @@ def test_too_little_is_rejected() -> None:
     with pytest.raises(ParameterError, match='nothing is left'):
         calibrate(HEXAPOD, lengths, seen,
                   fixed=['base_joints', 'platform_joints', 'geometry.zero_length'])
-    with pytest.raises(StewartError, match='identifiable by itself: one and the same pose'):
+    with pytest.raises(StewartError, match='residuals of .* mm: one and the same pose'):
         same = np.zeros(40, dtype=int)
         calibrate(HEXAPOD, lengths[same] + rng.normal(0.0, 1e-6, (40, 6)), Pose(
             seen.position[same] + rng.normal(0.0, 1e-5, (40, 3)), seen.rotation[same]))

@@ -22,7 +22,7 @@ import pytest
 from referees import rng
 
 from stewart_dynamics.mechanics.least_squares import (
-    combinations, identifiability, Information, information, no_information, solve)
+    combinations, identifiability, Information, information, no_information, normal, solve)
 
 Array = NDArray[np.float64]
 
@@ -139,3 +139,11 @@ def test_without_samples_nothing_is_identifiable() -> None:
     assert solution.identifiability.rank == 0
     np.testing.assert_array_equal(solution.values, start)
     assert combinations(solution.identifiability) == ()
+
+
+@pytest.mark.parametrize('shape', [(1,), (83, 6), (84,), (200, 6), (0,)])
+def test_products_in_blocks_are_those_at_once(shape: tuple[int, ...]) -> None:
+    random = rng(7)
+    a, b = random.normal(size=(*shape, 5)), random.normal(size=(*shape, 3))
+    np.testing.assert_allclose(normal(a, b), a.reshape(-1, 5).T @ b.reshape(-1, 3), atol=1e-12)
+    assert normal(a[..., :0], b).shape == (0, 3)

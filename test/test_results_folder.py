@@ -16,12 +16,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 import subprocess
 import sys
 
+import pytest
 from referees import ROOT
 
+from stewart_dynamics import (
+    calibration, datasheet, description, export, identification, replay)
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import remove_abandoned, whole_folder
 
@@ -103,3 +107,12 @@ def test_results_are_replaced_while_another_run_begins(tmp_path: Path) -> None:
         replaced.rename(bag)
     assert names(tmp_path) == {'bag'}
     assert (bag / 'summary.json').read_text() == 'new'
+
+
+@pytest.mark.parametrize('main', [each.main for each in (
+    calibration, datasheet, description, export, identification, replay)])
+def test_an_empty_folder_is_not_the_current_one(
+        main: Callable[[list[str]], int], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='^2$'):
+        main(['--output', ''])
+    assert capsys.readouterr().err.endswith("error: argument --output: '': must name a folder\n")

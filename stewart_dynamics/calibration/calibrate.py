@@ -15,7 +15,7 @@
 """
 Calibration of a hexapod's geometry from measured poses; computes the result, writes no files.
 
-Outliers are found with equal weights, leg by leg; the rest is fitted with the noise given or
+Outliers are found by robust fits with equal weights; the rest is fitted with the noise given or
 estimated (``fit``). A fit without the held-out poses predicts these by forward kinematics.
 """
 
@@ -34,7 +34,7 @@ from stewart_dynamics.calibration.equations import (
 from stewart_dynamics.calibration.fit import Fit, fit, minimum, outliers, Unknowns
 from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
 from stewart_dynamics.calibration.likely_mistakes import (
-    lack_of_fit, mistakes_of_input, mistakes_of_result, not_identified)
+    lack_of_fit, mistakes_of_input, mistakes_of_outliers, mistakes_of_result, not_identified)
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
@@ -51,8 +51,8 @@ FEWEST = 8
 _FEWEST_OTHERS = 12
 # Errors of held-out poses may grow by this factor: a good file, and few poses.
 _WORSE = 1.2
-# Numbers of the file are rounded to a hundredth of this part of their standard errors.
-_DIGITS = 0.01
+# Numbers of the file are rounded to a hundredth of this part of their standard errors [m].
+_DIGITS, _FINEST = 0.01, 1e-10
 
 
 class Outlier(NamedTuple):
@@ -169,8 +169,10 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     sound: Flags = ~np.any(first.outlying, axis=1)
     used = measured.part(sound)
     if len(used.lengths) * 6 <= unknowns.basis.shape[1]:
-        raise StewartError(f'{len(used.lengths)} poses are left of {len(sound)} after outliers: '
+        raise StewartError(f'{len(used.lengths)} poses for {unknowns.basis.shape[1]} unknowns: '
                            f'at least {unknowns.basis.shape[1] // 6 + 1} are needed')
+    likely += mistakes_of_outliers(~sound)
+    _refuse(likely[-1:], accept_mistakes)
     found = fit(used, unknowns, None if noise is None else Noise(*noise))
     what = found.identifiability
     what = what._replace(scales=what.scales[:GEOMETRY], shares=what.shares[:GEOMETRY],
@@ -181,8 +183,10 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     _refuse(far, accept_mistakes)
     missing = not_identified(p['joints'], what.shares, LARGEST_SHARE, used, size)
     if IDENTIFIED not in states and not accept_mistakes:
-        raise StewartError(f'no number is identifiable by itself: {missing}; nothing is '
-                           'calibrated (--accept-mistakes does)')
+        left = float(np.sqrt(np.mean(found.lin.residuals ** 2)))
+        raise StewartError(
+            f'no number is identifiable by itself, with residuals of {1e3 * left:.3g} mm: '
+            f'{missing}; nothing is calibrated (--accept-mistakes does)')
     validation = _validated(p, used, unknowns, found, hold_out)
     if validation is not None:
         before, after = (math.hypot(each.rms[0], size * each.rms[1]) for each in validation)
@@ -194,7 +198,8 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     covariance = found.covariance[:GEOMETRY, :GEOMETRY]
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + (what.shares * what.scales) ** 2)
     # Errors of neighbors are correlated: poses are known better than each number of the geometry.
-    rounded = justified(found.values[:GEOMETRY], _DIGITS * np.sqrt(np.diag(covariance)))
+    rounded = justified(found.values[:GEOMETRY],
+                        np.maximum(_DIGITS * np.sqrt(np.diag(covariance)), _FINEST))
     return Calibration(
         with_geometry(p, rounded), names_of(p), unknowns.start[:GEOMETRY],
         found.values[:GEOMETRY], covariance, errors, states, what, missing, found.noise,
@@ -231,7 +236,7 @@ def _with_frames(equations: Equations, unknowns: Unknowns, unknown: bool) -> Arr
     if not unknown:
         return unknowns.start
     only = unknowns.frames_only()
-    return minimum(equations, only.start, only.scales[:, None] * only.basis, 1.0)
+    return minimum(equations, only.start, only.scales[:, None] * only.basis, np.eye(6))
 
 
 def _validated(parameters: Parameters, equations: Equations, unknowns: Unknowns, found: Fit,

@@ -21,7 +21,6 @@ Directions in which the poses have no information keep the file's values
 
 from __future__ import annotations
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -30,19 +29,20 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.equations import (
     ALL, BASE, DEVICE, Equations, GEOMETRY, Linearization, PLATFORM, TARGET)
 from stewart_dynamics.calibration.noise import (
-    covariances, estimated_noise, Noise, ROUNDING, whitening)
+    covariances, Noise, ROUNDING, VarianceComponents, whitening)
 from stewart_dynamics.mechanics.least_squares import (
-    Identifiability, identifiability, LARGEST_ERROR, TWO_SIDED)
+    Identifiability, identifiability, LARGEST_ERROR, normal)
 
 # Change of a joint that would matter, by the characteristic length; the same of a frame's angles.
 _SCALE = 0.01
 # Rounds of noise and fit, until the noise changes by a smaller part.
-_ROUNDS, _SETTLED = 10, 1e-3
-# Relative change of residuals and values at which a fit ends.
-_DONE = 1e-12
-# Residuals above this multiple of the leg's deviation are outliers; if a larger part of the poses
-# has one, no pose counts as an outlier. Rounds of leaving them out.
-_OUTLIER, MOST_OUTLIERS, _OUTLIER_ROUNDS = 8.0, 0.2, 5
+_ROUNDS, _SETTLED = 20, 0.01
+# A fit ends with a step that changes the residuals by a smaller part of them (least squares,
+# robust), or of the largest coordinate: a rounding error. Most steps; damping of a second try.
+_DONE, _EXACT, _STEPS, _DAMPING = (1e-6, 1e-3), 1e-15, 100, 1e-3
+# Residuals above this multiple of the leg's deviation are outliers; robust fits are repeated while
+# the deviations fall below this part.
+_OUTLIER, _FALLS = 8.0, 0.8
 
 
 class Fit(NamedTuple):
@@ -104,9 +104,9 @@ class Unknowns(NamedTuple):
     def identifiability(self, lin: Linearization, whiten: Array, largest_error: float,
                         ) -> Identifiability:
         """Return what weighted poses identify of all unknowns."""
-        rows = (whiten @ lin.derivatives).reshape(-1, ALL) @ (self.scales[:, None] * self.basis)
+        rows = whiten @ (lin.derivatives @ (self.scales[:, None] * self.basis))
         found = identifiability(
-            rows.T @ rows, np.ones(self.basis.shape[1]), largest_error=largest_error)
+            normal(rows, rows), np.ones(self.basis.shape[1]), largest_error=largest_error)
         directions = self.basis @ found.directions
         shares = np.sqrt(np.minimum(np.sum(directions[:, found.rank:] ** 2, axis=1), 1.0))
         return found._replace(scales=self.scales, directions=directions, shares=shares)
@@ -114,59 +114,69 @@ class Unknowns(NamedTuple):
 
 def fit(equations: Equations, unknowns: Unknowns, noise: Noise | None = None) -> Fit:
     """Return the best values for poses with the given noise, or with the noise estimated."""
-    from scipy.stats import t
-
-    values, known = unknowns.start, noise
+    size, values, estimated = unknowns.size, unknowns.start, noise is None
     lin = equations.at(values)
-    count = lin.residuals.size
-    noise, largest_error = noise or Noise(unknowns.size, 0.0, 0.0), (
-        np.inf if known is None else LARGEST_ERROR)
+    noise, largest_error = noise or Noise(size, 0.0, 0.0), (
+        np.inf if estimated else LARGEST_ERROR)
     for _ in range(_ROUNDS):
-        whiten = whitening(covariances(noise, unknowns.size, lin))
+        whiten = whitening(covariances(noise, size, lin))
         what = unknowns.identifiability(lin, whiten, largest_error)
-        values = minimum(equations, unknowns.start, what.known, whiten)
+        values = minimum(equations, unknowns.start, what.known, whiten, guess=values)
         lin = equations.at(values)
-        if known is not None:
+        whitened = (whiten @ lin.residuals[..., None])[..., 0]
+        components = VarianceComponents.of(lin, whiten, what.known)
+        if not estimated:
             break
         before, largest_error = noise, LARGEST_ERROR
-        noise = estimated_noise(lin, whiten, unknowns.size, what.rank)
-        if np.abs(np.subtract(before, noise)).max() < _SETTLED * max(noise):
+        noise = components.noise(whitened, size)
+        if np.abs(np.subtract(before, noise)).max() < _SETTLED * max(noise) + ROUNDING * size:
             break
-    whiten = whitening(covariances(noise, unknowns.size, lin))
-    rows = (whiten @ lin.derivatives).reshape(-1, ALL) @ what.known
-    # Few poses give the estimated noise an error of its own: Student's distribution.
-    wider = 1.0 if known else (t.ppf(0.975, max(count - what.rank, 1)) / TWO_SIDED) ** 2
-    covariance = wider * what.known @ np.linalg.pinv(rows.T @ rows, hermitian=True) @ what.known.T
-    return Fit(values, covariance, what, noise, lin, (whiten @ lin.residuals[..., None])[..., 0])
+    return Fit(values, components.covariance(estimated), what, noise, lin, whitened)
 
 
-def minimum(equations: Equations, start: Array, known: Array, whiten: Array | float,
-            loss: str = 'linear') -> Array:
-    """Return the values with the smallest whitened residuals, from ``start`` along ``known``."""
-    from scipy.optimize import least_squares
+def minimum(equations: Equations, start: Array, known: Array, whiten: Array,
+            robust: bool = False, guess: Array | None = None) -> Array:
+    """
+    Return the values with the smallest whitened residuals, from ``start`` along ``known``.
 
-    def white(rows: Array) -> Array:
-        return rows * whiten if isinstance(whiten, float) else whiten @ rows
-
-    def residuals(steps: Array) -> Array:
-        return white(at(steps.tobytes()).residuals[..., None]).ravel()
-
-    def derivatives(steps: Array) -> Array:
-        return white(at(steps.tobytes()).derivatives).reshape(-1, ALL) @ known
-
-    @functools.lru_cache(maxsize=1)
-    def at(steps: bytes) -> Linearization:
-        return equations.at(start + known @ np.frombuffer(steps))
+    Gauss-Newton steps, damped as Levenberg and Marquardt do if the sum of squares would not
+    decrease (J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., Springer 2006, section
+    10.3). ``robust`` sums 2 sqrt(1 + r^2) instead of r^2. The steps begin at ``guess``.
+    """
+    def state(steps: Array) -> tuple[Linearization, Array, float]:
+        lin = equations.at(start + known @ steps)
+        r = (whiten @ lin.residuals[..., None])[..., 0]
+        return lin, r, float(np.sum(2.0 * np.sqrt(1.0 + r ** 2) if robust else r ** 2))
 
     if not known.shape[1]:
         return start
-    sizes = np.linalg.norm(derivatives(np.zeros(known.shape[1])), axis=0)
-    found = least_squares(
-        residuals, np.zeros(known.shape[1]), derivatives, x_scale=1.0 / sizes, loss=loss,
-        method='lm' if loss == 'linear' else 'trf', ftol=_DONE, xtol=_DONE, gtol=_DONE,
-        max_nfev=200)
-    values: Array = start + known @ found.x
+    steps: Array = np.asarray(np.linalg.solve(
+        known.T @ known, known.T @ ((start if guess is None else guess) - start)))
+    (lin, r, cost), damping, exact = state(steps), 0.0, _EXACT * float(np.abs(start).max())
+    for _ in range(_STEPS):
+        derivatives = lin.derivatives @ known
+        rows = whiten @ derivatives
+        weighted = rows / np.sqrt(1.0 + r ** 2)[..., None] if robust else rows
+        matrix = normal(rows, weighted)
+        scale = 1.0 / np.sqrt(np.diag(matrix))
+        step = -scale * np.linalg.lstsq(
+            scale[:, None] * matrix * scale + damping * np.eye(len(steps)),
+            scale * normal(weighted, r[..., None])[:, 0], rcond=None)[0]
+        done = _rms(derivatives @ step) <= _DONE[robust] * _rms(lin.residuals) + exact
+        new = state(steps + step)
+        if new[-1] < cost:
+            (lin, r, cost), steps = new, steps + step
+            damping = 0.1 * damping if damping > _DAMPING else 0.0
+        else:
+            damping = max(10.0 * damping, _DAMPING)
+        if done:
+            break
+    values: Array = start + known @ steps
     return values
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values ** 2)))
 
 
 class Outliers(NamedTuple):
@@ -186,29 +196,31 @@ def outliers(equations: Equations, unknowns: Unknowns) -> Outliers:
     lin = equations.at(unknowns.start)
     everything = np.ones(len(equations.lengths), dtype=bool)
 
-    def fitted(deviation: float, largest_error: float, sound: Flags, loss: str = 'linear',
+    def fitted(deviation: float, largest_error: float, sound: Flags, robust: bool = False,
                ) -> Outliers:
-        what = unknowns.identifiability(lin, np.eye(6) / deviation, largest_error)
-        values = minimum(equations.part(sound), unknowns.start, what.known,
-                         1.0 / deviation, loss)
+        whiten = np.eye(6) / deviation
+        what = unknowns.identifiability(lin, whiten, largest_error)
+        values = minimum(equations.part(sound), unknowns.start, what.known, whiten, robust)
         r = equations.at(values).residuals
-        many = 6 * np.count_nonzero(sound)
-        wider = np.sqrt(many / max(many - what.rank, 1))
+        count = 6 * np.count_nonzero(sound)
+        wider = np.sqrt(count / max(count - what.rank, 1))
         deviations = 1.4826 * wider * np.median(np.abs(r[sound]), axis=0) + (
             10.0 * ROUNDING * unknowns.size)
         return Outliers(r, deviations, np.abs(r) > _OUTLIER * deviations, values)
 
     # All directions are free at first, so that the deviations are those of noise.
     found = fitted(unknowns.size, np.inf, everything)
-    first = fitted(float(np.median(found.deviations)), LARGEST_ERROR, everything)
-    found = fitted(float(np.median(first.deviations)), LARGEST_ERROR, everything, 'soft_l1')
-    for _ in range(_OUTLIER_ROUNDS):
+    first = found = fitted(float(np.median(found.deviations)), LARGEST_ERROR, everything)
+    for _ in range(_ROUNDS):  # outliers lose weight as the deviations approach those of the others
+        before, found = found, fitted(
+            float(np.median(found.deviations)), LARGEST_ERROR, everything, True)
+        if np.median(found.deviations) > _FALLS * np.median(before.deviations):
+            break
+    for _ in range(_ROUNDS):
         sound: Flags = ~np.any(found.outlying, axis=1)
-        if np.mean(sound) < 1.0 - MOST_OUTLIERS or (
-                6 * np.count_nonzero(sound) <= unknowns.basis.shape[1]):
+        if 6 * np.count_nonzero(sound) <= unknowns.basis.shape[1]:
             return first._replace(outlying=np.zeros_like(first.outlying))
-        before = found
-        found = fitted(float(np.median(found.deviations)), LARGEST_ERROR, sound)
+        before, found = found, fitted(float(np.median(found.deviations)), LARGEST_ERROR, sound)
         if (found.outlying == before.outlying).all() and np.allclose(
                 found.deviations, before.deviations):
             break

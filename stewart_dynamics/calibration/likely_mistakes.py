@@ -35,11 +35,14 @@ from stewart_dynamics.calibration.frames import find_frames
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_euler, to_quaternion
+from stewart_dynamics.mechanics.least_squares import Information, normal, solve
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # A mistake is likely if the misfit without it is smaller than this part.
 _BETTER = 0.25
+# A larger part of the poses that are outliers is no accident.
+_MOST_OUTLIERS = 0.2
 # A joint that moves by a larger part of the characteristic length is not of this hexapod.
 _FARTHEST = 0.3
 # Residuals above this part of it mean that the model does not describe the poses.
@@ -64,15 +67,19 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
                       angles: Array | None, degrees: bool) -> Iterator[LikelyMistake]:
     """Yield the likeliest mistake in lengths, poses or their angles (N, 3), if one is likely."""
     given = _misfit(parameters, equations, unknown_frames)
-    tried = [(_misfit(parameters, each, unknown_frames), mistake)
-             for mistake, each in _without_mistakes(parameters, equations)]
+    without = list(_without_mistakes(parameters, equations))
     if angles is not None:
-        turned = from_euler(np.degrees(angles) if degrees else np.radians(angles))
-        tried.append((_misfit(parameters, equations._replace(
-            pose=Pose(equations.pose.position, turned)), unknown_frames), LikelyMistake(
-                'degrees', 'the angles are in radians, not in degrees: without --degrees they '
-                'are read so' if degrees else
-                'the angles are in degrees, not in radians: --degrees reads them')))
+        rotation = from_euler(angles if degrees else np.radians(angles))
+        text = ('the angles are in radians, not in degrees: without --degrees they are read so'
+                if degrees else
+                'the angles are in degrees, not in radians: --degrees reads them')
+        units = [each for each in without if each[0].what == 'unit']
+        without += [
+            (mistake, each._replace(pose=Pose(each.pose.position, rotation)))
+            for mistake, each in [(LikelyMistake('degrees', text), equations), *(
+                (mistake._replace(text=f'{mistake.text}; {text}'), each)
+                for mistake, each in units)]]
+    tried = [(_misfit(parameters, each, unknown_frames), mistake) for mistake, each in without]
     if not unknown_frames:
         tried.append((_misfit(parameters, equations, True), LikelyMistake(
             'frames', 'the poses are not those of the platform frame in the base frame, but of '
@@ -81,6 +88,14 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
     if best < _BETTER * given:
         yield mistake._replace(text=f'{mistake.text} (misfit {best:.2g} of the motion'
                                + (f' instead of {given:.2g})' if given < math.inf else ')'))
+
+
+def mistakes_of_outliers(outlying: Flags) -> list[LikelyMistake]:
+    """Return that too many poses (N,) are outliers, if they are."""
+    return [LikelyMistake(
+        'outliers', f'{np.count_nonzero(outlying)} of {len(outlying)} poses do not fit the '
+        'geometry that fits all others: lengths and poses must be of the same instants, at rest',
+    )] if np.mean(outlying) > _MOST_OUTLIERS else []
 
 
 def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, size: float,
@@ -225,18 +240,20 @@ def _explained(r: Array, own: Array, terms: Array) -> tuple[float, float]:
     if not terms.size or len(r) < own.shape[1] + _FEWEST * terms.shape[1]:
         return 0.0, 0.0
     both = np.concatenate([own, terms], axis=1)
-    both = both / np.maximum(np.linalg.norm(both, axis=0), 1e-300)
-    lefts, ranks, slope = [], [], 0.0
-    for each in (both[:, :own.shape[1]], both):
-        x, _, rank, _ = np.linalg.lstsq(each, r, rcond=1e-9)
-        lefts.append(float(np.sum((r - each @ x) ** 2)))
-        ranks.append(int(rank))
-        slope = float(x[-1] / max(np.linalg.norm(terms[:, -1]), 1e-300))
-    more, rest = ranks[1] - ranks[0], len(r) - ranks[1]
+    sums = Information(normal(both, both), normal(both, r[:, None])[:, 0], float(r @ r), len(r))
+    scales = 1.0 / np.maximum(np.sqrt(np.diag(sums.matrix)), 1e-12)
+    lefts, ranks, slope = [sums.squares], [0], 0.0
+    for count in (own.shape[1], both.shape[1])[not own.shape[1]:]:
+        part = sums._replace(matrix=sums.matrix[:count, :count], vector=sums.vector[:count])
+        found = solve(part, np.zeros(count), scales[:count], largest_error=math.inf)
+        lefts.append(part.residual_squares(found.values))
+        ranks.append(found.identifiability.rank)
+        slope = float(found.values[-1])
+    more, rest = ranks[-1] - ranks[-2], len(r) - ranks[-1]
     if more < 1 or rest < 1:
         return 0.0, 0.0
-    ratio = (lefts[0] - lefts[1]) / more / max(lefts[1] / rest, 1e-24)
-    return (lefts[0] - lefts[1] if f.sf(ratio, more, rest) < _PROBABILITY else 0.0), slope
+    ratio = (lefts[-2] - lefts[-1]) / more / max(lefts[-1] / rest, 1e-24)
+    return (lefts[-2] - lefts[-1] if f.sf(ratio, more, rest) < _PROBABILITY else 0.0), slope
 
 
 def not_identified(joints: Sequence[str], shares: Array, largest: float, equations: Equations,

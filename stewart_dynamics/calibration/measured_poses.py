@@ -73,25 +73,26 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
         In one line: the file cannot be read, lacks a column, or has a value that is not a number.
 
     """
-    text = read_text(path, _LARGEST, StewartError).lstrip('\ufeff')
-    first = text.partition('\n')[0]
+    # Lines end in any way: newline=None reads them as '\n'.
+    lines = io.StringIO(read_text(path, _LARGEST, StewartError).lstrip('\ufeff'), newline=None)
+    first = lines.readline()
+    lines.seek(0)
     separator = next((each for each in (';', '\t') if each in first), ',')
     try:
-        rows = [row for row in csv.reader(io.StringIO(text), delimiter=separator, strict=True)
+        rows = [row for row in csv.reader(lines, delimiter=separator, strict=True)
                 if any(cell.strip() for cell in row)]
     except csv.Error as exc:
         raise StewartError(f'{path}: not a CSV file: {exc}') from exc
     if not rows:
         raise StewartError(f'{path}: is empty: row 1 must name the columns')
     header = [cell.strip() for cell in rows[0]]
-    rotation = QUATERNION if set(QUATERNION) & set(header) else ANGLES
+    rotation = max((QUATERNION, ANGLES), key=lambda names: bool(set(names) & set(header)))
     wanted = (*joints, *POSITION, *rotation)
     missing = [name for name in wanted if name not in header]
     if missing:
-        raise StewartError(
-            f'{path}: has no column {", ".join(missing)}; it has {shown(header)}: needed are '
-            f'{", ".join((*joints, *POSITION))} and {", ".join(QUATERNION)}, or '
-            f'{", ".join(ANGLES)}')
+        other = f' (or {", ".join(ANGLES)})' if missing[-4:] == list(QUATERNION) else ''
+        raise StewartError(f'{path}: has no column {shown_name(", ".join(missing))}{other}; row 1 '
+                           f'has {shown_name(", ".join(header))}')
     double = [name for name in wanted if header.count(name) > 1]
     if double:
         raise StewartError(f'{path}: column {double[0]}: is there {header.count(double[0])} times')

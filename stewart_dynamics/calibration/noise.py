@@ -30,10 +30,13 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.equations import Linearization
+from stewart_dynamics.mechanics.least_squares import normal, TWO_SIDED
 
-# Lower bounds of estimated standard deviations of the lengths: by the residuals, as the rest would
-# be a model without any error, and by the size of the hexapod, reached with exact data.
+# Lower bounds of standard deviations of the lengths: by the estimated noise of the poses, without
+# which some combinations of lengths could be exact; by the size of the hexapod, for exact data.
 _LEAST, ROUNDING = 0.05, 1e-13
+# Relative information, squared, of directions that are combinations of others.
+_DEPENDENT = 1e-13
 
 
 class Noise(NamedTuple):
@@ -60,25 +63,83 @@ def whitening(covariance: Array) -> Array:
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
-def estimated_noise(lin: Linearization, whiten: Array, size: float, unknowns: int) -> Noise:
+class VarianceComponents(NamedTuple):
     """
-    Return the noise of residuals of a fit, from their products in each pose.
+    A weighted fit to N poses, from which the three variances of the noise are estimated.
 
-    The three variances, not negative, fit the products of whitened residuals best
-    (Rao, "Estimation of variance and covariance components - MINQUE theory", J. Multivariate
-    Analysis 1(3), 1971, doi:10.1016/0047-259X(71)90001-7).
+    The weights W have W V W^T = 1, V being the covariance of the residuals.
     """
-    from scipy.optimize import nnls
 
-    r = lin.residuals * np.sqrt(lin.residuals.size / max(lin.residuals.size - unknowns, 1))
-    square = float(np.mean(r ** 2))
-    sides = [whiten, whiten @ lin.position, whiten @ lin.rotation]
-    parts = [each @ np.swapaxes(each, 1, 2) for each in sides]
-    unit = whiten @ r[..., None]
-    matrix = np.array([[np.sum(a * b) for b in parts] for a in parts])
-    vector = np.array([np.sum((np.swapaxes(unit, 1, 2) @ each) ** 2) for each in sides])
-    scale = 1.0 / np.sqrt(np.diag(matrix))
-    factor = np.linalg.cholesky(scale[:, None] * matrix * scale + 1e-12 * np.eye(3))
-    variances, _ = nnls(factor.T, np.linalg.solve(factor, scale * vector))
-    length, position, rotation = np.sqrt(scale * variances).tolist()
-    return Noise(max(length, _LEAST * math.sqrt(square), ROUNDING * size), position, rotation)
+    units: Array
+    """A (3, N, 6, 6): W V_i W^T for a unit of variance i."""
+    rows: Array
+    """Z (N, 6, n): orthonormal combinations of the weighted derivatives."""
+    known: Array
+    """(ALL, n): the same combinations of the unknowns; their covariance is known known^T."""
+
+    @classmethod
+    def of(cls, lin: Linearization, whiten: Array, known: Array) -> VarianceComponents:
+        """Return the components of a fit along ``known`` (ALL, m)."""
+        sides = (whiten, whiten @ lin.position, whiten @ lin.rotation)
+        rows = whiten @ (lin.derivatives @ known)
+        scale = 1.0 / np.sqrt(np.sum(rows ** 2, axis=(0, 1)))
+        squares, directions = np.linalg.eigh(normal(rows * scale, rows * scale))
+        sound = squares > _DEPENDENT
+        factor = scale[:, None] * directions[:, sound] / np.sqrt(squares[sound])
+        return cls(np.stack([each @ np.swapaxes(each, 1, 2) for each in sides]), rows @ factor,
+                   known @ factor)
+
+    def _projected(self) -> tuple[Array, Array, Array]:
+        """Return A_i Z (3, N, 6, n), Z^T A_i Z (3, n, n), and the traces of P V_i P V_j (3, 3)."""
+        turned = self.units @ self.rows
+        inner = np.stack([normal(self.rows, each) for each in turned])
+        traces = (np.einsum('inab,jnab->ij', self.units, self.units)
+                  - 2.0 * np.einsum('inak,jnak->ij', turned, turned)
+                  + np.einsum('iab,jab->ij', inner, inner))
+        return turned, inner, traces
+
+    def noise(self, residuals: Array, size: float) -> Noise:
+        """
+        Return the noise of weighted residuals (N, 6) of the fit.
+
+        Repeated with the weights of its result it is the restricted maximum likelihood, with
+        variances that are not negative (D. A. Harville, "Maximum likelihood approaches to
+        variance component estimation and to related problems", J. American Statistical
+        Association 72(358), 1977, doi:10.1080/01621459.1977.10480998).
+        """
+        from scipy.optimize import nnls
+
+        traces = self._projected()[2]
+        vector = np.einsum('na,inab,nb->i', residuals, self.units, residuals)
+        scale = 1.0 / np.sqrt(np.diag(traces))
+        factor = np.linalg.cholesky(scale[:, None] * traces * scale + 1e-12 * np.eye(3))
+        variances, _ = nnls(factor.T, np.linalg.solve(factor, scale * vector))
+        length, position, rotation = np.sqrt(scale * variances).tolist()
+        return Noise(max(length, _LEAST * math.hypot(position, size * rotation)), position,
+                     rotation)
+
+    def covariance(self, estimated: bool) -> Array:
+        """
+        Return how uncertain the unknowns are (ALL, ALL), more so if the noise is estimated.
+
+        Errors of the estimated variances make weights that are not the best, and standard errors
+        that are uncertain, each with its own degrees of freedom. Student's quantile for these, by
+        the normal one, is included: 1.96 standard errors have the probability of 95 %
+        (M. G. Kenward, J. H. Roger, "Small sample inference for fixed effects from restricted
+        maximum likelihood", Biometrics 53(3), 1997, doi:10.2307/2533558).
+        """
+        from scipy.stats import t
+
+        if not estimated:
+            return self.known @ self.known.T
+        turned, inner, traces = self._projected()
+        of_variances = 2.0 * np.linalg.pinv(traces, rcond=1e-12, hermitian=True)
+        more = sum(of_variances[i, j] * (normal(turned[i], turned[j]) - inner[i] @ inner[j])
+                   for i in range(3) for j in range(3))
+        slopes = np.einsum('pa,iab,pb->pi', self.known, inner, self.known)
+        spread = np.einsum('pi,ij,pj->p', slopes, of_variances, slopes)
+        freedom = 2.0 * np.sum(self.known ** 2, axis=1) ** 2 / np.maximum(spread, 1e-300)
+        wider = t.ppf(0.975, np.maximum(freedom, 1.0)) / TWO_SIDED
+        covariance: Array = wider[:, None] * (
+            self.known @ (np.eye(len(more)) + 2.0 * more) @ self.known.T) * wider
+        return covariance

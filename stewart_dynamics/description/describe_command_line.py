@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.program import DONE, Program
+from stewart_dynamics.program import DONE, folder, Program
 from stewart_dynamics.whole_file import check_new, write_new
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def _arguments() -> argparse.ArgumentParser:
                         help='parameters of the hexapod, the file that the node takes')
     source.add_argument('--from', dest='source', type=Path, metavar='FILE',
                         help='URDF, SDFormat or MJCF (needs mujoco) of a hexapod')
-    parser.add_argument('--output', type=Path, default=Path('.'), metavar='DIR',
+    parser.add_argument('--output', type=folder, default=Path('.'), metavar='DIR',
                         help='folder of the results (default: the current one)')
     parser.add_argument('--name', type=_name, metavar='NAME',
                         help='name of the model and of the files (default: that of FILE)')

@@ -20,7 +20,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from stewart_dynamics.program import DONE, Program
+from stewart_dynamics.program import DONE, folder, Program
 from stewart_dynamics.whole_file import write_new
 
 _PROGRAM = Program('stewart_export')
@@ -45,7 +45,7 @@ def _arguments() -> argparse.ArgumentParser:
                'be written;\n130 interrupted')
     parser.add_argument('--params', type=Path, required=True, metavar='FILE',
                         help='parameters of the hexapod, the file that the node takes')
-    parser.add_argument('--output', type=Path, required=True, metavar='DIR',
+    parser.add_argument('--output', type=folder, required=True, metavar='DIR',
                         help='folder of the files')
     parser.add_argument('--fmu', nargs='?', const='3', choices=('3', '2'), metavar='VERSION',
                         help='write an FMU for co-simulation, too, of FMI 3.0 (3, the default) or '

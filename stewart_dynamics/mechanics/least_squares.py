@@ -29,6 +29,7 @@ information of the noise alone is given, only information well above it counts.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,8 @@ LARGEST_SHARE = 0.05
 LEAST_SHARE = 0.1
 # A smaller coefficient of a combination, by its largest one and the scales, is left out.
 SMALLEST_COEFFICIENT = 0.02
+# Rows that are multiplied at once.
+_BLOCK = 84
 
 
 class Information(NamedTuple):
@@ -167,6 +170,20 @@ class Combination(NamedTuple):
 def no_information(many: int) -> Information:
     """Return the information of no samples about some parameters."""
     return Information(np.zeros((many, many)), np.zeros(many), 0.0, 0)
+
+
+def normal(first: Array, second: Array) -> Array:
+    """
+    Return A^T B (m, n) of rows (..., m) and (..., n), in blocks.
+
+    BLAS multiplies larger ones in threads, which wait for each other on a busy computer.
+    """
+    a, b = (each.reshape(math.prod(each.shape[:-1]), each.shape[-1])
+            for each in (first, second))
+    total = np.zeros((a.shape[1], b.shape[1]))
+    for n in range(0, len(a), _BLOCK):
+        total += a[n:n + _BLOCK].T @ b[n:n + _BLOCK]
+    return total
 
 
 def information(regressor: Array, efforts: Array, weights: Array) -> Information:

@@ -38,8 +38,8 @@ HOLD_OUT = 0.2
 """Share of the data that validates a fit to the rest, by default."""
 _WITHOUT_VALUE = {IN_COMBINATION: 'only in a combination', FIXED: 'fixed',
                   NOT_IDENTIFIABLE: 'kept: not identifiable'}
-# Numbers with more decimals have an exponent.
-_MOST_DECIMALS = 9
+# Numbers below _SMALL with more decimals have an exponent.
+_MOST_DECIMALS, _SMALL = 9, 1e-4
 
 
 class LikelyMistake(NamedTuple):
@@ -121,19 +121,19 @@ def in_words(coefficients: Array, names: Sequence[str]) -> str:
 def table_lines(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the table of estimates for the terminal."""
     name_width = max([len(each['name']) for each in parameters] + [9])
-    lines = [f'{"parameter":<{name_width}} {"file":>10} {"identified":>11} {"95 % interval":>24}'
+    lines = [f'{"parameter":<{name_width}} {"file":>10} {"identified":>12} {"95 % interval":>28}'
              '  unit']
     for each in parameters:
         if each['state'] == IDENTIFIED:
             error = each['standard_error']
-            shown = f'{rounded(each["value"], error):>11}', 'none: lack of fit'
+            shown = f'{rounded(each["value"], error):>12}', 'none: lack of fit'
             if each['interval']:
                 shown = shown[0], ' .. '.join(rounded(end, error) for end in each['interval'])
             remark = '  at its bound' if each['at_bound'] else ''
         else:
-            shown, remark = (f'{"-":>11}', _WITHOUT_VALUE[each['state']]), ''
+            shown, remark = (f'{"-":>12}', _WITHOUT_VALUE[each['state']]), ''
         lines.append(f'{each["name"]:<{name_width}} {each["file"]:>10.5g} {shown[0]} '
-                     f'{shown[1]:>24}  {each["unit"]}{remark}')
+                     f'{shown[1]:>28}  {each["unit"]}{remark}')
     return lines
 
 
@@ -157,10 +157,11 @@ def not_identifiable_lines(result: Mapping[str, Any], source: str) -> list[str]:
 def rounded(value: float, error: float) -> str:
     """Return a number as text with two digits of its standard error."""
     digits = decimals(error)
-    if value == 0.0 or error == 0.0 or (digits < _MOST_DECIMALS and abs(value) < 1e9):
+    if value == 0.0 or error == 0.0 or (abs(value) < 1e9 and (
+            digits < _MOST_DECIMALS or abs(value) > _SMALL)):
         return f'{value:.{digits}f}'
     places = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
-    return f'{value:.{max(0, places)}e}'
+    return f'{value:.{min(max(0, places), _MOST_DECIMALS)}e}'
 
 
 def decimals(error: float) -> int:
