@@ -26,8 +26,10 @@ from referees import ROOT
 
 from stewart_dynamics import (
     calibration, datasheet, description, export, identification, replay)
+from stewart_dynamics.errors import BagError
 from stewart_dynamics.replay.replay_options import Options
-from stewart_dynamics.reporting.results_folder import remove_abandoned, whole_folder
+from stewart_dynamics.reporting.results_folder import (
+    check_free, DATASHEET, remove_abandoned, whole_folder)
 
 # Killed before the folder is complete, or between the two renames.
 KILLED = """\
@@ -116,3 +118,16 @@ def test_an_empty_folder_is_not_the_current_one(
     with pytest.raises(SystemExit, match='^2$'):
         main(['--output', ''])
     assert capsys.readouterr().err.endswith("error: argument --output: '': must name a folder\n")
+
+
+@pytest.mark.parametrize('other', ['summary.json', 'flight/summary.json', 'identification.json'])
+def test_results_of_another_program_are_not_replaced(tmp_path: Path, other: str) -> None:
+    sheet = tmp_path / 'sheet'
+    (sheet / other).parent.mkdir(parents=True)
+    with pytest.raises(BagError, match='is not a folder of a datasheet'):
+        check_free(sheet, Options(force=True), DATASHEET)
+    (sheet / DATASHEET).touch()
+    check_free(sheet, Options(force=True), DATASHEET)
+    (sheet / other).touch()
+    with pytest.raises(BagError, match=f'sheet: contains .*{other}: it is not replaced'):
+        check_free(sheet, Options(force=True), DATASHEET)

@@ -27,8 +27,9 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import travel
 from stewart_dynamics.capability.force_intervals import (
     largest_multiple, quadratic_exit)
+from stewart_dynamics.capability.growth import Growth
 from stewart_dynamics.capability.motions import (
-    constant, Deviations, faster, first_exit, timed)
+    constant, Deviations, faster, timed)
 from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
@@ -509,10 +510,11 @@ class Capability:
         Return how much larger a motion can be until the first limit.
 
         Positions and rotation vectors from a center grow by the factor, and their rates and
-        accelerations with them. Lengths, joint angles and singularities end the factor as they end
-        a ``travel`` from the center: exactly. Rates and forces are followed in steps of 1/64 of
-        that range, smaller ones where three steps say that a limit may be exceeded between two;
-        their root is exact to rounding errors.
+        accelerations with them. Lengths, joint angles, clearance and singularities end the factor
+        as they end a ``travel`` from the center. Rates, forces, and speeds and torques of motors
+        are bounded between factors (``growth_bounds``), in intervals that are bisected until no
+        limit is exceeded before the answer: it is the first root, exact to rounding errors. Only
+        a part in which a limit is exceeded by no more than 1e-10 of it may be passed.
 
         Parameters
         ----------
@@ -522,6 +524,12 @@ class Capability:
             By default the first pose of the motion; less than half a turn from all poses.
         wrench, base, times
             As in ``speed_factor``.
+
+        Raises
+        ------
+        MotionError
+            Next to a singularity, or after ``growth.MOST_INTERVALS`` intervals, it is not known
+            whether a limit is exceeded.
 
         """
         check_kind(motion, Motion)
@@ -538,44 +546,21 @@ class Capability:
     def _amplitude(self, motion: Motion, start: Motion, wrench: ArrayLike | None,
                    base: BaseMotion | None, most: float) -> Extent:
         deviations = Deviations(start, motion.rows)
-        moving = np.flatnonzero(deviations.value.any(axis=1))
+        moving = np.flatnonzero(deviations.changes[:, 0].any(axis=1))
         path = Extent(math.inf, '', -1)
         if len(moving):
-            travels = self.travel(start, deviations.value[moving])
+            travels = self.travel(start, deviations.changes[moving, 0])
             at = int(np.argmin(travels.value))
             path = Extent(float(travels.value[at]), str(travels.limit[at]),
                           int(travels.leg[at]), int(moving[at]))
-        bounds = {name: self._limits.bounds[name] for name in (
-            limits.VELOCITY_MAX, limits.FORCE_MAX) if name in self._limits.bounds}
-        names = [_short(name) for name in bounds]
-        motors = self._motors
-        if motors is not None:
-            names += ['speed_max', 'torque']
-
-        def ratios(factor: float, which: Any) -> Array:
-            """Return rates, forces, speeds and torques relative to their limits (N, 6 M)."""
-            load = None if wrench is None else _some(np.asarray(wrench), motion.shape, which)
-            moved = None if base is None else BaseMotion.of_rows(
-                _some(base.rows, motion.shape, which))
-            solved = self.platform.inverse_dynamics(
-                Motion.of_rows(deviations.at(factor, which)), load, moved, singular='nan')
-            return np.concatenate([
-                *((solved.rates if name == limits.VELOCITY_MAX else solved.forces) / bound
-                  for name, bound in bounds.items()),
-                *(motors.ratios(deviations.at(factor, which), solved.rows) if motors else ())],
-                axis=1)
-
-        if not names or path.value == 0.0:
+        growth = Growth(self.platform, self._limits.bounds, self._motors, deviations, wrench, base)
+        if not growth.names or path.value == 0.0:
             return path
-        found = first_exit(ratios, min(path.value, most))
+        found = growth.first_exit(min(path.value, most))
         if found is None:
             return path
         factor, sample, column = found
-        name, leg = names[column // 6], column % 6
-        if name == 'torque' and motors is not None:
-            rows = deviations.at(factor, [sample])
-            name = motors.torque_limit(rows, self.platform.solve(rows))[0, leg]
-        return Extent(factor, str(name), leg, sample)
+        return Extent(factor, growth.limit(factor, sample, column), column % 6, sample)
 
     def _of_path(self, motion: Motion, solved: InverseDynamics) -> Extent | None:
         """
@@ -759,11 +744,6 @@ def _directions(value: ArrayLike) -> tuple[Array, Array]:
 
 def _divided(extent: Extent, sizes: Array) -> Extent:
     return _extent(np.asarray(extent.value / sizes), extent.limit, extent.leg)
-
-
-def _some(rows: Array, shape: tuple[int, ...], which: Any) -> Array:
-    """Return the rows of some samples, or the row of all."""
-    return rows if rows.ndim == 1 else np.broadcast_to(rows, (*shape, rows.shape[-1]))[which]
 
 
 def _short(limit: str) -> str:

@@ -23,7 +23,7 @@ from typing import Any, cast, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
@@ -39,11 +39,8 @@ from stewart_dynamics.planned.interpolation import (
 from stewart_dynamics.planned.sampling import Sampling
 from stewart_dynamics.planned.trajectory import MOST_SAMPLES
 
-# Steps of a factor up to the first limit of the path; of a step that may exceed a limit; of a
-# bisection.
-_STEPS, _CLOSER, _BISECTIONS = 64, 16, 60
-# A factor without a limit of the path grows by doubling up to this one.
-_LARGEST = 2.0 ** 20
+LARGEST = 2.0 ** 20
+"""A factor that nothing limits grows by doubling up to this one."""
 # Rounds in which the sample that limits is found between two, and samples of a round.
 _ZOOMS, _NEAR = 6, 33
 
@@ -61,6 +58,11 @@ class Deviations:
     rows : (N, MOTION)
         Rows of motion.
 
+    Attributes
+    ----------
+    changes : (N, 3, 6)
+        Displacement and rotation vector, their rates and accelerations.
+
     """
 
     def __init__(self, center: Motion, rows: Array) -> None:
@@ -70,16 +72,18 @@ class Deviations:
         turn = rotation_vector(np.broadcast_to(self._quaternion, quaternions.shape), quaternions)
         turn_rate, turn_acceleration = rates_of_vector(
             turn, rows[:, ANGULAR_VELOCITY], rows[:, ANGULAR_ACCELERATION])
-        self.value = np.concatenate([rows[:, POSITION] - self._position, turn], axis=1)
-        self._rate = np.concatenate([rows[:, LINEAR_VELOCITY], turn_rate], axis=1)
-        self._acceleration = np.concatenate(
-            [rows[:, LINEAR_ACCELERATION], turn_acceleration], axis=1)
+        self.changes = np.stack([
+            np.concatenate(each, axis=1) for each in (
+                (rows[:, POSITION] - self._position, turn),
+                (rows[:, LINEAR_VELOCITY], turn_rate),
+                (rows[:, LINEAR_ACCELERATION], turn_acceleration))], axis=1)
 
-    def at(self, factor: float, which: Any = slice(None)) -> Array:
-        """Return rows of motion (N, MOTION) with deviations larger by a factor."""
-        rows = motion_of(np.broadcast_to(self._quaternion, (len(self.value[which]), 4)),
-                         factor * self.value[which], factor * self._rate[which],
-                         factor * self._acceleration[which])
+    def at(self, factors: Array | float, which: Any = slice(None)) -> Array:
+        """Return rows of motion (N, MOTION) with deviations larger by factors () or (N,)."""
+        value, rate, acceleration = np.moveaxis(
+            np.asarray(factors)[..., None, None] * self.changes[which], 1, 0)
+        rows = motion_of(np.broadcast_to(self._quaternion, (len(value), 4)), value, rate,
+                         acceleration)
         rows[:, POSITION] += self._position
         return rows
 
@@ -90,67 +94,6 @@ def faster(rows: Array, factor: float) -> Array:
     rows[..., TWIST] *= factor
     rows[..., ACCELERATION] *= factor ** 2
     return rows
-
-
-def first_exit(ratios: Callable[[float, Any], Array], most: float,
-               ) -> tuple[float, int, int] | None:
-    """
-    Return the first factor up to ``most`` at which a ratio leaves [-1, 1], its sample and column.
-
-    Parameters
-    ----------
-    ratios : callable
-        Takes a factor and samples; returns ratios of them (N, M).
-    most : float
-        May be infinite.
-
-    """
-    every = slice(None)
-    step = most / _STEPS if most < _LARGEST else 1.0 / _STEPS
-    low, here = 0.0, ratios(0.0, every)
-    if (np.abs(here) > 1.0).any():
-        return 0.0, *_largest(here)
-    before = here
-    while low < min(most, _LARGEST):
-        high = min(low + step, most)
-        there = ratios(high, every)
-        # a parabola through three of its values has its extreme at most this far above two
-        bow = np.abs(there - 2.0 * here + before)
-        near = np.maximum(np.abs(here), np.abs(there)) + 0.25 * bow
-        which = np.flatnonzero((near > 1.0).any(axis=1))
-        if len(which):
-            found = _within(ratios, low, high, which)
-            if found is not None:
-                return found
-        before, here, low = here, there, high
-        if most >= _LARGEST and low >= 64.0 * step:
-            step *= 2.0
-            before = here  # the last step was shorter
-    return None
-
-
-def _within(ratios: Callable[[float, Any], Array], low: float, high: float, which: Integers,
-            ) -> tuple[float, int, int] | None:
-    """Return the first exit of some samples between two factors."""
-    begin = low
-    for end in np.linspace(low, high, _CLOSER + 1)[1:].tolist():
-        if (np.abs(ratios(end, which)) > 1.0).any():
-            low, high = begin, end
-            for _ in range(_BISECTIONS):
-                middle = 0.5 * (low + high)
-                if (np.abs(ratios(middle, which)) > 1.0).any():
-                    high = middle
-                else:
-                    low = middle
-            sample, column = _largest(ratios(high, which))
-            return low, int(which[sample]), column
-        begin = end
-    return None
-
-
-def _largest(ratios: Array) -> tuple[int, int]:
-    sample, column = divmod(int(np.nan_to_num(np.abs(ratios)).argmax()), ratios.shape[1])
-    return sample, column
 
 
 def constant(wrench: ArrayLike | None, base: BaseMotion | None) -> None:
@@ -200,7 +143,7 @@ def timed(platform: StewartPlatform, times: ArrayLike, motion: Any,
     found: Any = ask(motion, math.inf)
     # At its limit, the motion needs the samples that a planned trajectory needs.
     value = float(found.value)
-    factor = value if 0.0 < value < _LARGEST else 1.0
+    factor = value if 0.0 < value < LARGEST else 1.0
     rows = grown(motion.rows, factor)
     scale = factor if grown is faster else 1.0
     results = platform.solve(rows)

@@ -64,6 +64,10 @@ class MotorBounds:
     ----------
     limited : bool
         There is a limit of torques.
+    inertia : (6,)
+        At the motors' shafts [kg m^2].
+    scales : two of (6,)
+        Torques per load [m]: of the motor that drives, and of the one that is driven.
     fastest : (6,)
         ``drive.speed_max``, or infinity [rad/s].
 
@@ -76,6 +80,8 @@ class MotorBounds:
         constants = drive_constants(p)
         self._ratio, self._mass = constants[:, 0], constants[:, 2]
         self._factors = 1.0 + constants[:, 3], 1.0 + constants[:, 4]
+        self.inertia = self._mass / self._ratio ** 2
+        self.scales = tuple(each / self._ratio for each in self._factors)
         self._strongest, self.fastest = (
             np.full(6, math.inf) if p[name] is None else p[name] for name in (
                 TORQUE_MAX, SPEED_MAX))
@@ -97,7 +103,7 @@ class MotorBounds:
         rows = np.broadcast_to(motions, (*shape, MOTION)).reshape(-1, MOTION)
         turning, straight = (drives(rows, results.reshape(-1, RESULT)).reshape(*shape, -1)
                              for drives in (self._drives, self._guided))
-        own = self._mass / self._ratio ** 2 * turning[..., ACCELERATIONS]
+        own = self.inertia * turning[..., ACCELERATIONS]
         return MovingMotors(turning[..., SPEEDS], own,
                             self._mass / self._ratio * straight[..., ACCELERATIONS])
 
@@ -114,6 +120,42 @@ class MotorBounds:
 
     def _names(self, largest: Array) -> Array:
         return np.where(largest < self._strongest, 'torque_speed', 'torque_max')
+
+    def between(self, low: Array, high: Array, friction: tuple[Array, Array], band: Array,
+                ) -> list[Array]:
+        """
+        Return bounds of ``ratios`` in an interval.
+
+        Parameters
+        ----------
+        low, high : (6, N, 6)
+            Bounds of the quantities of ``GrowthBounds``.
+        friction : two of (N, 6)
+            Bounds of the Coulomb friction, low and high [N].
+        band : (6,)
+            Rates below which a leg is near standstill.
+
+        """
+        rates, speeds, load = ((low[n], high[n]) for n in (0, 2, 3))
+        with np.errstate(invalid='ignore'):  # both factors count where loads are not bounded
+            sign = np.sign(rates[0]) * ((rates[0] >= band) | (rates[1] <= -band))
+            power = sign * (load[0] + friction[0]), sign * (load[1] + friction[1])
+        largest: Array = np.zeros(sign.shape)
+        for n, scale, unused in ((4, self.scales[0], np.maximum(*power) < 0.0),
+                                 (5, self.scales[1], np.minimum(*power) > 0.0)):
+            extra = np.minimum(*(scale * each for each in friction)), np.maximum(
+                *(scale * each for each in friction))
+            torque = np.maximum(-low[n] - extra[0], high[n] + extra[1])
+            largest = np.where(unused, largest, np.maximum(largest, torque))
+        fastest = np.maximum(-speeds[0], speeds[1])
+        slowest = np.maximum(np.maximum(speeds[0], -speeds[1]), 0.0)
+        available = np.minimum(self._largest(slowest), self._largest(fastest))
+        for speed, least in () if self._curve is None else self._curve:
+            inside = (slowest < speed) & (speed < fastest)
+            available = np.where(inside, np.minimum(available, least), available)
+        with np.errstate(divide='ignore', invalid='ignore'):
+            return [fastest / self.fastest,
+                    np.where(largest == 0.0, 0.0, np.minimum(largest / available, _FAR_BEYOND))]
 
     @property
     def forces_at_rest(self) -> Array:

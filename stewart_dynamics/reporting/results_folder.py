@@ -50,7 +50,8 @@ DATASHEETS, REPLAYS = 'datasheet', 'replayed'
 """Folders of their results if no other is given."""
 
 _KINDS = {RESULT: 'replay results', IDENTIFICATION: 'results of an identification',
-          DATASHEET: 'a datasheet', CALIBRATION: 'results of a calibration'}
+          DATASHEET: 'a datasheet', CALIBRATION: 'results of a calibration',
+          'trajectory.yaml': 'a designed motion', 'poses.csv': 'designed poses'}
 
 _REPLACED = '.replaced'
 _PARTIAL = re.compile(
@@ -168,3 +169,7 @@ def check_free(folder: Path, options: Writing, result: str = RESULT) -> None:
     if not (folder / result).is_file():
         raise BagError(f'{folder}: exists already and is not a folder of {_KINDS[result]}: it is '
                        'not replaced')
+    for part in (folder, *(each for each in folder.iterdir() if each.is_dir())):
+        for name, kind in _KINDS.items():
+            if (part / name).is_file() and (part != folder or name != result):
+                raise BagError(f'{folder}: contains {kind}, {part / name}: it is not replaced')
