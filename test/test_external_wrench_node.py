@@ -246,9 +246,6 @@ def test_measured_legs_are_forgotten_at_a_deactivation(felt: Felt) -> None:
     assert first not in felt.stamps()
 
 
-# In the loop with the simulator
-
-
 # The service that identifies the payload, of the node in a process of its own
 
 PAYLOAD = 'payload'

@@ -429,12 +429,11 @@ def test_a_simulator_that_was_stopped_takes_what_is_due_and_skips_the_rest(
     end = time.monotonic() + 1.0
     simulator.until(lambda: time.monotonic() > end, 'a second goes by')
     simulator.program.process.send_signal(signal.SIGCONT)
-    line = simulator.until_said('WARN', 'fell behind by')
-    assert float(line.rpartition('fell behind by ')[2].partition(' s')[0]) > 0.5
+    simulator.until_said('WARN', 'fell behind by')
+    simulator.until(lambda: np.diff(simulator.stamps()).max() > 500_000_000, 'a gap of a second')
     many = len(simulator.raw['leg_states'])
     simulator.until(lambda: len(simulator.raw['leg_states']) > many + 100, 'it goes on')
     gaps = np.diff(simulator.stamps())
-    assert np.sum(gaps != PERIOD) >= 1
     assert np.all(gaps >= PERIOD)
 
 
