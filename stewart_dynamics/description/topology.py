@@ -45,16 +45,16 @@ class LegJoint(NamedTuple):
     @property
     def near(self) -> Array:
         """Return its point on the side of the base [m]."""
-        far = self.joint.child_anchor is not None and not self.from_parent
-        return self.joint.child_anchor if far and self.joint.child_anchor is not None else (
-            self.joint.anchor)
+        return self._point(self.from_parent)
 
     @property
     def far(self) -> Array:
         """Return its point on the side of the platform [m]."""
-        far = self.joint.child_anchor is not None and self.from_parent
-        return self.joint.child_anchor if far and self.joint.child_anchor is not None else (
-            self.joint.anchor)
+        return self._point(not self.from_parent)
+
+    def _point(self, on_parent: bool) -> Array:
+        on_child = self.joint.child_anchor
+        return self.joint.anchor if on_parent or on_child is None else on_child
 
 
 class Chain(NamedTuple):
@@ -86,19 +86,22 @@ class _Groups:
     """Bodies that fixed joints make one."""
 
     def __init__(self, mechanism: Mechanism) -> None:
+        self._parts = mechanism.parts
         self._of = {name: name for name in [WORLD, *mechanism.parts]}
         for joint in mechanism.joints:
             if joint.kind == FIXED:
                 self._of[self.of(joint.parent)] = self.of(joint.child)
-        self._members: dict[str, list[str]] = {}
+        self.members: dict[str, list[str]] = {}
+        """Names of the bodies of each group."""
         for name in self._of:
-            self._members.setdefault(self.of(name), []).append(name)
-        self._at: dict[str, list[Joint]] = {}
+            self.members.setdefault(self.of(name), []).append(name)
+        self.joints: dict[str, list[Joint]] = {group: [] for group in self.members}
+        """Joints at each group."""
         for joint in mechanism.joints:
             ends = self.of(joint.parent), self.of(joint.child)
             if joint.kind != FIXED and ends[0] != ends[1]:
                 for end in ends:
-                    self._at.setdefault(end, []).append(joint)
+                    self.joints[end].append(joint)
 
     def of(self, name: str) -> str:
         """Return the group of a body."""
@@ -107,30 +110,54 @@ class _Groups:
             name = self._of[name]
         return name
 
-    def members(self, group: str) -> list[str]:
-        """Return the bodies of a group."""
-        return self._members[group]
+    def hubs(self) -> list[str]:
+        """Return the groups at which six legs may end."""
+        return [group for group in dict.fromkeys(map(self.of, self._parts))
+                if len(self.joints[group]) >= LEGS]
 
-    def at(self, group: str) -> list[Joint]:
-        """Return the joints at a group."""
-        return self._at.get(group, [])
+    def parts(self, group: str) -> list[MechanismBody]:
+        """Return the bodies of a group; a world that is no body has none."""
+        return [self._parts[name] for name in self.members[group] if name in self._parts]
+
+    def main(self, group: str) -> MechanismBody:
+        """Return the body of a group to which its legs are attached, or else the heaviest."""
+        ends = Counter(
+            end for joint in self.joints[group] for end in (joint.parent, joint.child))
+        return max(self.parts(group), key=lambda part: (
+            ends[part.name] > LEGS // 2, part.mass or 0.0, ends[part.name]))
+
+    def shown(self, group: str) -> str:
+        """Return the name of a group's main body, in quotes."""
+        return repr(self.main(group).name)
 
     def other(self, joint: Joint, group: str) -> str:
         """Return the group at the other end of a joint."""
         parent = self.of(joint.parent)
         return self.of(joint.child) if parent == group else parent
 
-    def reached(self, start: str, without: Iterable[str], slides: bool = True) -> set[str]:
-        """Return the groups that are connected to one while others are taken away."""
-        taken, found, waiting = {*without, start}, {start}, deque([start])
+    def separate(self, one: str, other: str) -> None:
+        """Take the joints away that connect two groups directly, as the free joint in MJCF."""
+        for group in (one, other):
+            self.joints[group] = [joint for joint in self.joints[group]
+                                  if self.other(joint, group) not in (one, other)]
+
+    def reached(self, start: str, without: Iterable[str] = (), slides: bool = True,
+                ) -> dict[str, tuple[str, Joint] | None]:
+        """
+        Return the groups that are connected to one while others are taken away, nearest first.
+
+        Each has the group and the joint that lead to it, None for the first.
+        """
+        found: dict[str, tuple[str, Joint] | None] = {start: None}
+        waiting = deque([start])
         while waiting:
             group = waiting.popleft()
-            for joint in self.at(group):
-                next_one = self.other(joint, group)
-                if next_one not in taken and (slides or joint.kind != SLIDE):
-                    taken.add(next_one)
-                    found.add(next_one)
-                    waiting.append(next_one)
+            for joint in self.joints[group]:
+                other = self.other(joint, group)
+                if other not in found and other not in without and (
+                        slides or joint.kind != SLIDE):
+                    found[other] = group, joint
+                    waiting.append(other)
         return found
 
 
@@ -138,52 +165,44 @@ def topology_of(mechanism: Mechanism) -> Topology:
     """Return the hexapod of a mechanism; DescriptionError says what there is instead."""
     slides = [joint for joint in mechanism.joints if joint.kind == SLIDE]
     groups = _Groups(mechanism)
-    hubs = _hubs(mechanism, groups)
+    hubs = groups.hubs()
     if len(hubs) == 1 and _close(mechanism, groups, hubs[0]):
         groups = _Groups(mechanism)
-        hubs = _hubs(mechanism, groups)
+        hubs = groups.hubs()
     if len(slides) < LEGS or len(hubs) < 2:
+        hint = '' if slides else '. Cranks with rods (rotary hexapods) are not read'
         raise DescriptionError(
             f'{mechanism.source}: no hexapod: {len(slides)} prismatic joints, and {len(hubs)} '
             'bodies at which six legs end; six prismatic joints are needed between two bodies, '
-            f'and joints or constraints that close the loops{_hint(slides)}')
-    hubs.sort(key=lambda group: _baseness(mechanism, groups, group))
-    base, platform = hubs[0], hubs[1]
+            f'and joints or constraints that close the loops{hint}')
+    base, platform = sorted(hubs, key=lambda group: _baseness(groups, group))[:2]
+    groups.separate(base, platform)
     chains: dict[str, Chain] = {}
-    seen = {platform}
-    for joint in groups.at(base):
+    seen: set[str] = set()
+    for joint in groups.joints[base]:
         start = groups.other(joint, base)
         if start in seen:
             continue
         inside = groups.reached(start, (base, platform))
-        seen |= inside
-        chain = _chain(mechanism, groups, base, platform, inside)
+        seen.update(inside)
+        chain = _chain(groups, base, platform, inside)
         if chain is not None:
             chains[chain.steps[chain.slide].joint.name] = chain
     if len(chains) != LEGS:
+        ends = [group for group, joints in groups.joints.items()
+                if len(joints) == 1 and groups.parts(group)]
+        open_ends = (
+            f'. {len(ends)} bodies have one joint alone, as {groups.shown(ends[0])}: joints or '
+            'constraints that close the loops are needed') if ends else ''
         raise DescriptionError(
             f'{mechanism.source}: no hexapod: legs with one prismatic joint each between '
-            f'{_shown(mechanism, groups, base)} and {_shown(mechanism, groups, platform)}: '
-            f'{len(chains)}; there must be six{_open_ends(mechanism, groups)}')
+            f'{groups.shown(base)} and {groups.shown(platform)}: {len(chains)}; there must be '
+            f'six{open_ends}')
     order = [name for name in mechanism.order if name in chains]
     names = order if len(order) == LEGS else [
         joint.name for joint in slides if joint.name in chains]
-    parts = [mechanism.parts[name] for name in groups.members(platform)
-             if name in mechanism.parts]
-    return Topology(_main(mechanism, groups, base), _main(mechanism, groups, platform), parts,
+    return Topology(groups.main(base), groups.main(platform), groups.parts(platform),
                     [chains[name] for name in names])
-
-
-def _hubs(mechanism: Mechanism, groups: _Groups) -> list[str]:
-    return [group for group in dict.fromkeys(groups.of(name) for name in mechanism.parts)
-            if len(groups.at(group)) >= LEGS]
-
-
-def _open_ends(mechanism: Mechanism, groups: _Groups) -> str:
-    ends = [group for group in dict.fromkeys(groups.of(name) for name in mechanism.parts)
-            if len(groups.at(group)) == 1]
-    return (f'. {len(ends)} bodies have one joint alone, as {_shown(mechanism, groups, ends[0])}: '
-            'joints or constraints that close the loops are needed') if ends else ''
 
 
 def _close(mechanism: Mechanism, groups: _Groups, base: str) -> bool:
@@ -193,109 +212,67 @@ def _close(mechanism: Mechanism, groups: _Groups, base: str) -> bool:
     One leg carries the platform, as in a URDF from CAD. Where all legs have as many joints, the
     last bodies of the others are fixed to it; where they have one less, they end in ball joints.
     """
-    ends = []
+    lengths: dict[str, int] = {}  # number of joints of each leg, by its last group
     seen: set[str] = set()
-    for joint in groups.at(base):
+    for joint in groups.joints[base]:
         start = groups.other(joint, base)
         if start in seen:
             continue
-        inside = groups.reached(start, (base,))
-        seen |= inside
-        distances = {start: 1}
-        waiting = deque([start])
-        while waiting:
-            group = waiting.popleft()
-            for each in groups.at(group):
-                other = groups.other(each, group)
-                if other in inside and other not in distances:
-                    distances[other] = distances[group] + 1
-                    waiting.append(other)
-        last, count = max(distances.items(), key=lambda item: item[1])
-        slides = sum(each.kind == SLIDE for group in inside for each in groups.at(group))
+        distances: dict[str, int] = {}
+        for group, before in groups.reached(start, (base,)).items():
+            distances[group] = distances[before[0]] + 1 if before else 1
+        seen.update(distances)
+        slides = sum(each.kind == SLIDE for group in distances for each in groups.joints[group])
         if slides == 2:  # seen from both of its bodies
-            ends.append((last, count))
-    if len(ends) != LEGS:
+            last = max(distances, key=lambda group: distances[group])
+            lengths[last] = distances[last]
+    if len(lengths) != LEGS:
         return False
-    longest = max(count for _, count in ends)
-    shorter = sorted(count for _, count in ends)[0]
-    if shorter == longest:
-        platform = max((group for group, _ in ends),
-                       key=lambda group: _mass(mechanism, groups, group))
-    elif sorted(count for _, count in ends)[:-1] == [longest - 1] * (LEGS - 1):
-        platform = next(group for group, count in ends if count == longest)
+    longest = max(lengths.values())
+    shorter = Counter(lengths.values())[longest - 1]
+    if min(lengths.values()) == longest:
+        kind, how = FIXED, 'fixed to'
+        platform = max(lengths, key=lambda group: sum(
+            part.mass or 0.0 for part in groups.parts(group)))
+    elif shorter == LEGS - 1:
+        kind, how = BALL, 'ball joints on'
+        platform = max(lengths, key=lambda group: lengths[group])
     else:
         return False
-    kind = FIXED if shorter == longest else BALL
-    for group, _ in ends:
+    for group in lengths:
         if group != platform:
-            end = _main(mechanism, groups, group)
+            end = groups.main(group)
             mechanism.joints.append(Joint(f'{end.name} to {platform}', kind, end.name, platform,
                                           end.placement.position))
     mechanism.remarks.append(
-        f'the loops are open: the ends of five legs are taken as '
-        f'{"fixed to" if kind == FIXED else "ball joints on"} '
-        f'{_shown(mechanism, groups, platform)} where they are in the file')
+        f'the loops are open: the ends of five legs are taken as {how} '
+        f'{groups.shown(platform)} where they are in the file')
     return True
 
 
-def _mass(mechanism: Mechanism, groups: _Groups, group: str) -> float:
-    return sum(mechanism.parts[name].mass or 0.0 for name in groups.members(group)
-               if name in mechanism.parts)
-
-
-def _hint(slides: list[Joint]) -> str:
-    return '' if slides else '. Cranks with rods (rotary hexapods) are not read'
-
-
-def _baseness(mechanism: Mechanism, groups: _Groups, group: str) -> tuple[int, int, float]:
+def _baseness(groups: _Groups, group: str) -> tuple[bool, bool, float]:
     """Return a key that is smallest for the base: in the world, carried by nothing, low."""
-    members = groups.members(group)
     carried = any(groups.of(joint.child) == group and joint.child_anchor is None
-                  for joint in groups.at(group))
-    heights = [mechanism.parts[name].placement.position[2] for name in members
-               if name in mechanism.parts]
-    return int(WORLD not in members), int(carried), float(np.mean(heights))
+                  for joint in groups.joints[group])
+    heights = [part.placement.position[2] for part in groups.parts(group)]
+    return WORLD not in groups.members[group], carried, float(np.mean(heights))
 
 
-def _chain(mechanism: Mechanism, groups: _Groups, base: str, platform: str, inside: set[str],
-           ) -> Chain | None:
+def _chain(groups: _Groups, base: str, platform: str, inside: Iterable[str]) -> Chain | None:
     """Return the leg that leads through these groups; None if it is not one."""
-    before: dict[str, tuple[str, Joint]] = {}
-    waiting = deque([base])
-    while waiting and platform not in before:
-        group = waiting.popleft()
-        for joint in groups.at(group):
-            other = groups.other(joint, group)
-            through = other in inside or (other == platform and group != base)
-            if through and other not in before:
-                before[other] = group, joint
-                waiting.append(other)
+    others = set(groups.members) - {*inside, platform}
+    before = groups.reached(base, others)
     if platform not in before:
         return None
     steps: list[LegJoint] = []
     path, group = [platform], platform
-    while group != base:
-        group, joint = before[group]
-        steps.append(LegJoint(joint, groups.of(joint.parent) == group))
-        path.append(group)
-    steps.reverse()
-    path.reverse()
-    at = [n for n, step in enumerate(steps) if step.joint.kind == SLIDE]
+    while (step := before[group]) is not None:
+        group, joint = step
+        steps.insert(0, LegJoint(joint, groups.of(joint.parent) == group))
+        path.insert(0, group)
+    at = [n for n, each in enumerate(steps) if each.joint.kind == SLIDE]
     if len(at) != 1:
         return None
-    lower = groups.reached(path[at[0]], (base, platform), slides=False) - {base}
-    names = [name for group in inside for name in groups.members(group)]
-    return Chain(steps, *([mechanism.parts[name] for name in names
-                           if (groups.of(name) in lower) == side] for side in (True, False)))
-
-
-def _main(mechanism: Mechanism, groups: _Groups, group: str) -> MechanismBody:
-    """Return the body of a group to which its legs are attached, or else the heaviest."""
-    ends = Counter(end for joint in groups.at(group) for end in (joint.parent, joint.child))
-    members = [mechanism.parts[name] for name in groups.members(group) if name in mechanism.parts]
-    return max(members, key=lambda part: (
-        ends[part.name] > LEGS // 2, part.mass or 0.0, ends[part.name]))
-
-
-def _shown(mechanism: Mechanism, groups: _Groups, group: str) -> str:
-    return repr(_main(mechanism, groups, group).name)
+    lower = groups.reached(path[at[0]], (base, platform), slides=False)
+    return Chain(steps, *([part for group in inside if (group in lower) == is_lower
+                           for part in groups.parts(group)] for is_lower in (True, False)))
