@@ -110,24 +110,9 @@ class LegLimits(NamedTuple):
 
 class Hexapod:
     """
-    A hexapod with the names of all its bodies.
+    A hexapod at its home pose, where formats of closed loops begin, with the names of all bodies.
 
-    Attributes
-    ----------
-    position, rotation : (3,), (3, 3)
-        The home pose, as ``homes`` gives it; formats of closed loops begin there.
-    base, platform : str
-        Names of these bodies.
-    base_body : str
-        The name of the base where a format has a world of its own, whose name is taken.
-    platform_body : Body
-    legs : tuple of Leg
-
-    Raises
-    ------
-    ParameterError
-        Two joints or bodies would have the same name.
-
+    Raises ParameterError if two joints or bodies would have the same name.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -137,6 +122,7 @@ class Hexapod:
         self.position, self.rotation = positions[0], rotations[0]
         self.base, self.platform = parameters['base_frame'], parameters['platform_frame']
         self.base_body = f'{_WORLD}_base' if self.base == _WORLD else self.base
+        """The name of the base where a format has a world of its own, whose name is taken."""
         self.platform_body = RigidBody(
             self.platform, parameters['platform.mass'], parameters['platform.center_of_mass'],
             inertia_matrix(parameters['platform.inertia']))

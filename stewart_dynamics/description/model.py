@@ -44,15 +44,7 @@ TF = '/tf'
 
 
 class ModelMessages:
-    """
-    Writes the messages.
-
-    Raises
-    ------
-    ParameterError
-        Two joints of the URDF would have the same name.
-
-    """
+    """Writes the messages; ParameterError if two joints of the URDF have the same name."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._joints = TreeJoints(parameters)
@@ -60,17 +52,7 @@ class ModelMessages:
         self._transform = TransformWriter(parameters['base_frame'], parameters['platform_frame'])
 
     def joint_states(self, stamp: int, pose: Sequence[float]) -> bytes:
-        """
-        Return the sensor_msgs/JointState of all joints at a pose.
-
-        Parameters
-        ----------
-        stamp : int
-            [ns]
-        pose : sequence of float
-            A row of motion, or its first 12 numbers.
-
-        """
+        """Return the sensor_msgs/JointState of all joints at a pose, as in a row of motion."""
         return self._positions.write(stamp, self._joints.of_sample(pose))
 
     def transform(self, stamp: int, pose: Sequence[float]) -> bytes:
@@ -82,29 +64,16 @@ _SOURCE = Path('robot_description')  # of errors
 
 
 class LinkTransforms:
-    """
-    The transforms of the joints of a URDF.
-
-    Parameters
-    ----------
-    urdf : str
-        A robot of revolute, prismatic and fixed joints, as ``urdf`` writes it.
-
-    Attributes
-    ----------
-    moving, fixed : list of (parent, child)
-        The links of the joints that move (K,), and of those that do not (M,).
-    at_fixed : (M, 7)
-        The transforms of the latter: x y z [m] and the quaternion's x y z w.
-
-    """
+    """The transforms of the joints of a URDF that ``urdf`` has written."""
 
     def __init__(self, urdf: str) -> None:
         joints = ET.fromstring(urdf).findall('joint')
         fixed = [each for each in joints if each.get('type') == 'fixed']
         moving = [each for each in joints if each.get('type') != 'fixed']
         self.moving, self.fixed = [*map(_links, moving)], [*map(_links, fixed)]
+        """Parent and child of the K joints that move, and of the M joints that do not."""
         self.at_fixed = _rows([origin_of(each, _SOURCE) for each in fixed])
+        """Transforms of the latter (M, 7): x y z [m] and the quaternion's x y z w."""
         places = [origin_of(each, _SOURCE) for each in moving]
         self._origins = _rows(places)
         self._revolute = np.array([each.get('type') == 'revolute' for each in moving])
@@ -116,15 +85,7 @@ class LinkTransforms:
             self._origins[:, 3:], np.column_stack([axes, np.zeros(len(axes))]))
 
     def at(self, positions: Array) -> Array:
-        """
-        Return the transforms of the joints that move (N, K, 7): x y z [m] and x y z w.
-
-        Parameters
-        ----------
-        positions : (N, K)
-            Positions of the moving joints, in the order of the file [m, rad].
-
-        """
+        """Return the moving transforms (N, K, 7) at positions (N, K) of the joints [m, rad]."""
         shifts = np.where(self._revolute, 0.0, positions)
         halves = np.where(self._revolute, 0.5 * positions, 0.0)
         cosines, sines = np.cos(halves), np.sin(halves)

@@ -76,13 +76,8 @@ def recognized(mechanism: Mechanism) -> Recognized:
     """
     Return the parameters of the hexapod in a mechanism.
 
-    Raises
-    ------
-    DescriptionError
-        There is no hexapod in it.
-    ParameterError
-        Its numbers break a rule of the parameters.
-
+    Raises DescriptionError if there is no hexapod in it, ParameterError if its numbers break a
+    rule of the parameters.
     """
     found = topology_of(mechanism)
     remarks = list(mechanism.remarks)
@@ -330,11 +325,7 @@ def read_hexapod(path: Path) -> Recognized:
     """
     Return the parameters of the hexapod in a file, with remarks on all assumptions.
 
-    Raises
-    ------
-    StewartError
-        The file cannot be read, or there is no hexapod in it; in one line.
-
+    Raises StewartError if the file cannot be read, or there is no hexapod in it.
     """
     try:
         return recognized(read_mechanism(path))

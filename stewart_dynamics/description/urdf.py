@@ -64,19 +64,7 @@ class Ros2Control(NamedTuple):
 
 
 def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str:
-    """
-    Return a hexapod as URDF.
-
-    Parameters
-    ----------
-    hexapod : Hexapod
-        The hexapod.
-    name : str
-        Name of the robot.
-    control : Ros2Control, optional
-        Adds a block ros2_control for the six legs.
-
-    """
+    """Return a hexapod as URDF; ``control`` adds a block ros2_control for the six legs."""
     root = ET.Element('robot', {'name': name})
     for color, rgba in COLORS.items():
         add(add(root, 'material', name=color), 'color', rgba=numbers(rgba))

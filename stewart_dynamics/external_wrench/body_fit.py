@@ -68,78 +68,46 @@ _LEAST_NOISE = 1e-5
 
 
 class Body(NamedTuple):
-    """
-    Mass, center of mass and inertia, as a parameter file has them.
-
-    Attributes
-    ----------
-    mass : float
-        [kg]
-    center : (3,)
-        Platform axes [m].
-    inertia : (6,)
-        ixx ixy ixz iyy iyz izz about the center of mass, platform axes [kg m^2].
-
-    """
+    """Mass, center of mass and inertia, as a parameter file has them."""
 
     mass: float
+    """[kg]"""
     center: Array
+    """Platform axes (3,) [m]."""
     inertia: Array
+    """ixx ixy ixz iyy iyz izz about the center of mass, platform axes (6,) [kg m^2]."""
 
 
 class FittedBody(NamedTuple):
-    """
-    The body that fits best.
-
-    Attributes
-    ----------
-    body : Body
-        Numbers that are not known have the given values.
-    half_widths : (10,)
-        Halves of the 95 % intervals of mass, center and inertia.
-    known : (10,)
-        Whether each of them is identifiable.
-    consistent : bool
-        False: no real body has the inertia that fits best; it has the given one.
-    residual : float
-        RMS of the efforts that remain [N].
-
-    """
+    """The body that fits best."""
 
     body: Body
+    """Numbers that are not known have the given values."""
     half_widths: Array
+    """(10,) halves of the 95 % intervals of mass, center and inertia"""
     known: Flags
+    """(10,) whether each of them is identifiable"""
     consistent: bool
+    """False: no real body has the inertia that fits best; it has the given one."""
     residual: float
+    """RMS of the efforts that remain [N]."""
 
 
 class LegSamples(NamedTuple):
-    """
-    N consecutive measurements, and how a wrong acceleration changes them.
-
-    Attributes
-    ----------
-    columns : (N, 6, 10)
-        Columns of the regressor, of ``about(center)``.
-    friction : (N, 6, FRICTION)
-        Effort [N] for one standard deviation of each kind of friction.
-    differences : (N, 6)
-        Efforts less those of the model [N].
-    acceleration_noise : (6, 6)
-        Covariance of the noise in the accelerations of one sample.
-    columns_by_acceleration : (6, 6, 10)
-        Derivative of the columns by each of the six accelerations.
-    model_by_acceleration : (6, 6)
-        Derivative of the model's efforts, likewise.
-
-    """
+    """N consecutive measurements, and how a wrong acceleration changes them."""
 
     columns: Array
+    """(N, 6, 10) of the regressor, of ``about(center)``"""
     friction: Array
+    """(N, 6, FRICTION) effort for one standard deviation of each kind of friction [N]"""
     differences: Array
+    """(N, 6) efforts less those of the model [N]"""
     acceleration_noise: Array
+    """(6, 6) covariance of the noise in the accelerations of one sample"""
     columns_by_acceleration: Array
+    """(6, 6, 10) derivative of the columns by each of the six accelerations"""
     model_by_acceleration: Array
+    """(6, 6) derivative of the model's efforts, likewise"""
 
 
 def about(center: Array) -> Array:
@@ -162,15 +130,8 @@ class BodyFit:
     """
     The fit, step by step: ``improve`` ROUNDS times, ``correlate`` all lags, then ``result``.
 
-    Parameters
-    ----------
-    samples : Samples
-        At least as many as LAGS.
-    given : Body
-        The model's.
-    size : float
-        Distance of the platform joints from their center [m].
-
+    ``samples`` are at least as many as LAGS; ``given`` is the body of the model, ``size`` the
+    distance of the platform joints from their center [m].
     """
 
     def __init__(self, samples: LegSamples, given: Body, size: float) -> None:

@@ -155,22 +155,10 @@ def _many(constants: Array, motions: Array, model_forces: Array, measured_forces
 def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: Array,
                       measured_forces: Array) -> Array:
     """
-    Return the external wrench of many samples, each alone: nothing is filtered.
+    Return the external wrench (N, 6) [N, N m] of many samples, each alone: nothing is filtered.
 
-    Parameters
-    ----------
-    platform : StewartPlatform
-        Its geometry is used.
-    motions : (N, 12) or (N, MOTION)
-        Rows of motion, of which only the poses are used.
-    model_forces, measured_forces : (N, 6)
-        Forces of the inverse dynamics, and of the actuators [N], + pushes.
-
-    Returns
-    -------
-    (N, 6)
-        Force [N] and moment [N m] at the platform's origin, base axes, the sign of ``~/wrench``.
-
+    The forces are those of the inverse dynamics and of the actuators (N, 6) [N], + pushes. Of the
+    rows of motion (N, 12) or (N, MOTION) only the poses are used.
     """
     wrenches = np.empty((len(motions), WRENCH))
     motions, model_forces, measured_forces = map(
@@ -226,12 +214,7 @@ class ExternalWrench:
     """
     The step from a measurement to the external wrench, for a hexapod with given parameters.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        They hold for every call. One thread at a time may call it: a call works in memory that is
-        its own.
-
+    One thread at a time may call it: a call works in memory that is its own.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -247,21 +230,11 @@ class ExternalWrench:
     def __call__(self, measurement: Measurement, before: Estimate | None, known: Six,
                  target: Sequence[float] | None, base: tuple[float, ...] = NO_BASE) -> Estimate:
         """
-        Return the estimate.
+        Return the estimate for a measurement with finite numbers.
 
-        Parameters
-        ----------
-        measurement : Measurement
-            Measurement with finite numbers.
-        before : Estimate, optional
-            Last estimate. If its stamp is later, or older by more than ``setpoint.timeout``,
-            only its pose is used, and the filter restarts.
-        known : six numbers
-            The load on ``~/wrench`` [N, N m].
-        target : sequence of float, optional
-            The last setpoint, as a row of motion.
-        base : 12 numbers, optional
-            A row of the base's motion; by default it is still.
+        ``known`` is the load on ``~/wrench`` [N, N m], ``target`` the last setpoint as a row of
+        motion. If the stamp of the last estimate is later, or older by more than
+        ``setpoint.timeout``, only its pose is used, and the filter restarts.
 
         Raises
         ------

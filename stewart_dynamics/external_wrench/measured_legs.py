@@ -48,15 +48,7 @@ HIGHEST_RATE = 2000.0
 
 
 class LegHistory:
-    """
-    A ring of measurements; the oldest make room for the newest.
-
-    Parameters
-    ----------
-    seconds : float
-        Time that it holds at HIGHEST_RATE.
-
-    """
+    """A ring of measurements of some seconds at HIGHEST_RATE; the oldest are overwritten."""
 
     def __init__(self, seconds: float) -> None:
         self.capacity = round(seconds * HIGHEST_RATE)
@@ -66,19 +58,7 @@ class LegHistory:
         self._memory = self._rows.data.cast('B')
 
     def add(self, forces: Six, estimate: Estimate, known: Six) -> None:
-        """
-        Add a measurement.
-
-        Parameters
-        ----------
-        forces : six numbers
-            Forces of the actuators since the last measurement [N].
-        estimate : Estimate
-            Its stamp, pose and twist; the motion of the base.
-        known : six numbers
-            The load on ``~/wrench`` [N, N m].
-
-        """
+        """Add a measurement with the forces since the one before and the load on ``~/wrench``."""
         _ROW.pack_into(
             self._memory, self.count % self.capacity * _ROW.size, estimate.stamp,
             *estimate.motion[:TWIST.stop], *forces, *known, *estimate.base)
@@ -131,19 +111,8 @@ class MeasuredLegs:
     """
     Follows the measured legs.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Names, zero lengths and timeout.
-    step : ExternalWrench
-        It may be replaced at any time: ``step``.
-    rejected : callable
-        Called with each rejection and its details.
-    noticed : callable
-        Called with texts for the log: a restart.
-    history : LegHistory, optional
-        Gets the measurements that are used.
-
+    ``step`` may be replaced at any time. ``rejected`` is called with each rejection and its
+    details, ``noticed`` with texts for the log; ``history`` gets the measurements that are used.
     """
 
     def __init__(
@@ -167,17 +136,9 @@ class MeasuredLegs:
     def take(self, data: bytes, known: Six, target: tuple[float, ...] | None,
              base: BaseInput | None = None) -> Estimate | None:
         """
-        Return the estimate from a message, or None where it is rejected.
+        Return the estimate from a sensor_msgs/JointState (CDR), or None where it is rejected.
 
-        Parameters
-        ----------
-        data : bytes
-            A sensor_msgs/JointState as it came, CDR.
-        known, target
-            See ``ExternalWrench``.
-        base : BaseInput, optional
-            The motion of the base; by default it is still.
-
+        ``known`` and ``target`` are those of ``ExternalWrench``; by default the base is still.
         """
         measurement = self._sound(data)
         if measurement is None or not self._in_time(measurement.stamp):

@@ -108,13 +108,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     """
     Yield None after each piece of the work, and the outcome at the end.
 
-    Parameters
-    ----------
-    history : LegHistory
-        Measurements may be added meanwhile; those from now on are not used.
-    platform : StewartPlatform
-        Its parameters hold for all of the work.
-
+    Measurements may be added to the history meanwhile; those from now on are not used.
     """
     p = platform.parameters
     begin, end = _range(history, p['payload.window'])

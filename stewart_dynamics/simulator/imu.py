@@ -46,13 +46,9 @@ class SimulatedImu:
 
     def read(self, row: Array) -> list[float]:
         """
-        Return angular velocity [rad/s] and specific force [m/s^2], IMU axes; the noise is new.
+        Return angular velocity [rad/s] and specific force [m/s^2] in a motion of the base (BASE,).
 
-        Parameters
-        ----------
-        row : (BASE,)
-            The motion of the base.
-
+        They are in IMU axes; the noise is new in each call.
         """
         spin, spin_rate = (_vector(row[part]) for part in (
             BASE_ANGULAR_VELOCITY, BASE_ANGULAR_ACCELERATION))
@@ -78,13 +74,7 @@ class ImuWriter:
     """
     Writes sensor_msgs/Imu of an IMU that does not measure its orientation.
 
-    Parameters
-    ----------
-    frame : str
-        Frame of the IMU.
-    angular_velocity, specific_force : float
-        Standard deviations of the readings [rad/s, m/s^2]; the covariances are made of them.
-
+    The covariances are made of the standard deviations of the readings [rad/s, m/s^2].
     """
 
     def __init__(self, frame: str, angular_velocity: float, specific_force: float) -> None:

@@ -144,15 +144,7 @@ class BasePeriod(NamedTuple):
 
 
 class GeneratedBase:
-    """
-    A base that moves as the simulator generates it.
-
-    Parameters
-    ----------
-    parameters : SimulatorParameters
-        ``base_motion.source`` is sine or sea.
-
-    """
+    """A base that moves as the simulator generates it: ``base_motion.source`` is sine or sea."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
         self._motion = GeneratedBaseMotion(parameters)
@@ -163,17 +155,7 @@ class GeneratedBase:
         self._rest = self._computed(np.zeros(3))[0]
 
     def period(self, index: int, end: int) -> BasePeriod:
-        """
-        Return a period.
-
-        Parameters
-        ----------
-        index : int
-            Number of the period since the motion began; the first is 1, 0 is at rest.
-        end : int
-            The stamp of its end [ns], not used.
-
-        """
+        """Return the period of a number since the motion began: the first is 1, 0 is at rest."""
         if index < 1:
             return self._rest
         first = (index - 1) // _AT_ONCE * _AT_ONCE
@@ -217,17 +199,7 @@ class BaseOfTopics:
         self._last[:, GRAVITY] = parameters['gravity']
 
     def period(self, index: int, end: int) -> BasePeriod:
-        """
-        Return a period.
-
-        Parameters
-        ----------
-        index : int
-            Number of the period, not used.
-        end : int
-            The stamp of its end [ns].
-
-        """
+        """Return the period that ends at a stamp [ns]."""
         rows: Array = np.array(
             [self.input.at(round(end - halves * self._half)) for halves in (2, 1, 0)])
         known = bool(np.max(np.abs(rows)) < LARGEST)  # not where it is nan

@@ -61,11 +61,7 @@ def substeps(parameters: Parameters) -> int:
     """
     Return into how many parts the step of the parameters must be divided.
 
-    Raises
-    ------
-    ParameterError
-        These would be too many; names the parameter.
-
+    Raises ParameterError if they would be too many, with the parameter that is too large.
     """
     step = parameters['step']
     with np.errstate(all='ignore'):
@@ -116,15 +112,8 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
     A force along leg i moves the platform's joint along the leg by no more than
     1 / m + |p_i - c|^2 / I_min, of the platform alone, times the force; the sum of these
     products is the trace of a matrix with these eigenvalues. The reflected masses in series give
-    another bound; the masses of the legs would only make it smaller.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Geometry, platform and reflected masses.
-    of_legs : (6,)
-        Damping [N s/m] or stiffness [N/m] of each leg.
-
+    another bound; the masses of the legs would only make it smaller. ``of_legs`` (6,) are dampings
+    [N s/m] or stiffnesses [N/m].
     """
     arms = parameters['geometry.platform_joints'] - parameters['platform.center_of_mass']
     smallest = np.linalg.eigvalsh(inertia_matrix(parameters['platform.inertia']))[0]
@@ -169,12 +158,8 @@ class Plant:
     could reverse it, the hexapod is held at rest in the last pose that could be, permanently:
     ``fault`` states it.
 
-    Raises
-    ------
-    ParameterError
-        The initial pose exceeds a limit of length, or friction or end stops would need too short
-        steps.
-
+    Raises ParameterError if the initial pose exceeds a limit of length, or friction or end stops
+    would need too short steps.
     """
 
     def __init__(self, parameters: SimulatorParameters) -> None:
@@ -214,17 +199,10 @@ class Plant:
         """
         Return the state one period later.
 
-        Parameters
-        ----------
-        commands : (6,)
-            Forces of the actuators [N], + pushes, that saturate at limits.force_max; or torques of
-            the motors [N m] that saturate at drive.torque_max and drive.torque_speed.
-        wrench : (6,)
-            External wrench on the platform at its origin, base axes [N, N m].
-        base : (3, BASE), optional
-            How the base moves at begin, middle and end of the period, see ``mechanics.rows``;
-            not at all by default.
-
+        Commands are forces of the actuators [N], + pushes, that saturate at limits.force_max; or
+        torques of the motors [N m] that saturate at drive.torque_max and drive.torque_speed. The
+        wrench acts on the platform at its origin, base axes [N, N m]. ``base`` (3, BASE) are rows
+        of its motion at begin, middle and end of the period; by default it is still.
         """
         if not self.fault:
             self._loads[:BASE_BEGIN.start] = commands + wrench
