@@ -41,7 +41,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
     COLORS, Hexapod, LegDescription, RigidBody, shapes, solids, VisualShape)
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, LEG_BODIES, numbers, text_of)
+    add, CARRIED, carried, inertia_texts, LEG_BODIES, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 
 _VERSION = '1.9'
@@ -158,9 +158,8 @@ def _inertial(link: ET.Element, body: RigidBody) -> None:
     _pose(inertial, body.center, np.eye(3))
     add(inertial, 'mass', numbers(body.mass))
     inertia = add(inertial, 'inertia')
-    for tag, value in zip(('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'),
-                          body.inertia[np.triu_indices(3)], strict=True):
-        add(inertia, tag, numbers(value))
+    for tag, text in inertia_texts(body).items():
+        add(inertia, tag, text)
 
 
 def _shapes(link: ET.Element, looks: Sequence[VisualShape]) -> None:

@@ -37,7 +37,7 @@ from stewart_dynamics.description.hexapod import (
     COLORS, Hexapod, LegDescription, PASSIVE_RATE, RigidBody, shapes, solids, UNLIMITED,
     VisualShape)
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, numbers, text_of)
+    add, CARRIED, carried, inertia_texts, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.kinematics.leg_joints import PLATFORM_JOINTS
 
@@ -136,12 +136,9 @@ def _link(root: ET.Element, body: RigidBody, looks: Sequence[VisualShape]) -> No
         inertial = add(link, 'inertial')
         add(inertial, 'origin', xyz=numbers(body.center))
         add(inertial, 'mass', value=numbers(body.mass))
-        add(inertial, 'inertia', **{
-            name: numbers(value) for name, value in zip(
-                ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'),
-                body.inertia[np.triu_indices(3)], strict=True)})
-    for kind in ('visual', 'collision'):
-        for shape in looks if kind == 'visual' else solids(looks):
+        add(inertial, 'inertia', **inertia_texts(body))
+    for kind, some in (('visual', looks), ('collision', solids(looks))):
+        for shape in some:
             one = add(link, kind)
             _origin(one, shape.position, shape.rotation)
             _geometry(one, shape)

@@ -24,6 +24,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics import __version__
+from stewart_dynamics.description.hexapod import RigidBody
 from stewart_dynamics.parameters.table import Parameters
 
 CARRIED = 'stewart_dynamics'
@@ -38,6 +39,8 @@ _IN_ELEMENTS = frozenset((
     *LIMITS, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
     'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
     'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'))
+INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+"""Names of the inertia in URDF and SDFormat."""
 NOT_CHECKED = 'none'
 """Value there of a limit that is not checked."""
 
@@ -45,6 +48,12 @@ NOT_CHECKED = 'none'
 def numbers(*values: Any) -> str:
     """Return numbers and arrays as text that reads back equal."""
     return ' '.join(repr(float(each) + 0.0) for value in values for each in np.ravel(value))
+
+
+def inertia_texts(body: RigidBody) -> dict[str, str]:
+    """Return the inertia of a body as text by its names."""
+    values = body.inertia[np.triu_indices(3)]
+    return {name: numbers(value) for name, value in zip(INERTIA, values, strict=True)}
 
 
 def add(parent: ET.Element, tag: str, text: str | None = None, **attributes: str) -> ET.Element:

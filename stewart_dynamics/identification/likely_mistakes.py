@@ -38,14 +38,14 @@ from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.least_squares import (
-    Information, information, no_information, solve)
+    Information, information, solve)
 from stewart_dynamics.parameters.table import AUTO, Parameters, STANDARD_GRAVITY
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
 _NEAR = 1.35
-# A scale that differs from 1 by a larger ratio is a mistake.
-_FAR = 2.0
+# A scale that differs from 1 by a larger ratio is a mistake; a smaller one is that of torques.
+_FAR, _TORQUES = 2.0, 0.05
 _FACTORS = ((1e-3, 'kN in place of N'), (-1.0 / STANDARD_GRAVITY[2], 'kgf in place of N'),
             (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
 # A residual above this fraction of the efforts starts the search for swapped legs.
@@ -119,31 +119,28 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, of_motors: bool,
         return
     if 1.0 / _FAR < scale < _FAR:
         return
-    lead = p['actuator.screw_lead']
+    lead, ratio = p['actuator.screw_lead'], p['drive.gear_ratio']
+    torques = 'likely torques of the motors in place of forces: --motor-torque takes them'
+    units = [unit for factor, unit in _FACTORS if _is_near(scale, factor)]
     if of_motors:
-        yield LikelyMistake(
-            'scale', f'the efforts are {scale:.3g} times what the model computes: likely '
-            f'actuator.screw_lead, {lead[0]:g} m, is wrong: about '
-            f'{lead[0] * scale:.3g} m would fit; or drive.gear_ratio, '
-            f'{p["drive.gear_ratio"][0]:g}: about {p["drive.gear_ratio"][0] / scale:.3g}')
-        return
-    torque = 1.0 if lead is None else float(np.mean(1.0 / motor_ratio(p)))
-    if lead is not None and 1.0 / _NEAR < scale / torque < _NEAR:
-        yield LikelyMistake(
-            'torque', f'the efforts are {scale:.3g} times what the model computes: '
-            'likely torques of the motors in place of forces: --motor-torque takes them')
-        return
-    for factor, unit in _FACTORS:
-        if 1.0 / _NEAR < scale / factor < _NEAR:
-            yield LikelyMistake(
-                'unit', f'the efforts are {scale:.3g} times what the model computes: '
-                f'likely {unit}')
-            return
-    yield LikelyMistake('torque' if scale < 0.05 else 'scale', (
-        f'the efforts are {scale:.3g} times what the model computes: ' + (
-            'likely torques of the motors in place of forces: --motor-torque takes them, with '
-            f'actuator.screw_lead (a lead of {2.0 * np.pi * scale:.2g} m would fit)'
-            if scale < 0.05 else 'another unit, or a wrong platform.mass')))
+        what, likely = 'scale', (
+            f'likely actuator.screw_lead, {lead[0]:g} m, is wrong: about {lead[0] * scale:.3g} m '
+            f'would fit; or drive.gear_ratio, {ratio[0]:g}: about {ratio[0] / scale:.3g}')
+    elif lead is not None and _is_near(scale, float(np.mean(1.0 / motor_ratio(p)))):
+        what, likely = 'torque', torques
+    elif units:
+        what, likely = 'unit', f'likely {units[0]}'
+    elif scale < _TORQUES:
+        what, likely = 'torque', (f'{torques}, with actuator.screw_lead (a lead of '
+                                  f'{2.0 * np.pi * scale:.2g} m would fit)')
+    else:
+        what, likely = 'scale', 'another unit, or a wrong platform.mass'
+    yield LikelyMistake(
+        what, f'the efforts are {scale:.3g} times what the model computes: {likely}')
+
+
+def _is_near(scale: float, factor: float) -> bool:
+    return 1.0 / _NEAR < scale / factor < _NEAR
 
 
 def of_fit(p: Parameters, extraction: Extraction, window: Window, fit: Fit,
@@ -200,23 +197,16 @@ def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, f
     many = len(unknowns.linear)  # a tilt does not change the scale
     theta = unknowns.theta(unknowns.start)
     known = len(theta)
-    total = no_information(many + 1)
-    for bag in range(len(sums.counts)):
-        for leg in range(6):
-            gram, count = sums.grams[bag, leg], sums.counts[bag, leg]
-            if not count:
-                continue
-            # efforts = scale known + Y theta'
-            columns = np.zeros((len(gram), many + 1))
-            columns[:many, :many] = np.diag(unknowns.linear_scales)
-            columns[known, many] = 1.0
-            if platform_too:
-                columns[:known, many] = theta
-            effort = np.zeros(len(gram))
-            effort[known + 1] = 1.0
-            total = total.plus(Information(
-                columns.T @ gram @ columns, columns.T @ gram @ effort,
-                float(effort @ gram @ effort), int(count)))
+    gram = sums.grams.sum(axis=(0, 1))
+    # efforts = scale known + Y theta'
+    columns = np.zeros((len(gram), many + 1))
+    columns[:many, :many] = np.diag(unknowns.linear_scales)
+    columns[known, many] = 1.0
+    if platform_too:
+        columns[:known, many] = theta
+    total = Information(
+        columns.T @ gram @ columns, columns.T @ gram[known + 1],
+        float(gram[known + 1, known + 1]), int(sums.counts.sum()))
     if not total.rows or total.squares <= 0.0:
         return float('nan'), float('inf')
     if platform_too:

@@ -39,52 +39,31 @@ _PYTHON_TYPES: Mapping[str, Any] = {'string': str, 'double': float, 'bool': bool
 
 
 class Parameter(NamedTuple):
-    """
-    The declaration of one parameter.
-
-    Attributes
-    ----------
-    name : str
-        Dotted, as in a file.
-    kind : str
-        Type in ROS, for an array the type of an entry: string, double or bool.
-    text : str
-        Meaning, for the documents, ``--help`` and ROS's description.
-    unit : str
-        SI; empty for a number without a unit.
-    default : object
-        The value if it is not given; an empty tuple: no value, unlimited.
-    required : bool
-        Whether it must be given.
-    sizes : tuple of int
-        The lengths that an array may have, empty for a single value; an array of length 1 or 6
-        may also be given as a single value, for all legs.
-    repeated : bool
-        Whether an array has any number of rows, one after the other, of its one length each.
-    minimum, maximum : float
-        Bounds of every entry.
-    above : bool
-        Whether ``minimum`` itself is out of range.
-    choices : tuple of str
-        The accepted texts.
-    while_active : bool
-        Whether it may be changed while the node is active.
-
-    """
+    """The declaration of one parameter."""
 
     name: str
+    """Dotted, as in a file."""
     kind: str
+    """Type in ROS, for an array the type of an entry: string, double or bool."""
     text: str
+    """Meaning, for the documents, ``--help`` and ROS's description."""
     unit: str = ''
     default: Any = None
+    """The value if it is not given; an empty tuple: no value, unlimited."""
     required: bool = False
     sizes: tuple[int, ...] = ()
+    """The lengths that an array may have, empty for a single value; an array of length 1 or 6
+    may also be given as a single value, for all legs."""
     repeated: bool = False
+    """Whether an array has any number of rows, one after the other, of its one length each."""
     minimum: float = -math.inf
     maximum: float = math.inf
     above: bool = False
+    """Whether ``minimum`` itself is out of range."""
     choices: tuple[str, ...] = ()
+    """The accepted texts."""
     while_active: bool = False
+    """Whether it may be changed while the node is active."""
 
     @property
     def ros_type(self) -> str:
@@ -183,22 +162,9 @@ class ParameterSet(Mapping[str, Any]):
     A complete, checked set of parameters under their dotted names; immutable.
 
     Arrays are read-only numpy arrays: joints (6, 3), values of the legs (6,); limits that are not
-    checked are None.
-
-    Parameters
-    ----------
-    values : mapping of dotted name to value
-        As YAML, ROS or Python give them; None stands for the default.
-    source : str
-        Where they come from, for the text of an error.
-    exact_types : bool
-        Reject an integer in place of a double, as ROS does.
-
-    Raises
-    ------
-    ParameterError
-        At the first rule that is broken.
-
+    checked are None. None as a given value stands for the default. ``source`` names where the
+    values come from in the text of an error; ``exact_types`` rejects an integer in place of a
+    double, as ROS does. Raises ParameterError at the first rule that is broken.
     """
 
     table: ClassVar[Mapping[str, Parameter]]

@@ -130,13 +130,16 @@ class SimulatorParameters(Parameters):
                     f'{source}: commands: {TORQUE}: drive.back_driving_efficiency {least:.3g}: '
                     'a self-locking screw can be simulated with commanded forces only')
         steps = 1.0 / (self['rate'] * self['step'])
-        if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=1e-9):
+        if not _is_whole(steps):
             raise ParameterError(
                 f'{source}: rate: {self["rate"]} Hz: a period must be a whole number of steps of '
                 f'{self["step"]:g} s, not {steps:.6g}')
         periods = self['rate'] / self['imu.rate']
-        if self['base_motion.source'] != 'fixed' and (
-                round(periods) < 1 or not math.isclose(periods, round(periods), rel_tol=1e-9)):
+        if self['base_motion.source'] != 'fixed' and not _is_whole(periods):
             raise ParameterError(
                 f'{source}: imu.rate: {self["imu.rate"]} Hz: rate, {self["rate"]:g} Hz, must be a '
                 f'whole multiple of it, not {periods:.6g}')
+
+
+def _is_whole(ratio: float) -> bool:
+    return round(ratio) >= 1 and math.isclose(ratio, round(ratio), rel_tol=1e-9)
