@@ -26,7 +26,8 @@ from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
-from stewart_dynamics.identification.windows import period_of, segments, Signal, uniform, Window
+from stewart_dynamics.identification.windows import (
+    FEWEST, period_of, segments, Signal, uniform, Window)
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, MISSING_JOINTS
 from stewart_dynamics.messages.recorded import Messages
@@ -100,7 +101,7 @@ class RecordedLegs:
             self._take(messages)
             if progress is not None:
                 progress(size)
-            while len(self._legs) > _WINDOW and (self._one or len(self._efforts) > 8):
+            while len(self._legs) > _WINDOW and (self._one or len(self._efforts) > FEWEST):
                 yield from self._released(last=False)
         yield from self._released(last=True)
         for reader in self._readers.values():
@@ -150,7 +151,7 @@ class RecordedLegs:
     def _released(self, last: bool) -> Iterator[Window]:
         """Yield windows of the buffered samples, and keep those that the next one needs."""
         legs, efforts = self._legs.signal(), self._efforts.signal()
-        if len(legs.stamps) < 8 or len(efforts.stamps) < 8:
+        if len(legs.stamps) < FEWEST or len(efforts.stamps) < FEWEST:
             self._legs.keep_from(int(legs.stamps[-1]) if len(legs.stamps) else 0)
             return
         if not self.period:
@@ -158,7 +159,7 @@ class RecordedLegs:
         end = min(int(legs.stamps[-1]), int(efforts.stamps[-1]))
         for part in segments(legs.stamps, self.period):
             inner = Signal(legs.stamps[part], legs.values[part]).between(0, end)
-            if len(inner.stamps) < 8:
+            if len(inner.stamps) < FEWEST:
                 continue
             pushes = efforts.between(
                 int(inner.stamps[0]) - SECOND, int(inner.stamps[-1]) + SECOND)

@@ -97,9 +97,6 @@ class Unknowns:
     """
 
     def __init__(self, parameters: Parameters, kinds: Sequence[str] = DEFAULT) -> None:
-        for kind in kinds:
-            if kind not in KINDS:
-                raise ParameterError(f'{kind}: cannot be identified; known are {", ".join(KINDS)}')
         self._parameters = p = parameters
         self._theta = linear_parameters(p)
         of_platform = np.zeros(PLATFORM, dtype=bool)

@@ -28,6 +28,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
 
+# Minimum number of samples of a window.
+FEWEST = 8
 # A longer time between two samples, in periods, is a gap.
 GAP = 4.0
 # A sample is an outlier if it deviates from the cubic through its neighbours by more than this
@@ -97,12 +99,12 @@ def uniform(legs: Signal, efforts: Signal, period: float) -> Window | None:
     ``legs`` are positions (N, 6), or (N, 12) with rates; ``efforts`` (M, 6) have stamps of their
     own.
     """
-    if len(legs.stamps) < 8 or len(efforts.stamps) < 8:
+    if len(legs.stamps) < FEWEST or len(efforts.stamps) < FEWEST:
         return None
     begin = max(int(legs.stamps[0]), int(efforts.stamps[0]))
     end = min(int(legs.stamps[-1]), int(efforts.stamps[-1]))
     many = int((end - begin) * 1e-9 / period + 1e-6) + 1
-    if many < 8:
+    if many < FEWEST:
         return None
     at = period * np.arange(many, dtype=float)
     positions, replaced = _without_outliers(legs.values[:, :6], 0.0)

@@ -79,7 +79,8 @@ class ImuWriter:
 
     def __init__(self, frame: str, angular_velocity: float, specific_force: float) -> None:
         self._writer = StampedWriter(frame, _NUMBERS)
-        self._covariances = [_diagonal(angular_velocity ** 2), _diagonal(specific_force ** 2)]
+        self._covariances = [(deviation ** 2 * np.eye(3)).ravel().tolist()
+                             for deviation in (angular_velocity, specific_force)]
 
     def write(self, stamp: int, angular_velocity: Sequence[float],
               specific_force: Sequence[float]) -> bytes:
@@ -87,7 +88,3 @@ class ImuWriter:
         of_gyro, of_accelerometer = self._covariances
         return self._writer.write(stamp, (
             *_NOT_MEASURED, *angular_velocity, *of_gyro, *specific_force, *of_accelerometer))
-
-
-def _diagonal(variance: float) -> tuple[float, ...]:
-    return variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance
