@@ -16,8 +16,8 @@
 """
 One MCAP file, whole, cut short or damaged: its valid messages in the order of time.
 
-An index with a correct checksum is used. Otherwise the records are followed from the beginning to
-the first damaged one; nothing after it is read.
+Chunks are found by the index if its checksum is correct. Otherwise the records are followed from
+the beginning to the first damaged one; nothing after it is read.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from collections.abc import Iterator, Mapping
 from heapq import heappop, heappush
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 import zlib
 
 import lz4.frame
@@ -39,7 +39,7 @@ import numpy as np
 from stewart_dynamics.arrays import Integers
 from stewart_dynamics.bags.blocks import (
     compact, cost, described, IN_A_BLOCK, LARGEST_CHUNK, LATEST, merged, split)
-from stewart_dynamics.bags.mcap_scan import HEAD, IGNORED, NUMBERS, Scan, scanned, UNDECLARED
+from stewart_dynamics.bags.mcap_scan import HEAD, IGNORED, NUMBERS, Scan, scanned
 from stewart_dynamics.errors import BagError, one_line, shown
 from stewart_dynamics.messages.recorded import Messages
 import zstandard
@@ -48,14 +48,11 @@ MAGIC = b'\x89MCAP0\r\n'
 
 _FOOTER = HEAD + 20 + len(MAGIC)
 _DATA_END = bytes([Opcode.DATA_END, 4, 0, 0, 0, 0, 0, 0, 0])
-_EMPTY_CHUNK = 64  # bytes; a chunk with a message is longer
 _LARGEST_INDEX = 1 << 28
 _WINDOW = 1 << 20
 _MOST_WAITING = 1 << 27
-_NO_TOPIC = np.full(NUMBERS, IGNORED)
+_OPCODES = {Schema: Opcode.SCHEMA, Channel: Opcode.CHANNEL}
 _ANY_TOPIC = np.zeros(NUMBERS, np.int64)
-_CONTRADICTORY = 'a damaged or contradictory record of a topic or type'
-_DECLARATIONS: dict[int, Any] = {-Opcode.SCHEMA: Schema, -Opcode.CHANNEL: Channel}
 _IN_CHUNK = np.isin(np.arange(256), [Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE])
 _IN_DATA = _IN_CHUNK | np.isin(np.arange(256), [
     Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA])
@@ -73,37 +70,23 @@ class _Piece(NamedTuple):
 
 class McapFile:
     """
-    The valid messages of an MCAP file.
+    The valid messages of an MCAP file, see Source.
 
     Raises BagError if it is not an MCAP file, OSError if it cannot be read.
-
-    Attributes
-    ----------
-    missing : list of str
-        Descriptions of the parts that could not be read.
-    unchecked : bool
-        Messages without a checksum were read.
-
     """
 
     def __init__(self, path: Path) -> None:
         self.missing: list[str] = []
         self.unchecked = False
-        self._types: dict[int, str] = {}
+        self._types: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
-        self._declared: set[int] = set()
-        self._undeclared = 0
+        self._declared = 0  # bytes of both
         self._file = path.open('rb')
         try:
             if self._file.read(len(MAGIC)) != MAGIC:
                 raise BagError('does not begin like an MCAP file')
             self._size = self._file.seek(0, 2)
-            pieces = self._indexed()
-            if pieces is None:
-                for known in (self._types, self._channels, self._declared):
-                    known.clear()
-                pieces = self._followed()
-            self._pieces = sorted(pieces)
+            self._pieces = sorted(self._indexed() or self._followed())
         except BaseException:
             self._file.close()
             raise
@@ -112,30 +95,28 @@ class McapFile:
     def topics(self) -> dict[str, str]:
         """Return the type of each topic, and its encoding if that is not CDR."""
         return described(
-            (channel.topic, self._types.get(channel.schema_id) or 'message without a type',
-             channel.message_encoding) for channel in self._channels.values())
+            (channel.topic, self._types[channel.schema_id].name if channel.schema_id in self._types
+             else 'message without a type', channel.message_encoding)
+            for channel in self._channels.values())
 
     def blocks(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
         """Yield the messages of these topics, see Source; those of one time in file order."""
         names = tuple(dict.fromkeys(keys.values()))
-        numbers = np.full(NUMBERS, UNDECLARED)
+        numbers = np.full(NUMBERS, IGNORED)
         for number, channel in self._channels.items():
-            numbers[number] = (names.index(keys[channel.topic]) if channel.topic in keys
-                               else IGNORED)
+            if channel.topic in keys:
+                numbers[number] = names.index(keys[channel.topic])
         # First time, position in the file, messages.
         waiting: list[tuple[int, tuple[int, int], Messages]] = []
         starts = [*(piece.time for piece in self._pieces), LATEST + 1]
         reached, held, read = -1, 0, 0
-        self._undeclared = 0
-        for n, piece in enumerate(self._pieces):
-            until = starts[n + 1]  # later pieces contain nothing earlier
+        for piece, until in zip(self._pieces, starts[1:], strict=True):
+            # Later pieces contain nothing before ``until``.
             read += piece.length
             for first, part in self._parts(piece, names, numbers, reached):
                 held += cost(part)
                 heappush(waiting, (int(part.times[0]), (piece.start, first), part))
-            if held > _MOST_WAITING and until <= LATEST:
-                self._note(f'chunks overlap in time by more than {_MOST_WAITING >> 20} MB of '
-                           'messages: those too late to be sorted are not read')
+            if held > _MOST_WAITING:
                 until = LATEST + 1
             ready = []
             while waiting and waiting[0][0] < until:
@@ -151,8 +132,6 @@ class McapFile:
                 ready.sort(key=lambda each: each[0])
                 yield merged([part for _, part in ready]), read
                 read = 0
-        if self._undeclared:
-            self._note('messages on a channel that no valid record declares')
 
     def close(self) -> None:
         """Close the file."""
@@ -164,15 +143,14 @@ class McapFile:
         found = self._content(piece, numbers)
         if found is None:
             return []
-        self._undeclared += found.undeclared
-        block = Messages(names, found.kinds, found.times, found.data, found.starts, found.sizes)
+        block = Messages(names, found.kinds, found.values, found.data, found.starts, found.sizes)
         if np.any(block.of_topic < 0):
             block = block.chosen(block.of_topic >= 0)
         if np.any(block.times[1:] < block.times[:-1]):
             block = block.chosen(np.argsort(block.times, kind='stable'))
         if len(block.times) and block.times[0] < reached:
-            self.missing.append(f'the chunk at byte {piece.start - HEAD}: part of it is earlier '
-                                'than its declared start')
+            self._note(f'chunks overlap in time by more than {_MOST_WAITING >> 20} MB of '
+                       'messages: those too late to be sorted are not read')
             block = block.chosen(block.times >= reached)
         return [(first, compact(block.chosen(slice(first, first + IN_A_BLOCK))))
                 for first in range(0, len(block.times), IN_A_BLOCK)]
@@ -186,77 +164,61 @@ class McapFile:
         if what not in self.missing:
             self.missing.append(what)
 
-    def _indexed(self) -> list[_Piece] | None:
-        """Return the chunks by the index at the end of the file; None if it cannot be used."""
+    def _indexed(self) -> list[_Piece]:
+        """Return the chunks by the index at the end of the file, if it is there and complete."""
         try:
             tail = self._read_at(max(self._size - _FOOTER, 0), _FOOTER)
             footer = next(StreamReader(BytesIO(tail), skip_magic=True).records)
             if not isinstance(footer, Footer) or not tail.endswith(MAGIC):
                 raise ValueError
-            start = footer.summary_start
+            start, size = footer.summary_start, self._size - footer.summary_start
             if not start or not footer.summary_crc:
-                return None
-            if not _FOOTER <= self._size - start <= _LARGEST_INDEX:
+                return []
+            if not _FOOTER <= size <= _LARGEST_INDEX:
                 raise ValueError
-            summary = self._read_at(start, self._size - start)
+            summary = self._read_at(start, size)
             if zlib.crc32(summary[:-len(MAGIC) - 4]) != footer.summary_crc:
                 raise ValueError
-            chunks: list[_Piece] = []
-            statistics = None
-            for record in StreamReader(BytesIO(summary), skip_magic=True).records:
-                if isinstance(record, ChunkIndex):
-                    chunks.append(_Piece(
-                        min(record.message_start_time, LATEST), record.chunk_start_offset + HEAD,
-                        record.chunk_length - HEAD, True))
-                elif isinstance(record, Statistics):
-                    statistics = record
-                elif isinstance(record, Schema | Channel):
-                    self._declare(record)
+            records = [*StreamReader(BytesIO(summary), skip_magic=True).records]
         except Exception:  # any bytes can be there
-            self.missing.append('the index at the end of the file')
-            return None
-        # No chunk is listed twice: the time of reading grows with the size of the file.
-        chunks.sort(key=lambda each: each.start)
-        ends = [each.start - HEAD for each in chunks[1:]] + [start] * bool(chunks)
-        if statistics is None or statistics.chunk_count != len(chunks) or (
-                statistics.message_count and not chunks) or any(
-                each.start + each.length > end for each, end in zip(chunks, ends, strict=True)):
-            return None
-        return chunks
+            self._note('the index at the end of the file')
+            return []
+        chunks = [each for each in records if isinstance(each, ChunkIndex)]
+        channels = {each.id: each for each in records if isinstance(each, Channel)}
+        counts = [(each.chunk_count, each.channel_count) for each in records
+                  if isinstance(each, Statistics)]
+        # The time of reading grows with the size of the file, not of the index.
+        if counts != [(len(chunks), len(channels))] or sum(
+                each.chunk_length for each in chunks) > start:
+            return []
+        self._channels = channels
+        self._types = {each.id: each for each in records if isinstance(each, Schema)}
+        return [_Piece(min(each.message_start_time, LATEST), each.chunk_start_offset + HEAD,
+                       each.chunk_length - HEAD, True) for each in chunks]
 
     def _followed(self) -> list[_Piece]:
         """Follow the records to the end of the data; return where messages are."""
         chunks, runs, at = list[_Piece](), list[_Piece](), len(MAGIC)
         while True:
-            found = scanned(self._read_at(at, _WINDOW), _ANY_TOPIC, _IN_DATA)
-            ends = at + found.starts + found.sizes
-            count = int(np.sum(ends <= self._size))  # only the last can extend beyond the file
-            if not count:
+            found = scanned(
+                self._read_at(at, _WINDOW), _ANY_TOPIC, _IN_DATA, self._size - at)
+            if not found.end:
                 break
-            loose = np.flatnonzero(found.kinds[:count] == 0)
-            if len(loose):
-                runs.append(_Piece(int(found.times[loose].min()), at, int(ends[loose[-1]]) - at,
-                                   False))
-            for n in np.flatnonzero(found.kinds[:count]):
-                kind, start, size = int(found.kinds[n]), int(found.starts[n]), int(found.sizes[n])
-                if kind == -Opcode.CHUNK and size > _EMPTY_CHUNK:
-                    chunks.append(_Piece(int(found.times[n]), at + start, size, True))
-                elif kind in _DECLARATIONS:
-                    try:
-                        self._read_declaration(
-                            kind, self._read_at(at + start, min(size, LARGEST_CHUNK)))
-                    except Exception as exc:  # any bytes can be there
-                        self._note(one_line(exc))
-            at = int(ends[count - 1])
+            self._declare(found, at)
+            chunks += [_Piece(0, at + int(found.starts[n]), int(found.sizes[n]), True)
+                       for n in np.flatnonzero(found.kinds == -Opcode.CHUNK)]
+            times = found.values[found.kinds == 0]
+            if len(times):
+                runs.append(_Piece(int(times.min()), at, found.end, False))
+            at += found.end
         end = self._read_at(at, HEAD + 4)
         if end[:HEAD] != _DATA_END:
-            self.missing.append(f'byte {at} to the end: the file is cut off, or no record begins '
-                                'there')
-        for piece in chunks:
-            self._content(piece, _NO_TOPIC, note=False)  # topics declared in chunks
-        if chunks and runs:  # a damaged record can look like a message
-            self._note('messages outside of chunks: no checksum covers them')
-        elif runs and end[:HEAD] == _DATA_END and any(end[HEAD:]):
+            self._note(f'byte {at} to the end: the file is cut off, or no record begins there')
+        if chunks:
+            if runs:  # a damaged record can look like a message
+                self._note('messages outside of chunks: no checksum covers them')
+            return [*self._timed(chunks)]
+        if runs and end[:HEAD] == _DATA_END and any(end[HEAD:]):
             checksum = 0
             for offset in range(0, at, _WINDOW):
                 checksum = zlib.crc32(self._read_at(offset, min(_WINDOW, at - offset)), checksum)
@@ -265,57 +227,58 @@ class McapFile:
                 return []
         else:
             self.unchecked = bool(runs)
-        return chunks or runs
+        return runs
 
-    def _read_declarations(self, found: Scan) -> None:
-        for n in np.flatnonzero(np.isin(found.kinds, list(_DECLARATIONS))):
-            start = found.starts[n]
-            self._read_declaration(
-                int(found.kinds[n]), found.data[start:start + found.sizes[n]].tobytes())
+    def _timed(self, chunks: list[_Piece]) -> Iterator[_Piece]:
+        """Yield the chunks that contain messages, and read their declarations."""
+        for chunk in chunks:
+            found = self._content(chunk, _ANY_TOPIC)
+            if found is not None:
+                self._declare(found)
+                times = found.values[found.kinds == 0]
+                # The time in the head of the chunk is not covered by its checksum.
+                if len(times):
+                    yield chunk._replace(time=int(times.min()))
 
-    def _read_declaration(self, kind: int, content: bytes) -> None:
-        """Note a schema or a channel, see ``_declare``; repetitions are not read again."""
-        if (known := hash((kind, content))) not in self._declared:
-            stream = ReadDataStream(BytesIO(content))
-            record = _DECLARATIONS[kind].read(stream)
-            if stream.count != len(content) or len(self._declared) >= 4 * NUMBERS:
-                raise ValueError(_CONTRADICTORY)
-            self._declare(record)
-            self._declared.add(known)
+    def _declare(self, found: Scan, offset: int | None = None) -> None:
+        """Keep topics and types, the first of each number, of a chunk or of records there."""
+        for kind, known in ((Schema, self._types), (Channel, self._channels)):
+            which = np.flatnonzero(found.kinds == -_OPCODES[kind])
+            numbers, firsts = np.unique(found.values[which], return_index=True)
+            for number, n in zip(numbers.tolist(), which[firsts].tolist(), strict=True):
+                if number in known:
+                    continue
+                start, size = int(found.starts[n]), int(found.sizes[n])
+                self._declared += size
+                try:
+                    if self._declared > LARGEST_CHUNK:
+                        raise ValueError(f'more than {LARGEST_CHUNK} bytes')
+                    content = (found.data[start:start + size].tobytes() if offset is None
+                               else self._read_at(offset + start, size))
+                    known[number] = kind.read(ReadDataStream(BytesIO(content)))
+                except Exception as exc:  # any bytes can be there
+                    self._note(f'topics and types: {one_line(exc)}')
 
-    def _declare(self, record: Schema | Channel) -> None:
-        """Note a schema or a channel; ValueError if it differs from an earlier one of its id."""
-        if isinstance(record, Schema):
-            same = self._types.setdefault(record.id, record.name) == record.name
-        else:
-            same = _used(self._channels.setdefault(record.id, record)) == _used(record)
-        if not same:
-            raise ValueError(_CONTRADICTORY)
-
-    def _content(self, piece: _Piece, numbers: Integers, note: bool = True) -> Scan | None:
+    def _content(self, piece: _Piece, numbers: Integers) -> Scan | None:
         """Return the records of a piece; None, and a note, if it is damaged."""
         try:
             if piece.length > LARGEST_CHUNK:
                 raise ValueError(f'{piece.length} bytes, at most {LARGEST_CHUNK} are read')
             data = (self._unpacked if piece.is_chunk else self._read_at)(piece.start, piece.length)
-            found = scanned(data, numbers, _IN_CHUNK if piece.is_chunk else _IN_DATA)
+            found = scanned(data, numbers, _IN_CHUNK if piece.is_chunk else _IN_DATA,
+                            len(data))
             if found.end != len(data):
                 raise ValueError('its records are inconsistent')
-            if piece.is_chunk:
-                self._read_declarations(found)
         except Exception as exc:  # damaged bytes: the decompressors raise any exception
-            if note:
-                self._note(f'the chunk at byte {piece.start - HEAD}: {one_line(exc)}')
+            self._note(f'the chunk at byte {piece.start - HEAD}: {one_line(exc)}')
             return None
         return found
 
     def _unpacked(self, offset: int, length: int) -> bytes:
         """
-        Return the records in a chunk.
+        Return the records in a chunk; raises any exception if they are damaged.
 
-        The package ``mcap`` does not limit the size of a chunk; here one is decompressed at most
-        to its declared size. Raises ValueError if a size, the compression or the checksum is
-        wrong; the decompressors raise other exceptions for damaged bytes.
+        Its size is limited, which the package ``mcap`` does not do.
         """
         if self._read_at(offset - HEAD, HEAD) != (
                 bytes([Opcode.CHUNK]) + length.to_bytes(8, 'little')):
@@ -342,7 +305,3 @@ class McapFile:
             raise ValueError('its checksum is wrong')
         self.unchecked = self.unchecked or not (chunk.uncompressed_crc or size == 0)
         return bytes(data)
-
-
-def _used(channel: Channel) -> tuple[int, str, str]:
-    return channel.schema_id, channel.topic, channel.message_encoding

@@ -24,12 +24,12 @@ import numpy as np
 from stewart_dynamics.arrays import Bytes, Flags, Integers
 from stewart_dynamics.compilation.functions import compiled, entry_point
 
-# Opcode and length in front of each record; the fields of a message in front of its data.
-HEAD, MESSAGE_HEAD = 9, 22
-# Entries of the table of channels: messages are skipped, or skipped and counted.
-IGNORED, UNDECLARED = -1, -2
+# Opcode and length in front of each record.
+HEAD = 9
 NUMBERS = 1 << 16
 """Possible channel numbers."""
+IGNORED = -1
+"""Entry of the table of channels: messages are skipped."""
 
 
 class Scan(NamedTuple):
@@ -37,17 +37,15 @@ class Scan(NamedTuple):
 
     kinds: Integers
     """(K,): the number of the topic of a message; minus the opcode of another record."""
-    times: Integers
-    """(K,): first field of eight bytes: the time of a message or the start of a chunk [ns]."""
+    values: Integers
+    """(K,): the time of a message [ns]; the first two bytes of another: number of a channel."""
     starts: Integers
     """(K,): start of the data of a message, or of the content of another record."""
     sizes: Integers
     """(K,): length of the data or content [bytes]."""
     data: Bytes
     end: int
-    """End of the last record; it may be outside of the data."""
-    undeclared: int
-    """Number of messages on undeclared channels."""
+    """End of the last record."""
 
 
 @compiled
@@ -72,51 +70,48 @@ def scan(data: Bytes, numbers: Integers, valid: Flags, found: Integers,
         The bytes of the records. The scan ends where the fields that it reads are not in them,
         or where the lengths in a message or a message index are inconsistent.
     numbers : (65536,)
-        Number of the topic of each channel, IGNORED or UNDECLARED.
+        Number of the topic of each channel, or IGNORED.
     valid : (256,)
         Whether records with an opcode may occur; the scan ends at others.
     found : (4, K)
         Output: see Scan. Records beyond K are only counted.
-    totals : (3,)
-        Output: K, end, undeclared, see Scan.
+    totals : (2,)
+        In: the second is the end that no record may exceed. Output: K and end, see Scan.
 
     """
-    count = at = undeclared = 0
+    count = at = 0
     while at + 9 <= len(data):
         opcode, begin, length = np.int64(data[at]), at + 9, _integer(data, at + 1, 8)
         # Fields up to this offset are read.
-        needed = 22 if opcode == 5 else 6 if opcode == 7 else 40 if opcode == 6 else 0
-        if not valid[opcode] or length < needed or length > (1 << 60) or (
+        needed = 22 if opcode == 5 else 6 if opcode == 7 else 2 if opcode in (3, 4) else 0
+        if not valid[opcode] or length < needed or length > totals[1] - begin or (
                 begin + needed > len(data)):
             break
         if opcode == 7 and _integer(data, begin + 2, 4) != length - 6:
             break
-        kind, first, skipped = -opcode, begin, 0
+        kind, value, skipped = -opcode, _integer(data, begin, 2), 0
         if opcode == 5:
-            kind = numbers[_integer(data, begin, 2)]
-            undeclared += kind == -2
-            first, skipped = begin + 6, 22
+            kind, value, skipped = numbers[value], _integer(data, begin + 6, 8), 22
         if opcode != 5 or kind >= 0:
             if count < found.shape[1]:
-                time = _integer(data, first, 8)
                 found[0, count] = kind
-                found[1, count] = time if time >= 0 else np.int64(9223372036854775807)
+                found[1, count] = value if value >= 0 else np.int64(9223372036854775807)
                 found[2, count] = begin + skipped
                 found[3, count] = length - skipped
             count += 1
         at = int(begin + length)
-    totals[0], totals[1], totals[2] = count, at, undeclared
+    totals[0], totals[1] = count, at
 
 
-def scanned(data: bytes, numbers: Integers, valid: Flags) -> Scan:
-    """Return the records in these bytes, see ``scan``."""
-    array, totals = np.frombuffer(data, np.uint8), np.empty(3, np.int64)
-    # For most chunks this is enough, and they are scanned once.
-    found = np.empty((4, min(len(data) // (HEAD + MESSAGE_HEAD), 8192) + 16), np.int64)
-    scan(array, numbers, valid, found, totals)
-    count, end, undeclared = totals.tolist()
-    if count > found.shape[1]:
-        found = np.empty((4, count), np.int64)
+def scanned(data: bytes, numbers: Integers, valid: Flags, limit: int) -> Scan:
+    """Return the records in these bytes that end before a limit, see ``scan``."""
+    array = np.frombuffer(data, np.uint8)
+    room = 8192  # for most chunks this is enough, and they are scanned once
+    while True:
+        found, totals = np.empty((4, room), np.int64), np.array([0, limit])
         scan(array, numbers, valid, found, totals)
-    kinds, times, starts, sizes = found[:, :count]
-    return Scan(kinds, times, starts, sizes, array, end, undeclared)
+        count, end = totals.tolist()
+        if count <= room:
+            kinds, values, starts, sizes = found[:, :count]
+            return Scan(kinds, values, starts, sizes, array, end)
+        room = count
