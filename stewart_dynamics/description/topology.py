@@ -116,7 +116,7 @@ class _Groups:
                 if len(self.joints[group]) >= LEGS]
 
     def parts(self, group: str) -> list[MechanismBody]:
-        """Return the bodies of a group; a world that is no body has none."""
+        """Return the bodies of a group, without a world that is no body."""
         return [self._parts[name] for name in self.members[group] if name in self._parts]
 
     def main(self, group: str) -> MechanismBody:

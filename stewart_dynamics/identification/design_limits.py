@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import math
+from typing import Any
 
 import numpy as np
 
@@ -28,16 +29,19 @@ from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS, OF_RESULTS, VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, MINIMA, OF_JOINTS, OF_RESULTS,
+    VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, FORCES, LENGTHS, MOTION, POSE, POSITION, RATES, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters.table import Parameters
 
 # Margins, as fractions of the stroke (at each end), rates, forces, and of joint angles and
 # clearance: the masses are not known yet, and a controller overshoots.
 _STROKE, _RATE, _FORCE, _ANGLE = 0.02, 0.1, 0.2, 0.1
 # Largest condition number, relative to singularity.warn_condition.
 _CONDITION = 0.5
+_WARN_CONDITION = 'singularity.warn_condition'
 
 
 class DesignLimits:
@@ -65,34 +69,16 @@ class DesignLimits:
             center = [*platform.home_pose().position.round(digits).tolist(), 0.0, 0.0, 0.0]
         self.center: Array = np.array(center, dtype=float)
         """X Y Z alpha beta gamma."""
-        low, high, rate, force = (
-            np.full(6, -np.inf if name == LENGTH_MIN else np.inf) if p[name] is None else p[name]
-            for name in (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX))
-        stroke = np.where(np.isfinite(high - low), high - low, 0.0)
-        self._low, self._high = low + _STROKE * stroke, high - _STROKE * stroke
-        self._rate, self._force = (1.0 - _RATE) * rate, (1.0 - _FORCE) * force
-        self._condition = _CONDITION * p['singularity.warn_condition']
-        row = np.zeros((1, MOTION))
         self._rotation = from_euler(self.center[3:]).ravel()
-        row[0, POSE] = *self.center[:3], *self._rotation
-        there = platform.solve(row)[0]
-        self._lengths, self._weights = there[LENGTHS], np.abs(there[FORCES])
-        self._condition_there = float(there[CONDITION])
-        bounds = {name: (1.0 - _ANGLE) * p[name] for name in OF_JOINTS if p[name] is not None}
-        self._angles = angles_to_check(p, tuple(bounds))
-        angles = self._angles(row)[0] if self._angles else np.zeros(0)
-        self._joints = {name: (angles[ANGLES[name]], bound) for name, bound in bounds.items()}
-        self._clearance = clearance_to_check(p)
-        self._clearance_min = (1.0 + _ANGLE) * (p[CLEARANCE_MIN] or 0.0)
-        self._clearance_there = self._clearance(row).min() if self._clearance else np.inf
-        for name, wrong in (
-                (LENGTH_MIN, self._lengths <= self._low),
-                (LENGTH_MAX, self._lengths >= self._high),
-                (FORCE_MAX, self._weights >= self._force),
-                ('singularity.warn_condition', self._condition_there >= self._condition),
-                (CLEARANCE_MIN, self._clearance_there <= self._clearance_min),
-                *((name, at >= bound) for name, (at, bound) in self._joints.items())):
-            if np.any(wrong):
+        self._bounds = _bounds(p)
+        self._of_joints = tuple(name for name in OF_JOINTS if name in self._bounds)
+        self._angles, self._clearance = angles_to_check(p, self._of_joints), clearance_to_check(p)
+        row = np.zeros((1, 1, MOTION))
+        row[..., POSE] = *self.center[:3], *self._rotation
+        self._there = {name: values[0, 0] for name, values in self._values(row)}
+        for name, there in self._there.items():
+            bound = self._bounds[name]
+            if np.any(there <= bound if name in MINIMA else there >= bound):
                 raise ParameterError(f'{name}: at the center of the motion the hexapod exceeds '
                                      'it, or is within its margin')
 
@@ -112,28 +98,43 @@ class DesignLimits:
                 if part[0] > 0.0}
 
     def _parts(self, rows: Array) -> dict[str, Array]:
-        many, samples = rows.shape[:2]
-        results = self._platform.solve(rows.reshape(-1, MOTION)).reshape(many, samples, -1)
-        lengths, rates = results[..., LENGTHS], np.abs(results[..., RATES])
-        forces = np.abs(results[..., FORCES])
+        """Return the fraction (M,) of the range from the center to each bound that is used."""
         parts = {
-            LENGTH_MIN: (self._lengths - lengths) / (self._lengths - self._low),
-            LENGTH_MAX: (lengths - self._lengths) / (self._high - self._lengths),
-            VELOCITY_MAX: rates / self._rate,
-            FORCE_MAX: (forces - self._weights) / (self._force - self._weights),
-            'singularity.warn_condition': (results[..., CONDITION, None] - self._condition_there)
-            / (self._condition - self._condition_there)}
-        if self._angles:
-            angles = self._angles(rows.reshape(-1, MOTION)).reshape(many, samples, -1)
-            for name, (at, bound) in self._joints.items():
-                parts[name] = (angles[..., ANGLES[name]] - at) / (bound - at)
-        if self._clearance:
-            clearances = self._clearance(rows.reshape(-1, MOTION)).reshape(many, samples, 6)
-            parts[CLEARANCE_MIN] = (self._clearance_there - clearances) / (
-                self._clearance_there - self._clearance_min)
+            name: (values - self._there[name]) / (self._bounds[name] - self._there[name])
+            for name, values in self._values(rows)}
         if self._amplitude is not None:
             moved = np.linalg.norm(rows[..., POSITION] - self.center[:3], axis=-1)
             turned = self._size * np.linalg.norm(
                 rows[..., ROTATION] - self._rotation, axis=-1) / np.sqrt(2.0)
             parts['--amplitude'] = np.maximum(moved, turned)[..., None] / self._amplitude
         return {name: part.max(axis=(1, 2)) for name, part in parts.items()}
+
+    def _values(self, rows: Array) -> Iterator[tuple[str, Array]]:
+        """Yield the values (M, N, ...) that each limit bounds, for motions (M, N, MOTION)."""
+        flat, shape = rows.reshape(-1, MOTION), rows.shape[:2]
+        results = self._platform.solve(flat).reshape(*shape, -1)
+        yield LENGTH_MIN, results[..., LENGTHS]
+        yield LENGTH_MAX, results[..., LENGTHS]
+        yield VELOCITY_MAX, np.abs(results[..., RATES])
+        yield FORCE_MAX, np.abs(results[..., FORCES])
+        yield _WARN_CONDITION, results[..., CONDITION, None]
+        if self._angles:
+            angles = self._angles(flat).reshape(*shape, -1)
+            for name in self._of_joints:
+                yield name, angles[..., ANGLES[name]]
+        if self._clearance:
+            yield CLEARANCE_MIN, self._clearance(flat).min(axis=-1).reshape(*shape, 1)
+
+
+def _bounds(p: Parameters) -> dict[str, Any]:
+    """Return the limits less their margins; infinite if not given."""
+    low, high, rate, force = (
+        np.full(6, -np.inf if name == LENGTH_MIN else np.inf) if p[name] is None else p[name]
+        for name in OF_RESULTS)
+    stroke = np.where(np.isfinite(high - low), high - low, 0.0)
+    return {
+        LENGTH_MIN: low + _STROKE * stroke, LENGTH_MAX: high - _STROKE * stroke,
+        VELOCITY_MAX: (1.0 - _RATE) * rate, FORCE_MAX: (1.0 - _FORCE) * force,
+        _WARN_CONDITION: _CONDITION * p[_WARN_CONDITION],
+        **{name: (1.0 - _ANGLE) * p[name] for name in OF_JOINTS if p[name] is not None},
+        CLEARANCE_MIN: (1.0 + _ANGLE) * (p[CLEARANCE_MIN] or 0.0)}
