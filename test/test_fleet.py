@@ -334,8 +334,8 @@ def test_a_process_that_dies_costs_only_its_bag(
         check_each_once(fleet, pairs, output)
         return
     check_only_the_long_one_failed(fleet, pairs, output)
-    assert fleet.ended[0].error == (f'{bags / "long"}: the process that replayed it was killed '
-                                    'twice (out of memory?)')
+    assert fleet.ended[0].error == (f'{bags / "long"}: every process that replayed it was killed '
+                                    '(out of memory?)')
 
 
 def test_processes_that_cannot_start_are_reported_at_once(bags: Path, tmp_path: Path) -> None:
@@ -579,8 +579,8 @@ def test_a_bag_that_kills_its_workers_does_not_affect_others(
             time.sleep(0.002)
         fleet = running.result()
     check_only_the_long_one_failed(fleet, pairs, output)
-    assert re.search(r'/long: the worker that replayed it died 2 times, the last one at '
-                     r'tcp://\S+ \(out of memory\?\)$', fleet.ended[0].error)
+    assert fleet.ended[0].error.endswith(
+        '/long: every process that replayed it was killed (out of memory?)')
     assert len(killed) == 2
 
 

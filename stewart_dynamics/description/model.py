@@ -35,7 +35,8 @@ from stewart_dynamics.mechanics.frames.rotation import (
     quaternion_of, quaternion_product, to_quaternion)
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
-from stewart_dynamics.messages.model import PositionsWriter, TransformWriter
+from stewart_dynamics.messages.joint_state import joint_state_layout
+from stewart_dynamics.messages.transforms import transforms
 from stewart_dynamics.parameters.table import Parameters
 
 JOINT_STATES = 'joint_states'
@@ -48,16 +49,17 @@ class ModelMessages:
 
     def __init__(self, parameters: Parameters) -> None:
         self._joints = TreeJoints(parameters)
-        self._positions = PositionsWriter(self._joints.names)
-        self._transform = TransformWriter(parameters['base_frame'], parameters['platform_frame'])
+        self._positions = joint_state_layout(self._joints.names, ['position'])
+        self._transform = transforms([(parameters['base_frame'], parameters['platform_frame'])])
 
     def joint_states(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the sensor_msgs/JointState of all joints at a pose, as in a row of motion."""
-        return self._positions.write(stamp, self._joints.of_sample(pose))
+        return self._positions.write_one(stamp, self._joints.of_sample(pose))
 
     def transform(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the tf2_msgs/TFMessage from ``base_frame`` to ``platform_frame`` at a pose."""
-        return self._transform.write(stamp, (*pose[POSITION], *quaternion_of(pose[ROTATION])))
+        return self._transform.write_one(
+            stamp, (*pose[POSITION], *quaternion_of(pose[ROTATION])))
 
 
 _SOURCE = Path('robot_description')  # of errors

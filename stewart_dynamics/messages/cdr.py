@@ -35,6 +35,7 @@ LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 # A builtin_interfaces/Time holds stamps below it [ns].
 STAMPS_END = 2 ** 31 * SECOND
 
+_TIME = Struct('<iI')
 # By the second byte of a message: 0 is big-endian, 1 little-endian.
 ORDERS = {0: '>', 1: '<'}
 TIME_AND_LENGTH = {0: Struct('>iII'), 1: Struct('<iII')}
@@ -140,9 +141,11 @@ def stamped(data: bytes, numbers: dict[int, Struct]) -> Stamped:
     return Stamped(nanoseconds(data, sec, nanosec), text(data, 16, size), values)
 
 
-def header(stamp: int) -> bytearray:
-    """Return a header with an empty frame_id, without the four bytes before it."""
-    return bytearray(TIME_AND_LENGTH[1].pack(*divmod(stamp, SECOND), 1) + b'\x00')
+def header(stamp: int, frame: str = '') -> bytearray:
+    """Return a header, without the four bytes before it."""
+    body = bytearray(_TIME.pack(*divmod(stamp, SECOND)))
+    put_text(body, frame)
+    return body
 
 
 def put_count(body: bytearray, number: int) -> None:

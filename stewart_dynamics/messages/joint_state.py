@@ -24,16 +24,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from operator import itemgetter
-from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Bytes, SECOND, Stamps
+from stewart_dynamics.arrays import Array, Bytes, Stamps
 from stewart_dynamics.messages.cdr import (
-    aligned8, COUNT, finite, LITTLE_ENDIAN, MALFORMED, MalformedError, nanoseconds, NOT_FINITE,
-    READ_ERRORS, sequence, short_sequence, text, TIME_AND_LENGTH)
+    aligned8, COUNT, finite, header, LITTLE_ENDIAN, MALFORMED, MalformedError, nanoseconds,
+    NOT_FINITE, put_count, put_text, READ_ERRORS, sequence, short_sequence, text, TIME_AND_LENGTH)
 from stewart_dynamics.messages.layout import Layout
 
 FIELDS = ('position', 'velocity', 'effort')
@@ -49,8 +48,6 @@ _SHOWN = 60
 _MOST_LAYOUTS = 8
 # Messages that are read at once.
 _AT_ONCE = 4096
-
-_ZEROS = (0.0,) * 6
 
 
 class JointStateError(ValueError):
@@ -267,47 +264,36 @@ class JointStateReader:
 
 
 class JointStateWriter:
-    """
-    Writes sensor_msgs/JointState of six joints with these names; frame_id is empty.
-
-    All but stamp and numbers is the same in every message and made once.
-    """
+    """Writes sensor_msgs/JointState of joints with these names; frame_id is empty."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        head = '<4siII1s'  # encapsulation, stamp, the empty frame_id and its zero byte
-        constant: list[object] = [1, b'\x00']
-        size = 13
-        for name in [None, *names]:
-            head += f'{-size % 4}x'
-            size += -size % 4
-            if name is None:
-                head, size = head + 'I', size + 4
-                constant.append(6)
-            else:
-                encoded = name.encode() + b'\x00'
-                head, size = head + f'I{len(encoded)}s', size + 4 + len(encoded)
-                constant += [len(encoded), encoded]
-        first = f'{-size % 4}xI'
-        size += -size % 4 + 4
-        doubles = f'{-size % 8}x6d'
-        at = 4 + size + -size % 8
-        # Each later count stands where doubles end, so that four bytes align what follows.
-        self._numbers = [(at, 6), (at + 56, 6), (at + 112, 6)]
-        self._whole = Struct(f'{head}{first}{doubles}I4x6dI4x6d')
-        self._without_effort = Struct(f'{head}{first}{doubles}I4x6dI')
-        self._constant = tuple(constant)
+        self._whole, self._without_effort = (
+            joint_state_layout(names, fields) for fields in (FIELDS, FIELDS[:2]))
 
     def write(self, stamp: int, position: Iterable[float], velocity: Sequence[float],
               effort: Sequence[float] | None) -> bytes:
         """Return the message, without effort if not given."""
-        sec, nanosec = divmod(stamp, SECOND)
         if effort is None:
-            return self._without_effort.pack(
-                LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position, 6, *velocity, 0)
-        return self._whole.pack(LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position,
-                                6, *velocity, 6, *effort)
+            return self._without_effort.write_one(stamp, position, velocity)
+        return self._whole.write_one(stamp, position, velocity, effort)
 
     def layout(self, effort: bool) -> Layout:
         """Return the layout of the messages with or without effort."""
-        numbers = self._numbers if effort else self._numbers[:2]
-        return Layout(self.write(0, _ZEROS, _ZEROS, _ZEROS if effort else None), numbers)
+        return self._whole if effort else self._without_effort
+
+
+def joint_state_layout(names: Sequence[str], fields: Sequence[str]) -> Layout:
+    """Return the layout of messages with these of FIELDS; the others are empty."""
+    body = bytearray(LITTLE_ENDIAN) + header(0)
+    put_count(body, len(names))
+    for name in names:
+        put_text(body, name)
+    numbers = []
+    for field in FIELDS:
+        count = len(names) if field in fields else 0
+        put_count(body, count)
+        if count:
+            body += bytes((4 - len(body)) % 8)
+            numbers.append((len(body), count))
+            body += bytes(8 * count)
+    return Layout(bytes(body), numbers)

@@ -21,7 +21,7 @@ others by comparing their bytes with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from operator import itemgetter
 from struct import Struct
 from typing import Any
@@ -43,63 +43,60 @@ class Layout:
         One of them.
     numbers : sequence of (offset, count)
         Where doubles stand in it, in the order of their offsets.
-    stamped : bool
-        It has a header.
+    stamps : sequence of int
+        Offsets of its stamps; by default that of a header, which reading requires.
     gaps : sequence of slice
         Bytes that may be anything: those that only align what follows.
 
     """
 
     def __init__(
-            self, message: bytes, numbers: Sequence[tuple[int, int]], stamped: bool = True,
+            self, message: bytes, numbers: Sequence[tuple[int, int]], stamps: Sequence[int] = (4,),
             gaps: Sequence[slice] = (),
     ) -> None:
         self.size = len(message)
         self._message = message
         order = ORDERS[message[1]]
-        free = np.zeros(self.size, dtype=bool)
-        fields: dict[str, tuple[Any, int]] = {}
-        if stamped:
-            free[4:12] = True
-            fields = {'sec': (f'{order}i4', 4), 'nanosec': (f'{order}u4', 8)}
-        self._parts = []
         numbers = [(at, count) for at, count in numbers if count]
-        for at, count in numbers:
-            free[at:at + 8 * count] = True
-            fields[f'numbers at {at}'] = ((f'{order}f8', (count,)), at)
-            self._parts.append(f'numbers at {at}')
-        for gap in gaps:
-            free[gap] = True
+        free = np.zeros(self.size, dtype=bool)
+        for part in (*(slice(at, at + 8) for at in stamps),
+                     *(slice(at, at + 8 * count) for at, count in numbers), *gaps):
+            free[part] = True
         # Runs of bytes that are the same in all messages.
         edges = np.flatnonzero(np.diff(free, prepend=True, append=True)).tolist()
         runs = list(zip(edges[::2], edges[1::2], strict=True))
-        self._fixed = {}
-        for begin, end in runs:
-            fields[f'fixed at {begin}'] = (f'V{end - begin}', begin)
-            self._fixed[f'fixed at {begin}'] = np.void(message[begin:end])
+        self._stamps = [f'stamp at {at}' for at in stamps]
+        self._parts = [f'numbers at {at}' for at, _ in numbers]
+        self._fixed = {f'fixed at {begin}': np.void(message[begin:end]) for begin, end in runs}
+        stamp = [('sec', f'{order}i4'), ('nanosec', f'{order}u4')]
         self._dtype = np.dtype({
-            'names': list(fields), 'formats': [kind for kind, _ in fields.values()],
-            'offsets': [at for _, at in fields.values()], 'itemsize': self.size})
+            'names': [*self._stamps, *self._parts, *self._fixed],
+            'formats': [*(stamp for _ in stamps),
+                        *((f'{order}f8', (count,)) for _, count in numbers),
+                        *(f'V{end - begin}' for begin, end in runs)],
+            'offsets': [*stamps, *(at for at, _ in numbers), *(begin for begin, _ in runs)],
+            'itemsize': self.size})
         self._prepare_one(order, sorted([
-            *((begin, f'{end - begin}s') for begin, end in runs),
-            *((at, f'{count}d') for at, count in numbers),
-            *([(4, 'iI')] if stamped else [])]))
+            *((begin, f'{end - begin}s') for begin, end in runs), *((at, 'iI') for at in stamps),
+            *((at, f'{count}d') for at, count in numbers)]))
 
-    def _prepare_one(self, order: str, places: Sequence[tuple[int, str]]) -> None:
-        """Prepare reading a single message by a Struct of its fixed fields, by offset."""
-        layout, constant, values, many = order, list[int](), list[int](), 0
-        for at, place in places:
-            layout += f'{at - Struct(layout).size}x{place}'
-            if place[-1] == 's':
-                constant.append(many)
-            elif place[-1] == 'd':
-                values += range(many, many + int(place[:-1]))
-            many = len(Struct(layout).unpack(bytes(Struct(layout).size)))
+    def _prepare_one(self, order: str, fields: Sequence[tuple[int, str]]) -> None:
+        """Prepare reading and writing of a single message by a Struct of its fields."""
+        layout, end = order, 0
+        # Of the fields of each kind: where their values are among all.
+        places: dict[str, list[slice]] = {'s': [], 'I': [], 'd': []}
+        for at, field in fields:
+            layout += f'{at - Struct(layout).size}x{field}'
+            begin, end = end, len(Struct(layout).unpack(bytes(Struct(layout).size)))
+            places[field[-1]].append(slice(begin, end))
         self._struct = Struct(f'{layout}{self.size - Struct(layout).size}x')
+        self._template = [*self._struct.unpack(self._message)]
+        self._stamp_places, self._number_places = places['I'], places['d']
+        values = [n for place in places['d'] for n in range(place.start, place.stop)]
         self._values: Callable[[tuple[Any, ...]], tuple[float, ...]] = (
             itemgetter(*values) if values else lambda fields: ())
-        self._constant = itemgetter(*constant)
-        self._expected = self._constant(self._struct.unpack(self._message))
+        self._constant = itemgetter(*(place.start for place in places['s']))
+        self._expected = self._constant(self._template)
 
     def read_one(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
         """Return stamp [ns] and numbers of a message with a stamp; None if of another layout."""
@@ -125,8 +122,9 @@ class Layout:
 
         """
         rows = at_any_byte(data, self.size)[starts].view(self._dtype)
-        stamps: Stamps = rows['sec'] * np.int64(SECOND) + rows['nanosec']
-        alike: Flags = rows['nanosec'] < SECOND
+        stamp, = (rows[name] for name in self._stamps)
+        stamps: Stamps = stamp['sec'] * np.int64(SECOND) + stamp['nanosec']
+        alike: Flags = stamp['nanosec'] < SECOND
         for name, fixed in self._fixed.items():
             alike &= rows[name] == fixed
         if not self._parts:
@@ -134,12 +132,23 @@ class Layout:
         numbers = np.concatenate([rows[name] for name in self._parts], axis=1)
         return alike, stamps, numbers.astype(float, copy=False)
 
+    def write_one(self, stamp: int, *numbers: Iterable[float]) -> bytes:
+        """Return a message of a stamp [ns] and the numbers of each part."""
+        fields = self._template.copy()
+        for place in self._stamp_places:
+            fields[place] = divmod(stamp, SECOND)
+        for place, values in zip(self._number_places, numbers, strict=True):
+            fields[place] = values
+        return self._struct.pack(*fields)
+
     def write(self, stamps: Integers | None, *numbers: Array) -> NDArray[np.void]:
         """Return messages (N,), each an entry of ``size`` bytes; each part's numbers (N, ...)."""
         rows = np.empty(len(numbers[0]), dtype=self._dtype)
         rows.view(np.uint8).reshape(-1, self.size)[:] = np.frombuffer(self._message, np.uint8)
         if stamps is not None:
-            rows['sec'], rows['nanosec'] = np.divmod(stamps, SECOND)
+            seconds, nanoseconds = np.divmod(stamps, SECOND)
+            for name in self._stamps:
+                rows[name]['sec'], rows[name]['nanosec'] = seconds, nanoseconds
         for name, values in zip(self._parts, numbers, strict=True):
             rows[name] = values
         return rows.view(f'V{self.size}')

@@ -24,9 +24,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from struct import Struct
 
-from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.messages.cdr import (
-    aligned8, COUNT, LITTLE_ENDIAN, MalformedError, nanoseconds, READ_ERRORS, sequence, SEVEN, SIX,
+    aligned8, COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, READ_ERRORS, sequence, SEVEN, SIX,
     Stamped, stamped, text, TIME_AND_LENGTH)
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.trajectory import points_of
@@ -113,12 +112,10 @@ class StampedWriter:
     """Writes PoseStamped (7 numbers), TwistStamped or AccelStamped (6) of geometry_msgs."""
 
     def __init__(self, frame: str, number: int) -> None:
-        self._frame = frame.encode() + b'\x00'
-        size = len(self._frame)
-        self._whole = Struct(f'<4siII{size}s{aligned8(16 + size) - 16 - size}x{number}d')
+        body = bytearray(LITTLE_ENDIAN) + header(0, frame)
+        body += bytes((4 - len(body)) % 8)
+        self.layout = Layout(bytes(body) + bytes(8 * number), [(len(body), number)])
 
     def write(self, stamp: int, values: Sequence[float]) -> bytes:
         """Return the message."""
-        sec, nanosec = divmod(stamp, SECOND)
-        return self._whole.pack(
-            LITTLE_ENDIAN, sec, nanosec, len(self._frame), self._frame, *values)
+        return self.layout.write_one(stamp, values)

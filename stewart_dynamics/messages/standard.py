@@ -79,5 +79,5 @@ def float64_values(data: bytes) -> tuple[float, ...]:
 
 
 # To write many of them at once.
-FLOAT64_ARRAY = Layout(float64_array((0.0,) * 6), [(20, 6)], stamped=False)
-FLOAT64 = Layout(float64(0.0), [(4, 1)], stamped=False)
+FLOAT64_ARRAY = Layout(float64_array((0.0,) * 6), [(20, 6)], stamps=())
+FLOAT64 = Layout(float64(0.0), [(4, 1)], stamps=())

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Iterator, Sequence
 import json
 from pathlib import Path
 import re
@@ -66,8 +66,8 @@ class Task(NamedTuple):
 
 At = Callable[[int, int, int], None]
 """Called with the number of a bag, its bytes read and its setpoints answered so far."""
-Results = Generator[tuple[int, Ended], None, None]
-"""Number and outcome of each bag, as they end; closing the generator stops the run."""
+Replayed = Callable[[Sequence[Task]], Iterator[tuple[Task, Ended | None]]]
+"""Yields the outcome of each bag, as they end; None if the process that replayed it has died."""
 
 
 class Cancelled(BaseException):

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Many bags on a Dask cluster; a bag whose worker died is started again."""
+"""Many bags on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from typing import Any
 
 from stewart_dynamics.errors import one_line, StewartError
 from stewart_dynamics.replay.bag_task import (
-    At, Cancelled, CLUSTER_INTERVAL, counted, Ended, failed, finished, replay_task, Results, Task)
+    At, Cancelled, CLUSTER_INTERVAL, counted, Ended, failed, finished, replay_task, Replayed, Task)
 
 # How long workers may take to remove partial results of a cancelled run [s].
 _PATIENCE = 20.0
@@ -37,9 +37,9 @@ _cancelled: set[str] = set()
 _in_work: set[tuple[str, int]] = set()
 
 
-def replay_on_cluster(tasks: Sequence[Task], address: str, at: At) -> Results:
-    """Replay on a cluster; ``at`` is called with the progress."""
-    run = tasks[0].options.run
+@contextmanager
+def cluster(address: str, run: str, at: At) -> Iterator[Replayed]:
+    """Yield a function that replays bags on the workers of a scheduler; an error cancels them."""
     dask = _dask()
     with _connected(dask, address) as client:
         client.subscribe_topic(run, lambda event: at(*event[1]))
@@ -48,52 +48,31 @@ def replay_on_cluster(tasks: Sequence[Task], address: str, at: At) -> Results:
         except (TimeoutError, asyncio.TimeoutError) as exc:
             raise StewartError(
                 f'{address}: this scheduler had no worker within {_PATIENCE:g} s') from exc
+        pending: dict[Any, Task] = {}
 
-        def submit(task: Task, attempt: int) -> Any:
-            task = task._replace(bag=task.bag.absolute(), folder=task.folder.absolute())
-            return client.submit(_on_worker, task, pure=False,
-                                 key=f'stewart_replay-{run}-{task.number}-{attempt}')
-
-        # A result is released at once: if the worker that holds it died, the bag would be
-        # replayed again.
-        pending = {submit(task, 1): task for task in tasks}
-        suspects: list[Task] = []
-        try:
+        def replayed(tasks: Sequence[Task]) -> Iterator[tuple[Task, Ended | None]]:
+            for task in tasks:
+                there = task._replace(bag=task.bag.absolute(), folder=task.folder.absolute())
+                pending[client.submit(_on_worker, there, pure=False)] = task
             for future in dask.as_completed(list(pending), loop=client.loop):
+                # A result is released at once: if the worker that holds it died, the bag would
+                # be replayed again.
                 task = pending.pop(future)
                 try:
-                    yield task.number, _result(dask, future, task)
+                    ended = future.result()
                 except dask.KilledWorker:
-                    suspects.append(task)
-            # Dask also blames bags that only waited for a worker that died: each is replayed
-            # alone now.
-            for task in suspects:
-                pending = {(future := submit(task, 2)): task}
-                try:
-                    ended = _result(dask, future, task)
-                except dask.KilledWorker as exc:
-                    ended = failed(
-                        task, 'the worker that replayed it died '
-                        f'{2 * (exc.allowed_failures + 1)} times, the last one at '
-                        f'{exc.last_worker.address} (out of memory?)')
-                yield task.number, ended
+                    ended = finished(task)
+                except Exception as exc:  # the connection may be lost
+                    ended = finished(task) or failed(task, f'{type(exc).__name__}: {exc}')
+                yield task, ended
+
+        try:
+            yield replayed
         except BaseException:
             client.cancel(list(pending))
             with suppress(Exception):  # a worker that died has nothing to remove
                 client.run(_stop, run)
             raise
-
-
-def _result(dask: Any, future: Any, task: Task) -> Ended:
-    """Return the outcome of a bag; raises KilledWorker."""
-    try:
-        ended: Ended = future.result()
-    except Exception as exc:
-        done = finished(task)
-        if isinstance(exc, dask.KilledWorker) and done is None:
-            raise
-        return done or failed(task, f'{type(exc).__name__}: {exc}')
-    return ended
 
 
 def _dask() -> Any:

@@ -13,115 +13,86 @@
 # limitations under the License.
 
 
-"""
-Many bags in processes of this computer, which replay one bag at a time.
-
-A process that dies costs only its bag. That bag is replayed again after all others and alone, so
-that a lack of memory caused by others cannot end it a second time.
-"""
+"""Many bags in processes of this computer, which replay one bag at a time."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
 import multiprocessing
 from multiprocessing import forkserver, parent_process, resource_tracker
 import os
 import signal
-from threading import local, Lock, Thread
+from threading import Lock, Thread
 from typing import Any
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.replay.bag_task import (
-    At, Cancelled, Ended, failed, finished, LOCAL_INTERVAL, replay_task, Results, Task)
+    At, Cancelled, Ended, LOCAL_INTERVAL, replay_task, Replayed, Task)
 
 _CONTEXT = multiprocessing.get_context('forkserver')
 _CONTEXT.set_forkserver_preload(['stewart_dynamics.replay.one_bag'])
 
 
-def replay_in_processes(tasks: Sequence[Task], jobs: int, at: At) -> Results:
-    """Yield the outcome of each bag, as they end; StewartError if processes cannot start."""
-    # The processes inherit the mask of the server: Ctrl-C ends this process, which ends them.
-    # Starting the resource tracker later would lift the mask.
+@contextmanager
+def processes(jobs: int, at: At) -> Iterator[Replayed]:
+    """Yield a function that replays bags, with so many processes at most; then end these."""
+    _start_server()
+    stopped: Any = _CONTEXT.RawValue('b')
+    # Bytes and setpoints of each process, without a lock, which a process could take with it.
+    counts: Any = _CONTEXT.RawArray('q', 2 * jobs)
+    pools: dict[int, ProcessPoolExecutor] = {}
+
+    def submitted(n: int, task: Task) -> Future[Ended]:
+        if n in pools:
+            with suppress(BrokenProcessPool):  # it has been killed
+                return pools[n].submit(_work, task)
+        # Pools of one process each: the death of one does not break the others.
+        pools[n] = ProcessPoolExecutor(1, _CONTEXT, _begin, (stopped, counts, 2 * n))
+        try:
+            pools[n].submit(os.getpid).result()
+        except BrokenProcessPool:
+            raise StewartError('the processes to replay bags could not start') from None
+        return pools[n].submit(_work, task)
+
+    def replayed(tasks: Sequence[Task]) -> Iterator[tuple[Task, Ended | None]]:
+        waiting, idle = deque(tasks), deque(range(min(jobs, len(tasks))))
+        running: dict[Future[Ended], tuple[Task, int]] = {}
+        while waiting or running:
+            while waiting and idle:
+                task, n = waiting.popleft(), idle.popleft()
+                counts[2 * n:2 * n + 2] = 0, 0
+                running[submitted(n, task)] = task, n
+            done, _ = wait(running, LOCAL_INTERVAL, FIRST_COMPLETED)
+            for task, n in running.values():
+                at(task.number, *counts[2 * n:2 * n + 2])
+            for future in done:
+                task, n = running.pop(future)
+                idle.append(n)
+                died = isinstance(future.exception(), BrokenProcessPool)
+                yield task, None if died else future.result()
+
+    try:
+        yield replayed
+    finally:
+        stopped.value = 1
+        for pool in pools.values():
+            pool.shutdown()  # waits until partial results are removed
+
+
+def _start_server() -> None:
+    """Start the process that starts the others."""
+    # They inherit its mask: Ctrl-C ends this process, which ends them. Starting the resource
+    # tracker later would lift the mask.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    processes = _Processes(tasks)
-    try:
-        died = []
-        for task, ended in processes.replayed(tasks, jobs, at):
-            if ended is None:
-                died.append(task)
-            else:
-                yield task.number, ended
-        for task, ended in processes.replayed(died, 1, at):
-            yield task.number, ended or finished(task) or failed(
-                task, 'the process that replayed it was killed twice (out of memory?)')
-    finally:
-        processes.close()
-
-
-class _Processes:
-    """
-    Pools of one process each, so that the death of one does not break the others.
-
-    The progress is in shared memory without a lock, which a process could take with it.
-    """
-
-    def __init__(self, tasks: Sequence[Task]) -> None:
-        self._places = {task.number: 2 * n for n, task in enumerate(tasks)}
-        self._counts: Any = _CONTEXT.RawArray('q', 2 * len(tasks))
-        self._stopped: Any = _CONTEXT.RawValue('b')
-        self._pools: list[ProcessPoolExecutor] = []
-        self._of_thread = local()
-
-    def replayed(self, tasks: Sequence[Task], jobs: int, at: At,
-                 ) -> Iterator[tuple[Task, Ended | None]]:
-        """Yield the outcome of each bag; None if its process has died."""
-        with ThreadPoolExecutor(jobs) as threads:
-            try:
-                pending = {threads.submit(self._replay, task): task for task in tasks}
-                while pending:
-                    done, _ = wait(pending, LOCAL_INTERVAL, FIRST_COMPLETED)
-                    for future, task in pending.items():
-                        if future.running():
-                            place = self._places[task.number]
-                            at(task.number, *self._counts[place:place + 2])
-                    for future in done:
-                        yield pending.pop(future), future.result()
-            except BaseException:
-                self._stopped.value = 1
-                threads.shutdown(cancel_futures=True)
-                raise
-
-    def _replay(self, task: Task) -> Ended | None:
-        """Replay a bag in the process of this thread."""
-        if not hasattr(self._of_thread, 'pool'):
-            pool = ProcessPoolExecutor(1, _CONTEXT, _begin, (self._stopped, self._counts))
-            self._pools.append(pool)
-            try:
-                pool.submit(os.getpid).result()
-            except BrokenProcessPool:
-                raise StewartError('the processes to replay bags could not start') from None
-            self._of_thread.pool = pool
-        place = self._places[task.number]
-        self._counts[place:place + 2] = 0, 0
-        try:
-            ended: Ended = self._of_thread.pool.submit(_work, task, place).result()
-        except BrokenProcessPool:
-            del self._of_thread.pool
-            return None
-        return ended
-
-    def close(self) -> None:
-        """Stop the processes, and wait until they have removed their partial results."""
-        self._stopped.value = 1
-        for pool in self._pools:
-            pool.shutdown()
 
 
 # -- in a process ---------------------------------------------------------------------------------
@@ -144,8 +115,8 @@ def _begin(*shared: Any) -> None:
     Thread(target=watch, daemon=True).start()
 
 
-def _work(task: Task, place: int) -> Ended:
-    stopped, counts = _shared
+def _work(task: Task) -> Ended:
+    stopped, counts, place = _shared
 
     def progress(read: int, setpoints: int) -> None:
         if stopped.value:

@@ -24,7 +24,7 @@ before it died is recognized by it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
 import os
@@ -39,7 +39,7 @@ from stewart_dynamics.errors import BagError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.bag_task import (
-    At, counted, Ended, kept, LOCAL_INTERVAL, replay_task, Results, Task)
+    At, counted, Ended, failed, finished, kept, LOCAL_INTERVAL, replay_task, Task)
 from stewart_dynamics.replay.index import Cell, listed_results, SEVERITY, write_fleet
 from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
 from stewart_dynamics.reporting.results_folder import remove_abandoned
@@ -119,10 +119,9 @@ def replay_fleet(
     try:
         with closing(_ProgressBar(sizes, show_progress, len(ended))) as bar, closing(
                 _results(order, jobs, scheduler, bar.at)) as results:
-            for number, result in results:
-                bag, folder = bags[number]
-                ended[number] = result._replace(bag=bag, folder=folder)
-                bar.end(number, result)
+            for task, result in results:
+                ended[task.number] = result._replace(bag=task.bag, folder=task.folder)
+                bar.end(task.number, result)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f'{len(ended)} of {len(tasks)} bags are done; the same command '
                                 'continues with the others') from None
@@ -133,19 +132,34 @@ def replay_fleet(
     return fleet
 
 
-def _results(tasks: Sequence[Task], jobs: int, scheduler: str | None, at: At) -> Results:
+def _results(tasks: Sequence[Task], jobs: int, scheduler: str | None, at: At,
+             ) -> Generator[tuple[Task, Ended], None, None]:
+    """Yield the outcome of each bag, as they end; closing the generator stops the run."""
     if not tasks:
         return
     if scheduler is not None:
-        from stewart_dynamics.replay.dask_cluster import replay_on_cluster
-        yield from replay_on_cluster(tasks, scheduler, at)
+        from stewart_dynamics.replay.dask_cluster import cluster
+        workers = cluster(scheduler, tasks[0].options.run, at)
     elif jobs > 1:
-        from stewart_dynamics.replay.local_processes import replay_in_processes
-        yield from replay_in_processes(tasks, jobs, at)
+        from stewart_dynamics.replay.local_processes import processes
+        workers = processes(jobs, at)
     else:
         for task in tasks:
-            yield task.number, replay_task(
-                task, counted(partial(at, task.number), LOCAL_INTERVAL))
+            yield task, replay_task(task, counted(partial(at, task.number), LOCAL_INTERVAL))
+        return
+    with workers as replayed:
+        died = []
+        for task, ended in replayed(tasks):
+            if ended is None:
+                died.append(task)
+            else:
+                yield task, ended
+        # Each of them alone: others cannot end it a second time by their need of memory, and Dask
+        # also blames bags that only waited for a worker that died.
+        for suspect in died:
+            for task, ended in replayed([suspect]):
+                yield task, ended or finished(task) or failed(
+                    task, 'every process that replayed it was killed (out of memory?)')
 
 
 def _check_replaceable(tasks: Sequence[Task], done: Mapping[int, Ended], output: Path,

@@ -34,8 +34,9 @@ from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.messages import type_names
-from stewart_dynamics.messages.model import positions_layout, TransformsWriter
+from stewart_dynamics.messages.joint_state import joint_state_layout
 from stewart_dynamics.messages.standard import string
+from stewart_dynamics.messages.transforms import transforms
 from stewart_dynamics.parameters.table import Parameters
 
 TF_STATIC = '/tf_static'
@@ -72,13 +73,14 @@ class RecordedModel:
         self._urdf = urdf(Hexapod(parameters), name)
         self._joints = TreeJoints(parameters)
         self._links = LinkTransforms(self._urdf)
-        self._positions = positions_layout(self._joints.names)
-        self._moving = TransformsWriter(self._links.moving)
-        self._fixed = TransformsWriter(self._links.fixed)
+        self._positions = joint_state_layout(self._joints.names, ['position'])
+        self._moving = transforms(self._links.moving)
+        self._fixed = transforms(self._links.fixed)
 
     def of_beginning(self, stamp: int) -> Iterator[Written]:
         """Yield topics and messages (1,) of the constant parts, at a stamp [ns]."""
-        yield TF_STATIC, self._fixed.write(np.array([stamp]), self._links.at_fixed[None])
+        yield TF_STATIC, self._fixed.write(
+            np.array([stamp]), *self._links.at_fixed[:, None])
         text = string(self._urdf)
         yield ROBOT_DESCRIPTION, np.frombuffer(text, dtype=f'V{len(text)}')
 
@@ -89,4 +91,5 @@ class RecordedModel:
         positions = self._joints.positions(
             poses[:, POSITION], poses[:, ROTATION].reshape(-1, 3, 3))
         yield JOINT_STATES, self._positions.write(stamps, positions)
-        yield TF, self._moving.write(stamps, self._links.at(positions))
+        yield TF, self._moving.write(
+            stamps, *np.moveaxis(self._links.at(positions), 1, 0))

@@ -22,10 +22,10 @@ from operator import sub
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array, NO_WRENCH, Six, Stamps
+from stewart_dynamics.arrays import Array, Six, Stamps
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import JointStateWriter
-from stewart_dynamics.messages.setpoint import layout_of, StampedWriter, wrench
+from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.messages.standard import (
     boolean, FLOAT64, float64, FLOAT64_ARRAY, float64_array)
 from stewart_dynamics.parameters.table import Parameters
@@ -71,7 +71,6 @@ class OutputMessages:
         self._motors = motor_states_writer(parameters)
         self.types = OUTPUT_TYPES | (MOTOR_TYPES if self._motors else {})
         self._wrench = StampedWriter(parameters['base_frame'], 6)
-        self._wrenches = layout_of(wrench, self._wrench.write(0, NO_WRENCH))
 
     def of_output(self, output: Output) -> Iterator[tuple[str, bytes]]:
         """Yield topics (keys of ``types``) and messages for an output; see of_wrench."""
@@ -145,7 +144,8 @@ class OutputMessages:
     def of_base_wrenches(self, stamps: Stamps, base_wrenches: Array) -> Written:
         """Return messages for stamps (N,) [ns] and wrenches (N, 6); none for rows of nan."""
         known = np.flatnonzero(~np.isnan(base_wrenches[:, 0]))
-        return BASE_WRENCH, known, self._wrenches.write(stamps[known], base_wrenches[known])
+        return BASE_WRENCH, known, self._wrench.layout.write(
+            stamps[known], base_wrenches[known])
 
 
 def motor_states_writer(parameters: Parameters) -> JointStateWriter | None:
