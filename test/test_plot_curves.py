@@ -50,7 +50,7 @@ def samples(draw: st.DrawFn, most: int = 120) -> tuple[Array, Array, list[int]]:
 
 def gathered(times: Array, values: Array, edges: list[int], buckets: int) -> Curves:
     """Return the curves of samples that come in blocks."""
-    curves = Curves(len(values), TIMEOUT, buckets)
+    curves = Curves(TIMEOUT, buckets)
     for first, end in zip([0, *edges], [*edges, len(times)], strict=True):
         curves.add(times[first:end], values[:, first:end])
     return curves
@@ -118,7 +118,7 @@ def test_up_to_two_samples_a_bucket_all_are_drawn() -> None:
 
 
 def test_the_number_of_points_is_bounded_and_a_spike_of_one_sample_stays() -> None:
-    curves = Curves(1, TIMEOUT)
+    curves = Curves(TIMEOUT)
     for block in range(200):
         values = np.sin(0.001 * np.arange(5000.0))[None]
         if block == 137:
@@ -142,7 +142,7 @@ def test_a_gap_is_distinguished_from_slow_samples() -> None:
 
 
 def test_without_samples_nothing_is_drawn() -> None:
-    curves = Curves(2, TIMEOUT)
+    curves = Curves(TIMEOUT)
     curves.add(np.empty(0), np.empty((2, 0)))
     assert [len(each) for each in curves.drawn(1)] == [0, 0]
     assert not len(curves.breaks())

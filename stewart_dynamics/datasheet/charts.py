@@ -124,7 +124,7 @@ def use_chart(seconds: Array, used: Mapping[str, Array], timeout: float) -> Pict
     picture.add('rect', x=46.0, y=26.0, width=640.0, height=y - 26.0, css='beyond')
     chart.draw_axes('time [s]', 'use of the limit [%]', 8)
     picture.line([46.0, y], [686.0, y], css='limit')
-    curves = Curves(len(used), timeout, 512)
+    curves = Curves(timeout, 512)
     curves.add(seconds, np.array(list(used.values())) * 100.0)
     for n, name in enumerate(used):
         times, values = curves.drawn(n)

@@ -25,8 +25,8 @@ from collections.abc import Callable, Sequence
 from struct import Struct
 
 from stewart_dynamics.messages.cdr import (
-    aligned8, COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, READ_ERRORS, sequence, SEVEN, SIX,
-    Stamped, stamped, text, TIME_AND_LENGTH)
+    aligned8, COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, READ_ERRORS, sequence,
+    SEVEN, SIX, Stamped, stamped, text, TIME_AND_LENGTH)
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.trajectory import points_of
 

@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime, timezone
 import hashlib
+import itertools
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
@@ -41,7 +42,6 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.statements import cards
-from stewart_dynamics.reporting import plots as channels
 from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
@@ -80,12 +80,14 @@ class Report:
                  folder: Path | None = None) -> None:
         self._parameters = parameters
         self._legs: tuple[str, ...] = parameters['joints']
+        self._sources = len(sources_of(parameters))
         timeout = parameters['setpoint.timeout']
-        self._channels = channels.channels_of(parameters)
-        self._curves = Curves(self._channels, timeout)
+        self._curves = Curves(timeout)
+        self._places: dict[str, slice] = {}
         self._spectrum = Spectrum(6, timeout, folder)
         self._frames = Frames(_FRAME)
-        self._compared = Curves(channels.COMPARED, timeout) if measured else None
+        self._compared = Curves(timeout) if measured else None
+        self._places_compared: dict[str, slice] = {}
         self._angles: Array = np.zeros((1, 3))
         self._operating = OperatingPoints() if parameters.drives else None
 
@@ -109,34 +111,36 @@ class Report:
 
         """
         motions, forces = setpoints.motions, outputs.demanded_forces
-        rows = np.empty((self._channels, len(seconds)))
-        rows[channels.POSITION] = motions[:, POSITION].T
-        rows[channels.ANGLES] = self._continued(_euler(motions[:, ROTATION])).T
-        rows[channels.VELOCITY] = motions[:, LINEAR_VELOCITY].T
-        rows[channels.OMEGA] = np.degrees(motions[:, ANGULAR_VELOCITY]).T
-        rows[channels.ACCELERATION] = motions[:, LINEAR_ACCELERATION].T
-        rows[channels.ALPHA] = np.degrees(motions[:, ANGULAR_ACCELERATION]).T
-        rows[channels.LENGTHS] = outputs.lengths.T
-        rows[channels.RATES] = outputs.rates.T
-        rows[channels.FORCES] = forces.T
         with np.errstate(over='ignore'):
-            rows[channels.POWERS] = (forces * outputs.rates).T
-        rows[channels.DETERMINANT] = outputs.determinants
-        rows[channels.CONDITION] = outputs.conditions
-        rows[channels.BASE_WRENCH] = base_wrenches.T
-        parts = rows[channels.BREAKDOWN.start:channels.joint_angles_of(self._parameters).start]
-        parts[:] = breakdown.reshape(len(seconds), -1).T[:len(parts)]
-        rows[channels.joint_angles_of(self._parameters)] = np.degrees(outputs.joint_angles).T
-        rows[channels.clearances_of(self._parameters)] = outputs.clearances.T
+            powers = forces * outputs.rates
+        quantities = {
+            'position': motions[:, POSITION],
+            'angles': self._continued(_euler(motions[:, ROTATION])),
+            'velocity': motions[:, LINEAR_VELOCITY],
+            'angular_velocity': np.degrees(motions[:, ANGULAR_VELOCITY]),
+            'acceleration': motions[:, LINEAR_ACCELERATION],
+            'angular_acceleration': np.degrees(motions[:, ANGULAR_ACCELERATION]),
+            'lengths': outputs.lengths,
+            'rates': outputs.rates,
+            'forces': forces,
+            'powers': powers,
+            'determinant': outputs.determinants[:, None],
+            'condition': outputs.conditions[:, None],
+            'base_force': base_wrenches[:, :3],
+            'base_moment': base_wrenches[:, 3:],
+            'breakdown': breakdown[:, :self._sources].reshape(len(seconds), -1),
+            'joint_angles': np.degrees(outputs.joint_angles),
+            'clearances': outputs.clearances}
         if self._operating is not None:
             motors = Motors.of_rows(outputs.motors[:, OF_DRIVES])
             with np.errstate(invalid='ignore'):
-                rows[channels.motors_of(self._parameters)] = np.concatenate([
-                    motors.torques, motors.speeds, outputs.motors[:, RISES],
-                    motors.power.sum(axis=1, keepdims=True)], axis=1).T
+                quantities |= {
+                    'torques': motors.torques, 'speeds': motors.speeds,
+                    'rises': outputs.motors[:, RISES],
+                    'bus_power': motors.power.sum(axis=1, keepdims=True)}
             self._operating.add(outputs.motors)
-        self._curves.add(seconds, rows)
-        self._spectrum.add(seconds, rows[channels.BASE_WRENCH])
+        self._places = _add(self._curves, seconds, quantities)
+        self._spectrum.add(seconds, base_wrenches.T)
         self._frames.add(seconds, np.concatenate(
             [motions[:, POSE], outputs.lengths, forces], axis=1))
 
@@ -157,8 +161,9 @@ class Report:
         """
         if self._compared is None:
             raise ValueError('the report was created without measured forces')
-        self._compared.add(seconds, np.concatenate(
-            [measured, computed, measured - computed, wrench], axis=1).T)
+        self._places_compared = _add(self._compared, seconds, {
+            'measured': measured, 'computed': computed, 'residual': measured - computed,
+            'external_force': wrench[:, :3], 'external_moment': wrench[:, 3:]})
 
     def write(self, path: Path, summary: Mapping[str, Any], plotly: Path | None = None) -> None:
         """
@@ -207,15 +212,18 @@ class Report:
         singularity = summary['singularity']
         p = self._parameters
         known = not summary['quasi_static']
-        curves = [_curve(self._curves, n) for n in range(self._channels)]
-        plots = [*motion_plots(p, known), *base_wrench_plots()] if self._curves.samples else []
+        curves = _lines(self._curves)
+        plots = [*motion_plots(p, self._places, known), *base_wrench_plots(self._places)] if (
+            curves) else []
         density = self._spectrum.density()
         if density is not None:
             plots += spectrum_plots(density, len(curves))
-            curves += [_packed(*drawn(density.frequencies, each)) for each in density.amplitudes]
+            curves += [drawn(density.frequencies, each) for each in density.amplitudes]
         if self._compared is not None and self._compared.samples:
-            plots += measured_plots(p, len(curves))
-            curves += [_curve(self._compared, n) for n in range(channels.COMPARED)]
+            plots += measured_plots(p, {
+                name: slice(len(curves) + at.start, len(curves) + at.stop)
+                for name, at in self._places_compared.items()})
+            curves += _lines(self._compared)
         return {
             'samples': self._curves.samples,
             'samplesInBucket': self._curves.samples_in_bucket,
@@ -232,7 +240,7 @@ class Report:
             'allCrossings': singularity['crossings'],
             'contacts': [[each['from_s'], each['to_s']] for each in (
                 summary['measured']['contacts']['strongest'] if summary['measured'] else ())],
-            'curves': curves,
+            'curves': [_packed(*each) for each in curves],
             'plots': [plot.plain() for plot in plots],
         }
 
@@ -246,8 +254,16 @@ def _euler(rotations: Array) -> Array:
     return angles
 
 
-def _curve(curves: Curves, channel: int) -> dict[str, str]:
-    return _packed(*curves.drawn(channel))
+def _add(curves: Curves, seconds: Array, quantities: Mapping[str, Array]) -> dict[str, slice]:
+    """Add quantities (N, ...), always the same; return the curves of each of them."""
+    curves.add(seconds, np.concatenate([values.T for values in quantities.values()]))
+    ends = itertools.accumulate(values.shape[1] for values in quantities.values())
+    return {name: slice(end - values.shape[1], end)
+            for (name, values), end in zip(quantities.items(), ends, strict=True)}
+
+
+def _lines(curves: Curves) -> list[tuple[Array, Array]]:
+    return [curves.drawn(n) for n in range(curves.channels)]
 
 
 def _packed(times: Array, values: Array) -> dict[str, str]:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 import csv
+from functools import partial
 import io
 import math
 import os
@@ -71,19 +72,30 @@ class Column(NamedTuple):
     optional: bool = False
 
 
-def _legs(key: str, choose: Callable[..., Any]) -> Callable[[dict[str, Any]], Cell]:
+def _value(*keys: str) -> Callable[[dict[str, Any]], Cell]:
+    """Return a function for the value under these keys; None if one of them leads to none."""
     def of(summary: dict[str, Any]) -> Cell:
-        values = [leg[key] for leg in summary['legs'].values() if leg[key] is not None]
-        return choose(values) if values else None
+        found: Any = summary
+        for key in keys:
+            found = None if found is None else found[key]
+        cell: Cell = found
+        return cell
 
     return of
 
 
-def _largest(values: Sequence[float]) -> float:
-    return max(values, key=abs)
+def _of_legs(key: str, choose: Callable[..., Any], part: str = '',
+             ) -> Callable[[dict[str, Any]], Cell]:
+    """Return a function that chooses among a value of each leg, in a part of the summary."""
+    def of(summary: dict[str, Any]) -> Cell:
+        legs = ((summary[part] or {'legs': {}}) if part else summary)['legs'].values()
+        cell: Cell = choose((leg[key] for leg in legs if leg[key] is not None), default=None)
+        return cell
+
+    return of
 
 
-def _worst_force(what: int) -> Callable[[dict[str, Any]], Cell]:
+def _of_worst_force(what: int) -> Callable[[dict[str, Any]], Cell]:
     """Return a function for the largest force: 0 its value, 1 its leg, 2 its time."""
     def of(summary: dict[str, Any]) -> Cell:
         peaks = [(leg['force_peak_n'], name, leg['force_peak_at_s'])
@@ -94,38 +106,7 @@ def _worst_force(what: int) -> Callable[[dict[str, Any]], Cell]:
     return of
 
 
-def _measured(of: Callable[[dict[str, Any]], Cell]) -> Callable[[dict[str, Any]], Cell]:
-    """Return a function for a value of the comparison with measured forces, if there is one."""
-    def of_summary(summary: dict[str, Any]) -> Cell:
-        return of(summary['measured']) if summary['measured'] else None
-
-    return of_summary
-
-
-def _largest_of_legs(key: str) -> Callable[[dict[str, Any]], Cell]:
-    def of(measured: dict[str, Any]) -> Cell:
-        return max((leg[key] for leg in measured['legs'].values() if leg[key] is not None),
-                   default=None)
-
-    return _measured(of)
-
-
-def _motors(key: str, choose: Callable[..., Any] = _largest) -> Callable[[dict[str, Any]], Cell]:
-    """Return a function for a value of the motors: the largest of all, by default."""
-    def of(summary: dict[str, Any]) -> Cell:
-        motors = summary['motors'] or {'legs': {}}
-        values = [leg[key] for leg in motors['legs'].values() if leg[key] is not None]
-        return choose(values) if values else None
-
-    return of
-
-
-def _bus(key: str) -> Callable[[dict[str, Any]], Cell]:
-    def of(summary: dict[str, Any]) -> Cell:
-        bus = (summary['motors'] or {}).get('bus')
-        return bus[key] if bus else None
-
-    return of
+_largest = partial(max, key=abs)
 
 
 def _exceeded(summary: dict[str, Any]) -> str:
@@ -139,38 +120,30 @@ def _rejected(summary: dict[str, Any]) -> int:
     return sum(each['count'] for each in summary['rejected'])
 
 
-def _singularity(key: str) -> Callable[[dict[str, Any]], Cell]:
-    def of(summary: dict[str, Any]) -> Cell:
-        cell: Cell = summary['singularity'][key]
-        return cell
-
-    return of
-
-
 COLUMNS = (
     Column('bag', 'bag', number=False),
     Column('code', ''),
     Column('result', 'result', number=False),
     Column('reason', 'reason', number=False),
-    Column('complete', '', '', lambda summary: bool(summary['complete']), number=False),
-    Column('setpoints', 'setpoints', '', lambda summary: summary['setpoints']['answered']),
-    Column('duration_s', 'duration', 's', lambda summary: summary['setpoints']['duration_s']),
-    Column('force_worst_n', 'worst force', 'N', _worst_force(0), size=True),
-    Column('force_worst_leg', 'of leg', '', _worst_force(1), number=False),
-    Column('force_worst_at_s', 'at', 's', _worst_force(2)),
-    Column('force_margin_n', 'force margin', 'N', _legs('force_margin_n', min)),
-    Column('length_margin_m', 'length margin', 'm', _legs('length_margin_m', min)),
-    Column('rate_margin_m_s', 'rate margin', 'm/s', _legs('rate_margin_m_s', min)),
+    Column('complete', '', '', _value('complete'), number=False),
+    Column('setpoints', 'setpoints', '', _value('setpoints', 'answered')),
+    Column('duration_s', 'duration', 's', _value('setpoints', 'duration_s')),
+    Column('force_worst_n', 'worst force', 'N', _of_worst_force(0), size=True),
+    Column('force_worst_leg', 'of leg', '', _of_worst_force(1), number=False),
+    Column('force_worst_at_s', 'at', 's', _of_worst_force(2)),
+    Column('force_margin_n', 'force margin', 'N', _of_legs('force_margin_n', min)),
+    Column('length_margin_m', 'length margin', 'm', _of_legs('length_margin_m', min)),
+    Column('rate_margin_m_s', 'rate margin', 'm/s', _of_legs('rate_margin_m_s', min)),
     Column('base_joint_angle_margin_rad', 'base joint margin', 'rad',
-           _legs('base_joint_angle_margin_rad', min), optional=True),
+           _of_legs('base_joint_angle_margin_rad', min), optional=True),
     Column('platform_joint_angle_margin_rad', 'platform joint margin', 'rad',
-           _legs('platform_joint_angle_margin_rad', min), optional=True),
-    Column('clearance_margin_m', 'clearance margin', 'm', _legs('clearance_margin_m', min),
+           _of_legs('platform_joint_angle_margin_rad', min), optional=True),
+    Column('clearance_margin_m', 'clearance margin', 'm', _of_legs('clearance_margin_m', min),
            optional=True),
     Column('limits_exceeded', 'limits exceeded', '', _exceeded, number=False),
-    Column('force_rms_n', 'RMS force', 'N', _legs('force_rms_n', max)),
-    Column('power_peak_w', 'peak power', 'W', _legs('power_peak_w', _largest), size=True),
-    *(Column(key, head, unit, _motors(key, min if 'margin' in key else _largest),
+    Column('force_rms_n', 'RMS force', 'N', _of_legs('force_rms_n', max)),
+    Column('power_peak_w', 'peak power', 'W', _of_legs('power_peak_w', _largest), size=True),
+    *(Column(key, head, unit, _of_legs(key, min if 'margin' in key else _largest, 'motors'),
              size='peak' in key, optional=True) for key, head, unit in (
         ('torque_rms_n_m', 'RMS motor torque', 'N m'),
         ('torque_peak_n_m', 'peak motor torque', 'N m'),
@@ -179,24 +152,24 @@ COLUMNS = (
         ('torque_continuous_margin_n_m', 'continuous torque margin', 'N m'),
         ('speed_margin_rad_s', 'speed margin', 'rad/s'),
         ('temperature_rise_max_k', 'temperature rise', 'K'))),
-    *(Column(f'bus_{key}', head, unit, _bus(key), optional=True) for key, head, unit in (
+    *(Column(f'bus_{key}', head, unit, _value('motors', 'bus', key), optional=True)
+      for key, head, unit in (
         ('power_peak_w', 'bus power', 'W'),
         ('regenerated_peak_w', 'power flowing back', 'W'),
         ('energy_per_cycle_j', 'energy of a cycle', 'J'))),
     Column('determinant_nearest_m3', 'det(J) nearest 0', 'm³',
-           _singularity('determinant_nearest_m3'), size=True),
-    Column('crossings', 'crossings', '', _singularity('crossings')),
-    Column('condition_max', 'condition number', 'max', _singularity('condition_max')),
-    Column('warnings', 'warnings', '', _singularity('warnings')),
+           _value('singularity', 'determinant_nearest_m3'), size=True),
+    Column('crossings', 'crossings', '', _value('singularity', 'crossings')),
+    Column('condition_max', 'condition number', 'max', _value('singularity', 'condition_max')),
+    Column('warnings', 'warnings', '', _value('singularity', 'warnings')),
     Column('rejected', 'rejected', '', _rejected),
-    Column('residual_rms_n', 'residual RMS', 'N', _largest_of_legs('residual_rms_n'),
-           optional=True),
+    Column('residual_rms_n', 'residual RMS', 'N',
+           _of_legs('residual_rms_n', max, 'measured'), optional=True),
     Column('residual_share', 'residual share', '',
-           _measured(lambda measured: measured['residual_share']), optional=True),
-    Column('contacts', 'contacts', '', _measured(lambda measured: measured['contacts']['count']),
+           _value('measured', 'residual_share'), optional=True),
+    Column('contacts', 'contacts', '', _value('measured', 'contacts', 'count'), optional=True),
+    Column('measured', 'measured', '', _value('measured', 'headline'), number=False,
            optional=True),
-    Column('measured', 'measured', '', _measured(lambda measured: measured['headline']),
-           number=False, optional=True),
     Column('results', '', number=False),
 )
 

@@ -17,13 +17,14 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.replay.csv_rows import rows_of, RowsProcess
@@ -32,31 +33,6 @@ from stewart_dynamics.setpoints.step import Outputs
 
 # Rows from which on a second process formats them: it takes 0.1 s to start.
 _LONG = 30_000
-
-
-class Table(Protocol):
-    """A file with one row per setpoint."""
-
-    def write(self, seconds: Array, motions: Array, outputs: Outputs,
-              base_wrenches: Array) -> None:
-        """
-        Write the rows of N setpoints.
-
-        Parameters
-        ----------
-        seconds : (N,)
-            Time since the first setpoint of the bag [s].
-        motions : (N, 24)
-            Their motions, laid out as ``inverse_dynamics`` says.
-        outputs : Outputs
-            Their outputs.
-        base_wrenches : (N, 6)
-            Their base wrenches [N, N m]; nan: not known.
-
-        """
-
-    def close(self) -> None:
-        """Complete the file."""
 
 
 def column_names(legs: Sequence[str], joint_angles: bool = False, clearance: bool = False,
@@ -75,23 +51,9 @@ def column_names(legs: Sequence[str], joint_angles: bool = False, clearance: boo
             *(f'{leg}_{quantity}' for quantity in limited for leg in legs), 'warning']
 
 
-def _numbers(seconds: Array, motions: Array, outputs: Outputs, base_wrenches: Array,
-             quasi_static: bool) -> Array:
-    """Return the columns between stamp and warning (N, 41 to 59); nan: not known."""
-    rates, determinant_rates = outputs.rates, outputs.determinant_rates
-    if quasi_static:
-        rates = np.full_like(rates, np.nan)
-        determinant_rates = np.full_like(determinant_rates, np.nan)
-    return np.column_stack([
-        seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
-        outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
-        outputs.determinants, determinant_rates, outputs.conditions, base_wrenches,
-        outputs.joint_angles, outputs.clearances])
-
-
-class CsvTable:
+class Table(ABC):
     """
-    legs.csv: each number with the fewest digits that represent it exactly.
+    A file with one row per setpoint.
 
     Parameters
     ----------
@@ -106,33 +68,77 @@ class CsvTable:
 
     """
 
-    FILE = 'legs.csv'
+    FILE = ''
 
     def __init__(
             self, folder: Path, legs: Sequence[str], quasi_static: bool = False,
             joint_angles: bool = False, clearance: bool = False) -> None:
         self._quasi_static = quasi_static
-        self._rows = 0
-        self._process: RowsProcess | None = None
-        self._file = (folder / self.FILE).open('wb')
-        names = [_quoted(harmless(name)) for name in column_names(legs, joint_angles, clearance)]
-        self._file.write(','.join(names).encode() + b'\n')
+        self._open(folder / self.FILE, column_names(legs, joint_angles, clearance))
 
     def write(self, seconds: Array, motions: Array, outputs: Outputs,
               base_wrenches: Array) -> None:
-        """Write the rows of N setpoints."""
+        """
+        Write the rows of N setpoints.
+
+        Parameters
+        ----------
+        seconds : (N,)
+            Time since the first setpoint of the bag [s].
+        motions : (N, 24)
+            Their motions, laid out as ``inverse_dynamics`` says.
+        outputs : Outputs
+            Their outputs.
+        base_wrenches : (N, 6)
+            Their base wrenches [N, N m]; nan: not known.
+
+        """
         if not len(outputs.stamps):
             return
-        numbers = _numbers(seconds, motions, outputs, base_wrenches, self._quasi_static)
-        block = outputs.stamps, numbers, outputs.warnings
+        rates, determinant_rates = outputs.rates, outputs.determinant_rates
+        if self._quasi_static:
+            rates = np.full_like(rates, np.nan)
+            determinant_rates = np.full_like(determinant_rates, np.nan)
+        numbers = np.column_stack([
+            seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
+            outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
+            outputs.determinants, determinant_rates, outputs.conditions, base_wrenches,
+            outputs.joint_angles, outputs.clearances])
+        self._write(outputs.stamps, numbers, outputs.warnings)
+
+    @abstractmethod
+    def _open(self, path: Path, names: Sequence[str]) -> None:
+        """Begin the file."""
+
+    @abstractmethod
+    def _write(self, stamps: Stamps, numbers: Array, warnings: Flags) -> None:
+        """Write rows: stamps (N,) [ns], numbers (N, 41 to 59) with nan: not known, warnings."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Complete the file."""
+
+
+class CsvTable(Table):
+    """legs.csv: each number with the fewest digits that represent it exactly."""
+
+    FILE = 'legs.csv'
+
+    def _open(self, path: Path, names: Sequence[str]) -> None:
+        self._rows = 0
+        self._process: RowsProcess | None = None
+        self._file = path.open('wb')
+        self._file.write(','.join(_quoted(harmless(name)) for name in names).encode() + b'\n')
+
+    def _write(self, stamps: Stamps, numbers: Array, warnings: Flags) -> None:
         self._rows += len(numbers)
         if self._rows <= _LONG:
-            self._file.write(rows_of(*block))
+            self._file.write(rows_of(stamps, numbers, warnings))
             return
         if self._process is None:
             self._file.flush()
             self._process = RowsProcess(self._file)
-        self._process.write(*block)
+        self._process.write(stamps, numbers, warnings)
 
     def close(self) -> None:
         """Complete the file."""
@@ -149,15 +155,12 @@ def _quoted(text: str) -> str:
     return text
 
 
-class ParquetTable:
+class ParquetTable(Table):
     """legs.parquet: the columns of legs.csv; null: not known, or no force."""
 
     FILE = 'legs.parquet'
 
-    def __init__(
-            self, folder: Path, legs: Sequence[str], quasi_static: bool = False,
-            joint_angles: bool = False, clearance: bool = False) -> None:
-        self._quasi_static = quasi_static
+    def _open(self, path: Path, names: Sequence[str]) -> None:
         try:
             import pyarrow
             import pyarrow.parquet
@@ -165,21 +168,17 @@ class ParquetTable:
             raise StewartError(
                 "--parquet needs pyarrow: pip install 'stewart_dynamics[parquet]'") from exc
         self._arrow = pyarrow
-        names = column_names(legs, joint_angles, clearance)
         self._schema = pyarrow.schema([
             (names[0], pyarrow.int64()), *((name, pyarrow.float64()) for name in names[1:-1]),
             (names[-1], pyarrow.bool_())])
-        self._writer = pyarrow.parquet.ParquetWriter(folder / self.FILE, self._schema)
+        self._writer = pyarrow.parquet.ParquetWriter(path, self._schema)
         self._waiting: list[Any] = []
 
-    def write(self, seconds: Array, motions: Array, outputs: Outputs,
-              base_wrenches: Array) -> None:
-        """Write the rows of N setpoints."""
-        numbers = _numbers(seconds, motions, outputs, base_wrenches, self._quasi_static)
-        columns = [outputs.stamps, *numbers.T, outputs.warnings]
+    def _write(self, stamps: Stamps, numbers: Array, warnings: Flags) -> None:
         self._waiting.append(self._arrow.record_batch(
-            [self._arrow.array(column, type=field.type, from_pandas=True)
-             for column, field in zip(columns, self._schema, strict=True)], schema=self._schema))
+            [self._arrow.array(column, type=field.type, from_pandas=True) for column, field in zip(
+                [stamps, *numbers.T, warnings], self._schema, strict=True)],
+            schema=self._schema))
         if sum(batch.num_rows for batch in self._waiting) >= 1 << 16:
             self._flush()
 
@@ -195,6 +194,6 @@ class ParquetTable:
             self._waiting.clear()
 
 
-def kind_of_table(parquet: bool) -> type[CsvTable] | type[ParquetTable]:
+def kind_of_table(parquet: bool) -> type[Table]:
     """Return the kind of table that a replay writes."""
     return ParquetTable if parquet else CsvTable

@@ -43,7 +43,7 @@ from stewart_dynamics.replay.bag_report import Report
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.fingerprint import fingerprint, plain_parameters, software, VERSION
-from stewart_dynamics.replay.legs_table import kind_of_table, Table
+from stewart_dynamics.replay.legs_table import kind_of_table
 from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recorded_efforts import Efforts
 from stewart_dynamics.replay.recorded_model import RecordedModel
@@ -188,7 +188,7 @@ class _Run:
             folder / 'bag', options.node, OutputMessages(parameters),
             _model(parameters, options.node.strip('/')), parameters['visualization_rate'])
         stack.callback(self._bag.abandon)
-        self._table: Table = kind_of_table(options.parquet)(
+        self._table = kind_of_table(options.parquet)(
             folder, parameters['joints'], self._quasi_static,
             any(parameters[name] is not None for name in OF_JOINTS),
             parameters[CLEARANCE_MIN] is not None)

@@ -48,8 +48,6 @@ class Curves:
 
     Parameters
     ----------
-    channels : int
-        Number of channels.
     timeout : float
         A step in time up to this long never breaks a line [s].
     buckets : int
@@ -57,21 +55,16 @@ class Curves:
 
     """
 
-    def __init__(self, channels: int, timeout: float, buckets: int = BUCKETS) -> None:
+    def __init__(self, timeout: float, buckets: int = BUCKETS) -> None:
+        self.channels = 0  # until there are samples
         self.samples = 0
         self.samples_in_bucket = 1
-        self._timeout = timeout
-        self._lowest = np.full((channels, buckets), np.inf)
-        self._highest = np.full((channels, buckets), -np.inf)
-        # times [s]; the last: of the first missing value in a bucket, inf if no value is missing
-        self._lowest_at = np.full((channels, buckets), np.inf)
-        self._highest_at = np.full((channels, buckets), np.inf)
-        self._missing_at = np.full((channels, buckets), np.inf)
+        self._timeout, self._buckets = timeout, buckets
         self._first_steps: Array = np.empty(0)
         self._breaks: Array = np.empty((0, 2))
         # the very first and the last sample
         self._end_times = [0.0, 0.0]
-        self._ends: list[Array] = [np.empty(channels), np.empty(channels)]
+        self._ends: list[Array] = [np.empty(0), np.empty(0)]
 
     def add(self, seconds: Array, values: Array) -> None:
         """
@@ -89,11 +82,12 @@ class Curves:
             return
         self._add_steps(seconds)
         if not self.samples:
+            self._begin(len(values))
             self._end_times[0], self._ends[0] = float(seconds[0]), values[:, 0].copy()
         self._end_times[1], self._ends[1] = float(seconds[-1]), values[:, -1].copy()
         missing = ~np.isfinite(values)
         spoiled = bool(missing.any())
-        at, buckets = 0, self._lowest.shape[1]
+        at, buckets = 0, self._buckets
         while at < len(seconds):
             if self.samples == buckets * self.samples_in_bucket:
                 self._merge()
@@ -111,8 +105,6 @@ class Curves:
 
     def drawn(self, channel: int) -> tuple[Array, Array]:
         """Return times [s], never decreasing, and values of the line; nan breaks it."""
-        if not self.samples:
-            return np.empty(0), np.empty(0)
         used = slice(0, -(-self.samples // self.samples_in_bucket))
         lowest, highest = self._lowest[channel, used], self._highest[channel, used]
         times = np.stack([self._lowest_at[channel, used], self._highest_at[channel, used],
@@ -143,6 +135,14 @@ class Curves:
             times, values = np.append(times, self._end_times[1]), np.append(values, last)
         return times, values
 
+    def _begin(self, channels: int) -> None:
+        self.channels = channels
+        shape = channels, self._buckets
+        self._lowest, self._highest = np.full(shape, np.inf), np.full(shape, -np.inf)
+        # times [s]; the last: of the first missing value in a bucket, inf if no value is missing
+        self._lowest_at, self._highest_at, self._missing_at = (
+            np.full(shape, np.inf) for _ in range(3))
+
     def _fold(self, buckets: slice, seconds: Array, values: Array,
               missing: Flags | None) -> None:
         """Add samples to these buckets, equally many to each."""
@@ -166,7 +166,7 @@ class Curves:
 
     def _merge(self) -> None:
         """Merge neighbors; of two equal extremes the first is kept."""
-        half = self._lowest.shape[1] // 2
+        half = self._buckets // 2
         for extreme, when, none, less in (
                 (self._lowest, self._lowest_at, np.inf, np.less),
                 (self._highest, self._highest_at, -np.inf, np.greater)):

@@ -25,25 +25,14 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES as ANGLES_OF, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN,
+    ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN,
     OF_JOINTS, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED, VELOCITY_MAX)
-from stewart_dynamics.mechanics.rows import JOINT_ANGLES
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.colors import AXIS_COLORS, LEG_COLORS, ROLES
 from stewart_dynamics.reporting.spectrum import Density
 
 _BLACK = ROLES['black']
 _SOURCE_COLORS = dict(zip(SOURCES, (*LEG_COLORS, _BLACK), strict=True))
-
-# The channels of a sample.
-POSITION, ANGLES, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
-    slice(n, n + 3) for n in range(0, 18, 3))
-LENGTHS, RATES, FORCES, POWERS = (slice(n, n + 6) for n in range(18, 42, 6))
-DETERMINANT, CONDITION = 42, 43
-BASE_WRENCH = slice(44, 50)
-# How many there are depends on the sources. Last, where they have limits, the joints' angles
-# and the clearances.
-BREAKDOWN = slice(50, 50 + 6 * len(SOURCES))
 
 BASE_SECTION = 'base_wrench'
 
@@ -55,39 +44,8 @@ PLOT_OF = {
     TORQUE_MAX: 'motor_torques', TORQUE_SPEED: 'motor_torques', SPEED_MAX: 'motor_speeds',
     TEMPERATURE_RISE_MAX: 'temperature_rises'}
 
-# The channels of a comparison with measured forces, after those of the motion.
-MEASURED, COMPUTED, RESIDUAL, WRENCH = (slice(n, n + 6) for n in range(0, 24, 6))
-COMPARED = 24
-
-
-def channels_of(parameters: Parameters) -> int:
-    """Return the number of channels of a sample."""
-    stop: int = motors_of(parameters).stop
-    return stop
-
-
-def joint_angles_of(parameters: Parameters) -> slice:
-    """Return the channels of the joints' angles; empty without limits."""
-    first = BREAKDOWN.start + 6 * len(sources_of(parameters))
-    limited = any(parameters[name] is not None for name in OF_JOINTS)
-    return slice(first, first + JOINT_ANGLES * limited)
-
-
-def clearances_of(parameters: Parameters) -> slice:
-    """Return the channels of the clearances between the legs; empty without limit."""
-    first: int = joint_angles_of(parameters).stop
-    return slice(first, first + 6 * (parameters[CLEARANCE_MIN] is not None))
-
-
-# Channels of the motors: torques, speeds, temperature rises, power of the bus.
-_TORQUES, _SPEEDS, _RISES = range(0, 18, 6)
-_BUS_POWER, _OF_MOTORS = 18, 19
-
-
-def motors_of(parameters: Parameters) -> slice:
-    """Return the channels of the motors; empty without ``drive.*``."""
-    first: int = clearances_of(parameters).stop
-    return slice(first, first + _OF_MOTORS * bool(parameters.drives))
+Places = Mapping[str, slice]
+"""The curves of each quantity, by its name: their numbers in the report."""
 
 
 class Curve(NamedTuple):
@@ -136,62 +94,63 @@ class Plot(NamedTuple):
                          for name, curves in self.variants.items()]}
 
 
-def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
+def motion_plots(p: Parameters, at: Places, velocities_known: bool) -> list[Plot]:
     """Return the plots of motion and forces; those of velocities only if they are known."""
-    p, joints = parameters, parameters['joints']
+    joints = p['joints']
     of_motion = [
         Plot('velocity', '13', 'Velocity of the platform', 'm/s',
-             _of_axes(VELOCITY, 'v x', 'v y', 'v z'), 'of its origin, base axes'),
+             _of_axes(at['velocity'], 'v x', 'v y', 'v z'), 'of its origin, base axes'),
         Plot('angular_velocity', '13', 'Angular velocity of the platform', 'deg/s',
-             _of_axes(OMEGA, 'w x', 'w y', 'w z'),
+             _of_axes(at['angular_velocity'], 'w x', 'w y', 'w z'),
              'base axes; not the rates of alpha, beta, gamma'),
         Plot('acceleration', '14', 'Acceleration of the platform', 'm/s²',
-             _of_axes(ACCELERATION, 'a x', 'a y', 'a z'), 'of its origin, base axes'),
+             _of_axes(at['acceleration'], 'a x', 'a y', 'a z'), 'of its origin, base axes'),
         Plot('angular_acceleration', '14', 'Angular acceleration of the platform', 'deg/s²',
-             _of_axes(ALPHA, 'dw/dt x', 'dw/dt y', 'dw/dt z'), 'base axes')]
+             _of_axes(at['angular_acceleration'], 'dw/dt x', 'dw/dt y', 'dw/dt z'), 'base axes')]
     of_rates = [
-        Plot('rates', '', 'Leg rates', 'm/s', _of_legs(joints, RATES), '+ extends',
+        Plot('rates', '', 'Leg rates', 'm/s', _of_legs(joints, at['rates']), '+ extends',
              _bounds('velocity_max', p['limits.velocity_max'], both=True)),
-        Plot('powers', '', 'Mechanical power of the legs', 'W', _of_legs(joints, POWERS),
+        Plot('powers', '', 'Mechanical power of the legs', 'W', _of_legs(joints, at['powers']),
              'demanded force times rate; + drives, − brakes', spikes=True)]
     return [
         Plot('position', '12', 'Inputs: position of the platform', 'm',
-             _of_axes(POSITION, 'X', 'Y', 'Z'), 'of its origin, base axes'),
+             _of_axes(at['position'], 'X', 'Y', 'Z'), 'of its origin, base axes'),
         Plot('angles', '12', 'Inputs: orientation of the platform', 'deg',
-             _of_axes(ANGLES, 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
+             _of_axes(at['angles'], 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
         *(of_motion if velocities_known else ()),
-        Plot('lengths', '15', 'Leg lengths', 'm', _of_legs(joints, LENGTHS),
+        Plot('lengths', '15', 'Leg lengths', 'm', _of_legs(joints, at['lengths']),
              'between the joint centers', [
                  *_bounds('length_min', p['limits.length_min']),
                  *_bounds('length_max', p['limits.length_max'])]),
-        *(_of_joints(p, limit) for limit in OF_JOINTS if p[limit] is not None),
+        *(_of_joints(p, at, limit) for limit in OF_JOINTS if p[limit] is not None),
         *([] if p[CLEARANCE_MIN] is None else [Plot(
             PLOT_OF[CLEARANCE_MIN], '', 'Clearance between the legs', 'm',
-            _of_legs(joints, clearances_of(p)), 'from each leg to the nearest other leg',
+            _of_legs(joints, at['clearances']), 'from each leg to the nearest other leg',
             [Bound(p[CLEARANCE_MIN], 'leg_clearance_min')])]),
         Plot('determinant', '17', 'det(J)', 'm³',
-             {'': [Curve('det(J)', LEG_COLORS[0], DETERMINANT)]},
+             {'': [Curve('det(J)', LEG_COLORS[0], at['determinant'].start)]},
              'zero at a singularity', [Bound(0.0, 'singular', ROLES['singular'])],
              spikes=True),
         Plot('condition', '17', 'Condition number of J_inv', '–',
-             {'': [Curve('condition', LEG_COLORS[1], CONDITION)]}, 'dimensionless; 1 is best', [
+             {'': [Curve('condition', LEG_COLORS[1], at['condition'].start)]},
+             'dimensionless; 1 is best', [
                  Bound(p['singularity.warn_condition'], 'warn', ROLES['near']),
                  Bound(p['singularity.stop_condition'], 'stop', ROLES['singular'])], log=True),
-        Plot('forces', '18', 'Leg forces', 'N', _of_legs(joints, FORCES),
+        Plot('forces', '18', 'Leg forces', 'N', _of_legs(joints, at['forces']),
              'demanded by the motion, + pushes',
              _bounds('force_max', p['limits.force_max'], both=True), spikes=True),
         *(of_rates if velocities_known else ()),
-        *(_of_motors(p, velocities_known) if p.drives else ()),
+        *(_of_motors(p, at, velocities_known) if p.drives else ()),
         Plot('force_breakdown', '', 'Leg force by source', 'N', {
-            leg: [Curve('sum', ROLES['zero'], FORCES.start + n, width=4.5),
-                  *(Curve(source, _SOURCE_COLORS[source], BREAKDOWN.start + 6 * k + n)
+            leg: [Curve('sum', ROLES['zero'], at['forces'].start + n, width=4.5),
+                  *(Curve(source, _SOURCE_COLORS[source], at['breakdown'].start + 6 * k + n)
                     for k, source in enumerate(sources_of(p)))]
             for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
 
 
-def _of_joints(p: Parameters, limit: str) -> Plot:
+def _of_joints(p: Parameters, at: Places, limit: str) -> Plot:
     name = limit.removeprefix('limits.')
-    which, first = ANGLES_OF[limit], joint_angles_of(p).start
+    which, first = ANGLES[limit], at['joint_angles'].start
     joint = 'base' if limit == BASE_ANGLE_MAX else 'platform'
     return Plot(
         PLOT_OF[limit], '', f'Angles of the {joint} joints', 'deg',
@@ -200,20 +159,19 @@ def _of_joints(p: Parameters, limit: str) -> Plot:
         _bounds(name, np.degrees(p[limit])))
 
 
-def base_wrench_plots() -> list[Plot]:
+def base_wrench_plots(at: Places) -> list[Plot]:
     """Return the plots of the base wrench over time."""
     return [
         Plot('base_force', '', 'Force on the base', 'N',
-             _all_or_one(_of_axes(_first(BASE_WRENCH), 'F x', 'F y', 'F z')),
+             _all_or_one(_of_axes(at['base_force'], 'F x', 'F y', 'F z')),
              'of the whole hexapod, base axes', spikes=True, section=BASE_SECTION),
         Plot('base_moment', '', 'Moment on the base', 'N m',
-             _all_or_one(_of_axes(_last(BASE_WRENCH), 'M x', 'M y', 'M z')),
+             _all_or_one(_of_axes(at['base_moment'], 'M x', 'M y', 'M z')),
              "about the base's origin, base axes", spikes=True, section=BASE_SECTION)]
 
 
 def spectrum_plots(density: Density, first: int) -> list[Plot]:
     """Return the plots of the spectra of the base wrench, whose curves begin at a number."""
-    wrench = slice(first, first + 6)
     note = (f'amplitude spectral density up to the Nyquist rate; {density.segments} Hann '
             f'{"window" if density.segments == 1 else "windows"} of {density.seconds:.3g} s, '
             'without their means')
@@ -221,49 +179,36 @@ def spectrum_plots(density: Density, first: int) -> list[Plot]:
         note += (f'; {100.0 * density.uneven:.2g} % of the steps in time are uneven, values are '
                  'interpolated: the upper half of the frequencies may be too low')
     return [
-        Plot('base_force_spectrum', '', 'Spectrum of the force on the base', 'N/√Hz',
-             _of_axes(_first(wrench), 'F x', 'F y', 'F z'), note, log=True,
-             section=BASE_SECTION, spectrum=True),
-        Plot('base_moment_spectrum', '', 'Spectrum of the moment on the base', 'N m/√Hz',
-             _of_axes(_last(wrench), 'M x', 'M y', 'M z'), note, log=True,
-             section=BASE_SECTION, spectrum=True)]
+        Plot(f'base_{name}_spectrum', '', f'Spectrum of the {name} on the base', f'{unit}/√Hz',
+             _of_axes(slice(begin, begin + 3), *(f'{letter} {axis}' for axis in 'xyz')), note,
+             log=True, section=BASE_SECTION, spectrum=True)
+        for name, unit, letter, begin in (
+            ('force', 'N', 'F', first), ('moment', 'N m', 'M', first + 3))]
 
 
-def _first(wrench: slice) -> slice:
-    return slice(wrench.start, wrench.start + 3)
-
-
-def _last(wrench: slice) -> slice:
-    return slice(wrench.start + 3, wrench.stop)
-
-
-def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
-    """Return the plots of a comparison, whose channels begin at a number."""
-    joints = parameters['joints']
-    measured, computed, residual, wrench = (
-        slice(first + each.start, first + each.stop)
-        for each in (MEASURED, COMPUTED, RESIDUAL, WRENCH))
+def measured_plots(p: Parameters, at: Places) -> list[Plot]:
+    """Return the plots of a comparison with measured forces."""
     return [
         Plot('measured', '', 'Measured and computed leg force', 'N', {
-            leg: [Curve('measured', _BLACK, measured.start + n),
-                  Curve('computed', LEG_COLORS[n], computed.start + n),
-                  Curve('residual', ROLES['faint'], residual.start + n, 'dot')]
-            for n, leg in enumerate(joints)}, 'residual: measured less computed',
+            leg: [Curve('measured', _BLACK, at['measured'].start + n),
+                  Curve('computed', LEG_COLORS[n], at['computed'].start + n),
+                  Curve('residual', ROLES['faint'], at['residual'].start + n, 'dot')]
+            for n, leg in enumerate(p['joints'])}, 'residual: measured less computed',
             contacts=True, spikes=True),
-        Plot('residuals', '', 'Residual of every leg', 'N', _of_legs(joints, residual),
+        Plot('residuals', '', 'Residual of every leg', 'N', _of_legs(p['joints'], at['residual']),
              'measured less computed force', contacts=True, spikes=True),
-        Plot('external_force', '', 'External force', 'N', _of_axes(wrench, 'F x', 'F y', 'F z'),
+        Plot('external_force', '', 'External force', 'N',
+             _of_axes(at['external_force'], 'F x', 'F y', 'F z'),
              'J_inv^T (computed − measured): the load that the model does not include, base axes',
              contacts=True, spikes=True),
         Plot('external_moment', '', 'External moment', 'N m',
-             _of_axes(_last(wrench), 'M x', 'M y', 'M z'),
+             _of_axes(at['external_moment'], 'M x', 'M y', 'M z'),
              "about the platform's origin, base axes", contacts=True, spikes=True)]
 
 
-def _of_motors(p: Parameters, velocities_known: bool) -> Iterator[Plot]:
-    first, joints = motors_of(p).start, p['joints']
+def _of_motors(p: Parameters, at: Places, velocities_known: bool) -> Iterator[Plot]:
     torques, speeds, rises = (
-        _of_legs(joints, slice(first + n, first + n + 6)) for n in (_TORQUES, _SPEEDS, _RISES))
+        _of_legs(p['joints'], at[name]) for name in ('torques', 'speeds', 'rises'))
     yield Plot(PLOT_OF[TORQUE_MAX], '', 'Torques of the motors', 'N m', torques,
                'demanded by the motion, + extends',
                _bounds('torque_max', p[TORQUE_MAX], both=True), spikes=True)
@@ -272,7 +217,7 @@ def _of_motors(p: Parameters, velocities_known: bool) -> Iterator[Plot]:
                    _bounds('speed_max', p[SPEED_MAX], both=True))
         if p['drive.resistance'] is not None:
             yield Plot('bus_power', '', 'Power of the bus', 'W', {
-                '': [Curve('bus', _BLACK, first + _BUS_POWER)]},
+                '': [Curve('bus', _BLACK, at['bus_power'].start)]},
                 'electrical, of all motors; − flows back', spikes=True)
     if p['drive.thermal_resistance'] is not None:
         yield Plot(PLOT_OF[TEMPERATURE_RISE_MAX], '', 'Temperature rises of the windings', 'K',
