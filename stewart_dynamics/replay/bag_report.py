@@ -236,8 +236,6 @@ class Report:
             'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8')},
             'warnings': singularity['warnings_from_to_s'],
             'crossings': singularity['crossings_at_s'],
-            'allWarnings': singularity['warnings'],
-            'allCrossings': singularity['crossings'],
             'contacts': [[each['from_s'], each['to_s']] for each in (
                 summary['measured']['contacts']['strongest'] if summary['measured'] else ())],
             'curves': [_packed(*each) for each in curves],

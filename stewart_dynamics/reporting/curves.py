@@ -105,6 +105,8 @@ class Curves:
 
     def drawn(self, channel: int) -> tuple[Array, Array]:
         """Return times [s], never decreasing, and values of the line; nan breaks it."""
+        if not self.samples:
+            return np.empty(0), np.empty(0)
         used = slice(0, -(-self.samples // self.samples_in_bucket))
         lowest, highest = self._lowest[channel, used], self._highest[channel, used]
         times = np.stack([self._lowest_at[channel, used], self._highest_at[channel, used],

@@ -86,7 +86,12 @@ function table(heads, rows) {
       ...others.map(each => each instanceof HTMLTableCellElement ? each : cell('td', each))))));
 }
 
-const empty = () => element('td', {textContent: '–'});
+// A table of names with cells for their values: the cells, row by row.
+function listIn(readout, heads, names) {
+  const cells = names.map(() => heads.slice(1).map(() => element('td', {textContent: '–'})));
+  readout.append(table(heads, names.map((name, n) => [name, ...cells[n]])));
+  return cells;
+}
 
 const INK = color('ink'), FAINT = color('faint');
 const FONT = {family: getComputedStyle(document.body).fontFamily, size: 12.5, color: INK};
@@ -158,9 +163,24 @@ const watcher = new IntersectionObserver(entries => {
   }
 }, {rootMargin: '250px 0px'});
 
-function watch(canvas, drawing) {
-  byCanvas.set(canvas, drawing);
-  watcher.observe(canvas);
+// A canvas and its readout, under a head.
+class Drawing {
+  constructor(place, options, ...head) {
+    this.drawn = false;
+    this.canvas = element('div', options);
+    this.readout = element('aside', {className: 'readout'});
+    place.append(element('div', {className: 'plot'}, element('div', {className: 'head'}, ...head),
+      element('div', {className: 'body'}, this.canvas, this.readout)));
+    byCanvas.set(this.canvas, this);
+    watcher.observe(this.canvas);
+  }
+
+  get inView() { return this.drawn && inView.has(this); }
+}
+
+function titled(title, figure) {
+  return element('h3', {}, title,
+    ...(figure ? [element('span', {className: 'figure', textContent: ` figure ${figure} of the paper`})] : []));
 }
 
 const AXIS = {gridcolor: color('grid'), zerolinecolor: color('zero'), linecolor: FAINT,
@@ -178,45 +198,33 @@ function layoutOf(xTitle, xaxis, yTitle, yaxis, more = {}) {
     yaxis: {...AXIS, ...yaxis, title: title(yTitle, 8)}, ...more};
 }
 
-class TimePlot {
+class TimePlot extends Drawing {
   constructor(spec, place) {
+    const tools = element('div', {className: 'tools'});
+    super(place, {className: 'canvas time', id: `plot_${spec.key}`}, titled(spec.title, spec.figure),
+      element('span', {className: 'note', textContent: spec.note}), tools);
     this.spec = spec;
     this.variant = 0;
-    this.drawn = false;
     this.hidden = new Set();
-    this.canvas = element('div', {className: 'canvas time', id: `plot_${spec.key}`});
     this.cursor = element('div', {className: 'cursor'}, element('span'));
-    this.values = [];
-    this.readout = element('aside', {className: 'readout'});
-    this.tools = element('div', {className: 'tools'});
+    this.tools = tools;
     if (spec.variants.length > 1) {
       const choice = element('select', {ariaLabel: 'curves'},
         ...spec.variants.map((each, n) => element('option', {value: n, textContent: each.name})));
       choice.addEventListener('change', () => this.choose(+choice.value));
-      this.tools.append(choice);
+      tools.append(choice);
     }
-    const head = element('div', {className: 'head'});
-    const title = element('h3', {textContent: spec.title});
-    if (spec.figure) {
-      title.append(element('span', {className: 'figure', textContent: ` figure ${spec.figure} of the paper`}));
-    }
-    this.remark = element('span', {className: 'note', textContent: spec.note});
-    head.append(title, this.remark, this.tools);
-    place.append(element('div', {className: 'plot'}, head,
-      element('div', {className: 'body'}, this.canvas, this.readout)));
     this.listValues();
-    watch(this.canvas, this);
   }
 
   get curves() { return this.spec.variants[this.variant].curves; }
 
   listValues() {
     this.where = element('span', {textContent: 'at the cursor'});
-    this.values = this.curves.map(empty);
     const toggles = this.curves.map(each => element(
       'button', {title: 'show or hide'}, swatch(each.color), each.name));
-    this.readout.replaceChildren(table(
-      [this.where, `[${this.spec.unit}]`], toggles.map((toggle, n) => [toggle, this.values[n]])));
+    this.readout.replaceChildren();
+    this.values = listIn(this.readout, [this.where, `[${this.spec.unit}]`], toggles).map(([cell]) => cell);
     toggles.forEach((toggle, n) => {
       const show = () => toggle.closest('tr').classList.toggle('off', this.hidden.has(n));
       show();
@@ -350,7 +358,7 @@ class TimePlot {
 
   // Take the common range.
   follow() {
-    if (!this.drawn || !inView.has(this)) return;
+    if (!this.inView) return;
     if (!sameRange(this.canvas._fullLayout.xaxis.range, time.range)) {
       Plotly.relayout(this.canvas, {'xaxis.range': time.range.slice()});
     }
@@ -410,7 +418,7 @@ class TimePlot {
   }
 
   showCursor() {
-    if (!this.drawn || !inView.has(this)) return;
+    if (!this.inView) return;
     const when = time.hover === null ? time.cursor : time.hover;
     this.placeCursor(when, `${grouped(when, 3)} s`);
     this.curves.forEach((each, n) => { this.values[n].textContent = shown(valueAt(each.curve, when)); });
@@ -591,32 +599,19 @@ function colorReach() {
   return +reach.toPrecision(2) || 1;
 }
 
-class Player {
+class Player extends Drawing {
   constructor(place) {
-    this.canvas = element('div', {className: 'canvas tall', id: 'platform'});
-    this.readout = element('aside', {className: 'readout'});
+    super(place, {className: 'canvas tall', id: 'platform'});
     this.frame = -1;
     this.wanted = 0;
     this.busy = false;
-    this.drawn = false;
     this.reach = colorReach();
-    place.append(element('h2', {textContent: 'Motion'}), element('p', {className: 'note', textContent:
-      'Legs are colored by the demanded force: red pushes, blue pulls. Play, or move the slider at the '
-      + 'bottom: the cursor in all plots follows. Drag to rotate the hexapod.'}),
-    element('div', {className: 'plot'}, element('div', {className: 'body'}, this.canvas, this.readout)));
-    this.listValues();
-    watch(this.canvas, this);
-  }
-
-  listValues() {
-    this.legValues = report.legs.map(() => [empty(), empty()]);
-    const pose = ['X [m]', 'Y [m]', 'Z [m]', 'alpha [deg]', 'beta [deg]', 'gamma [deg]'];
-    this.poseValues = pose.map(empty);
+    this.legValues = listIn(this.readout, ['leg', 'force [N]', 'length [m]'],
+      report.legs.map((name, n) => [swatch(report.colors[n]), name]));
+    this.poseValues = listIn(this.readout, ['platform', ''],
+      ['X [m]', 'Y [m]', 'Z [m]', 'alpha [deg]', 'beta [deg]', 'gamma [deg]']);
     this.sample = element('p', {className: 'note'});
-    this.readout.replaceChildren(
-      table(['leg', 'force [N]', 'length [m]'], report.legs.map(
-        (name, n) => [[swatch(report.colors[n]), name], ...this.legValues[n]])),
-      table(['platform', ''], pose.map((name, n) => [name, this.poseValues[n]])), this.sample);
+    this.readout.append(this.sample);
   }
 
   appear() {
@@ -643,7 +638,7 @@ class Player {
 
   show() {
     this.wanted = nearest(frames.times, time.cursor);
-    if (!this.drawn || !inView.has(this) || this.busy || this.wanted === this.frame) return;
+    if (!this.inView || this.busy || this.wanted === this.frame) return;
     this.busy = true;
     requestAnimationFrame(async () => {
       try {
@@ -673,25 +668,19 @@ class Player {
     });
     const pose = [frame[0], frame[1], frame[2], degrees * Math.atan2(r[7], r[8]),
       degrees * Math.atan2(-r[6], Math.hypot(r[0], r[3])), degrees * Math.atan2(r[3], r[0])];
-    this.poseValues.forEach((cell, n) => { cell.textContent = shown(pose[n]); });
+    this.poseValues.forEach(([cell], n) => { cell.textContent = shown(pose[n]); });
     this.sample.textContent = `sample at t = ${grouped(frames.times[number], 3)} s`
       + (frames.times.length < report.samples ? `, one of ${grouped(frames.times.length)} shown` : '');
   }
 }
 
-class InitialAndFinal {
+class InitialAndFinal extends Drawing {
   constructor(place) {
-    this.drawn = false;
-    this.canvas = element('div', {className: 'canvas tall', id: 'plot_ends'});
-    const last = frames.times.length - 1;
-    this.ends = [[0, FAINT, 4, 'initial'], [last, report.colors[1], 5, 'final']];
-    place.append(element('div', {className: 'plot'}, element('div', {className: 'head'},
-      element('h3', {}, 'Platform at initial and final position',
-        element('span', {className: 'figure', textContent: ' figure 16 of the paper'}))),
-    element('div', {className: 'body'}, this.canvas, element('aside', {className: 'readout'},
-      table([], this.ends.map(([number, of, , name]) => [
-        [swatch(of), `${name}, t = ${grouped(frames.times[number], 3)} s`]]))))));
-    watch(this.canvas, this);
+    super(place, {className: 'canvas tall', id: 'plot_ends'},
+      titled('Platform at initial and final position', 16));
+    this.ends = [[0, FAINT, 4, 'initial'], [frames.times.length - 1, report.colors[1], 5, 'final']];
+    listIn(this.readout, [], this.ends.map(
+      ([number, of, , name]) => [swatch(of), `${name}, t = ${grouped(frames.times[number], 3)} s`]));
   }
 
   appear() {
@@ -766,44 +755,16 @@ function setUpBar() {
 // ---- the page
 
 function setUp() {
+  if (!report.samples) return;
   const place = document.getElementById('plots');
   if (typeof Plotly === 'undefined') {
-    place.append(element('p', {className: 'note', textContent:
+    document.getElementById('motion').hidden = true;
+    place.replaceChildren(element('p', {className: 'note', textContent:
       'The plots need the file plotly-….min.js of the folder of results: move reports together with it.'}));
-    return;
-  }
-  if (!report.samples) {
-    place.append(element('p', {className: 'note', textContent:
-      'No setpoint could be answered: there are no plots.'}));
     return;
   }
   setUpBar();
   player = new Player(document.getElementById('motion'));
-  place.append(element('h2', {textContent: 'Plots over time'}));
-  const drag = TOUCH ? 'Tap: move the cursor there. '
-    : 'Drag to zoom: all plots follow. Double click: whole range. Click: move the cursor there. ';
-  place.append(element('p', {className: 'note', textContent: drag + (report.samplesInBucket < 2
-    ? 'Every sample is drawn.'
-    : `${grouped(report.samples)} samples: of each ${grouped(report.samplesInBucket)} the lowest and the `
-      + 'highest are drawn; values are those of the drawn sample nearest to the cursor.')}));
-  const part = (listed, all) => listed.length < all ? `, the first ${listed.length} of ${grouped(all)}` : '';
-  const legend = element('div', {className: 'legend'});
-  const explain = (style, text) => {
-    const box = element('i');
-    box.style.cssText = style;
-    legend.append(element('span', {}, box, text));
-  };
-  if (report.warnings.length) {
-    explain('background: rgba(240, 170, 40, 0.4)', `singularity warning${part(report.warnings, report.allWarnings)}`);
-  }
-  if (report.crossings.length) {
-    explain('width: 0; border-left: 2px dotted var(--singular)',
-      `det(J) crosses zero${part(report.crossings, report.allCrossings)}`);
-  }
-  if (report.contacts.length) {
-    explain('background: rgba(130, 90, 190, 0.35)', 'contact: external load on the platform');
-  }
-  place.append(legend);
   for (const spec of report.plots) {
     if (spec.key === 'determinant') new InitialAndFinal(place);
     const section = document.getElementById(spec.section);
