@@ -24,7 +24,7 @@ from pathlib import Path
 import re
 import signal
 import sys
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from stewart_dynamics.errors import one_line, StewartError
 
@@ -51,8 +51,10 @@ class Program:
 
     def parser(self, description: str, epilog: str) -> argparse.ArgumentParser:
         """Return a parser of arguments; the lines of the epilog stay."""
-        return argparse.ArgumentParser(prog=self.name, description=description, epilog=epilog,
-                                       formatter_class=argparse.RawDescriptionHelpFormatter)
+        parser = argparse.ArgumentParser(prog=self.name, description=description, epilog=epilog,
+                                         formatter_class=argparse.RawDescriptionHelpFormatter)
+        parser.register('action', None, _StoreOnce)
+        return parser
 
     def prepare(self, functions: Iterable[EntryPoint], mistakes: Iterable[str]) -> None:
         """Compile functions side by side; print why that is not possible, and likely mistakes."""
@@ -93,6 +95,20 @@ class Program:
     def complain(self, what: object) -> None:
         """Print one line on stderr."""
         print(f'{self.name}: {_printable(one_line(what))}', file=sys.stderr)
+
+
+class _StoreOnce(argparse.Action):
+    """Stores the value of an argument; an option that is given twice is an error."""
+
+    _stored = False
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace,
+                 values: Any, option_string: str | None = None) -> None:
+        """Store the value."""
+        if self._stored and self.option_strings:
+            raise argparse.ArgumentError(self, 'given twice')
+        self._stored = True
+        setattr(namespace, self.dest, values)
 
 
 def run_program(name: str, program: Callable[[Sequence[str] | None], int],

@@ -722,7 +722,8 @@ def test_a_bag_of_ros_1_gives_the_same(
 
 
 @pytest.mark.parametrize('arguments', [
-    [], ['bag'], ['--params', 'x.yaml'], ['bag', '--params', 'x.yaml', '--nonsense']])
+    [], ['bag'], ['--params', 'x.yaml'], ['bag', '--params', 'x.yaml', '--nonsense'],
+    ['bag', '--params', 'x.yaml', '--params', 'y.yaml']])
 def test_bad_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(arguments)

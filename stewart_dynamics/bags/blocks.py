@@ -145,17 +145,7 @@ def compact(block: Messages) -> Messages:
 
 
 class RowsFile:
-    """
-    A file without checksums that is read message by message, see Source.
-
-    Attributes
-    ----------
-    missing : list of str
-        Descriptions of the parts that could not be read.
-    unchecked : bool
-        True.
-
-    """
+    """A file without checksums that is read message by message, see Source."""
 
     def __init__(self) -> None:
         self.missing: list[str] = []

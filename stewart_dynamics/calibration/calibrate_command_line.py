@@ -41,8 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _arguments() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = _PROGRAM.parser(
         description="Calibrate a hexapod's geometry, base joints, platform joints and zero "
                     'lengths, from leg positions and poses that a tracker, camera or probe '
                     'measured.',

@@ -33,8 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _arguments() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = _PROGRAM.parser(
         description='Write the computation of the node for one hexapod as C99 source and as an '
                     'FMU, for real-time\ncomputers.',
         epilog='DIR gets stewart_dynamics.h and .c, the same for every hexapod; NAME.h and .c, '

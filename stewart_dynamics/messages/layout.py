@@ -83,7 +83,7 @@ class Layout:
     def _prepare_one(self, order: str, fields: Sequence[tuple[int, str]]) -> None:
         """Prepare reading and writing of a single message by a Struct of its fields."""
         layout, end = order, 0
-        # Of the fields of each kind: where their values are among all.
+        # By the kind of the fields: where their values are among all.
         places: dict[str, list[slice]] = {'s': [], 'I': [], 'd': []}
         for at, field in fields:
             layout += f'{at - Struct(layout).size}x{field}'

@@ -31,7 +31,7 @@ def transforms(frames: Sequence[tuple[str, str]]) -> Layout:
     Parameters
     ----------
     frames : sequence of (frame, child)
-        Those of each transform.
+        The frames of each transform.
 
     """
     body = bytearray(LITTLE_ENDIAN)

@@ -193,7 +193,9 @@ class Report:
             data=self._data(summary), sources=sources_of(self._parameters),
             cards=cards(summary), margins=smallest_margins(summary),
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
-            date=date(summary['setpoints']['first_stamp_ns']), units=units(), plot_of=PLOT_OF,
+            date=date(summary['setpoints']['first_stamp_ns']), plot_of=PLOT_OF,
+            units={name: (each.unit or '').replace('^2', '²')
+                   for name, each in PARAMETERS.items()},
             most_times=_MOST_TIMES,
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})
@@ -306,15 +308,11 @@ def margin_columns(parameters: Parameters) -> list[MarginColumn]:
     return [column for column in _MARGINS if column.limits[0] not in left_out]
 
 
-def _margin_column(name: str, unit: str) -> MarginColumn:
-    suffix = unit.lower().replace('/', '_')
-    return MarginColumn(
-        name, unit, f'{name.replace(" ", "_")}_margin_{suffix}',
+_MARGINS = [
+    MarginColumn(
+        name, unit, f'{name.replace(" ", "_")}_margin_{unit.lower().replace("/", "_")}',
         tuple(limit for limit in LIMITS if QUANTITIES[limit] == (name, unit)))
-
-
-_MARGINS = [_margin_column(*quantity) for quantity in dict.fromkeys(
-    QUANTITIES[limit] for limit in LIMITS)]
+    for name, unit in dict.fromkeys(QUANTITIES[limit] for limit in LIMITS)]
 
 
 def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -338,8 +336,3 @@ def date(stamp: int | None) -> str:
     except (OverflowError, OSError, ValueError):
         return ''
     return f' ({when:%Y-%m-%d %H:%M:%S} UTC)'
-
-
-def units() -> dict[str, str]:
-    """Return the unit of each parameter for display."""
-    return {name: (PARAMETERS[name].unit or '').replace('^2', '²') for name in PARAMETERS}

@@ -39,7 +39,7 @@ _CONTEXT.set_forkserver_preload(['stewart_dynamics.replay.one_bag'])
 
 @contextmanager
 def processes(jobs: int, at: At) -> Iterator[Replayed]:
-    """Yield a function that replays bags, with so many processes at most; then end these."""
+    """Yield a function that replays bags, in a number of processes at most; then end these."""
     _start_server()
     stopped: Any = _CONTEXT.RawValue('b')
     # Bytes and setpoints of each process, without a lock, which a process could take with it.

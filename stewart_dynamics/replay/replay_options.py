@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from stewart_dynamics.program import DONE, PARTLY_READ
@@ -33,7 +32,7 @@ class Options(NamedTuple):
 
     node: str = NODE
     """Node name: the prefix of the output topics, and of setpoint topics with usual names."""
-    topics: Mapping[str, str] = MappingProxyType({})
+    topics: Mapping[str, str] = {}
     """
     Topics in the bag to be read as pose, twist, accel, combined or wrench, or as base_pose,
     base_twist, base_accel or base_imu.
@@ -52,11 +51,6 @@ class Options(NamedTuple):
     """Replace existing results."""
     run: str = ''
     """Identifier of a run over many bags, written to summary.json."""
-
-    # A mapping proxy cannot be pickled.
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return how to unpickle the options."""
-        return type(self), (*self._replace(topics=dict(self.topics)),)
 
 
 def code_of(summary: Mapping[str, Any]) -> int:

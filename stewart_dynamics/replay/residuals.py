@@ -39,6 +39,7 @@ from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
+from stewart_dynamics.reporting.block_statistics import Extreme
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
 # The most setpoints and measured samples that wait to be matched.
@@ -90,10 +91,10 @@ class Comparison:
         self._setpoints = Waiting(self._gap, _SETPOINTS_WAITING)
         self._samples = Waiting(self._gap, _SAMPLES_WAITING)
         self._without_force = 0
-        self._legs = _Statistics(6)
+        self._legs = _Statistics()
         self._measured_squares = np.zeros(6)
         self._computed = np.zeros((3, 6))  # sums of it, its squares, its products with measured
-        self._wrench = _Statistics(6)
+        self._wrench = _Statistics()
         self._bins = WrenchBins()
 
     def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
@@ -238,26 +239,19 @@ class Comparison:
 
 
 class _Statistics:
-    """Sums, squares and peaks of quantities."""
+    """Sums, squares and peaks of six quantities."""
 
-    def __init__(self, quantities: int) -> None:
+    def __init__(self) -> None:
         self.count = 0
-        self.sums = np.zeros(quantities)
-        self.squares = np.zeros(quantities)
-        self._peaks = np.zeros(quantities)
-        self._peaks_at = np.zeros(quantities)
+        self.sums, self.squares = np.zeros(6), np.zeros(6)
+        self._peaks = Extreme(6, np.abs)
 
     def add(self, seconds: Array, values: Array) -> None:
-        """Add values (quantities, N) at times (N,) [s]."""
-        first = not self.count
+        """Add values (6, N) at times (N,) [s]."""
         self.count += len(seconds)
         self.sums += np.sum(values, axis=1)
         self.squares += np.sum(values ** 2, axis=1)
-        at = np.argmax(np.abs(values), axis=1)
-        peaks = values[np.arange(len(values)), at]
-        larger = (np.abs(peaks) > np.abs(self._peaks)) | first
-        self._peaks[larger] = peaks[larger]
-        self._peaks_at[larger] = seconds[at][larger]
+        self._peaks.add(seconds, values.T)
 
     def named(self, number: int, prefix: str, unit: str) -> dict[str, float | None]:
         """Return RMS, mean and peak under names with units; None without samples."""
@@ -268,7 +262,7 @@ class _Statistics:
         return dict(zip(names, [
             float(np.sqrt(self.squares[number] / self.count)),
             float(self.sums[number] / self.count),
-            float(self._peaks[number]), float(self._peaks_at[number])], strict=True))
+            float(self._peaks.values[number]), float(self._peaks.at[number])], strict=True))
 
 
 # -- contacts: intervals with an external load ----------------------------------------------------

@@ -336,19 +336,7 @@ class _BaseWrench:
         self._squares_and_sizes = Integral(2 * len(_BASE_WRENCH))
 
     def add(self, seconds: Array, steps: Array, wrenches: Array) -> None:
-        """
-        Add a block of samples.
-
-        Parameters
-        ----------
-        seconds : (N,)
-            Time since the first setpoint of the bag [s].
-        steps : (N,)
-            Time since the previous sample [s].
-        wrenches : (N, 6)
-            Force [N] and moment [N m]; nan: not known.
-
-        """
+        """Add times (N,), the time to each from the one before [s], and wrenches (N, 6)."""
         squares = np.empty((len(seconds), len(_BASE_WRENCH)))
         with np.errstate(over='ignore'):
             np.square(wrenches, out=squares[:, 2:])

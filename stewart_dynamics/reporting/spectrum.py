@@ -169,15 +169,7 @@ def _powers(places: Array, values: Array, length: int) -> Array:
     """
     Return the sums of the squares of the spectra of all segments of a run (C, length / 2 + 1).
 
-    Parameters
-    ----------
-    places : (N,)
-        Where its samples are, in units of the usual step; the first is at 0.
-    values : (N, C)
-        The samples.
-    length : int
-        Number of even samples in a segment.
-
+    The places (N,) of the samples (N, C) are in units of the usual step, the first is 0.
     """
     powers = np.zeros((values.shape[1], length // 2 + 1))
     window = _window(length)
