@@ -360,8 +360,8 @@ def test_figures_are_those_of_the_paper_by_name(tmp_path: Path) -> None:
     given = trajectory('clear')
     given.write(tmp_path / 'report.html')
     page = (tmp_path / 'report.html').read_text(encoding='utf-8')
-    assert 'figure ${spec.figure} of the paper' in page
-    assert 'figure 16 of the paper' in page
+    assert 'figure ${figure} of the paper' in page
+    assert "titled('Platform at initial and final position', 16)" in page
     assert 'Fig. ' not in page[page.index('<script id="own">'):]
 
 
