@@ -29,11 +29,11 @@ from urllib.parse import quote
 
 from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
+from stewart_dynamics.replay.legs_table import harmless
 from stewart_dynamics.replay.motor_loads import needed
 from stewart_dynamics.replay.replay_options import LIMIT_MET
 from stewart_dynamics.replay.statements import MEASURED, MISSING, needed_words, statements
 from stewart_dynamics.reporting.pages import page
-from stewart_dynamics.reporting.spreadsheet import harmless
 from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')

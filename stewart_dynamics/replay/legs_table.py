@@ -28,9 +28,10 @@ from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.replay.csv_rows import rows_of, RowsProcess
-from stewart_dynamics.reporting.spreadsheet import harmless
 from stewart_dynamics.setpoints.step import Outputs
 
+# Beginnings of text that spreadsheet programs execute.
+_FORMULA = ('=', '+', '-', '@', '\t', '\r', '\n')
 # Rows from which on a second process formats them: it takes 0.1 s to start.
 _LONG = 30_000
 
@@ -147,6 +148,11 @@ class CsvTable(Table):
                 self._process.close()
         finally:
             self._file.close()
+
+
+def harmless(text: str, mark: str = "'") -> str:
+    """Return a text, with a mark before it if a spreadsheet would read it as a formula."""
+    return f'{mark}{text}' if text.startswith(_FORMULA) else text
 
 
 def _quoted(text: str) -> str:

@@ -128,18 +128,17 @@ class MotorLoads:
         steady = math.nan if p['drive.thermal_resistance'] is None else (
             heat * p['drive.thermal_resistance'][leg])
         found = {
-            'torque_peak_n_m': self._torque.values[leg], 'torque_peak_at_s': self._torque.at[leg],
+            **self._torque.named(leg, 'torque_peak', 'n_m'),
             'torque_rms_n_m': rms,
             'torque_margin_n_m': self._margin.values[leg] if limited else None,
             'torque_margin_at_s': self._margin.at[leg] if limited else None,
             'torque_continuous_margin_n_m': None if continuous is None else continuous - rms,
-            'speed_peak_rad_s': speed, 'speed_peak_at_s': self._speed.at[leg],
+            **self._speed.named(leg, 'speed_peak', 'rad_s'),
             'speed_mean_rad_s': self._means.mean[6 + leg],
             'speed_margin_rad_s': None if fastest is None else fastest - abs(speed),
             'current_peak_a': self._current.values[leg],
             'current_rms_a': None if constant is None else rms / constant[leg],
-            'temperature_rise_max_k': self._rise.values[leg],
-            'temperature_rise_max_at_s': self._rise.at[leg],
+            **self._rise.named(leg, 'temperature_rise_max', 'k'),
             'temperature_rise_steady_k': steady,
             'temperature_rise_margin_k': (
                 None if p[TEMPERATURE_RISE_MAX] is None
@@ -155,8 +154,7 @@ class MotorLoads:
         *_, mean_drawn, mean_regenerated = self._electrical.mean.tolist()
         back = self._regenerated.values[0] < 0.0
         return {
-            'power_peak_w': finite(self._drawn.values[0]),
-            'power_peak_at_s': finite(self._drawn.at[0]),
+            **self._drawn.named(0, 'power_peak', 'w'),
             'regenerated_peak_w': finite(-self._regenerated.values[0]) if back else 0.0,
             'regenerated_peak_at_s': finite(self._regenerated.at[0]) if back else None,
             'power_mean_w': finite(mean_drawn - mean_regenerated),

@@ -268,12 +268,11 @@ class Summary:
                           *([] if most is None else [most - longest])]
         found = {
             'length_min_m': finite(shortest), 'length_max_m': finite(longest),
-            'rate_peak_m_s': finite(rate), 'rate_peak_at_s': finite(self._rate.at[leg]),
-            'force_peak_n': finite(force), 'force_peak_at_s': finite(self._force.at[leg]),
+            **self._rate.named(leg, 'rate_peak', 'm_s'),
+            **self._force.named(leg, 'force_peak', 'n'),
             'force_rms_n': finite(math.sqrt(squares)),
             'force_published_peak_n': finite(self._published.values[leg]),
-            'power_peak_w': finite(self._power.values[leg]),
-            'power_peak_at_s': finite(self._power.at[leg]),
+            **self._power.named(leg, 'power_peak', 'w'),
             'power_mean_w': finite(driving - braking),
             'energy_driving_j': finite(energy_driving) if solved else None,
             'energy_braking_j': finite(energy_braking) if solved else None,
@@ -282,15 +281,13 @@ class Summary:
             'force_margin_n': None if strongest is None else finite(strongest - abs(force)),
         }
         for (name, angles), bound in zip(self._angles.items(), widest, strict=True):
-            key, angle = QUANTITIES[name][0].replace(' ', '_'), angles.values[leg]
-            found |= {f'{key}_max_rad': finite(angle),
-                      f'{key}_max_at_s': finite(angles.at[leg]),
-                      f'{key}_margin_rad': None if bound is None else finite(bound - angle)}
-        clearance = self._clearance.values[leg]
-        found |= {
-            'clearance_min_m': finite(clearance),
-            'clearance_min_at_s': finite(self._clearance.at[leg]),
-            'clearance_margin_m': None if nearest is None else finite(clearance - nearest)}
+            key = QUANTITIES[name][0].replace(' ', '_')
+            found |= angles.named(leg, f'{key}_max', 'rad')
+            found[f'{key}_margin_rad'] = (
+                None if bound is None else finite(bound - angles.values[leg]))
+        found |= self._clearance.named(leg, 'clearance_min', 'm')
+        found['clearance_margin_m'] = (
+            None if nearest is None else finite(self._clearance.values[leg] - nearest))
         return found | (dict.fromkeys(_OF_VELOCITY) if self._quasi_static else {})
 
     def _singularity(self) -> dict[str, Any]:
@@ -298,18 +295,16 @@ class Summary:
         most = np.where(np.isnan(self._unit_load_force.values), -np.inf,
                         self._unit_load_force.values)
         leg = int(most.argmax())
+        crossing = self._time_to_crossing.named(0, 'time_to_crossing_min', 's')
+        if self._quasi_static:
+            crossing = dict.fromkeys(crossing)
         return {
-            'determinant_nearest_m3': finite(self._nearest.values[0]),
-            'determinant_nearest_at_s': finite(self._nearest.at[0]),
+            **self._nearest.named(0, 'determinant_nearest', 'm3'),
             'crossings': self._crossings.count,
             'crossings_at_s': list(self._crossings.first),
-            'condition_max': finite(self._condition.values[0]),
-            'condition_max_at_s': finite(self._condition.at[0]),
+            **self._condition.named(0, 'condition_max'),
             'unsolved': self._unsolved, 'suppressed': self._suppressed,
-            'time_to_crossing_min_s': None if self._quasi_static else finite(
-                self._time_to_crossing.values[0]),
-            'time_to_crossing_min_at_s': None if self._quasi_static else finite(
-                self._time_to_crossing.at[0]),
+            **crossing,
             'unit_load_force_max': finite(most[leg]),
             'unit_load_force_leg': self._legs[leg] if most[leg] > -np.inf else None,
             'warnings': self._warnings.count,

@@ -71,6 +71,11 @@ class Extreme:
         self.values = np.where(new, values[row, self._columns], self.values)
         self.at = np.where(new, seconds[row], self.at)
 
+    def named(self, column: int, name: str, unit: str = '') -> dict[str, float | None]:
+        """Return value and time of a column for summary.json, under names with units."""
+        return {f'{name}_{unit}' if unit else name: finite(self.values[column]),
+                f'{name}_at_s': finite(self.at[column])}
+
 
 class Exceeded:
     """
