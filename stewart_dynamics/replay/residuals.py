@@ -142,7 +142,7 @@ class Comparison:
         if not len(rows):
             six = np.empty((0, 6))
             return Compared(np.empty(0), six, six, six)
-        samples = self._samples.joined()
+        samples = self._samples.rows
         measured = np.full((len(rows), 6), np.nan)
         for number in np.unique(setpoints.passes):
             mine, same = setpoints.passes == number, samples.passes == number

@@ -71,8 +71,8 @@ class Waiting:
         self.newest = 0
         self._gap, self._most = gap, most
         self._unsure: tuple[Stamps, Array] | None = None
-        self._chunks: list[Rows] = []
-        self._waiting = 0
+        none = np.empty(0, dtype=np.int64)
+        self.rows = Rows(none, none, np.empty((0, 0)))
 
     def add(self, stamps: Stamps, rows: Array) -> None:
         """Add rows (N, K) with their stamps (N,) [ns]."""
@@ -104,15 +104,10 @@ class Waiting:
         else:
             passes = np.array(self._passes(stamps.tolist()), dtype=np.int64)
             self.out_of_order += int(np.count_nonzero(passes < 0))
-        in_line = passes >= 0
-        if in_line.any():
-            chunk = Rows(stamps[:-1], passes, rows).part(in_line)
-            self._chunks.append(chunk)
-            self._waiting += len(chunk.stamps)
-        excess = self._waiting - self._most
-        if excess > 0:
-            self._chunks = [self.joined().part(np.arange(excess, self._waiting))]
-            self._waiting = self._most
+        new = Rows(stamps[:-1], passes, rows).part(passes >= 0)
+        if len(self.rows.stamps):
+            new = Rows._make(map(np.concatenate, zip(self.rows, new, strict=True)))
+        self.rows = new.part(slice(max(len(new.stamps) - self._most, 0), None))
 
     def _passes(self, stamps: list[int]) -> list[int]:
         """Return the pass of each stamp except the last, -1 if out of order."""
@@ -133,45 +128,23 @@ class Waiting:
 
     def take_before(self, pass_number: int, stamp: int) -> Rows:
         """Return and remove the rows of earlier passes, and of this one up to the stamp."""
-        ready: list[Rows] = []
-        while self._chunks:
-            chunk = self._chunks[0]
-            count = int(np.count_nonzero((chunk.passes < pass_number) | (
-                (chunk.passes == pass_number) & (chunk.stamps <= stamp))))
-            if count:
-                ready.append(chunk.part(slice(0, count)))
-                self._waiting -= count
-            if count < len(chunk.stamps):
-                self._chunks[0] = chunk.part(slice(count, None))
-                break
-            self._chunks.pop(0)
-        return _rows(ready)
-
-    def joined(self) -> Rows:
-        """Return the waiting rows."""
-        rows = _rows(self._chunks)
-        self._chunks = [rows] if len(rows.stamps) else []
-        return rows
-
-    def oldest(self) -> tuple[int, int]:
-        """Return the pass and stamp of the oldest row, or of the newest ever added."""
-        if not self._chunks:
-            return self.pass_number, self.newest
-        return int(self._chunks[0].passes[0]), int(self._chunks[0].stamps[0])
+        count = self._before(pass_number, stamp)
+        taken, self.rows = self.rows.part(slice(count)), self.rows.part(slice(count, None))
+        return taken
 
     def forget_before(self, pass_number: int, stamp: int) -> None:
         """Remove the rows before this time except the last one."""
-        rows = self.joined()
-        before = int(np.count_nonzero((rows.passes < pass_number) | (
-            (rows.passes == pass_number) & (rows.stamps <= stamp))))
-        if before > 1:
-            self._chunks = [rows.part(np.arange(before - 1, len(rows.stamps)))]
-            self._waiting = len(rows.stamps) - before + 1
+        last = self._before(pass_number, stamp) - 1
+        self.rows = self.rows.part(slice(max(last, 0), None))
 
+    def oldest(self) -> tuple[int, int]:
+        """Return the pass and stamp of the oldest row, or of the newest ever added."""
+        if not len(self.rows.stamps):
+            return self.pass_number, self.newest
+        return int(self.rows.passes[0]), int(self.rows.stamps[0])
 
-def _rows(chunks: list[Rows]) -> Rows:
-    if not chunks:
-        none = np.empty(0, dtype=np.int64)
-        return Rows(none, none, np.empty((0, 0)))
-    return chunks[0] if len(chunks) == 1 else Rows(
-        *map(np.concatenate, zip(*chunks, strict=True)))
+    def _before(self, pass_number: int, stamp: int) -> int:
+        """Return the number of rows of earlier passes, and of this one up to the stamp."""
+        stamps, passes, _ = self.rows
+        return int(np.count_nonzero(
+            (passes < pass_number) | ((passes == pass_number) & (stamps <= stamp))))
