@@ -65,15 +65,8 @@ class Report:
     """
     The plots of a bag, collected block by block, and the file that contains them.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-    measured : bool
-        There are measured forces: ``add_measured`` will be called.
-    folder : Path, optional
-        Contains a file until the end, which has no name there.
-
+    With ``measured``, ``add_measured`` will be called. Until the end the folder contains a
+    file, which has no name there.
     """
 
     def __init__(self, parameters: Parameters, measured: bool = False,
@@ -93,23 +86,7 @@ class Report:
 
     def add(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
             breakdown: Array) -> None:
-        """
-        Add setpoints and their outputs.
-
-        Parameters
-        ----------
-        seconds : (N,)
-            Time since the first setpoint of the bag, never decreasing [s].
-        setpoints : Batch
-            At least one.
-        outputs : Outputs
-            Outputs for these setpoints.
-        base_wrenches : (N, 6)
-            Wrench of the hexapod on its base [N, N m]; nan: not known.
-        breakdown : (N, 7, 6)
-            The demanded forces by source: sample, source, leg [N].
-
-        """
+        """Add setpoints, at least one, and their outputs, see Summary.add."""
         motions, forces = setpoints.motions, outputs.demanded_forces
         with np.errstate(over='ignore'):
             powers = forces * outputs.rates
@@ -146,19 +123,7 @@ class Report:
 
     def add_measured(
             self, seconds: Array, measured: Array, computed: Array, wrench: Array) -> None:
-        """
-        Add measured forces and the computed ones at the same times.
-
-        Parameters
-        ----------
-        seconds : (M,)
-            Time since the first setpoint of the bag, never decreasing [s].
-        measured, computed : (M, 6)
-            Leg forces [N].
-        wrench : (M, 6)
-            The external wrench that accounts for their difference [N, N m].
-
-        """
+        """Add setpoints that were compared, see Compared."""
         if self._compared is None:
             raise ValueError('the report was created without measured forces')
         self._places_compared = _add(self._compared, seconds, {
@@ -167,19 +132,10 @@ class Report:
 
     def write(self, path: Path, summary: Mapping[str, Any], plotly: Path | None = None) -> None:
         """
-        Write the report.
+        Write the report, from summary.json; a file that exists is overwritten.
 
-        Parameters
-        ----------
-        path : Path
-            The file; one that exists is overwritten.
-        summary : mapping
-            The content of summary.json.
-        plotly : Path, optional
-            The file of plotly.js that several reports share; by default it is in the report.
-
-        Raises StewartError if plotly is not installed.
-
+        ``plotly`` is the file of plotly.js that several reports share; by default it is in the
+        report. Raises StewartError if plotly is not installed.
         """
         script = plotly_script() if plotly is None else ''
         known = not summary['quasi_static']

@@ -60,11 +60,7 @@ class RowsProcess:
     """
     A process that appends rows to a file.
 
-    Parameters
-    ----------
-    file : binary file
-        Flushed; nothing else writes to it until the process has ended.
-
+    The file is flushed, and nothing else writes to it until the process has ended.
     """
 
     def __init__(self, file: BinaryIO) -> None:

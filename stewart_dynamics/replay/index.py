@@ -178,15 +178,8 @@ def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, C
     """
     Return a bag's cells except its path and the folder of its results.
 
-    Parameters
-    ----------
-    code : int
-        Exit code of its replay.
-    summary : dict, optional
-        The content of summary.json; None if the bag failed.
-    error : str
-        Why the bag failed or was read in part.
-
+    They are those of summary.json, or of a bag that failed if it is None. The error is the reason
+    why the bag failed or was read in part.
     """
     cells: dict[str, Cell] = {'code': code, 'result': RESULTS[code], 'reason': error}
     if summary is not None:

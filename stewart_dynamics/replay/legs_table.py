@@ -79,21 +79,7 @@ class Table(ABC):
 
     def write(self, seconds: Array, motions: Array, outputs: Outputs,
               base_wrenches: Array) -> None:
-        """
-        Write the rows of N setpoints.
-
-        Parameters
-        ----------
-        seconds : (N,)
-            Time since the first setpoint of the bag [s].
-        motions : (N, 24)
-            Their motions, laid out as ``inverse_dynamics`` says.
-        outputs : Outputs
-            Their outputs.
-        base_wrenches : (N, 6)
-            Their base wrenches [N, N m]; nan: not known.
-
-        """
+        """Write the rows of N setpoints, see Summary.add; motions (N, MOTION)."""
         if not len(outputs.stamps):
             return
         rates, determinant_rates = outputs.rates, outputs.determinant_rates

@@ -135,15 +135,7 @@ def motor_charts(points: OperatingPoints, parameters: Parameters,
     """
     Return a picture (SVG) of each motor, all with the same axes.
 
-    Parameters
-    ----------
-    points : OperatingPoints
-        Where the motors have been.
-    parameters : Parameters
-        Parameters of the hexapod.
-    loads : mapping
-        ``motors.legs`` of summary.json.
-
+    The loads are ``motors.legs`` of summary.json.
     """
     limits = [Deliverable(parameters, leg) for leg in range(6)]
     speed, torque = points.extent

@@ -46,15 +46,9 @@ _NEEDED = {'torque_continuous_n_m': 'torque_rms_n_m', 'torque_peak_n_m': 'torque
 
 class MotorLoads:
     """
-    The loads of the motors of a hexapod.
+    The loads of the motors of a hexapod that has ``drive.*``.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        With ``drive.*``.
-    quasi_static : bool
-        Only poses are known: values that depend on velocities are None, not zero.
-
+    Quasi-static, only poses are known: values that depend on velocities are None, not zero.
     """
 
     def __init__(self, parameters: Parameters, quasi_static: bool) -> None:
@@ -72,17 +66,7 @@ class MotorLoads:
         self._electrical = Integral(8)
 
     def add(self, seconds: Array, steps: Array, rows: Array) -> None:
-        """
-        Add a block of samples.
-
-        Parameters
-        ----------
-        seconds, steps : (N,)
-            Time since the first setpoint of the bag, and since the sample before [s].
-        rows : (N, MOTOR_ROW)
-            Their motors.
-
-        """
+        """Add rows (N, MOTOR_ROW) at times (N,), and the time to each from the one before [s]."""
         motors, rises = Motors.of_rows(rows[:, OF_DRIVES]), rows[:, RISES]
         with np.errstate(over='ignore', invalid='ignore'):
             power = motors.power.sum(axis=1, keepdims=True)

@@ -103,17 +103,8 @@ class OutputBag:
         """
         Write a chunk: the messages of setpoints.
 
-        Parameters
-        ----------
-        times : (N,)
-            When they are recorded [ns].
-        motions : (N, MOTION)
-            Their motions.
-        outputs : Outputs
-            N of them.
-        base_wrenches : (N, 6)
-            Their base wrenches [N, N m]; nan: not known.
-
+        They are recorded at times (N,) [ns]; for motions (N, MOTION), outputs and base wrenches
+        see Summary.add.
         """
         if not len(times):
             return

@@ -34,16 +34,7 @@ _PATIENCE = 1000
 
 
 class Efforts:
-    """
-    Reads the efforts of the joints of a hexapod.
-
-    Parameters
-    ----------
-    joints : sequence of str
-        Names of the six joints in the order of the result. A message may contain other joints,
-        in any order.
-
-    """
+    """Reads the efforts of the joints of a hexapod; messages may contain other joints, too."""
 
     def __init__(self, joints: Sequence[str]) -> None:
         self._joints = list(joints)
@@ -55,16 +46,9 @@ class Efforts:
         """
         Return stamps (K,) [ns], efforts (K, 6) [N], and the number of rejected messages by reason.
 
-        Parameters
-        ----------
-        data : bytes or array of them
-            It contains all messages.
-        starts, sizes : (M,)
-            Start and length of each message [bytes].
-
-        Messages without all joints may come from another publisher, and are rejected. Raises
-        BagError if a thousand were rejected and none had all joints.
-
+        The messages are given as in JointStateReader.read_many. Those without all joints may come
+        from another publisher, and are rejected. Raises BagError if a thousand were rejected and
+        none had all joints.
         """
         stamps, efforts, rejected = self._reader.read_many(data, starts, sizes)
         in_range = (np.abs(efforts) < _FORCE_END).all(axis=1)

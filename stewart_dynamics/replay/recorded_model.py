@@ -53,20 +53,9 @@ Written = tuple[str, NDArray[np.void]]
 
 class RecordedModel:
     """
-    Writes the messages.
+    Writes the messages of a hexapod, which has a name in the URDF.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-    name : str
-        Name of the robot in the URDF.
-
-    Raises
-    ------
-    ParameterError
-        Two joints or links of the URDF would have the same name.
-
+    Raises ParameterError if two joints or links of the URDF would have the same name.
     """
 
     def __init__(self, parameters: Parameters, name: str) -> None:

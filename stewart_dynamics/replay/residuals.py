@@ -75,12 +75,6 @@ class Comparison:
     time jumps back by more than ``setpoint.timeout``, as in a bag that loops, another pass
     begins; setpoints of a pass are compared with the measured samples of the pass of the same
     number. A single stamp that is late or in the future begins no pass and is left out.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -98,40 +92,18 @@ class Comparison:
         self._bins = WrenchBins()
 
     def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
-        """
-        Add setpoints and their outputs; return the setpoints that could be compared.
-
-        Parameters
-        ----------
-        seconds : (N,)
-            Time since the first setpoint, never decreasing [s].
-        setpoints : Batch
-            N setpoints.
-        outputs : Outputs
-            Outputs for these setpoints.
-
-        """
+        """Add setpoints, see Summary.add; return the compared setpoints."""
         self._setpoints.add(setpoints.stamps, np.column_stack([
             seconds, setpoints.motions[:, POSE], outputs.demanded_forces]))
         return self._compared()
 
     def add_measured(self, stamps: Stamps, efforts: Array) -> Compared:
-        """
-        Add measured forces; return the setpoints that could be compared.
-
-        Parameters
-        ----------
-        stamps : (M,)
-            [ns]
-        efforts : (M, 6)
-            Forces in the order of the parameter ``joints``, finite [N].
-
-        """
+        """Add finite forces (M, 6) [N] at stamps (M,) [ns]; return the compared setpoints."""
         self._samples.add(stamps, efforts)
         return self._compared()
 
     def finish(self) -> Compared:
-        """Return the remaining setpoints, after the last call of the others."""
+        """Return the remaining compared setpoints, after the last call of the others."""
         self._setpoints.confirm()
         self._samples.confirm()
         return self._compared()

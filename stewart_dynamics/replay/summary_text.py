@@ -32,17 +32,7 @@ _WIDTH = 100
 
 
 def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
-    """
-    Return the summary of a bag, without the likely mistakes among its notices.
-
-    Parameters
-    ----------
-    summary : mapping
-        The content of summary.json.
-    parameters : Parameters
-        Parameters of the hexapod.
-
-    """
+    """Return the summary of a bag, from summary.json; likely mistakes are no part of it."""
     lines = [f'{summary["bag"]}:']
     if summary['measured']:
         lines += _measured_lines(summary['measured'])
@@ -78,15 +68,7 @@ def summary_lines(summary: Mapping[str, Any]) -> list[str]:
 
 
 def measured_headline(measured: Mapping[str, Any]) -> str:
-    """
-    Return by how much measured and computed forces differ.
-
-    Parameters
-    ----------
-    measured : mapping
-        The values of Comparison.values.
-
-    """
+    """Return by how much measured and computed forces differ, from the values of Comparison."""
     if not measured['setpoints_compared']:
         return 'no setpoint could be compared'
     worst, leg = max((leg['residual_rms_n'], name) for name, leg in measured['legs'].items())

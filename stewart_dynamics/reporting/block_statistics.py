@@ -81,11 +81,7 @@ class Exceeded:
     """
     Number of samples that exceed a limit, the first and the worst of them, of each leg.
 
-    Parameters
-    ----------
-    minimum : bool
-        Values below the limit exceed it; else larger magnitudes do.
-
+    Values below a minimum exceed it; larger magnitudes exceed another limit.
     """
 
     def __init__(self, minimum: bool = False) -> None:
