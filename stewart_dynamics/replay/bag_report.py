@@ -41,7 +41,7 @@ from stewart_dynamics.mechanics.rows import (
     ROTATION)
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
-from stewart_dynamics.replay.statements import cards
+from stewart_dynamics.replay.statements import cards, FIRST, values_of
 from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
@@ -275,10 +275,8 @@ def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the smallest margins of all quantities with a limit, each with its leg."""
     found = []
     for name, unit, key, _ in _MARGINS:
-        of_legs = [(leg[key], joint) for joint, leg in summary['legs'].items()
-                   if leg[key] is not None]
-        if of_legs:
-            value, joint = min(of_legs, key=lambda each: each[0])
+        if margins := values_of(summary['legs'], key):
+            value, joint = min(margins, key=FIRST)
             found.append({'name': name, 'value': value, 'unit': unit, 'leg': joint})
     return found
 

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import math
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from stewart_dynamics.mechanics.limits import CLIPPED, Exceedance, QUANTITIES, TORQUE_SPEED
@@ -111,6 +112,14 @@ def plural(number: int, what: str) -> str:
     return f'{number} {what}' if number == 1 else f'{number} {what}s'
 
 
+def values_of(legs: Mapping[str, Summary], key: str) -> list[tuple[float, str]]:
+    """Return the known values of the legs, each with its leg."""
+    return [(leg[key], name) for name, leg in legs.items() if leg[key] is not None]
+
+
+FIRST = itemgetter(0)
+
+
 def _answered(points: Summary) -> Iterator[Statement]:
     yield Statement(READING, 'good', f'{plural(points["answered"], "setpoint")} in '
                                      f'{points["duration_s"]:.2f} s{_interruptions(points)}')
@@ -177,21 +186,16 @@ def _joints(legs: Summary) -> Iterator[Statement]:
     for joint in ('base', 'platform'):
         angle, at, margin = (
             f'{joint}_joint_angle_{key}' for key in ('max_rad', 'max_at_s', 'margin_rad'))
-        angles = {name: leg[angle] for name, leg in legs.items() if leg[angle] is not None}
-        margins = {name: leg[margin] for name, leg in legs.items() if leg[margin] is not None}
-        if angles and margins:
-            most = max(angles, key=lambda name: angles[name])
-            least = min(margins, key=lambda name: margins[name])
+        if (angles := values_of(legs, angle)) and (margins := values_of(legs, margin)):
+            (largest, most), (smallest, least) = max(angles, key=FIRST), min(margins, key=FIRST)
             yield Statement(
-                JOINTS, 'none', f'{joint} joints: {_angle(angles[most])} at most, {most}',
-                legs[most][at], '', f'; margin {_angle(margins[least])}'
+                JOINTS, 'none', f'{joint} joints: {_angle(largest)} at most, {most}',
+                legs[most][at], '', f'; margin {_angle(smallest)}'
                 + (f', {least}' if least != most else ''))
-    clearances = {name: leg['clearance_min_m'] for name, leg in legs.items()
-                  if leg['clearance_min_m'] is not None}
-    if clearances:
-        least = min(clearances, key=lambda name: clearances[name])
+    if clearances := values_of(legs, 'clearance_min_m'):
+        smallest, least = min(clearances, key=FIRST)
         yield Statement(
-            JOINTS, 'none', f'clearance between legs: {clearances[least]:.4g} m at least, {least}',
+            JOINTS, 'none', f'clearance between legs: {smallest:.4g} m at least, {least}',
             legs[least]['clearance_min_at_s'], '',
             f'; margin {legs[least]["clearance_margin_m"]:.4g} m')
 
@@ -214,25 +218,22 @@ def _motors(summary: Summary) -> Iterator[Statement]:
     if not motors:
         return
     legs = motors['legs']
-    continuous = {name: leg['torque_continuous_margin_n_m'] for name, leg in legs.items()
-                  if leg['torque_continuous_margin_n_m'] is not None}
-    over = [name for name, margin in continuous.items() if margin < 0.0]
+    over = [each for each in values_of(legs, 'torque_continuous_margin_n_m') if each[0] < 0.0]
     if over:
-        worst = min(over, key=lambda name: continuous[name])
+        margin, worst = min(over, key=FIRST)
         others = f' and {plural(len(over) - 1, "other motor")}' if len(over) > 1 else ''
         yield Statement(
             MOTORS, 'warn', f'drive.torque_continuous, exceeded by the RMS torque of {worst}'
-            f'{others}: {legs[worst]["torque_rms_n_m"]:.4g} N m, by {-continuous[worst]:.4g} N m')
+            f'{others}: {legs[worst]["torque_rms_n_m"]:.4g} N m, by {-margin:.4g} N m')
     for key, at, plot, text, unit in (
             ('torque_peak_n_m', 'torque_peak_at_s', 'motor_torques', 'motor torque', 'N m'),
             ('speed_peak_rad_s', 'speed_peak_at_s', 'motor_speeds', 'motor speed', 'rad/s'),
             ('temperature_rise_max_k', 'temperature_rise_max_at_s', 'temperature_rises',
              'temperature rise of the windings', 'K')):
-        known = [name for name in legs if legs[name][key] is not None]
-        if known:
-            most = max(known, key=lambda name: abs(legs[name][key]))
-            yield Statement(MOTORS, 'none', f'{text}: {legs[most][key]:.4g} {unit} at most, '
-                            f'{most},', legs[most][at], plot)
+        if values := values_of(legs, key):
+            value, most = max(values, key=lambda each: abs(each[0]))
+            yield Statement(MOTORS, 'none', f'{text}: {value:.4g} {unit} at most, {most},',
+                            legs[most][at], plot)
     if bus := motors['bus']:
         yield Statement(MOTORS, 'none', f'power of the bus: {bus["power_peak_w"]:.4g} W at most,',
                         bus['power_peak_at_s'], 'bus_power',
