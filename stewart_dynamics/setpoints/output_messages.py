@@ -65,18 +65,22 @@ class OutputMessages:
 
     def __init__(self, parameters: Parameters) -> None:
         self._zero_lengths = parameters['geometry.zero_length'].tolist()
-        self._joint_state = JointStateWriter(parameters['joints'])
+        leg_states = JointStateWriter(parameters['joints'])
         self._with_effort, self._without_effort = (
-            self._joint_state.layout(effort) for effort in (True, False))
+            leg_states.layout(effort) for effort in (True, False))
         self._motors = motor_states_writer(parameters)
         self.types = OUTPUT_TYPES | (MOTOR_TYPES if self._motors else {})
         self._wrench = StampedWriter(parameters['base_frame'], 6)
 
     def of_output(self, output: Output) -> Iterator[tuple[str, bytes]]:
         """Yield topics (keys of ``types``) and messages for an output; see of_wrench."""
-        yield 'leg_states', self._joint_state.write(
-            output.stamp, map(sub, output.lengths, self._zero_lengths), output.rates,
-            output.forces)
+        positions = map(sub, output.lengths, self._zero_lengths)
+        if output.forces is None:
+            yield 'leg_states', self._without_effort.write_one(
+                output.stamp, positions, output.rates)
+        else:
+            yield 'leg_states', self._with_effort.write_one(
+                output.stamp, positions, output.rates, output.forces)
         yield 'leg_lengths', float64_array(output.lengths)
         if output.forces is not None:
             yield 'leg_forces', float64_array(output.forces)
