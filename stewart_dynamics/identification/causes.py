@@ -189,28 +189,30 @@ class Causes:
                 yield Cause(what, np.array([place]), text.format(f' of {leg}'), factor)
             if what in ('offset', 'reflected_mass', 'zero_length'):
                 yield Cause(what, places[what], text.format(''), factor)
-        of_all: tuple[tuple[str, str, float, Callable[[Array], Any]], ...] = (
-            ('tilt', 'a base tilted by {} degrees', np.degrees(1.0), np.linalg.norm),
-            ('leg_mass', 'other leg masses, cylinders and pistons {} %', 100.0, np.asarray),
-            *((f'stribeck_friction {n}', 'Stribeck friction, {} N at low rates', 1.0, np.mean)
-              for n in range(1, SLIP)),
-            ('load_friction', 'friction that depends on the load, {} % of it', 100.0, np.mean),
-            ('quadratic_friction', 'friction that grows with the square of the rate, '
-             '{} N s^2/m^2', 1.0, np.mean),
-            ('scale', 'efforts that are by {} % larger than the forces', 100.0, np.asarray),
-            ('saturation', f'saturation of the efforts at about {self._largest:.4g} N', 1.0,
-             np.asarray),
-            ('friction_drift', 'friction that changes with time', 1.0, np.asarray),
-            ('offset_drift', 'offsets of the efforts that change with time, {} N', 1.0,
-             np.asarray),
-            ('platform', 'platform parameters that are not identified', 1.0, np.asarray),
-            ('viscous_friction', 'another actuator.viscous_friction, {} N s/m', 1.0,
-             np.asarray),
-            ('coulomb_friction', 'another actuator.coulomb_friction, {} N', 1.0, np.asarray),
-            (f'{UNKNOWN} pose', 'forces that depend on the pose', 1.0, np.asarray),
-            (f'{UNKNOWN} rate', 'forces that depend on the rate', 1.0, np.asarray))
-        for what, text, factor, measure in of_all:
-            yield Cause(what.partition(' ')[0], places[what], text, factor, measure)
+
+        def of_all(what: str, text: str, factor: float = 1.0,
+                   measure: Callable[[Array], Any] = np.asarray) -> Cause:
+            return Cause(what.partition(' ')[0], places[what], text, factor, measure)
+
+        yield of_all('tilt', 'a base tilted by {} degrees', np.degrees(1.0), np.linalg.norm)
+        yield of_all('leg_mass', 'other leg masses, cylinders and pistons {} %', 100.0)
+        for n in range(1, SLIP):
+            yield of_all(f'stribeck_friction {n}', 'Stribeck friction, {} N at low rates',
+                         measure=np.mean)
+        yield of_all('load_friction', 'friction that depends on the load, {} % of it', 100.0,
+                     np.mean)
+        yield of_all('quadratic_friction',
+                     'friction that grows with the square of the rate, {} N s^2/m^2',
+                     measure=np.mean)
+        yield of_all('scale', 'efforts that are by {} % larger than the forces', 100.0)
+        yield of_all('saturation', f'saturation of the efforts at about {self._largest:.4g} N')
+        yield of_all('friction_drift', 'friction that changes with time')
+        yield of_all('offset_drift', 'offsets of the efforts that change with time, {} N')
+        yield of_all('platform', 'platform parameters that are not identified')
+        yield of_all('viscous_friction', 'another actuator.viscous_friction, {} N s/m')
+        yield of_all('coulomb_friction', 'another actuator.coulomb_friction, {} N')
+        yield of_all(f'{UNKNOWN} pose', 'forces that depend on the pose')
+        yield of_all(f'{UNKNOWN} rate', 'forces that depend on the rate')
         for n, change in enumerate(self._changes):
             yield Cause('payload', places[f'payload {n}'], (
                 f'a payload that changes at about {100.0 * change:.0f} % of the time, {{}} kg'),
