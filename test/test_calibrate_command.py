@@ -29,13 +29,12 @@ from stewart_dynamics import (
     check_planned_trajectory, Motion, ParameterError, Parameters, Pose, StewartError,
     StewartPlatform)
 from stewart_dynamics.calibration import main
-from stewart_dynamics.calibration.calibration_options import CalibrationOptions
 from stewart_dynamics.calibration.design import design_poses, NOISE
 from stewart_dynamics.calibration.equations import Equations, values_of
 from stewart_dynamics.calibration.fit import fit, Unknowns
 from stewart_dynamics.calibration.measured_poses import poses_csv, read_poses
 from stewart_dynamics.calibration.noise import Noise
-from stewart_dynamics.calibration.one_run import run
+from stewart_dynamics.calibration.one_run import CalibrationOptions, run
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
@@ -135,7 +134,7 @@ def edited(change: Callable[[list[str]], list[str]], table: Path, tmp_path: Path
      "row 4: leg_1: 'nan': must be a finite number"),
     (lambda rows: [*rows[:3], '0,5' + rows[3][rows[3].index(','):], *rows[4:]], 'row 4: has 14'),
     (lambda rows: [*rows[:3], 'long' + rows[3][rows[3].index(','):], *rows[4:]],
-     "row 4: leg_1: 'long': must be a number"),
+     "row 4: leg_1: 'long': must be a finite number"),
     (lambda rows: [*rows[:3], rows[3].rpartition(',')[0] + ',3.0', *rows[4:]],
      'row 4: quaternion of length 3'),
     (lambda rows: [rows[0], *[rows[1]] * 20], 'itself, with residuals of')])

@@ -25,7 +25,7 @@ from stewart_dynamics import (
 from stewart_dynamics.calibration.equations import (
     ALL, Equations, Frames, GEOMETRY, inverse, product, values_of, with_geometry)
 from stewart_dynamics.calibration.fit import fit, Unknowns
-from stewart_dynamics.calibration.frames import find_frames, target_in_platform
+from stewart_dynamics.calibration.frames import find_frames
 from stewart_dynamics.calibration.noise import covariances, Noise
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 
@@ -175,8 +175,7 @@ def test_unknown_frames_are_defined_by_the_joints_of_the_file() -> None:
         joints, true = (each[part].reshape(6, 3) for each in (found.values, values))
         assert_allclose(np.linalg.norm(joints[:, None] - joints, axis=-1),
                         np.linalg.norm(true[:, None] - true, axis=-1), atol=1e-11)
-    target = target_in_platform(found.frames)
-    assert_allclose(product(found.frames.target, target).rows,
+    assert_allclose(product(found.frames.target, inverse(found.frames.target)).rows,
                     Pose(np.zeros(3), np.eye(3)).rows, atol=1e-13)
 
 

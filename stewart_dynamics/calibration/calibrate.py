@@ -21,7 +21,7 @@ estimated (``fit``). A fit without the held-out poses predicts these by forward 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 import math
 from typing import NamedTuple
 
@@ -34,7 +34,7 @@ from stewart_dynamics.calibration.equations import (
 from stewart_dynamics.calibration.fit import Fit, fit, minimum, outliers, Unknowns
 from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
 from stewart_dynamics.calibration.likely_mistakes import (
-    lack_of_fit, mistakes_of_input, mistakes_of_outliers, mistakes_of_result, not_identified)
+    lack_of_fit, mistakes_of_input, mistakes_of_result, not_identified)
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
@@ -49,6 +49,8 @@ from stewart_dynamics.reporting.estimates import (
 FEWEST = 8
 # Held-out poses are the middle ones of equal groups; below this number of others, no pose is.
 _FEWEST_OTHERS = 12
+# A larger part of the poses that are outliers is no accident.
+_MOST_OUTLIERS = 0.2
 # Errors of held-out poses may grow by this factor: a good file, and few poses.
 _WORSE = 1.2
 # Numbers of the file are rounded to a hundredth of this part of their standard errors [m].
@@ -159,8 +161,15 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         held[chosen(p, name)] = True
     if held.all() and not unknown:
         raise ParameterError('fixed: nothing is left to be calibrated')
-    likely = list(mistakes_of_input(p, measured, unknown, angles, degrees))
-    _refuse(likely, accept_mistakes)
+    likely: list[LikelyMistake] = []
+
+    def refuse(mistakes: Iterable[LikelyMistake]) -> None:
+        likely.extend(mistakes)
+        if likely and not accept_mistakes:
+            raise StewartError(
+                f'{likely[0].text}; nothing is calibrated (--accept-mistakes does)')
+
+    refuse(mistakes_of_input(p, measured, unknown, angles, degrees))
     known = find_frames(p, measured) if unknown else SAME
     measured = measured._replace(frames=known)
     size = p['singularity.characteristic_length']
@@ -171,30 +180,33 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     if len(used.lengths) * 6 <= unknowns.basis.shape[1]:
         raise StewartError(f'{len(used.lengths)} poses for {unknowns.basis.shape[1]} unknowns: '
                            f'at least {unknowns.basis.shape[1] // 6 + 1} are needed')
-    likely += mistakes_of_outliers(~sound)
-    _refuse(likely[-1:], accept_mistakes)
+    if np.mean(sound) < 1.0 - _MOST_OUTLIERS:
+        refuse([LikelyMistake(
+            'outliers', f'{np.sum(~sound)} of {len(sound)} poses do not fit the geometry that '
+            'fits all others: lengths and poses must be of the same instants, at rest')])
     found = fit(used, unknowns, None if noise is None else Noise(*noise))
     what = found.identifiability
     what = what._replace(scales=what.scales[:GEOMETRY], shares=what.shares[:GEOMETRY],
                          directions=what.directions[:GEOMETRY])
     states = tuple(FIXED if each else state for each, state in zip(
         held, states_of(what), strict=True))
-    far = list(mistakes_of_result(p, found.values, found.lin.residuals, size))
-    _refuse(far, accept_mistakes)
+    refuse(mistakes_of_result(p, found.values, found.lin.residuals, size))
     missing = not_identified(p['joints'], what.shares, LARGEST_SHARE, used, size)
-    if IDENTIFIED not in states and not accept_mistakes:
-        left = float(np.sqrt(np.mean(found.lin.residuals ** 2)))
-        raise StewartError(
-            f'no number is identifiable by itself, with residuals of {1e3 * left:.3g} mm: '
-            f'{missing}; nothing is calibrated (--accept-mistakes does)')
+    before, after = (np.sqrt(np.mean(each ** 2, axis=0)) for each in (
+        used.at(_with_frames(used, unknowns)).residuals, found.lin.residuals))
+    if IDENTIFIED not in states:
+        refuse([LikelyMistake(
+            'identifiable', 'no number is identifiable by itself, with residuals of '
+            f'{1e3 * after.max():.3g} mm: {missing}')])
     validation = _validated(p, used, unknowns, found, hold_out)
     if validation is not None:
-        before, after = (math.hypot(each.rms[0], size * each.rms[1]) for each in validation)
-        if not after < _WORSE * before and not accept_mistakes:
-            raise StewartError(
-                f'held-out poses are {_shown(validation.before)} off by the file, but '
+        errors_before, errors_after = (
+            math.hypot(each.rms[0], size * each.rms[1]) for each in validation)
+        if not errors_after < _WORSE * errors_before:
+            refuse([LikelyMistake(
+                'worse', f'held-out poses are {_shown(validation.before)} off by the file, but '
                 f'{_shown(validation.after)} by a fit to the others: the poses do not support a '
-                'better geometry; nothing is calibrated (--accept-mistakes does)')
+                'better geometry')])
     covariance = found.covariance[:GEOMETRY, :GEOMETRY]
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + (what.shares * what.scales) ** 2)
     # Errors of neighbors are correlated: poses are known better than each number of the geometry.
@@ -204,13 +216,12 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         with_geometry(p, rounded), names_of(p), unknowns.start[:GEOMETRY],
         found.values[:GEOMETRY], covariance, errors, states, what, missing, found.noise,
         noise is not None, used.frames_at(found.values) if unknown else None,
-        len(used.lengths), _rms(used.at(_with_frames(used, unknowns, unknown)).residuals),
-        _rms(found.lin.residuals),
+        len(used.lengths), before, after,
         tuple(Outlier(int(n), tuple(map(int, np.flatnonzero(first.outlying[n]))),
                       float(np.abs(first.residuals[n]).max())) for n in np.flatnonzero(~sound)),
         validation, lack_of_fit(
             p, used, first, found.whitened if noise else None, what.rank, held),
-        tuple(likely + far))
+        tuple(likely))
 
 
 def _checked(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion) -> Equations:
@@ -226,17 +237,11 @@ def _checked(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion
     return Equations(given, pose)
 
 
-def _refuse(likely: Sequence[LikelyMistake], accepted: bool) -> None:
-    if likely and not accepted:
-        raise StewartError(f'{likely[0].text}; nothing is calibrated (--accept-mistakes does)')
-
-
-def _with_frames(equations: Equations, unknowns: Unknowns, unknown: bool) -> Array:
-    """Return the file's values, with the frames that fit them best."""
-    if not unknown:
+def _with_frames(equations: Equations, unknowns: Unknowns) -> Array:
+    """Return the file's values, with the frames that fit them best if these are unknown."""
+    if not unknowns.basis[GEOMETRY:].any():
         return unknowns.start
-    only = unknowns.frames_only()
-    return minimum(equations, only.start, only.scales[:, None] * only.basis, np.eye(6))
+    return minimum(equations, unknowns.start, np.diag(unknowns.scales)[:, GEOMETRY:], np.eye(6))
 
 
 def _validated(parameters: Parameters, equations: Equations, unknowns: Unknowns, found: Fit,
@@ -248,8 +253,7 @@ def _validated(parameters: Parameters, equations: Equations, unknowns: Unknowns,
     if not held.any() or np.count_nonzero(~held) < _FEWEST_OTHERS:
         return None
     others = equations.part(~held)
-    unknown = bool(unknowns.basis[GEOMETRY:].any())
-    before = _with_frames(others, unknowns, unknown)
+    before = _with_frames(others, unknowns)
     after = fit(others, unknowns, found.noise).values
     return Validation(*(pose_errors(
         with_geometry(parameters, each), equations.part(held), equations.frames_at(each))
@@ -259,7 +263,3 @@ def _validated(parameters: Parameters, equations: Equations, unknowns: Unknowns,
 def _shown(errors: PoseErrors) -> str:
     position, rotation = errors.rms
     return f'{1e3 * position:.3g} mm and {1e3 * rotation:.3g} mrad'
-
-
-def _rms(residuals: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(residuals ** 2, axis=0)))

@@ -92,10 +92,9 @@ def _arguments() -> argparse.ArgumentParser:
 
 def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
-    from stewart_dynamics.calibration.calibration_options import CalibrationOptions
     from stewart_dynamics.calibration.measured_poses import read_poses
     from stewart_dynamics.calibration.noise import Noise
-    from stewart_dynamics.calibration.one_run import FUNCTIONS, run
+    from stewart_dynamics.calibration.one_run import CalibrationOptions, FUNCTIONS, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
     from stewart_dynamics.calibration.results import result_text
     from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes

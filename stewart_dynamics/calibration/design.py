@@ -51,7 +51,6 @@ _CANDIDATES, _TRIES, _RANDOM = 1500, 40, 100
 _MARGIN, _LARGEST_ANGLE = 0.02, 0.6
 # An exchange that increases the logarithm of the determinant by less ends the search.
 _LEAST_GAIN, _MOST_EXCHANGES = 1e-3, 500
-_AXES = 'xyz'
 
 
 class PoseDesign(NamedTuple):
@@ -97,8 +96,7 @@ def design_poses(platform: StewartPlatform, count: int, noise: Noise = NOISE, se
         part = lin._replace(derivatives=lin.derivatives[which])
         what = unknowns.identifiability(part, whiten[which], LARGEST_ERROR)
         variances = np.sum((what.directions / np.maximum(what.singular_values, 1.0)) ** 2, axis=1)
-        widths: Array = TWO_SIDED * what.scales * np.sqrt(variances)
-        return widths[:GEOMETRY]
+        return np.asarray(TWO_SIDED * what.scales * np.sqrt(variances))[:GEOMETRY]
 
     deviations = np.sqrt(np.einsum('nll->nl', covariances(noise, size, lin)))
     of_leg = [[*range(3 * n, 3 * n + 3), *range(18 + 3 * n, 21 + 3 * n), 36 + n]
@@ -213,7 +211,7 @@ def trajectory_csv(motion: TimedMotion) -> str:
     """Return a planned trajectory as text: time, pose, twist and acceleration of each point."""
     text = io.StringIO()
     names = ['time', *POSITION, *QUATERNION, *(f'{kind}{axis}' for kind in (
-        'v', 'w', 'a', 'dw') for axis in _AXES)]
+        'v', 'w', 'a', 'dw') for axis in 'xyz')]
     m = motion.motion
     np.savetxt(text, np.column_stack([
         motion.times, m.position, m.pose.quaternion, m.linear_velocity, m.angular_velocity,

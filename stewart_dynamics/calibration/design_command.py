@@ -41,10 +41,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace, parameters: Parameters) -> str:
     """Design poses, write them and return the text for the terminal."""
     # Imported here, so that --help is fast.
-    from stewart_dynamics.calibration.calibration_options import CalibrationOptions
     from stewart_dynamics.calibration.design import design_poses, NOISE, trajectory_csv, visit
+    from stewart_dynamics.calibration.equations import BASE, PLATFORM, ZERO
     from stewart_dynamics.calibration.measured_poses import poses_csv
     from stewart_dynamics.calibration.noise import Noise
+    from stewart_dynamics.calibration.one_run import CalibrationOptions
     from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
     from stewart_dynamics.reporting.results_folder import (
         check_free, remove_abandoned, whole_folder)
@@ -67,14 +68,12 @@ def run(given: argparse.Namespace, parameters: Parameters) -> str:
              f'{1e6 * noise.length:.3g} um, {1e6 * noise.position:.3g} um and '
              f'{1e6 * noise.rotation:.3g} urad:',
              f'  {"":28}{"designed":>10}  random poses']
-    widest: dict[str, tuple[float, float]] = {}
-    for name, own, other in zip(
-            found.names, found.half_widths, found.random_half_widths, strict=True):
-        parts = name.split('.')
-        kind = '.'.join([parts[1], *parts[3:]])
-        widest[kind] = tuple(map(max, zip(  # type: ignore[assignment]
-            widest.get(kind, (0.0, 0.0)), (float(own), float(other)), strict=True)))
-    lines += [f'  {kind:28}{f"+- {1e3 * own:.3g}":>10}  +- {1e3 * other:.3g} mm'
-              for kind, (own, other) in widest.items()]
+    for name, part, axes in (('base_joints', BASE, ('.x', '.y', '.z')),
+                             ('platform_joints', PLATFORM, ('.x', '.y', '.z')),
+                             ('zero_length', ZERO, ('',))):
+        widest = (1e3 * each[part].reshape(6, -1).max(axis=0)
+                  for each in (found.half_widths, found.random_half_widths))
+        lines += [f'  {name + axis:28}{f"+- {own:.3g}":>10}  +- {other:.3g} mm'
+                  for axis, own, other in zip(axes, *widest, strict=True)]
     return '\n'.join([*lines, f'{given.design} poses: {folder / POSES}; {motion.times[-1]:.0f} s '
                       f'through them: {folder / TRAJECTORY}'])

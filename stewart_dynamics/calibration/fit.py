@@ -27,7 +27,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.equations import (
-    ALL, BASE, DEVICE, Equations, GEOMETRY, Linearization, PLATFORM, TARGET)
+    ALL, BASE, Equations, GEOMETRY, Linearization, PLATFORM)
 from stewart_dynamics.calibration.noise import (
     covariances, Noise, ROUNDING, VarianceComponents, whitening)
 from stewart_dynamics.mechanics.least_squares import (
@@ -96,10 +96,6 @@ class Unknowns(NamedTuple):
             _, _, right = np.linalg.svd(np.concatenate(conditions) @ basis)
             basis = basis @ right[6 * len(conditions):].T
         return cls(start, scales, basis, size)
-
-    def frames_only(self) -> Unknowns:
-        """Return the unknowns of the frames alone."""
-        return self._replace(basis=np.eye(ALL)[:, DEVICE.start:TARGET.stop])
 
     def identifiability(self, lin: Linearization, whiten: Array, largest_error: float,
                         ) -> Identifiability:
@@ -171,8 +167,7 @@ def minimum(equations: Equations, start: Array, known: Array, whiten: Array,
             damping = max(10.0 * damping, _DAMPING)
         if done:
             break
-    values: Array = start + known @ steps
-    return values
+    return np.asarray(start + known @ steps)
 
 
 def _rms(values: Array) -> float:

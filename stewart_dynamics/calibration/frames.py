@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.calibration.equations import Equations, Frames, product
+from stewart_dynamics.calibration.equations import Equations, Frames
 from stewart_dynamics.errors import PoseError, SingularityError, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
@@ -118,9 +118,3 @@ def find_frames(parameters: Parameters, equations: Equations) -> Frames:
     wanted = found.position - measured.position @ device.T
     positions, *_ = np.linalg.lstsq(rows.reshape(-1, 6), wanted.ravel(), rcond=None)
     return Frames(Pose(positions[3:], device), Pose(positions[:3], target))
-
-
-def target_in_platform(frames: Frames) -> Pose:
-    """Return the pose of the target in the platform frame."""
-    back = frames.target.rotation.T
-    return product(Pose(np.zeros(3), back), Pose(-frames.target.position, np.eye(3)))

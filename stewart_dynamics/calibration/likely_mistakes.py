@@ -41,8 +41,6 @@ from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # A mistake is likely if the misfit without it is smaller than this part.
 _BETTER = 0.25
-# A larger part of the poses that are outliers is no accident.
-_MOST_OUTLIERS = 0.2
 # A joint that moves by a larger part of the characteristic length is not of this hexapod.
 _FARTHEST = 0.3
 # Residuals above this part of it mean that the model does not describe the poses.
@@ -73,12 +71,11 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
         text = ('the angles are in radians, not in degrees: without --degrees they are read so'
                 if degrees else
                 'the angles are in degrees, not in radians: --degrees reads them')
-        units = [each for each in without if each[0].what == 'unit']
-        without += [
-            (mistake, each._replace(pose=Pose(each.pose.position, rotation)))
-            for mistake, each in [(LikelyMistake('degrees', text), equations), *(
-                (mistake._replace(text=f'{mistake.text}; {text}'), each)
-                for mistake, each in units)]]
+        turned = [(LikelyMistake('degrees', text), equations), *(
+            (mistake._replace(text=f'{mistake.text}; {text}'), each)
+            for mistake, each in without if mistake.what == 'unit')]
+        without += [(mistake, each._replace(pose=Pose(each.pose.position, rotation)))
+                    for mistake, each in turned]
     tried = [(_misfit(parameters, each, unknown_frames), mistake) for mistake, each in without]
     if not unknown_frames:
         tried.append((_misfit(parameters, equations, True), LikelyMistake(
@@ -88,14 +85,6 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
     if best < _BETTER * given:
         yield mistake._replace(text=f'{mistake.text} (misfit {best:.2g} of the motion'
                                + (f' instead of {given:.2g})' if given < math.inf else ')'))
-
-
-def mistakes_of_outliers(outlying: Flags) -> list[LikelyMistake]:
-    """Return that too many poses (N,) are outliers, if they are."""
-    return [LikelyMistake(
-        'outliers', f'{np.count_nonzero(outlying)} of {len(outlying)} poses do not fit the '
-        'geometry that fits all others: lengths and poses must be of the same instants, at rest',
-    )] if np.mean(outlying) > _MOST_OUTLIERS else []
 
 
 def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, size: float,
@@ -177,21 +166,9 @@ def lack_of_fit(parameters: Parameters, equations: Equations, found: Outliers,
     """
     Return the causes of residuals that are more than noise, the likeliest first.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        The file's parameters.
-    equations : Equations
-        N poses that are not outliers.
-    found : Outliers
-        A fit to them with equal weights.
-    whitened : (N, 6) or None
-        Residuals by the noise that was given.
-    unknowns : int
-        Number of directions that were determined.
-    fixed : (42,)
-        Which numbers keep the file's values.
-
+    ``equations`` are N poses without outliers, ``found`` a fit to them with equal weights that
+    determined ``unknowns`` directions, ``whitened`` (N, 6) residuals by the noise that was given,
+    and ``fixed`` (42,) the numbers that keep the file's values.
     """
     from scipy.stats import chi2, f
 
@@ -289,8 +266,8 @@ def not_identified(joints: Sequence[str], shares: Array, largest: float, equatio
     elif turned == 1:
         along = directions[:, -1]
         near = int(np.argmax(np.abs(along)))
-        name = ('yaw' if near == 2 else f'turns about {"xyz"[near]}') if abs(
-            along[near]) > 0.99 else f'turns about ({", ".join(f"{x:.2f}" for x in along)})'
+        name = ('turns about x', 'turns about y', 'yaw')[near] if abs(along[near]) > 0.99 else (
+            f'turns about ({", ".join(f"{x:.2f}" for x in along)})')
         motion, more = f'{name} only', 'add poses that are turned about another axis'
     elif lines < 3:
         motion = ('a fixed position', 'positions on a line', 'positions in a plane')[lines]

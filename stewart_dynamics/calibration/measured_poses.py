@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -55,23 +56,11 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
     """
     Return the poses of a file with the columns of ``joints``, x, y, z and the rotation.
 
-    The rotation is a quaternion, qx, qy, qz, qw, or the angles alpha, beta, gamma of
-    Rz(gamma) Ry(beta) Rx(alpha). Other columns are ignored.
-
-    Parameters
-    ----------
-    path : Path
-        Columns are separated by commas, semicolons or tabs; row 1 has their names.
-    joints : tuple of str
-        Names of the legs.
-    millimeters, degrees : bool
-        Units of positions and leg positions, and of angles, instead of m and rad.
-
-    Raises
-    ------
-    StewartError
-        In one line: the file cannot be read, lacks a column, or has a value that is not a number.
-
+    Row 1 has the names of the columns, separated by commas, semicolons or tabs; others than the
+    names of the legs, ``joints``, and those of the pose are ignored. The rotation is a quaternion,
+    qx, qy, qz, qw, or the angles alpha, beta, gamma of Rz(gamma) Ry(beta) Rx(alpha). Units are m
+    and rad, or ``millimeters`` and ``degrees``. StewartError if the file cannot be read, lacks a
+    column, or has a value that is not a number.
     """
     # Lines end in any way: newline=None reads them as '\n'.
     lines = io.StringIO(read_text(path, _LARGEST, StewartError).lstrip('\ufeff'), newline=None)
@@ -123,8 +112,8 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
 def _number(cell: str, where: str) -> float:
     try:
         value = float(cell)
-    except ValueError as exc:
-        raise StewartError(f'{where}: {shown(cell)}: must be a number') from exc
+    except ValueError:
+        value = math.nan
     if not abs(value) < _END:
         raise StewartError(f'{where}: {shown(cell)}: must be a finite number')
     return value

@@ -52,10 +52,9 @@ class Noise(NamedTuple):
 
 def covariances(noise: Noise, size: float, lin: Linearization) -> Array:
     """Return the covariance (N, 6, 6) of the residuals of each pose [m^2]."""
-    found: Array = max(noise.length, ROUNDING * size) ** 2 * np.eye(6) + sum(
+    return np.asarray(max(noise.length, ROUNDING * size) ** 2 * np.eye(6) + sum(
         deviation ** 2 * each @ np.swapaxes(each, 1, 2) for deviation, each in (
-            (noise.position, lin.position), (noise.rotation, lin.rotation)))
-    return found
+            (noise.position, lin.position), (noise.rotation, lin.rotation))))
 
 
 def whitening(covariance: Array) -> Array:
@@ -140,6 +139,5 @@ class VarianceComponents(NamedTuple):
         spread = np.einsum('pi,ij,pj->p', slopes, of_variances, slopes)
         freedom = 2.0 * np.sum(self.known ** 2, axis=1) ** 2 / np.maximum(spread, 1e-300)
         wider = t.ppf(0.975, np.maximum(freedom, 1.0)) / TWO_SIDED
-        covariance: Array = wider[:, None] * (
-            self.known @ (np.eye(len(more)) + 2.0 * more) @ self.known.T) * wider
-        return covariance
+        return np.asarray(wider[:, None] * (
+            self.known @ (np.eye(len(more)) + 2.0 * more) @ self.known.T) * wider)

@@ -17,16 +17,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from stewart_dynamics.calibration.calibrate import calibrate
-from stewart_dynamics.calibration.calibration_options import CalibrationOptions
 from stewart_dynamics.calibration.calibration_report import write_report
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
+from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.results import comments, document
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reporting.estimates import HOLD_OUT
 from stewart_dynamics.reporting.results_folder import (
     CALIBRATION, check_free, remove_abandoned, whole_folder)
 from stewart_dynamics.whole_file import write_json
@@ -36,29 +37,33 @@ PARAMETERS, RESULT, REPORT = 'calibrated.yaml', CALIBRATION, 'report.html'
 FUNCTIONS = (forward_kinematics.poses,)
 
 
+class CalibrationOptions(NamedTuple):
+    """Options of a calibration as ``calibrate`` takes them, and of its files."""
+
+    fixed: tuple[str, ...] = ()
+    frames: str = 'known'
+    noise: Noise | None = None
+    hold_out: float = HOLD_OUT
+    millimeters: bool = False
+    degrees: bool = False
+    accept_mistakes: bool = False
+    report: bool = True
+    force: bool = False
+    run: str = ''
+
+    def shown(self) -> dict[str, Any]:
+        """Return the options of the calibration for JSON."""
+        return {name: value for name, value in self._asdict().items()
+                if name not in ('noise', 'report', 'force', 'run')}
+
+
 def run(measured: MeasuredPoses, source: str, parameters: Parameters, folder: Path,
         options: CalibrationOptions) -> dict[str, Any]:
     """
-    Calibrate into a folder; return the content of calibration.json.
+    Calibrate into a folder, created when complete; return the content of calibration.json.
 
-    Parameters
-    ----------
-    measured : MeasuredPoses
-        Legs and poses.
-    source : str
-        Name of the file that they are of.
-    parameters : Parameters
-        The hexapod as it is drawn.
-    folder : Path
-        Results folder, created when complete.
-    options : CalibrationOptions
-        Options of the calibration.
-
-    Raises
-    ------
-    StewartError
-        The poses do not support a calibration: nothing is written.
-
+    ``source`` names the measured poses, ``parameters`` are those of the drawing. StewartError if
+    the poses do not support a calibration: nothing is written.
     """
     check_free(folder, options, RESULT)
     remove_abandoned([folder])

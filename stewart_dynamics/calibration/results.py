@@ -22,9 +22,9 @@ import math
 import textwrap
 from typing import Any
 
-from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.calibrate import Calibration
-from stewart_dynamics.calibration.frames import PoseErrors, target_in_platform
+from stewart_dynamics.calibration.equations import inverse
+from stewart_dynamics.calibration.frames import PoseErrors
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
@@ -61,11 +61,12 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
                   'position_m': found.noise.position, 'rotation_rad': found.noise.rotation},
         'frames': None if found.frames is None else {
             'device_in_base': _pose(found.frames.device),
-            'target_in_platform': _pose(target_in_platform(found.frames))},
+            'target_in_platform': _pose(inverse(found.frames.target))},
         'residuals': {'legs': {joint: {'before_rms_m': float(before), 'after_rms_m': float(after)}
                                for joint, before, after in zip(
                                    joints, found.before, found.after, strict=True)},
-                      'before_rms_m': _rms(found.before), 'after_rms_m': _rms(found.after)},
+                      'before_rms_m': math.sqrt((found.before ** 2).mean()),
+                      'after_rms_m': math.sqrt((found.after ** 2).mean())},
         'outliers': [{'pose': measured.names[each.pose], 'legs': [joints[n] for n in each.legs],
                       'residual_m': each.residual} for each in found.outliers],
         'validation': None if found.validation is None else {
@@ -80,10 +81,6 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
 
 def _pose(pose: Pose) -> dict[str, list[float]]:
     return {'position_m': pose.position.tolist(), 'quaternion': pose.quaternion.tolist()}
-
-
-def _rms(values: Array) -> float:
-    return math.sqrt(float((values ** 2).mean()))
 
 
 def _errors(errors: PoseErrors) -> dict[str, float]:
