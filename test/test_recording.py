@@ -591,6 +591,14 @@ def test_chunks_that_overlap_wait_in_limited_memory(
     assert peak_of(file) < 40_000_000
 
 
+def test_declarations_do_not_fill_the_memory(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(bomb(*(channel(n, '/' + 'a' * (1 << 24)) for n in range(2, 22))))
+    assert file.stat().st_size < 100_000
+    assert any('topics and types: more than' in said for said in read(file).missing)
+    assert peak_of(file) < 250_000_000
+
+
 def test_many_small_chunks_of_equal_times(tmp_path: Path) -> None:
     file = tmp_path / 'bag.mcap'
     for content, count in ((b'', 0), (message(1, 5), 5000)):
