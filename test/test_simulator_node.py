@@ -423,7 +423,7 @@ TOO_STIFF = 'actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0'
 
 def test_a_simulator_that_was_stopped_takes_what_is_due_and_skips_the_rest(
         start: Start) -> None:
-    simulator = start()
+    simulator = start('rate:=50.0')  # a busy computer keeps up with it
     simulator.until_there()
     simulator.program.process.send_signal(signal.SIGSTOP)
     end = time.monotonic() + 1.0
@@ -433,8 +433,7 @@ def test_a_simulator_that_was_stopped_takes_what_is_due_and_skips_the_rest(
     simulator.until(lambda: np.diff(simulator.stamps()).max() > 500_000_000, 'a gap of a second')
     many = len(simulator.raw['leg_states'])
     simulator.until(lambda: len(simulator.raw['leg_states']) > many + 100, 'it goes on')
-    gaps = np.diff(simulator.stamps())
-    assert np.all(gaps >= PERIOD)
+    assert np.all(np.diff(simulator.stamps()) >= 20_000_000)
 
 
 @pytest.mark.slow
