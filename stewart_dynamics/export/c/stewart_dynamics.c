@@ -483,7 +483,7 @@ static void check_joints(
   }
 }
 
-/* ---- singularity_warning, limits; setpoints/published_forces ----------------------------------- */
+/* ---- singularity_warning, limits; setpoints/published_forces -------------------------------- */
 
 static void advance_warning(
   const stewart_platform * platform, const stewart_result * result, stewart_state * state) {
