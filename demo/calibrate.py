@@ -42,6 +42,7 @@ from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.calibration.measured_poses import poses_csv, read_poses
 from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.program import folder
 from stewart_dynamics.whole_file import write_files, write_json
 
 matplotlib.use('Agg')
@@ -123,7 +124,7 @@ def main() -> None:
                         help='parameter file of the motion, which must begin at rest')
     parser.add_argument('--poses', type=int, default=40, help='number of measured poses')
     parser.add_argument('--seconds', type=float, default=6.0, help='duration of the motion [s]')
-    parser.add_argument('--output', type=Path, default=ROOT / 'calibrated_demo',
+    parser.add_argument('--output', type=folder, default=ROOT / 'calibrated_demo',
                         help='folder of the results')
     options = parser.parse_args()
     random = np.random.default_rng(SEED)

@@ -38,6 +38,7 @@ from stewart_dynamics.calibration.one_run import CalibrationOptions, run
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
+from stewart_dynamics.reporting.estimates import rounded
 from test_calibration import HEXAPOD, measured, random_poses, true_values
 
 JOINTS = HEXAPOD.parameters['joints']
@@ -179,6 +180,14 @@ def test_degrees_read_as_radians_are_named(table: Path, tmp_path: Path) -> None:
             CalibrationOptions())
     assert main([str(path), '--params', str(PLATFORM), '--degrees', '--output',
                  str(tmp_path / 'out')]) == 0
+
+
+@pytest.mark.parametrize(('value', 'error', 'text'), [
+    (0.5, 3e-4, '0.5000'), (0.879076396422, 1e-13, '0.879076396'), (-4e-10, 1e-13, '-4.0000e-10'),
+    (1.23456789e-6, 1e-21, '1.234567890e-06')])
+def test_tables_have_no_more_digits_than_mean_something(
+        value: float, error: float, text: str) -> None:
+    assert rounded(value, error) == text
 
 
 def test_poses_of_a_bag_at_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

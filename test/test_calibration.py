@@ -383,6 +383,11 @@ def test_too_little_is_rejected() -> None:
     rough = measured(rng, true_values(rng, 1e-6), random_poses(rng, 16), Noise(0.0, 1e-4, 1e-4))
     with pytest.raises(StewartError, match='the poses do not support a better geometry'):
         calibrate(HEXAPOD, *rough)
+    for tilt in ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5)):
+        with pytest.raises(StewartError, match='^poses must be turned about two axes or more'):
+            calibrate(HEXAPOD, *measured(rng, true_values(rng), random_poses(rng, 40, tilt=tilt)),
+                      frames='unknown')
+    assert calibrate(HEXAPOD, lengths, seen, noise=(0.0, 1e-5, 0.0)).noise.length == 0.0
 
 
 def test_fixed_parts_keep_the_values_of_the_file() -> None:

@@ -37,6 +37,8 @@ from stewart_dynamics.parameters.table import Parameters
 
 # Minimum number of poses whose legs have a pose by the file's geometry.
 _FEWEST = 4
+# Largest singular value of the mean rotation of poses that determine the frames.
+_ONE_AXIS = 1.0 - 1e-6
 
 
 class PoseErrors(NamedTuple):
@@ -91,12 +93,11 @@ def find_frames(parameters: Parameters, equations: Equations) -> Frames:
     """
     Return the device's frame in the base frame, and the platform frame in the target's.
 
-    Raises
-    ------
-    StewartError
-        The file's geometry has no pose for most of the measured legs.
-
+    StewartError if they are not determined, or if most of the measured legs have no pose.
     """
+    if np.linalg.svd(equations.pose.rotation.mean(axis=0), compute_uv=False)[0] > _ONE_AXIS:
+        raise StewartError('poses must be turned about two axes or more, or the frames of the '
+                           'device are not determined')
     found, solved = poses_of(
         parameters, equations.lengths, StewartPlatform(parameters).home_pose())
     if np.count_nonzero(solved) < _FEWEST:

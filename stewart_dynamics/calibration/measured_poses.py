@@ -35,8 +35,8 @@ QUATERNION = ('qx', 'qy', 'qz', 'qw')
 ANGLES = ('alpha', 'beta', 'gamma')
 # Largest size of a file [bytes], and number of its poses.
 _LARGEST, _MOST = 64 << 20, 20_000
-# A number of a larger size would overflow when squared.
-_END = 1e100
+# Squares of larger numbers, and their squares, would overflow.
+_END = 1e30
 
 
 class MeasuredPoses(NamedTuple):
@@ -115,7 +115,7 @@ def _number(cell: str, where: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) < _END:
-        raise StewartError(f'{where}: {shown(cell)}: must be a finite number')
+        raise StewartError(f'{where}: {shown(cell)}: must be a finite number below {_END:g}')
     return value
 
 

@@ -52,7 +52,8 @@ class Noise(NamedTuple):
 
 def covariances(noise: Noise, size: float, lin: Linearization) -> Array:
     """Return the covariance (N, 6, 6) of the residuals of each pose [m^2]."""
-    return np.asarray(max(noise.length, ROUNDING * size) ** 2 * np.eye(6) + sum(
+    least = ROUNDING * size + 1e-6 * math.hypot(noise.position, size * noise.rotation)
+    return np.asarray(max(noise.length, least) ** 2 * np.eye(6) + sum(
         deviation ** 2 * each @ np.swapaxes(each, 1, 2) for deviation, each in (
             (noise.position, lin.position), (noise.rotation, lin.rotation))))
 
