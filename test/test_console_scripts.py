@@ -52,7 +52,7 @@ sys.exit(code)
 def run(program: str, *arguments: str, ros: str = 'with ROS') -> tuple[int, str, str]:
     """Return exit code, stdout and stderr of a program."""
     done = subprocess.run([sys.executable, '-c', RUN, ros, program, *arguments], check=False,
-                          capture_output=True, text=True, timeout=60)
+                          capture_output=True, text=True, timeout=300)
     return done.returncode, done.stdout, done.stderr
 
 

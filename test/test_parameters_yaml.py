@@ -96,7 +96,7 @@ def test_ros_itself_reads_the_same(tmp_path: Path, domain: int) -> None:
     file = file_of(tmp_path, parameters_of(list(VALUES)))
     read = subprocess.run(
         [sys.executable, '-c', READ_BY_ROS, str(file), str(len(VALUES))], check=True,
-        capture_output=True, text=True, timeout=60,
+        capture_output=True, text=True, timeout=300,
         env={**os.environ, 'ROS_DOMAIN_ID': f'{domain}'})
     for text, value, expected in zip(
             VALUES, json.loads(read.stdout), VALUES.values(), strict=True):

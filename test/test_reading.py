@@ -380,7 +380,7 @@ def test_libsdformat_finds_the_file_valid(seed, tmp_path):
     file = tmp_path / 'hexapod.sdf'
     file.write_text(sdf(Hexapod(p), 'hexapod'), encoding='utf-8')
     done = subprocess.run([PROGRAM, 'sdf', '-k', str(file)], capture_output=True, text=True,
-                          timeout=60)
+                          timeout=300)
     assert done.returncode == 0, done.stderr
     assert 'Valid' in done.stdout
 

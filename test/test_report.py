@@ -61,7 +61,7 @@ BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 FLAGS = ('--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
          '--disable-background-networking', '--disable-component-update', '--disable-sync',
          '--use-angle=swiftshader', '--enable-unsafe-swiftshader')
-PATIENCE = 60.0  # [s]
+PATIENCE = 300.0  # [s]
 HOSTILE = ('</script ><script >window.hacked=1</script >', '<img src=x onerror=window.hacked=1>',
            '"><b>bold</b>', "';window.hacked=1;'", '${window.hacked=1}<br>', '<!--=data-->')
 

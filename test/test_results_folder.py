@@ -52,7 +52,7 @@ RUN = 32 * 'a'
 def kill(final: Path, run: str, where: str) -> None:
     """Let a process be killed that writes a folder of results."""
     done = subprocess.run([sys.executable, '-c', KILLED, str(final), run, where], cwd=ROOT,
-                          capture_output=True, timeout=60)
+                          capture_output=True, timeout=300)
     assert done.returncode == -9, done.stderr
 
 

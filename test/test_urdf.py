@@ -151,7 +151,7 @@ def test_urdfdom_reads_the_urdf(tmp_path):
     file = tmp_path / 'hexapod.urdf'
     file.write_text(urdf(Hexapod(Parameters.from_yaml(PLATFORM)), 'hexapod',
                          Ros2Control(['effort'], 'mock')), encoding='utf-8')
-    done = subprocess.run([CHECK_URDF, str(file)], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([CHECK_URDF, str(file)], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0
     assert 'root Link: base has 7 child(ren)' in done.stdout
     assert 'error' not in (done.stdout + done.stderr).lower()
