@@ -447,8 +447,15 @@ def test_forces_of_the_legs_and_the_weight_change_the_modes_little() -> None:
         stiff.frequencies, PLATFORM.natural_modes(home, 1e8).frequencies, rtol=1e-3)
     assert not np.allclose(soft.frequencies, PLATFORM.natural_modes(home, 1e5).frequencies,
                            rtol=1e-4)
-    with pytest.raises(MotionError, match='not stable'):
-        capability.modes(home, 10.0)
+
+
+def test_modes_that_do_not_come_back_have_no_frequency() -> None:
+    """In one batch with a stable pose, whose modes are those of the pose alone."""
+    capability, home = Capability(PLATFORM), PLATFORM.home_pose()
+    both = Pose(np.stack([home.position] * 2), np.stack([home.rotation] * 2))
+    frequencies = capability.modes(both, np.array([[10.0] * 6, [1e8] * 6])).frequencies
+    assert frequencies[0, 0] == 0.0 <= frequencies[0].min()
+    np.testing.assert_allclose(frequencies[1], capability.modes(home, 1e8).frequencies)
 
 
 def test_clearance_needs_the_shape_of_the_legs() -> None:

@@ -97,7 +97,20 @@ def test_the_files_are_there_and_name_what_limits(sheet: Path, figures: dict[str
     assert figures['motion']['factor'] > 1.0
     assert figures['payload']['any_orientation'] < figures['payload']['value']
     assert figures['stiffness']['worst']['frequencies'][0] < figures['stiffness']['frequencies'][0]
+    platform = StewartPlatform(PARAMETERS)
+    for (i, j), plane in zip(((0, 2), (1, 2), (0, 1)), ('xz', 'yz', 'xy'), strict=True):
+        found = figures['stiffness']['sections'][plane]
+        values = np.array(found['frequencies'], dtype=float)
+        assert 0.2 < np.isfinite(values).mean() < 0.95
+        for n, m in np.argwhere(np.isfinite(values))[::97]:
+            position = platform.home_pose().position.copy()
+            position[[i, j]] += found['first'][n], found['second'][m]
+            at = Pose(position, platform.home_pose().rotation)
+            assert Capability(platform).travel(at, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]).value > 0.0
+            assert values[n, m] == pytest.approx(
+                Capability(platform).modes(at, 5e7).frequencies[0], rel=1e-6)
     page = (sheet / 'datasheet.html').read_text()
+    assert page.count('aria-label="Lowest natural frequency') == 3
     assert page.count(f'smallest at {figures["worst"]["poses"]} poses') == 2
 
 

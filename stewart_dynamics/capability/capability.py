@@ -81,6 +81,8 @@ class Extent(NamedTuple):
         Index of the sample of a motion at which it is reached, or of the last one before.
     time : float or None
         Time in a motion with times at which it is reached [s].
+    upper : float or None
+        Of a box: a factor that is proven not to be reachable. ``value`` is proven to be.
 
     """
 
@@ -89,6 +91,7 @@ class Extent(NamedTuple):
     leg: Any
     sample: int | None = None
     time: float | None = None
+    upper: float | None = None
 
 
 class Tilt(NamedTuple):
@@ -170,6 +173,11 @@ class Capability:
         pivot : (..., 3), optional
             Point that the platform turns about, platform frame [m]; by default its origin.
 
+        Raises
+        ------
+        MotionError
+            A bounded number of steps does not decide whether a limit is exceeded.
+
         """
         check_kind(pose, Pose, Motion)
         directions, sizes = _directions(direction)
@@ -189,6 +197,11 @@ class Capability:
         in_parts(solve, self.platform.constants, rows, copies(directions, shape),
                  copies(pivots, shape), values, codes, legs,
                  scratch=(travel.SCRATCH + sum(map(len, self._plates)), travel.LEG))
+        if np.isnan(values).any():
+            at = int(np.isnan(values).argmax())
+            where = list(map(int, np.unravel_index(at, shape))) if shape else ''
+            raise MotionError(f'travel{where}: {_ENDS[codes[at]]}: not decided whether it is '
+                              'exceeded, after the largest number of steps')
         return _extent(values.reshape(shape) / sizes, _ENDS[codes].reshape(shape),
                        legs.reshape(shape))
 
@@ -225,15 +238,21 @@ class Capability:
         Arguments are those of ``reachable``; each range includes zero. The box of the answer is
         proven to be reachable. Where lengths or joint angles limit, a box larger by 1e-8 is not;
         where the clearance of the legs limits it is found to 1 %, if that takes a bounded number
-        of steps; where a singularity limits the factor may be too small.
-        Rotations grow up to a turn.
+        of steps; where a singularity limits the number of steps may end the proof earlier.
+        ``upper`` is the shortest travel towards an end or the middle of each range: no larger
+        factor is reachable. Rotations grow up to a turn.
         """
         ranges = checked_ranges(box)
         if (ranges[:, 0] > 0.0).any() or (ranges[:, 1] < 0.0).any():
             raise MotionError('box: a range without zero cannot be scaled')
         factor, worst = self._boxes(pose, pivot).factor(ranges)
-        return Extent(factor, '', -1) if worst is None else Extent(
-            factor, worst.limit, worst.leg)
+        middle: Array = np.zeros(6)
+        ways = np.stack(np.meshgrid(*np.stack([*ranges.T, middle], axis=1)), axis=-1)
+        ways = ways.reshape(-1, 6)
+        ends = self.travel(self._single(pose), ways[ways.any(axis=1)], pivot).value
+        upper = max(float(ends.min()), factor)
+        return Extent(factor, '', -1, upper=upper) if worst is None else Extent(
+            factor, worst.limit, worst.leg, upper=upper)
 
     def smallest(self, quantity: Callable[[Pose], ArrayLike], box: ArrayLike,
                  pose: Pose | Motion | None = None, pivot: ArrayLike | None = None) -> InBox:
@@ -372,13 +391,8 @@ class Capability:
         Return natural frequencies and shapes at rest, as ``StewartPlatform.natural_modes``.
 
         Besides ``stiffness``, the change of the weight's wrench holds the platform or tips it
-        over; both together are symmetric.
-
-        Raises
-        ------
-        MotionError
-            The pose is not stable.
-
+        over; both together are symmetric. At a pose that is not stable the frequency of each mode
+        that does not come back is 0.
         """
         total = self.stiffness(pose, leg_stiffness) + self._weight_stiffness(pose)
         return modes_of(

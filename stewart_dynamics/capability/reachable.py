@@ -47,7 +47,7 @@ _EXACT = 1e-9
 # For a box that ends at a clearance or a singularity the factor is found to these parts: each
 # proof takes longer.
 _EXACT_OF_CLEARANCE = 0.01
-_EXACT_OF_CONDITION = 0.05
+_EXACT_OF_CONDITION = 1e-3
 # Boxes of translations are proven up to this multiple of the hexapod's size.
 _LARGEST = 1e6
 

@@ -258,7 +258,11 @@ def _of_leg(leg: Array, velocity: Vector3, rate: float, bound: float, code: int,
 @compiled
 def _end_of_leg(leg: Array, velocity: Vector3, rate: float, bound: float, code: int, end: float,
                 ) -> float:
-    """Return the first t in [0, end] at which a leg exceeds a limit, or end."""
+    """
+    Return the first t in [0, end] at which a leg exceeds a limit, or end.
+
+    Minus the t up to which it does not, where the steps do not decide it.
+    """
     if code <= LENGTH_MAX and (rate == 0.0 or dot(velocity, velocity) == 0.0):
         return _end_of_length(leg, velocity, rate, bound, code == LENGTH_MAX, end)
     t = before = 0.0
@@ -285,6 +289,8 @@ def _end_of_leg(leg: Array, velocity: Vector3, rate: float, bound: float, code: 
                 return end
             t = end
             break
+    else:
+        return -t
     low, high = before, t
     for _ in range(100):
         middle = 0.5 * (low + high)
@@ -452,7 +458,11 @@ def _approach(legs: Array, corners: Array, i: int, j: int) -> float:
 def _end_of_clearance(constants: Array, shapes: Array, legs: Array, corners: Array,
                       base_corners: int, velocity: Vector3, rate: float, bound: float, i: int,
                       j: int, end: float) -> float:
-    """Return the first t in [0, end] at which a leg and a leg or plate are too near, or end."""
+    """
+    Return the first t in [0, end] at which a leg and a leg or plate are too near, or end.
+
+    Minus the t up to which it is proven not to be so, where the steps do not decide it.
+    """
     size = characteristic_length_of(constants)
     bound -= _EXACT_CLEARANCE * size
     margin, step = _room(
@@ -477,6 +487,8 @@ def _end_of_clearance(constants: Array, shapes: Array, legs: Array, corners: Arr
         if margin < 0.0:
             break  # the root is between the two
         t += narrow
+    else:
+        return -t
     low, high = t, t + narrow
     for _ in range(100):
         middle = 0.5 * (low + high)
@@ -585,7 +597,11 @@ def _margin(constants: Array, legs: Array, velocity: Vector3, rate: float, stop:
 @compiled
 def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: float, stop: float,
                       end: float) -> float:
-    """Return the first t in [0, end] at which the condition number is ``stop``, or end."""
+    """
+    Return the first t in [0, end] at which the condition number is ``stop``, or end.
+
+    Minus the t up to which it is proven not to be so, where the steps do not decide it.
+    """
     margin, width, side = _margin(constants, legs, velocity, rate, stop, 0.0)
     if margin <= 0.0:
         return 0.0
@@ -607,6 +623,8 @@ def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: fl
             width = 0.5 * max(min(width, cleared), narrow) if inside else 0.25 * width
         else:
             break  # the root is between t and the middle
+    else:
+        return -t
     low, high = t, t + narrow
     for _ in range(100):
         middle = 0.5 * (low + high)
@@ -623,23 +641,28 @@ def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: fl
 @compiled
 def _travel(constants: Array, bounds: Array, shapes: Array, base_corners: int, stop: float,
             legs: Array, direction: Array) -> tuple[float, int, int]:
-    """Return t at the first limit, its code, and the leg (-1: none)."""
+    """Return t at the first limit, nan if not decided, its code, and the leg (-1: none)."""
     velocity = read3(direction, 0)
     rate = norm(read3(direction, 3))
     # a platform that only turns is back at its pose after one turn
     whole = 2.0 * math.pi / rate if norm(velocity) == 0.0 else math.inf
     end, limit, leg = whole, NOTHING, -1
+    proven, undecided, its = math.inf, NOTHING, -1
     for code in (LENGTH_MAX, LENGTH_MIN, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX):
         for n in range(6):
             bound = bounds[code, n]
             limited = (bound > 0.0 if code == LENGTH_MIN else
                        bound < (math.inf if code == LENGTH_MAX else math.pi))
             if limited:
-                t = _end_of_leg(legs[n], velocity, rate, bound, code, end)
-                if t < end:
+                t = _end_of_leg(legs[n], velocity, rate, bound, code, min(end, proven))
+                if t < 0.0:
+                    proven, undecided, its = -t, code, n
+                elif t < min(end, proven):
                     end, limit, leg = t, code, n
-    t = _end_of_condition(constants, legs, velocity, rate, stop, end)
-    if t < end:
+    t = _end_of_condition(constants, legs, velocity, rate, stop, min(end, proven))
+    if t < 0.0:
+        proven, undecided, its = -t, SINGULARITY, -1
+    elif t < min(end, proven):
         end, limit, leg = t, SINGULARITY, -1
     if bounds[CLEARANCE_MIN, 0] > -math.inf:
         for i in range(6):
@@ -648,9 +671,13 @@ def _travel(constants: Array, bounds: Array, shapes: Array, base_corners: int, s
                         j == PLATFORM and len(legs) == SCRATCH + base_corners):
                     continue
                 t = _end_of_clearance(constants, shapes, legs, legs[6:], base_corners, velocity,
-                                      rate, bounds[CLEARANCE_MIN, 0], i, j, end)
-                if t < end:
+                                      rate, bounds[CLEARANCE_MIN, 0], i, j, min(end, proven))
+                if t < 0.0:
+                    proven, undecided, its = -t, CLEARANCE_MIN, i
+                elif t < min(end, proven):
                     end, limit, leg = t, CLEARANCE_MIN, i
+    if proven < end:
+        return math.nan, undecided, its
     if limit == NOTHING:
         end = math.inf
     return end, limit, leg
@@ -689,7 +716,8 @@ def travels(constants: Array, axes: Array, bounds: Array, shapes: Array, base: A
     values, limits, legs : (N,)
         Written: multiple of the direction until the first limit, its code, and the leg, of two
         legs that are too near the first; infinity, NOTHING and -1 if nothing limits, leg -1 at a
-        singularity.
+        singularity. nan where the bounded number of steps does not decide whether a limit is
+        exceeded, with that limit.
     work : (SCRATCH + corners of the plates, LEG)
         Scratch memory.
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.capability.workspace import Section
-from stewart_dynamics.datasheet.workspace import Boundary
+from stewart_dynamics.datasheet.workspace import Boundary, Frequencies
 from stewart_dynamics.reporting.curves import Curves
 from stewart_dynamics.reporting.vector_picture import Chart, Picture, tick_text, ticks
 
@@ -33,31 +33,71 @@ DASHES = {'length_max': None, 'length_min': '6 3', 'base_joint_angle_max': '2 2.
           'platform_joint_angle_max': '9 2 2 2', 'leg_clearance_min': '4 2 1 2 1 2',
           'singularity': '1 3'}
 _MILLI = 1e3
+# Shades of a quantity over a section.
+_BANDS = 8
 
 
 def section_chart(section: Section, origin: Array, axes: tuple[int, int], ranges: Array | None,
                   ) -> Picture:
     """Draw a section around a position [mm], and the rectangle in it of ranges (6, 2) [m]."""
     first, second = axes
-    names = 'XYZ'[first], 'XYZ'[second]
-    picture = Picture(_WIDTH, 330.0, f'Workspace, {names[0]}-{names[1]} section')
-
-    def flat(points: Array) -> Array:
-        moved: Array = _MILLI * (points - origin)[:, axes]
-        return moved
-
-    loops = [flat(each) for each in section.loops]
-    x, y = _equal_ranges(np.concatenate(loops) if loops else np.zeros((1, 2)), (272.0, 252.0))
-    chart = Chart(picture, (52.0, 30.0, 272.0, 252.0), x, y)
+    picture, chart, loops = _section(section, origin, axes, 'Workspace')
     picture.path(*map(chart.at, loops), closed=True, css='area', fill_rule='evenodd')
-    chart.draw_axes(f'{names[0]} [mm]', f'{names[1]} [mm]')
+    chart.draw_axes(f'{"XYZ"[first]} [mm]', f'{"XYZ"[second]} [mm]')
     for part in section.boundary:
-        _draw_edge(picture, chart.at(flat(part.points)), part.limit, part.leg)
+        _draw_edge(picture, chart.at(_flat(part.points, origin, axes)), part.limit, part.leg)
     if ranges is not None:
         (a, b), (c, d) = _MILLI * ranges[first], _MILLI * ranges[second]
         picture.path(chart.at([[a, c], [b, c], [b, d], [a, d]]), closed=True, css='set')
     _cross(picture, chart.at([0.0, 0.0]))
     return picture
+
+
+def frequency_chart(section: Section, modes: Frequencies, origin: Array, axes: tuple[int, int],
+                    ) -> Picture:
+    """Draw the lowest natural frequency over a section, darker where it is higher."""
+    picture, chart, loops = _section(section, origin, axes, 'Lowest natural frequency')
+    values = modes.values
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    with np.errstate(invalid='ignore'):
+        bands = np.minimum((values - low) / max(high - low, 1e-9 * high) * _BANDS, _BANDS - 1)
+    half = [0.5 * _MILLI * (each[1] - each[0]) for each in modes[:2]]
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+    for band in range(_BANDS):
+        cells = np.argwhere(np.floor(np.nan_to_num(bands, nan=-1.0)) == band)
+        middles = _MILLI * np.stack([modes.first[cells[:, 0]], modes.second[cells[:, 1]]], axis=1)
+        shade = {'css': 'band', 'fill_opacity': f'{(band + 1) / _BANDS:.3g}',
+                 'shape_rendering': 'crispEdges'}
+        picture.path(*(chart.at(each + corners) for each in middles), closed=True, **shade)
+        x = 66.0 + 18.0 * band
+        picture.path(np.array([[x, 311.0], [x + 18.0, 311.0], [x + 18.0, 320.0], [x, 320.0]]),
+                     closed=True, **shade)
+    picture.text([60.0, 320.0], f'{tick_text(_rounded(low))} Hz', 'end', css='tick')
+    picture.text([72.0 + 18.0 * _BANDS, 320.0], f'{tick_text(_rounded(high))} Hz', css='tick')
+    chart.draw_axes(f'{"XYZ"[axes[0]]} [mm]', f'{"XYZ"[axes[1]]} [mm]')
+    for loop in loops:
+        picture.path(chart.at(loop), closed=True, css='edge')
+    _cross(picture, chart.at([0.0, 0.0]))
+    return picture
+
+
+def _section(section: Section, origin: Array, axes: tuple[int, int], title: str,
+             ) -> tuple[Picture, Chart, list[Array]]:
+    """Return an empty picture of a section, and its closed curves [mm]."""
+    first, second = ('XYZ'[axis] for axis in axes)
+    picture = Picture(_WIDTH, 330.0, f'{title}, {first}-{second} section')
+    loops = [_flat(each, origin, axes) for each in section.loops]
+    x, y = _equal_ranges(np.concatenate(loops) if loops else np.zeros((1, 2)), (272.0, 252.0))
+    return picture, Chart(picture, (52.0, 30.0, 272.0, 252.0), x, y), loops
+
+
+def _flat(points: Array, origin: Array, axes: tuple[int, int]) -> Array:
+    moved: Array = _MILLI * (points - origin)[:, axes]
+    return moved
+
+
+def _rounded(value: float) -> float:
+    return float(f'{value:.3g}')
 
 
 def tilt_chart(boundaries: Sequence[Boundary], names: Sequence[str]) -> Picture:

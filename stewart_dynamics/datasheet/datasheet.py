@@ -117,6 +117,11 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     progress.stage('workspace')
     sections = {name: hexapod.section(normal) for name, normal in zip(
         workspace.PLANES, 'yxz', strict=True) if hexapod.limited('length_max')}
+    modes = {} if order.leg_stiffness is None else {
+        name: workspace.frequencies(hexapod, each, workspace.PLANES[name], order.leg_stiffness)
+        for name, each in sections.items()}
+    if modes:
+        sheet['stiffness']['sections'] = {name: each.listed() for name, each in modes.items()}
     tilts = {name: workspace.tilt(hexapod, part * (sheet['travel'][
         'z+' if part > 0.0 else 'z-']['value'] or 0.0)) for name, part in _HEIGHTS.items()}
     sheet['tilt'] = _smallest_tilt(tilts['at the pose'], hexapod)
@@ -128,7 +133,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
             'rejected': recorded.rejected, 'missing': recorded.missing}
     progress.stage('page')
     sheet['parameters'] = plain_parameters(hexapod.given)
-    pictures = Pictures(hexapod, sheet, sections, tilts, ranges,
+    pictures = Pictures(hexapod, sheet, sections, modes, tilts, ranges,
                         None if recorded is None else recorded.seconds, used)
     with whole_folder(folder, options, DATASHEET) as partial:
         write_json(partial / DATASHEET, sheet)

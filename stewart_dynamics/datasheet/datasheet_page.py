@@ -34,7 +34,7 @@ from stewart_dynamics.datasheet.payloads import Payloads
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.datasheet.ratings import AXES, grid, poses_of
 from stewart_dynamics.datasheet.workspace import (
-    Boundary, PLANES, rotations_over_height)
+    Boundary, Frequencies, PLANES, rotations_over_height)
 from stewart_dynamics.parameters.table import inertia_matrix
 from stewart_dynamics.reporting.pages import link_to_other, page
 from stewart_dynamics.reporting.results_folder import REPLAYS, REPORT_PAGE
@@ -51,6 +51,7 @@ class Pictures(NamedTuple):
     hexapod: RatedHexapod
     sheet: Mapping[str, Any]
     sections: Mapping[str, Section]
+    modes: Mapping[str, Frequencies]
     tilts: Mapping[str, Boundary]
     ranges: Array | None
     """Ranges (6, 2) that are reachable at once."""
@@ -71,6 +72,9 @@ class Pictures(NamedTuple):
         """Return sections, tilt, rotation over height, and payload where it is limited."""
         found = [charts.section_chart(each, self.hexapod.origin.position, PLANES[name],
                                       self.ranges) for name, each in self.sections.items()]
+        found += [charts.frequency_chart(
+            self.sections[name], each, self.hexapod.origin.position, PLANES[name])
+            for name, each in self.modes.items() if np.isfinite(each.values).any()]
         found.append(charts.tilt_chart(list(self.tilts.values()), list(self.tilts)))
         low, high = (self.sheet['travel'][key]['value'] for key in ('z-', 'z+'))
         if low and high:

@@ -17,7 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,8 @@ from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.mechanics.frames.motion import Pose
 
 _AZIMUTHS = 360
+# Cells of a section, in both directions, for which a natural frequency is given.
+_CELLS = 32
 PLANES = {'xz': (0, 2), 'yz': (1, 2), 'xy': (0, 1)}
 """Sections, and the axes in them."""
 
@@ -81,6 +84,47 @@ def rotations_over_height(hexapod: RatedHexapod, low: float, high: float, count:
     values = hexapod.travel(poses[:, None], directions).value
     return heights, {'tilt, every direction': values[:, :-2].min(axis=1),
                      'θZ': values[:, -2:].min(axis=1)}
+
+
+class Frequencies(NamedTuple):
+    """Lowest natural frequencies over a section, at the middles of equal cells."""
+
+    first: Array
+    """Displacements from the pose along the first axis of the section (N,) [m]."""
+    second: Array
+    """The same along the second axis (M,) [m]."""
+    values: Array
+    """(N, M) [Hz]; nan outside the section, 0 where the pose is not stable."""
+
+    def listed(self) -> dict[str, Any]:
+        """Return the numbers for ``datasheet.json``; None outside the section."""
+        return {'first': self.first.tolist(), 'second': self.second.tolist(),
+                'frequencies': [[None if math.isnan(each) else each for each in row]
+                                for row in self.values.tolist()]}
+
+
+def frequencies(hexapod: RatedHexapod, section: Section, axes: tuple[int, int],
+                leg_stiffness: float) -> Frequencies:
+    """Return the lowest natural frequency over a section, with legs of a stiffness [N/m]."""
+    loops = [(each - hexapod.origin.position)[:, axes] for each in section.loops]
+    points = np.concatenate([*loops, np.zeros((1, 2))])
+    low, high = points.min(axis=0), points.max(axis=0)
+    middles = (np.arange(_CELLS) + 0.5)[:, None] / _CELLS * (high - low) + low
+    at = np.stack(np.meshgrid(*middles.T, indexing='ij'), axis=-1).reshape(-1, 2)
+    inside = np.zeros(len(at), dtype=bool)
+    for loop in loops:  # a line to the right crosses them an odd number of times
+        (x, y), (next_x, next_y) = loop[:-1].T, loop[1:].T
+        above = (y > at[:, 1:]) != (next_y > at[:, 1:])
+        with np.errstate(all='ignore'):
+            crossing = x + (at[:, 1:] - y) / (next_y - y) * (next_x - x)
+        inside ^= (above & (crossing > at[:, :1])).sum(axis=1) % 2 == 1
+    positions = np.tile(hexapod.pose.position, (int(inside.sum()), 1))
+    positions[:, axes] += at[inside]
+    values: Array = np.full(len(at), math.nan)
+    if inside.any():
+        poses = Pose(positions, np.broadcast_to(hexapod.pose.rotation, (len(positions), 3, 3)))
+        values[inside] = hexapod.loads.modes(poses, leg_stiffness).frequencies[:, 0]
+    return Frequencies(middles[:, 0], middles[:, 1], values.reshape(_CELLS, _CELLS))
 
 
 def table(sections: Mapping[str, Section], tilts: Mapping[str, Boundary],

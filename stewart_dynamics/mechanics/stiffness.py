@@ -116,15 +116,9 @@ def modes_of(mass: Array, stiffness: Array) -> NaturalModes:
     """
     Return the modes of M and a symmetric K (..., 6, 6).
 
-    Raises
-    ------
-    MotionError
-        K is not positive definite: the pose is not stable.
-
+    The frequency is 0 where K is not positive: the platform does not come back.
     """
     inverse = np.linalg.inv(np.linalg.cholesky(mass))
     squares, vectors = np.linalg.eigh(inverse @ stiffness @ np.swapaxes(inverse, -1, -2))
-    if not np.all(squares > 0.0):
-        raise MotionError('natural modes: the stiffness is not positive definite: the pose is not '
-                          'stable')
-    return NaturalModes(np.sqrt(squares) / (2.0 * np.pi), np.swapaxes(inverse, -1, -2) @ vectors)
+    return NaturalModes(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi),
+                        np.swapaxes(inverse, -1, -2) @ vectors)

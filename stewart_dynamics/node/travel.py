@@ -26,6 +26,7 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayou
 
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.compilation.functions import Preparation
+from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.limits import (
     CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, OF_JOINTS)
@@ -94,6 +95,9 @@ class TravelPublisher(PublisherAtRate):
     def _write(self, motion: Sequence[float]) -> Any:
         if self._capability is None:
             self._capability = Capability(StewartPlatform(self._parameters))
-        values = self._capability.travel(Motion.of_rows(np.array(motion)), _DIRECTIONS).value
-        values = np.where(np.isposinf(values), _UNLIMITED, np.nan_to_num(values))
+        try:
+            values = self._capability.travel(Motion.of_rows(np.array(motion)), _DIRECTIONS).value
+        except MotionError:  # not decided within the largest number of steps
+            values = np.zeros(12)
+        values = np.where(np.isposinf(values), _UNLIMITED, values)
         return Float64MultiArray(layout=_LAYOUT, data=values.tolist())
