@@ -82,7 +82,7 @@ class Extent(NamedTuple):
     time : float or None
         Time in a motion with times at which it is reached [s].
     upper : float or None
-        Of a box: a factor that is proven not to be reachable. ``value`` is proven to be.
+        A factor that is proven not to be reachable, of a box; ``value`` is proven to be.
 
     """
 
