@@ -600,7 +600,7 @@ def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: fl
     """
     Return the first t in [0, end] at which the condition number is ``stop``, or end.
 
-    Minus the t up to which it is proven not to be so, where the steps do not decide it.
+    Far away, where the steps do not decide it, the t up to which it is proven not to be so.
     """
     margin, width, side = _margin(constants, legs, velocity, rate, stop, 0.0)
     if margin <= 0.0:
@@ -623,8 +623,6 @@ def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: fl
             width = 0.5 * max(min(width, cleared), narrow) if inside else 0.25 * width
         else:
             break  # the root is between t and the middle
-    else:
-        return -t
     low, high = t, t + narrow
     for _ in range(100):
         middle = 0.5 * (low + high)
