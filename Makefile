@@ -69,7 +69,7 @@ INSTALLED := $(VENV)/installed-$(ROS)
 test: lint
 	$(VENV)/bin/python -m pytest --numprocesses $(TESTERS) --dist loadfile --no-loadscope-reorder
 
-# Beside one another: mypy and flake8 take the same time.
+# Beside one another: mypy and flake8 take nearly the same time.
 lint: $(INSTALLED)
 	@$(MAKE) --no-print-directory --jobs --output-sync lint-mypy lint-flake8 lint-ruff lint-layers
 
