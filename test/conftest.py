@@ -49,10 +49,12 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     """Before several processes run the tests, compile once what each of them would compile."""
     is_worker = hasattr(session.config, 'workerinput')
     if not is_worker and getattr(session.config.option, 'numprocesses', None):
-        # Meanwhile, as bytecode, the test modules: their errors are reported by the processes.
+        # Meanwhile, as bytecode, the test modules, as many as there is time for: their errors are
+        # reported by the processes.
         with subprocess.Popen([sys.executable, '-m', 'pytest', '--collect-only', '-qq',
-                               Path(__file__).parent], stdin=DEVNULL, stdout=DEVNULL):
+                               Path(__file__).parent], stdin=DEVNULL, stdout=DEVNULL) as reading:
             subprocess.run([sys.executable, '-c', COMPILE_ALL], check=True, stdin=DEVNULL)
+            reading.terminate()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -36,7 +36,7 @@ from test_external_wrench_node import Felt
 from test_planned_trajectory_node import check, MOTION
 
 # Modules that the test lets the node compile: for planned trajectories and external wrenches.
-LATER = ('stewart_dynamics.mechanics.kinematics.forward_kinematics',
+LATER = ('stewart_dynamics.mechanics.dynamics.friction',
          'stewart_dynamics.external_wrench.estimate')
 
 

@@ -98,7 +98,8 @@ def imports(tree: ast.AST) -> Iterator[str]:
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             yield node.module or ''
-        yield from imports(node)
+        elif not isinstance(node, ast.expr):  # which holds no statement
+            yield from imports(node)
 
 
 def third_party(*folders: str) -> set[str]:
