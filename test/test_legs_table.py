@@ -29,12 +29,9 @@ from numpy.typing import NDArray
 import pyarrow.parquet
 import pytest
 from scipy.spatial.transform import Rotation
-from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
-from stewart_dynamics.replay import legs_table
-from stewart_dynamics.replay.csv_rows import RowsProcess
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
 from stewart_dynamics.setpoints.step import Outputs
 from test_output import base_wrenches_of, LEGS, turning
@@ -190,49 +187,6 @@ def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
         assert not read_csv(file)[1]
     else:
         assert pyarrow.parquet.read_table(file).shape == (0, 43)
-
-
-def write_blocks(folder: Path, number: int) -> CsvTable:
-    """Write blocks to legs.csv; the table is still open."""
-    table = CsvTable(folder, LEGS)
-    for first in range(0, 100 * number, 100):
-        outputs = turning(100, first)
-        table.write(seconds_of(100), motions_of(100), outputs, base_wrenches_of(outputs))
-    return table
-
-
-def test_a_second_process_writes_the_same_rows(
-        monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / 'other').mkdir()
-    write_blocks(tmp_path, 6).close()
-    monkeypatch.setattr(legs_table, '_LONG', 200)
-    write_blocks(tmp_path / 'other', 6).close()
-    rows = (tmp_path / 'legs.csv').read_bytes()
-    assert rows.count(b'\n') == 601
-    assert b',,' in rows  # forces or base wrenches that are not known
-    assert (tmp_path / 'other' / 'legs.csv').read_bytes() == rows
-
-
-def test_a_full_disk_is_reported_by_the_second_process() -> None:
-    outputs = turning(100)
-    numbers = np.ones((100, 41))
-    with open('/dev/full', 'wb') as file:
-        process = RowsProcess(file)
-        with pytest.raises(OSError, match='No space left on device: .*/dev/full'):
-            while True:
-                process.write(outputs.stamps, numbers, outputs.warnings)
-        process.close()
-
-
-def test_a_second_process_that_is_killed_is_reported(
-        monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(legs_table, '_LONG', 0)
-    table = write_blocks(tmp_path, 1)
-    assert table._process is not None and table._process._process is not None
-    table._process._process.kill()
-    with pytest.raises(StewartError, match=r'legs\.csv: .* ended by signal 9'):
-        table.close()
-    table.close()
 
 
 def test_parquet_is_written_in_groups_of_many_rows(tmp_path: Path) -> None:

@@ -23,17 +23,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import orjson
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.replay.csv_rows import rows_of, RowsProcess
 from stewart_dynamics.setpoints.step import Outputs
 
 # Beginnings of text that spreadsheet programs execute.
 _FORMULA = ('=', '+', '-', '@', '\t', '\r', '\n')
 # Rows from which on a second process formats them: it takes 0.1 s to start.
-_LONG = 30_000
+_ENDS = (b',0\n', b',1\n')
 
 
 def column_names(legs: Sequence[str], joint_angles: bool = False, clearance: bool = False,
@@ -112,28 +112,28 @@ class CsvTable(Table):
     FILE = 'legs.csv'
 
     def _open(self, path: Path, names: Sequence[str]) -> None:
-        self._rows = 0
-        self._process: RowsProcess | None = None
         self._file = path.open('wb')
         self._file.write(','.join(_quoted(harmless(name)) for name in names).encode() + b'\n')
 
     def _write(self, stamps: Stamps, numbers: Array, warnings: Flags) -> None:
-        self._rows += len(numbers)
-        if self._rows <= _LONG:
-            self._file.write(rows_of(stamps, numbers, warnings))
-            return
-        if self._process is None:
-            self._file.flush()
-            self._process = RowsProcess(self._file)
-        self._process.write(stamps, numbers, warnings)
+        self._file.write(_rows(stamps, numbers, warnings))
 
     def close(self) -> None:
         """Complete the file."""
-        try:
-            if self._process is not None:
-                self._process.close()
-        finally:
-            self._file.close()
+        self._file.close()
+
+
+def _rows(stamps: Stamps, numbers: Array, warnings: Flags) -> bytes:
+    """Return the text of rows: stamps (N,) [ns], numbers (N, K) with nan as empty, warnings."""
+    text = orjson.dumps(numbers, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2]
+    if not np.isfinite(numbers).all():
+        text = text.replace(b'null', b'')
+    # '1,2],[3,4' becomes ',1,2' and ',3,4'
+    cells = [b''] * (3 * len(numbers))
+    cells[::3] = orjson.dumps(stamps, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1].split(b',')
+    cells[1::3] = (b',' + text.replace(b'[', b'')).split(b']')
+    cells[2::3] = [_ENDS[on] for on in warnings.tolist()]
+    return b''.join(cells)
 
 
 def harmless(text: str, mark: str = "'") -> str:

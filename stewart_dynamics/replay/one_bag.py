@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing, ExitStack
-from functools import lru_cache
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
@@ -33,32 +32,28 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, SECOND, Stamps
 from stewart_dynamics.bags import blocks, mcap_scan
+from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.bag_report import Report
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.fingerprint import fingerprint, plain_parameters, software, VERSION
-from stewart_dynamics.replay.legs_table import kind_of_table
-from stewart_dynamics.replay.output import OutputBag
+from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.recorded_efforts import Efforts
-from stewart_dynamics.replay.recorded_model import RecordedModel
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
-from stewart_dynamics.replay.writer_thread import WriterThread
 from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
 from stewart_dynamics.setpoints import base_wrench, inputs, step
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
-from stewart_dynamics.setpoints.step import Batch, Outputs, State, Step
+from stewart_dynamics.setpoints.step import Batch, State, Step
 from stewart_dynamics.whole_file import write_json
 
 _STAMP = re.compile(r'stamp (\d+) ns')
@@ -69,7 +64,8 @@ Progress = Callable[[int, int], None]
 FUNCTIONS = (
     *step.FUNCTIONS, *base_wrench.FUNCTIONS, *blocks.FUNCTIONS, mcap_scan.scan)
 
-_model = lru_cache(maxsize=1)(RecordedModel)  # many bags have one hexapod
+# Starting a process takes as long as writing the outputs of a bag of this size [bytes].
+_LARGE = 32 << 20
 
 
 class Replayed(NamedTuple):
@@ -184,17 +180,9 @@ class _Run:
         if options.report:
             self.report = Report(parameters, options.measured is not None, folder)
             self._breakdown = ForceBreakdownRows(parameters)
-        self._bag = OutputBag(
-            folder / 'bag', options.node, OutputMessages(parameters),
-            _model(parameters, options.node.strip('/')), parameters['visualization_rate'])
-        stack.callback(self._bag.abandon)
-        self._table = kind_of_table(options.parquet)(
-            folder, parameters['joints'], self._quasi_static,
-            any(parameters[name] is not None for name in OF_JOINTS),
-            parameters[CLEARANCE_MIN] is not None)
-        stack.callback(self._table.close)
-        self._writer = WriterThread()
-        stack.callback(self._writer.abandon)
+        files = OutputProcess if bytes_of(recording.path) > _LARGE else OutputFiles
+        self._files = files(folder, parameters, options, self._quasi_static)
+        stack.callback(self._files.abandon)
 
     def take(self, messages: Messages) -> int:
         """Process messages; return the number of setpoints answered."""
@@ -220,9 +208,7 @@ class _Run:
         if self._comparison is not None:
             self._efforts.check()
             self._compared(self._comparison.finish())
-        self._writer.finish()
-        self._table.close()
-        self._bag.close()
+        self._files.close()
 
     def summary(self) -> dict[str, Any]:
         """Return the content of summary.json."""
@@ -308,18 +294,13 @@ class _Run:
         seconds = self._seconds(setpoints.stamps)
         breakdown = None if self._breakdown is None else self._breakdown(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
-        self._writer.call(self._write, seconds, setpoints, outputs, base_wrenches)
+        self._files.write(seconds, setpoints, outputs, base_wrenches)
         self._summary.add(seconds, setpoints, outputs, base_wrenches, breakdown)
         if self.report is not None and breakdown is not None:
             self.report.add(seconds, setpoints, outputs, base_wrenches, breakdown)
         if self._comparison is not None:
             self._compared(self._comparison.add_setpoints(seconds, setpoints, outputs))
         return len(setpoints.stamps)
-
-    def _write(self, seconds: Array, setpoints: Batch, outputs: Outputs,
-               base_wrenches: Array) -> None:
-        self._bag.write(setpoints.times, setpoints.motions, outputs, base_wrenches)
-        self._table.write(seconds, setpoints.motions, outputs, base_wrenches)
 
     def _seconds(self, stamps: Stamps) -> Array:
         """Return the time since the first setpoint, never decreasing [s]."""
@@ -342,4 +323,4 @@ class _Run:
 
     def _compared(self, compared: Any) -> None:
         if self.report is not None and len(compared[0]):
-            self._writer.call(self.report.add_measured, *compared)
+            self.report.add_measured(*compared)

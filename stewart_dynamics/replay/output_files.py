@@ -1,0 +1,163 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The files of a replay with an entry for each setpoint, and a process that writes them.
+
+Assembling messages and formatting numbers take as long as computing them, and both hold Python's
+global lock: large bags are therefore written by a process of its own. It reads blocks from its
+standard input, and ends without completing the files when the replay is killed.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+import pickle
+import subprocess
+import sys
+from typing import Any
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.program import unexpected
+from stewart_dynamics.replay.legs_table import kind_of_table
+from stewart_dynamics.replay.output import OutputBag
+from stewart_dynamics.replay.recorded_model import RecordedModel
+from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.setpoints.output_messages import OutputMessages
+from stewart_dynamics.setpoints.step import Batch, Outputs
+
+_PROGRAM = ('import sys; sys.path[:] = sys.argv[1:]; '
+            'from stewart_dynamics.replay.output_files import main; main()')
+# About a block: one is computed while the one before is written.
+_PIPE = 1 << 20
+
+_model = lru_cache(maxsize=1)(RecordedModel)  # many bags have one hexapod
+
+
+class OutputFiles:
+    """
+    The output bag and the table of a replay.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the files.
+    parameters : Parameters
+        Parameters of the hexapod.
+    options : Options
+        Name of the node, and kind of the table.
+    quasi_static : bool
+        Velocities are not known: columns that depend on them are empty.
+
+    """
+
+    def __init__(self, folder: Path, parameters: Parameters, options: Options,
+                 quasi_static: bool) -> None:
+        model = _model(parameters, options.node.strip('/'))
+        self._table = kind_of_table(options.parquet)(
+            folder, parameters['joints'], quasi_static,
+            any(parameters[name] is not None for name in OF_JOINTS),
+            parameters[CLEARANCE_MIN] is not None)
+        self._bag = OutputBag(folder / 'bag', options.node, OutputMessages(parameters), model,
+                              parameters['visualization_rate'])
+
+    def write(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
+              ) -> None:
+        """Write setpoints; see Summary.add."""
+        self._bag.write(setpoints.times, setpoints.motions, outputs, base_wrenches)
+        self._table.write(seconds, setpoints.motions, outputs, base_wrenches)
+
+    def close(self) -> None:
+        """Complete the files."""
+        self._table.close()
+        self._bag.close()
+
+    def abandon(self) -> None:
+        """Close the files without completing them."""
+        self._table.close()
+        self._bag.abandon()
+
+
+class OutputProcess:
+    """Output files, by the same calls, that a process writes; its errors are raised here."""
+
+    def __init__(self, folder: Path, parameters: Parameters, options: Options,
+                 quasi_static: bool) -> None:
+        self._folder = folder
+        # A session of its own: Ctrl-C ends the replay, which ends the process.
+        self._process = subprocess.Popen(
+            [sys.executable, '-I', '-c', _PROGRAM, *sys.path], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, start_new_session=True)
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._blocks, self._error = self._process.stdin, self._process.stdout
+        with suppress(ImportError, OSError):  # other systems; too many large pipes
+            from fcntl import F_SETPIPE_SZ, fcntl
+            fcntl(self._blocks, F_SETPIPE_SZ, _PIPE)
+        self._send((folder, parameters, options, quasi_static))
+
+    def write(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
+              ) -> None:
+        """Send setpoints; raises the error of earlier ones."""
+        self._send((seconds, setpoints, outputs, base_wrenches))
+
+    def close(self) -> None:
+        """Complete the files."""
+        self._send(None)
+        self._end()
+
+    def abandon(self) -> None:
+        """End the process without completing the files."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._blocks, self._error):
+            with suppress(BrokenPipeError):
+                pipe.close()
+
+    def _send(self, what: Any) -> None:
+        try:
+            pickle.dump(what, self._blocks, protocol=5)
+        except BrokenPipeError:
+            self._end()
+
+    def _end(self) -> None:
+        with suppress(BrokenPipeError):
+            self._blocks.close()
+        error = self._error.read()
+        code = self._process.wait()
+        if error:
+            raise pickle.loads(error)
+        if code:
+            raise StewartError(f'{self._folder}: cannot be written: the process that writes it '
+                               f'was ended by signal {-code}')
+
+
+def main() -> None:
+    """Write the blocks of the standard input; an error goes to the standard output."""
+    blocks, error = sys.stdin.buffer, sys.stdout.buffer
+    try:
+        files = OutputFiles(*pickle.load(blocks))
+        while (block := pickle.load(blocks)) is not None:
+            files.write(*block)
+        files.close()
+    except (EOFError, pickle.UnpicklingError):
+        pass  # the replay was killed
+    except (StewartError, OSError) as exc:
+        pickle.dump(exc, error)
+    except Exception as exc:
+        pickle.dump(StewartError(unexpected(exc)), error)

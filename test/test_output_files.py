@@ -1,0 +1,89 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The files of a replay with an entry for each setpoint, written in place and by a process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
+from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.setpoints.step import Batch
+from test_legs_table import motions_of, seconds_of
+from test_output import base_wrenches_of, PARAMETERS, times_of, turning
+
+BLOCK = 100
+
+
+def started(kind: type[OutputFiles] | type[OutputProcess], folder: Path,
+            parameters: Parameters = PARAMETERS) -> OutputFiles | OutputProcess:
+    folder.mkdir(exist_ok=True)
+    return kind(folder, parameters, Options(), False)
+
+
+def write_block(files: OutputFiles | OutputProcess, first: int = 0) -> None:
+    outputs = turning(BLOCK, first)
+    files.write(seconds_of(BLOCK), Batch(
+        outputs.stamps, motions_of(BLOCK), np.zeros((BLOCK, 6)), np.zeros(BLOCK, dtype=bool),
+        times_of(BLOCK, first)), outputs, base_wrenches_of(outputs))
+
+
+def test_the_process_writes_the_same_files(tmp_path: Path) -> None:
+    for kind in (OutputFiles, OutputProcess):
+        files = started(kind, tmp_path / kind.__name__)
+        for first in range(0, 6 * BLOCK, BLOCK):
+            write_block(files, first)
+        files.close()
+        files.abandon()  # closed before: nothing is left to do
+    for name in ('legs.csv', 'bag/bag.mcap', 'bag/metadata.yaml'):
+        content = tmp_path.joinpath('OutputFiles', name).read_bytes()
+        assert tmp_path.joinpath('OutputProcess', name).read_bytes() == content
+    rows = (tmp_path / 'OutputFiles' / 'legs.csv').read_bytes()
+    assert rows.count(b'\n') == 6 * BLOCK + 1
+    assert b',,' in rows  # forces or base wrenches that are not known
+
+
+def test_errors_of_the_process_are_raised_here(tmp_path: Path) -> None:
+    (tmp_path / 'legs.csv').symlink_to('/dev/full')
+    files = started(OutputProcess, tmp_path)
+    with pytest.raises(OSError, match='No space left on device'):
+        while True:
+            write_block(files)
+    files.abandon()
+    joints = (PARAMETERS['base_frame'], *PARAMETERS['joints'][1:])
+    files = started(OutputProcess, tmp_path / 'names', PARAMETERS.replaced({'joints': joints}))
+    with pytest.raises(ParameterError, match='joints'):
+        files.close()
+
+
+def test_a_process_that_is_killed_is_reported(tmp_path: Path) -> None:
+    files = started(OutputProcess, tmp_path)
+    assert isinstance(files, OutputProcess)
+    write_block(files)
+    files._process.kill()
+    with pytest.raises(StewartError, match='cannot be written: .* ended by signal 9'):
+        files.close()
+
+
+def test_an_abandoned_process_completes_nothing(tmp_path: Path) -> None:
+    files = started(OutputProcess, tmp_path)
+    write_block(files)
+    files.abandon()
+    assert not (tmp_path / 'bag' / 'metadata.yaml').exists()
