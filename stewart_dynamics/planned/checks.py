@@ -73,6 +73,31 @@ class Violation(NamedTuple):
         return self.time, self.reason != SINGULAR, self.words
 
 
+class Samples(NamedTuple):
+    """M samples of a trajectory in the order of time."""
+
+    times: Array
+    """(M,) [s]"""
+    durations: Array
+    """Time from each sample to the next (M - 1,) [s]."""
+    motions: Array
+    """Rows of motion (M, MOTION)."""
+    results: Array
+    """Rows of results (M, RESULT)."""
+    joined: Flags
+    """Whether the next sample follows this one in the trajectory (M - 1,)."""
+    near: Flags
+    """Whether it is near enough for motion and forces between both to follow from theirs."""
+    ways: Array
+    """Bound of how far a platform joint, or corner of its plate, moves to the next [m]."""
+
+    def until(self, n: int) -> Samples:
+        """Return the samples before the n-th, n more than 0."""
+        return Samples(self.times[:n], self.durations[:n - 1], self.motions[:n],
+                       self.results[:n], self.joined[:n - 1], self.near[:n - 1],
+                       self.ways[:n - 1])
+
+
 class Checks:
     """
     Finds violations in samples of a trajectory that come in the order of time.
@@ -108,112 +133,91 @@ class Checks:
         self._motor_limits = MotorLimits(parameters)
         self._rises = np.zeros(6)
 
-    def check(self, times: Array, durations: Array, results: Array, joined: Flags, near: Flags,
-              ) -> list[int]:
-        """
-        Check samples and the intervals between them.
-
-        Parameters
-        ----------
-        times : (M,)
-            [s]
-        durations : (M - 1,)
-            Time from each sample to the next [s].
-        results : (M, RESULT)
-            Rows of results.
-        joined : (M - 1,)
-            Whether the next sample follows this one in the trajectory.
-        near : (M - 1,)
-            Whether the next sample is near enough for det(J) and forces between the two to follow
-            from their values there.
-
-        Returns
-        -------
-        list of int
-            Indices of samples after which det(J) or the forces need closer samples.
-
-        """
-        finite = np.isfinite(results).all(axis=1)
+    def check(self, samples: Samples) -> list[int]:
+        """Check samples and what lies between them; return after which closer ones are needed."""
+        self._check_joints(samples)
+        unclear = {*self._check_motors(samples), *self._check_clearance(samples)}
+        finite = np.isfinite(samples.results).all(axis=1)
         if not finite.all():
             n = int(np.argmin(finite))
-            self.violations.append(Violation(float(times[n]), OUT_OF_RANGE, f': {OUT_OF_RANGE}'))
+            self.violations.append(Violation(
+                float(samples.times[n]), OUT_OF_RANGE, f': {OUT_OF_RANGE}'))
             if n == 0:
-                return []
-            times, results = times[:n], results[:n]
-            durations, joined, near = durations[:n - 1], joined[:n - 1], near[:n - 1]
+                return sorted(unclear)
+            samples = samples.until(n)
+        results = samples.results
         self._keep_largest_force(results[:, FORCES])
         for limit, values in ((LENGTH_MIN, results[:, LENGTHS]), (LENGTH_MAX, results[:, LENGTHS]),
                               (VELOCITY_MAX, results[:, RATES]), (FORCE_MAX, results[:, FORCES])):
-            self._check_limit(limit, values, np.broadcast_to(times[:, None], values.shape))
-        self._check_cubics(times, durations, results, joined)
-        unclear = self.check_singularities(times, durations, results, near)
-        return sorted({*unclear, *self._reversals(durations, results, near)})
+            self._check_limit(limit, values, _of_legs(samples.times))
+        self._check_cubics(samples)
+        return sorted({
+            *unclear, *self._check_singularities(samples), *self._reversals(samples)})
 
-    def check_joints(self, times: Array, durations: Array, motions: Array, joined: Flags) -> None:
-        """
-        Check the angles of the joints at samples, and between those that are joined.
+    def check_path(self, samples: Samples) -> list[int]:
+        """Check poses as ``check`` does: singularities, joints and clearance of the legs."""
+        self._check_singularities(samples)
+        self._check_joints(samples)
+        return self._check_clearance(samples)
 
-        Parameters
-        ----------
-        times, durations, joined : (M,), (M - 1,), (M - 1,)
-            As in ``check``.
-        motions : (M, MOTION)
-            Rows of motion.
-
-        """
+    def _check_joints(self, samples: Samples) -> None:
+        """Check the angles of the joints at samples, and between those that are near."""
         if self._angles is None:
             return
+        times, durations = samples.times, samples.durations
         with np.errstate(all='ignore'):  # numbers that overflow are found by ``check``
-            values, rates = self._angles.haversines(motions)
+            values, rates = self._angles.haversines(samples.motions)
             cubics = Cubics.between(values, rates, durations[:, None])
             _, high = cubics.bounds()
         for limit in self._limits.of_joints:
             where = ANGLES[limit]
-            at = np.broadcast_to(times[:, None], (len(times), 6))
-            self._check_limit(limit, _angle(values[:, where]), at)
+            self._check_limit(limit, _angle(values[:, where]), _of_legs(times))
             suspect = np.flatnonzero(
-                joined & self._limits.exceeds(limit, _angle(high[:, where])).any(axis=1))
+                samples.near & self._limits.exceeds(limit, _angle(high[:, where])).any(axis=1))
             begin, duration = times[suspect, None], durations[suspect, None]
             between = Cubics._make(each[suspect, where] for each in cubics)
             for fraction in between.extrema():
                 self._check_limit(
                     limit, _angle(between.at(fraction)), begin + fraction * duration)
 
-    def check_motors(self, times: Array, durations: Array, motions: Array, results: Array,
-                     joined: Flags) -> list[int]:
+    def _check_motors(self, samples: Samples) -> list[int]:
         """
-        Check torques and speeds of the motors at samples, and speeds between those joined.
+        Check torques and speeds of the motors at samples, and speeds between those near.
 
-        Arguments are those of ``check`` and ``check_joints``. Return the indices of samples after
-        which closer samples are needed: where a leg reverses, the losses in its screw do.
+        Return where closer samples are needed: where a leg reverses, the losses in its screw do.
         """
         if self._drives is None:
             return []
-        p = self._parameters
+        times, durations, results = samples.times, samples.durations, samples.results
         with np.errstate(all='ignore'):  # numbers that overflow are found by ``check``
-            rows = self._drives(motions, results)
-            at = np.broadcast_to(times[:, None], (len(times), 6))
+            rows = self._drives(samples.motions, results)
             for limit, (values, bounds) in self._motor_limits.excesses(
                     rows, np.full((len(rows), 6), np.nan)).items():
-                self._note(limit, exceeds(values, bounds), values, bounds, at)
+                self._note(limit, exceeds(values, bounds), values, bounds, _of_legs(times))
             cubics = Cubics.between(rows[:, ANGLES_OF_MOTORS], rows[:, SPEEDS], durations[:, None])
             most = self._motor_limits.bounds[SPEED_MAX]
-            suspect = np.flatnonzero(joined & exceeds(
+            suspect = np.flatnonzero(samples.near & exceeds(
                 cubics.middle_rate() / durations[:, None], most).any(axis=1))
             fraction = (between := cubics.selected(suspect)).rate_extremum()
             begin, duration = times[suspect, None], durations[suspect, None]
             speeds = between.rate_at(fraction) / duration
             self._note(SPEED_MAX, exceeds(speeds, most), speeds, np.broadcast_to(
                 most, speeds.shape), begin + fraction * duration)
-            rates, ratio = results[:, RATES], motor_ratio(p)
-            inertial = p['actuator.reflected_mass'] / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
-            highest = (np.abs(inertial) + (np.abs(results[:, FORCES] - inertial)
-                                           + 2.0 * self._coulomb) / p['drive.efficiency']) / ratio
-            may = exceeds(np.maximum(highest[:-1], highest[1:]), np.minimum(
-                rows[:-1, AVAILABLE_TORQUES], rows[1:, AVAILABLE_TORQUES]))
-            reverses = (rates[:-1] * rates[1:] < 0.0) & (np.maximum(
-                np.abs(rates[:-1]), np.abs(rates[1:])) > self._coulomb_velocity)
-        unclear: list[int] = np.flatnonzero(joined & (may & reverses).any(axis=1)).tolist()
+            return self._losses_reverse(samples, rows)
+
+    def _losses_reverse(self, samples: Samples, rows: Array) -> list[int]:
+        """Return after which samples a leg reverses while its motor, row, may be at its limit."""
+        p, rates, ratio = self._parameters, samples.results[:, RATES], motor_ratio(
+            self._parameters)
+        inertial = p['actuator.reflected_mass'] / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
+        highest = (np.abs(inertial) + (np.abs(samples.results[:, FORCES] - inertial)
+                                       + 2.0 * self._coulomb) / p['drive.efficiency']) / ratio
+        may = exceeds(np.maximum(highest[:-1], highest[1:]), np.minimum(
+            rows[:-1, AVAILABLE_TORQUES], rows[1:, AVAILABLE_TORQUES]))
+        reverses = (rates[:-1] * rates[1:] < 0.0) & (np.maximum(
+            np.abs(rates[:-1]), np.abs(rates[1:])) > self._coulomb_velocity)
+        unclear: list[int] = np.flatnonzero(
+            samples.near & (may & reverses).any(axis=1)).tolist()
         return unclear
 
     def check_windings(self, times: Array, motions: Array, results: Array) -> None:
@@ -227,51 +231,25 @@ class Checks:
         rises = temperature_rises(self._parameters, times, held, self._rises)
         self._rises = rises[-1]
         bounds = np.broadcast_to(self._motor_limits.bounds[TEMPERATURE_RISE_MAX], rises.shape)
-        self._note(TEMPERATURE_RISE_MAX, exceeds(rises, bounds), rises, bounds,
-                   np.broadcast_to(times[:, None], rises.shape))
+        self._note(
+            TEMPERATURE_RISE_MAX, exceeds(rises, bounds), rises, bounds, _of_legs(times))
 
-    def check_clearance(self, times: Array, motions: Array, joined: Flags, ways: Array,
-                        ) -> list[int]:
-        """
-        Check the clearance of the legs at samples, and between those that are joined.
-
-        Parameters
-        ----------
-        times, joined : (M,), (M - 1,)
-            As in ``check``.
-        motions : (M, MOTION)
-            Rows of motion.
-        ways : (M - 1,)
-            Bound of how far a platform joint, or corner of its plate, moves from each sample to
-            the next [m].
-
-        Returns
-        -------
-        list of int
-            Indices of samples after which closer samples are needed.
-
-        """
+    def _check_clearance(self, samples: Samples) -> list[int]:
+        """Check the clearance of the legs at samples, and between those that are near."""
         if self._clearance is None:
             return []
         with np.errstate(all='ignore'):  # numbers that overflow are found by ``check``
-            clearances, others = self._clearance.nearest(motions)
+            clearances, others = self._clearance.nearest(samples.motions)
             # Two legs approach each other by no more than both of their joints move.
             nearest = clearances.min(axis=1)
-            lowest = 0.5 * (nearest[:-1] + nearest[1:]) - ways
-        self._check_limit(CLEARANCE_MIN, clearances,
-                          np.broadcast_to(times[:, None], clearances.shape), others)
+            lowest = 0.5 * (nearest[:-1] + nearest[1:]) - samples.ways
+        self._check_limit(CLEARANCE_MIN, clearances, _of_legs(samples.times), others)
         bound = float(self._limits.bounds[CLEARANCE_MIN][0])
         held = np.minimum(nearest[:-1], nearest[1:]) >= self._limits.thresholds[
             LIMITS.index(CLEARANCE_MIN), 0]
         unclear: list[int] = np.flatnonzero(
-            joined & held & (lowest < bound - self._clearance_tolerance)).tolist()
+            samples.near & held & (lowest < bound - self._clearance_tolerance)).tolist()
         return unclear
-
-    def check_singularities(self, times: Array, durations: Array, results: Array, near: Flags,
-                            ) -> list[int]:
-        """Check samples as ``check`` does, for singularities alone."""
-        self._check_conditions(times, results)
-        return self._check_determinants(times, durations, results, near)
 
     def no_pose(self, time: float) -> None:
         """Note that no pose on this side of singularities has the lengths of the legs."""
@@ -293,10 +271,11 @@ class Checks:
         exceeding: Flags = (forces > known).any(axis=1)
         return exceeding
 
-    def _reversals(self, durations: Array, results: Array, near: Flags) -> list[int]:
+    def _reversals(self, samples: Samples) -> list[int]:
         """Return after which samples a change of Coulomb friction may add to the largest force."""
+        results, durations = samples.results, samples.durations
         forces = np.abs(results[:, FORCES])
-        which = np.flatnonzero(near & self._exceed_known(
+        which = np.flatnonzero(samples.near & self._exceed_known(
             np.maximum(forces[:-1], forces[1:]) + 2.0 * self._coulomb))
         if not len(which) or not self._coulomb.any():
             return []
@@ -334,16 +313,16 @@ class Checks:
         self.violations.append(Violation(
             float(times[n, leg]), LIMIT, f' {exceedance.words(self._joints)}', leg, limit))
 
-    def _check_cubics(self, times: Array, durations: Array, results: Array, joined: Flags,
-                      ) -> None:
+    def _check_cubics(self, samples: Samples) -> None:
         """Check lengths and rates between the samples."""
+        times, durations, results = samples.times, samples.durations, samples.results
         cubics = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
         # Most are within the bounds of their control points, and those within the limits.
         low, high = cubics.bounds()
         with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
             middle = np.abs(cubics.middle_rate() / durations[:, None])
         shortest, longest, fastest = self._limits.thresholds[:3]
-        suspect = np.flatnonzero(joined & (
+        suspect = np.flatnonzero(samples.joined & (
             (low < shortest) | (high > longest) | (middle > fastest)).any(axis=1))
         if not len(suspect):
             return
@@ -357,6 +336,11 @@ class Checks:
         self._check_limit(
             VELOCITY_MAX, cubics.rate_at(fraction) / duration, begin + fraction * duration)
 
+    def _check_singularities(self, samples: Samples) -> list[int]:
+        """Check samples for singularities; return after which closer ones are needed."""
+        self._check_conditions(samples.times, samples.results)
+        return self._check_determinants(samples)
+
     def _check_conditions(self, times: Array, results: Array) -> None:
         condition = results[:, CONDITION]
         n = int(np.argmax(condition))
@@ -367,9 +351,10 @@ class Checks:
             self._singular(times[n], results[n], f'condition number {condition[n]:.4g} reaches '
                            f'singularity.stop_condition, {self._stop:g}')
 
-    def _check_determinants(self, times: Array, durations: Array, results: Array, near: Flags,
-                            ) -> list[int]:
+    def _check_determinants(self, samples: Samples) -> list[int]:
         """Check whether det(J) crosses zero between samples; return where that is not clear."""
+        times, durations, results = samples.times, samples.durations, samples.results
+        near = samples.near
         determinants, condition = results[:, DETERMINANT], results[:, CONDITION]
         cubics = Cubics.between(determinants, results[:, DETERMINANT_RATE], durations)
         cubics = Cubics._make(each * np.sign(determinants[:-1]) for each in cubics)
@@ -393,6 +378,11 @@ class Checks:
         leg = int(np.argmax(result[UNIT_LOAD_FORCES]))
         self.violations.append(Violation(
             float(time), SINGULAR, f': {words}, worst for {self._joints[leg]}', leg))
+
+
+def _of_legs(times: Array) -> Array:
+    """Return times (M,) for each of the legs (M, 6)."""
+    return np.broadcast_to(times[:, None], (len(times), 6))
 
 
 def _angle(haversines: Array) -> Array:

@@ -27,6 +27,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,7 +45,7 @@ from stewart_dynamics.mechanics.limits import TEMPERATURE_RISE_MAX
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_VELOCITY, consecutive, FORCES, LENGTHS, LINEAR_VELOCITY, RATES, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.planned.checks import Checks, Violation
+from stewart_dynamics.planned.checks import Checks, Samples, Violation
 from stewart_dynamics.planned.interpolation import Cubics, Interpolation
 from stewart_dynamics.planned.sampling import Sampling
 
@@ -119,7 +120,7 @@ TOO_FAR = 'points too far apart'
 
 _LENGTHS, _RATES, _FORCES = consecutive(6, 6, 6)
 # Index of the point before each sample in a block (M,), and fraction of the interval (M,).
-_Samples = tuple[Integers, Array]
+_Places = tuple[Integers, Array]
 
 
 def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion: Motion,
@@ -235,6 +236,27 @@ class _ViolationError(Exception):
         self.violation = violation
 
 
+class _Block(NamedTuple):
+    """N consecutive points of a trajectory that are checked together, and the motion between."""
+
+    first: int
+    """Index of the first of them."""
+    points: Samples
+    between: Interpolation
+    legs: Cubics
+    """Motion of the legs under a controller in each interval (N - 1, 6)."""
+    speeds: Array
+    """
+    Bound of the speed of a platform joint, or corner of its plate, in each interval (N - 1,)
+    [m/s]; zero if the clearance is not checked.
+    """
+
+    def times(self, which: Integers, fraction: Array) -> Array:
+        """Return the times of samples [s]."""
+        times: Array = self.points.times[which] + fraction * self.points.durations[which]
+        return times
+
+
 class _Work:
     """The work on one trajectory; see ``check_in_pieces``."""
 
@@ -251,8 +273,7 @@ class _Work:
         self._sampling = Sampling(self._parameters)
         self._samples = 0
         clearance = leg_clearance.clearance_to_check(self._parameters)
-        self._checks_clearance = clearance is not None
-        self._reach = clearance.reach if clearance else 0.0
+        self._reach = clearance.reach if clearance else None
         self._warms = self._parameters[TEMPERATURE_RISE_MAX] is not None
 
     def check(self) -> Iterator[None]:
@@ -265,65 +286,66 @@ class _Work:
 
     def _check_block(self, first: int, end: int) -> Iterator[None]:
         """Check from one point to another, both included."""
-        block = slice(first, end + 1)
-        motions, times = self._motions[block], _seconds(self._times[block])
-        results = self._solve(motions, np.arange(first, end + 1), 0.0)
-        for here, there in ((_LENGTHS, LENGTHS), (_RATES, RATES), (_FORCES, FORCES)):
-            self._legs[block, here] = results[:, there]
-        durations = _seconds(np.diff(self._times[block]))
-        with np.errstate(all='ignore'):
-            between = Interpolation(durations, motions)
-            many = self._parts_between(first, durations, between, results)
-            speeds = (between.bounds(self._reach).speed if self._checks_clearance
-                      else np.zeros_like(many))
-        legs = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
-        near = many == 1.0
-        dips = self._checks.check(times, durations, results, np.ones_like(near), near)
-        self._checks.check_joints(times, durations, motions, near)
-        dips = sorted({*dips, *self._checks.check_clearance(
-            times, motions, near, speeds * durations), *self._checks.check_motors(
-                times, durations, motions, results, near)})
+        block, parts = self._block(first, end)
+        dips = self._checks.check(block.points)
         if self._warms:
-            yield from self._check_windings(first, times, durations, between)
+            yield from self._check_windings(block)
         self._count(_PARTS * len(dips))
-        closer: deque[_Samples] = deque((np.full(_PARTS + 1, n), _IN_PARTS) for n in dips)
-        coarse = _samples(many, self._piece)
-        while samples := closer.popleft() if closer else next(coarse, None):
+        closer: deque[_Places] = deque((np.full(_PARTS + 1, n), _IN_PARTS) for n in dips)
+        coarse = _samples(parts, self._piece)
+        while places := closer.popleft() if closer else next(coarse, None):
             yield
-            which, fraction = samples
-            with np.errstate(all='ignore'):
-                rows = between.at(which, fraction)
-            joined = which[1:] == which[:-1]
+            which, fraction = places
             step = np.diff(fraction)
-            at, after = times[which] + fraction * durations[which], step * durations[which[1:]]
-            self._checks.check_joints(at, after, rows, joined)
-            results = self._solve(rows, first + which, fraction)
-            unclear = {
-                *self._checks.check_motors(at, after, rows, results, joined),
-                *self._checks.check_clearance(at, rows, joined, speeds[which[1:]] * after),
-                *self._check_legs_path(
-                    at, after, legs.selected(which), fraction, durations[which], rows),
-                *self._checks.check(at, after, results, joined, joined)}
-            for n in sorted(unclear):
+            for n in self._check_samples(block, which, fraction):
                 if step[n] > _CLOSEST:
                     self._count(_PARTS)
                     closer.append(
                         (np.full(_PARTS + 1, which[n]), fraction[n] + step[n] * _IN_PARTS))
         yield
 
-    def _check_windings(self, first: int, times: Array, durations: Array,
-                        between: Interpolation) -> Iterator[None]:
+    def _block(self, first: int, end: int) -> tuple[_Block, Array]:
+        """Return the points, and the number of parts in which each interval is sampled."""
+        block = slice(first, end + 1)
+        motions, durations = self._motions[block], _seconds(np.diff(self._times[block]))
+        results = self._solve(motions, np.arange(first, end + 1), 0.0)
+        for here, there in ((_LENGTHS, LENGTHS), (_RATES, RATES), (_FORCES, FORCES)):
+            self._legs[block, here] = results[:, there]
+        with np.errstate(all='ignore'):
+            between = Interpolation(durations, motions)
+            parts = self._parts_between(first, durations, between, results)
+            speeds = (np.zeros_like(durations) if self._reach is None
+                      else between.bounds(self._reach).speed)
+        points = Samples(_seconds(self._times[block]), durations, motions, results,
+                         np.ones(len(durations), dtype=bool), parts == 1.0, speeds * durations)
+        legs = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
+        return _Block(first, points, between, legs, speeds), parts
+
+    def _check_samples(self, block: _Block, which: Integers, fraction: Array) -> list[int]:
+        """Check samples between points; return after which closer ones are needed."""
+        with np.errstate(all='ignore'):
+            motions = block.between.at(which, fraction)
+        joined = which[1:] == which[:-1]
+        durations = np.diff(fraction) * block.points.durations[which[1:]]
+        samples = Samples(
+            block.times(which, fraction), durations, motions,
+            self._solve(motions, block.first + which, fraction), joined, joined,
+            block.speeds[which[1:]] * durations)
+        return sorted({*self._checks.check(samples), *self._check_legs_path(
+            block, which, fraction, samples)})
+
+    def _check_windings(self, block: _Block) -> Iterator[None]:
         """Check the temperatures of windings, with a fixed number of samples in each interval."""
-        for n in range(0, len(durations), max(1, self._piece // _PARTS)):
-            which = np.repeat(np.arange(n, min(
-                n + max(1, self._piece // _PARTS), len(durations))), _PARTS)
+        intervals = len(block.speeds)
+        together = max(1, self._piece // _PARTS)
+        for n in range(0, intervals, together):
+            which = np.repeat(np.arange(n, min(n + together, intervals)), _PARTS)
             fraction = np.tile(_IN_PARTS[:-1], len(which) // _PARTS)
             which, fraction = np.append(which, which[-1]), np.append(fraction, 1.0)
             with np.errstate(all='ignore'):
-                rows = between.at(which, fraction)
-            self._checks.check_windings(
-                times[which] + fraction * durations[which], rows,
-                self._solve(rows, first + which, fraction))
+                motions = block.between.at(which, fraction)
+            self._checks.check_windings(block.times(which, fraction), motions, self._solve(
+                motions, block.first + which, fraction))
             yield
 
     def _solve(self, rows: Array, which: Integers, fraction: Array | float) -> Array:
@@ -339,49 +361,39 @@ class _Work:
                 bases = bases[which]
         return self._platform.solve(rows, self._wrench, bases)
 
-    def _check_legs_path(self, times: Array, after: Array, legs: Cubics, fraction: Array,
-                         durations: Array, rows: Array) -> list[int]:
+    def _check_legs_path(self, block: _Block, which: Integers, fraction: Array,
+                         samples: Samples) -> list[int]:
         """
         Check singularities and joints along the platform motion due to the legs' cubics.
 
         Return the indices of samples after which the clearance needs closer samples.
-
-        Parameters
-        ----------
-        times, after : (M,), (M - 1,)
-            Times of the samples, and durations between them [s].
-        legs, fraction, durations : Cubics of (M, 6), (M,), (M,)
-            Legs in the interval of points around each sample, fraction of it, its duration [s].
-        rows : (M, MOTION)
-            Planned motion of the platform.
-
         """
-        poses, many = rows.copy(), len(rows)
-        codes, steps = np.empty(many, dtype=np.int64), np.empty(many, dtype=np.int64)
+        legs, durations = block.legs.selected(which), block.points.durations[which, None]
+        poses, count = samples.motions.copy(), len(which)
+        codes, steps = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
         constants = self._platform.constants
         forward_kinematics.poses(
-            constants, legs.at(fraction[:, None]), poses, codes, steps, np.empty(many))
+            constants, legs.at(fraction[:, None]), poses, codes, steps, np.empty(count))
         lost = np.flatnonzero(codes != forward_kinematics.FOUND)
-        found = int(lost[0]) if len(lost) else many
-        if found < many:
-            self._legs_checks.no_pose(float(times[found]))
-        if not found:
+        if len(lost):
+            count = int(lost[0])
+            self._legs_checks.no_pose(float(samples.times[count]))
+        if not count:
             return []
-        poses = poses[:found]
+        poses = poses[:count]
         forward_kinematics.twists(
-            constants, legs.rate_at(fraction[:, None])[:found] / durations[:found, None],
-            poses)
-        joined = after[:found - 1] > 0.0
-        self._legs_checks.check_singularities(
-            times[:found], after[:found - 1], self._platform.solve(poses), joined)
-        self._legs_checks.check_joints(times[:found], after[:found - 1], poses, joined)
-        if not self._checks_clearance:
-            return []
-        with np.errstate(all='ignore'):
-            speeds = (np.linalg.norm(poses[:, LINEAR_VELOCITY], axis=1)
-                      + self._reach * np.linalg.norm(poses[:, ANGULAR_VELOCITY], axis=1))
-            ways = _SPEED * np.maximum(speeds[:-1], speeds[1:]) * after[:found - 1]
-        return self._legs_checks.check_clearance(times[:found], poses, joined, ways)
+            constants, legs.rate_at(fraction[:, None])[:count] / durations[:count], poses)
+        found = samples.until(count)
+        ways = np.zeros(count - 1)
+        if self._reach is not None:
+            with np.errstate(all='ignore'):
+                speeds = (np.linalg.norm(poses[:, LINEAR_VELOCITY], axis=1)
+                          + self._reach * np.linalg.norm(poses[:, ANGULAR_VELOCITY], axis=1))
+                ways = _SPEED * np.maximum(speeds[:-1], speeds[1:]) * found.durations
+        joined = found.durations > 0.0
+        return self._legs_checks.check_path(found._replace(
+            motions=poses, results=self._platform.solve(poses), joined=joined, near=joined,
+            ways=ways))
 
     def _parts_between(self, first: int, durations: Array, between: Interpolation,
                        results: Array) -> Array:
@@ -442,7 +454,7 @@ def _seconds(nanoseconds: Stamps) -> Array:
     return np.multiply(nanoseconds, 1e-9, dtype=float)
 
 
-def _samples(many: Array, piece: int) -> Iterator[_Samples]:
+def _samples(many: Array, piece: int) -> Iterator[_Places]:
     """
     Yield pieces of the samples that divide each interval of points (N,) into equal parts.
 
