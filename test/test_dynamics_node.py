@@ -672,12 +672,6 @@ def test_a_rejected_parameter_is_reported_in_one_line(domain: int, tmp_path: Pat
         'stewart_dynamics: command line: platform.mass: 150: is an integer')
 
 
-def test_missing_parameters_are_reported_in_one_line(domain: int, tmp_path: Path) -> None:
-    assert rejected(domain, tmp_path / 'node') == (
-        'stewart_dynamics: command line: geometry.base_joints: missing, it has no default; '
-        'a file is given by --params-file after --ros-args')
-
-
 # Any input
 
 _numbers_of_any_kind = st.floats(allow_nan=True, allow_infinity=True)

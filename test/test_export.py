@@ -61,7 +61,7 @@ WARNINGS = ['-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wdouble-promotio
             '-Werror']
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason='needs a C compiler')
 
-SAMPLES = 100_000
+SAMPLES, MOTIONS = 100_000, 5  # of each hexapod
 HAS_WRENCH, HAS_BASE = 1, 2
 OK, OUT_OF_RANGE, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = 0, 5, 6, 7, 8, 9
 
@@ -126,29 +126,30 @@ def structure(parameters: Parameters) -> Any:
 
 def random_hexapods(random: np.random.Generator) -> Any:
     """
-    Return hexapods (SAMPLES,) with any numbers.
+    Return hexapods (SAMPLES / MOTIONS,) with any numbers.
 
     Three tenths have the joints of the example, whose symmetry makes pivots equal.
     """
-    hexapods = np.zeros(SAMPLES, HEXAPOD)
+    many = SAMPLES // MOTIONS
+    hexapods = np.zeros(many, HEXAPOD)
     for name in FIELDS_BEFORE_LEGS:
         hexapods[name] = random.normal(0.0, 5.0, hexapods[name].shape)
     legs = hexapods['legs']
     for name in LEG_FIELDS:
         legs[name] = random.normal(0.3, 10.0 ** random.uniform(-2, 1), legs[name].shape)
-    legs['actuator.coulomb_velocity'] = 10.0 ** random.uniform(-4.0, 0.0, (SAMPLES, 6))
-    legs['geometry.base_joints'] = random.normal(0.0, 1.0, (SAMPLES, 6, 3))
-    legs['geometry.platform_joints'] = random.normal(0.0, 0.6, (SAMPLES, 6, 3))
+    legs['actuator.coulomb_velocity'] = 10.0 ** random.uniform(-4.0, 0.0, (many, 6))
+    legs['geometry.base_joints'] = random.normal(0.0, 1.0, (many, 6, 3))
+    legs['geometry.platform_joints'] = random.normal(0.0, 0.6, (many, 6, 3))
     example = Parameters.from_yaml(PLATFORM_FILE)
     for name in ('geometry.base_joints', 'geometry.platform_joints'):
-        legs[name][random.random(SAMPLES) < 0.3] = example[name]
-    hexapods['singularity.characteristic_length'] = random.uniform(0.1, 3.0, SAMPLES)
+        legs[name][random.random(many) < 0.3] = example[name]
+    hexapods['singularity.characteristic_length'] = random.uniform(0.1, 3.0, many)
     return hexapods
 
 
 @pytest.fixture(scope='module')
 def samples(library: ctypes.CDLL) -> dict[str, Any]:
-    """Return SAMPLES random hexapods, each in a random motion, and the results in C."""
+    """Return random hexapods, each in MOTIONS random motions, and the results in C."""
     random = rng()
     motions = np.zeros((SAMPLES, MOTION))
     motions[:, :3] = random.normal([0.0, 0.0, 1.2], 0.4, (SAMPLES, 3))
@@ -156,19 +157,21 @@ def samples(library: ctypes.CDLL) -> dict[str, Any]:
     motions[:, 12:] = random.normal(0.0, 2.0, (SAMPLES, 12))
     at_home = random.random(SAMPLES) < 0.1  # symmetric, at rest: with many zeros
     motions[at_home] = [0.0, 0.0, 1.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, *[0.0] * 12]
-    made = {'hexapods': random_hexapods(random), 'motions': motions,
+    hexapods = random_hexapods(random)
+    made = {'hexapods': np.repeat(hexapods, MOTIONS), 'motions': motions,
             'wrenches': random.normal(0.0, 500.0, (SAMPLES, WRENCH)),
             'bases': random.normal(0.0, 3.0, (SAMPLES, BASE)),
             'given': random.integers(0, 4, SAMPLES, dtype=np.int32),
             'results': np.zeros(SAMPLES, RESULTS), 'codes': np.zeros(SAMPLES, np.int32)}
     call(library.inverse_dynamics, SAMPLES, made['hexapods'], 1, made['motions'],
          made['wrenches'], made['bases'], made['given'], made['results'], made['codes'])
-    made['constants'] = constants = np.empty((SAMPLES, CONSTANTS))
-    for n, hexapod in enumerate(made['hexapods']):
+    constants = np.empty((len(hexapods), CONSTANTS))
+    for n, hexapod in enumerate(hexapods):
         legs = hexapod['legs']
         constants[n] = hexapod_constants({  # type: ignore[arg-type]
             **{name: legs[name] for name in LEG_FIELDS}, **{
                 name: hexapod[name] for name in (*FIELDS_BEFORE_LEGS, *FIELDS_AFTER_LEGS)}})
+    made['constants'] = np.repeat(constants, MOTIONS, axis=0)
     return made
 
 

@@ -27,7 +27,7 @@ from referees import (
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import (
-    Motion, MotionError, Parameters, Pose, PoseError, SingularityError, StewartPlatform)
+    Motion, Parameters, Pose, PoseError, SingularityError, StewartPlatform)
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.forward_kinematics import FOUND, RESIDUAL, SINGULAR
@@ -245,24 +245,6 @@ def test_leading_shapes_broadcast(hexapod: StewartPlatform) -> None:
     assert hexapod.forward_kinematics(lengths[0], guesses).position.shape == (12, 3)
     assert hexapod.twist(shaped, np.ones(6)).shape == (3, 4, 6)
     assert hexapod.twist(AT_HOME, np.ones((5, 6))).shape == (5, 6)
-
-
-@pytest.mark.parametrize(('lengths', 'guess', 'text'), [
-    (np.ones(5), AT_HOME, 'lengths: shape (5,)'),
-    ([np.nan] * 6, AT_HOME, 'lengths[0]: nan'),
-    (np.ones(6), (HOME, np.eye(3)), 'guess: a value of type tuple: must be a Pose or a Motion'),
-    (np.ones((2, 6)), Pose([HOME] * 3, np.eye(3)), 'lengths (2,), guess (3,)')])
-def test_arguments_of_wrong_shape_are_rejected(
-        hexapod: StewartPlatform, lengths: Any, guess: Any, text: str) -> None:
-    with pytest.raises(MotionError) as error:
-        hexapod.forward_kinematics(lengths, guess)
-    assert text in str(error.value)
-
-
-@pytest.mark.parametrize('rates', [np.ones(5), [np.inf] * 6, np.ones((3, 6))])
-def test_rates_that_do_not_fit_are_rejected(hexapod: StewartPlatform, rates: Any) -> None:
-    with pytest.raises(MotionError, match='rates'):
-        hexapod.twist(Pose([HOME] * 2, np.eye(3)), rates)
 
 
 def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:

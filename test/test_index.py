@@ -182,18 +182,6 @@ def test_no_cell_is_a_formula_or_is_split(tmp_path: Path) -> None:
     assert not set(re.sub(r'"(?:[^"]|"")*"', '', text)) - set('0123456789.,\r\n')
 
 
-def test_files_are_replaced_whole(tmp_path: Path) -> None:
-    write_fleet(tmp_path, [row('first')])
-    before = (tmp_path / 'fleet.csv').read_bytes(), (tmp_path / 'index.html').read_bytes()
-    with pytest.raises(ValueError, match='JSON compliant'):
-        write_fleet(tmp_path, [{**row('second'), 'code': float('nan')}])
-    assert (tmp_path / 'index.html').read_bytes() == before[1]
-    write_fleet(tmp_path, [row('third')])
-    assert [cells['bag'] for cells in table(tmp_path)] == ['third']
-    assert (tmp_path / 'index.html').read_bytes() != before[1]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ['fleet.csv', 'index.html']
-
-
 # index.html
 
 class Page:

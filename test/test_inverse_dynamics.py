@@ -394,24 +394,6 @@ def test_any_leading_shape_gives_the_same_samples() -> None:
         assert function(flat[0]).shape == of_batch.shape[1:]
 
 
-def test_an_empty_batch_gives_an_empty_result() -> None:
-    platform = StewartPlatform(symmetric_parameters())
-    result = platform.inverse_dynamics(Motion(np.zeros((0, 3)), np.zeros((0, 3, 3))))
-    assert result.forces.shape == (0, 6)
-    assert result.determinant.shape == (0,)
-
-
-@pytest.mark.parametrize(('wrench', 'text'), [
-    (np.zeros(5), 'must end in'), (5.0, 'must end in'), (np.zeros((4, 6)), 'do not fit'),
-    ('push', 'not an array of real numbers'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
-])
-def test_a_wrench_that_does_not_fit_is_rejected(wrench: Any, text: str) -> None:
-    platform = StewartPlatform(symmetric_parameters())
-    with pytest.raises(MotionError, match=text) as error:
-        platform.inverse_dynamics(turned([0.0, 0.1, 0.2]), wrench)
-    assert 'wrench' in str(error.value)
-
-
 def test_many_loads_on_one_pose_are_many_samples() -> None:
     platform = StewartPlatform(symmetric_parameters())
     motion = turned(0.1)
@@ -535,19 +517,6 @@ def numbers(many: int) -> Any:
     """Return a strategy for lists of ordinary numbers, of any, and of both."""
     return st.one_of(*(st.lists(each, min_size=many, max_size=many)
                        for each in (ordinary, finite, st.one_of(ordinary, finite))))
-
-
-@given(st.lists(numbers(3), min_size=6, max_size=6), numbers(6))
-@np.errstate(all='ignore')
-def test_any_motion_gives_finite_results_or_an_error_of_the_package(
-        motion: Any, wrench: Any) -> None:
-    platform = StewartPlatform(symmetric_parameters())
-    try:
-        result = platform.inverse_dynamics(Motion.from_euler(*motion), wrench)
-    except StewartError:
-        return
-    assert np.all(np.isfinite(result.rows))
-    assert result.condition_number >= 1.0
 
 
 def _random_hexapods(amount: Any) -> Any:

@@ -28,7 +28,7 @@ from referees import (
     derivative, each_relative, energies, friction, moved, PinocchioReferee, QUARTER_TURN,
     random_base_motion, random_motion, random_parameters, random_wrench, relative, rng, ROOT,
     size_of, symmetric_parameters, uncompiled)
-from stewart_dynamics import Motion, MotionError, Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.dynamics import forward_dynamics, lagrange
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.rows import NO_BASE
@@ -401,31 +401,6 @@ def test_any_leading_shape_gives_the_same_samples() -> None:
     assert np.array_equal(platform.forward_dynamics(one, forces[5], wrench[5]).rows, truth[5])
     assert platform.forward_dynamics(one, forces).shape == (12,)
     assert platform.forward_dynamics(motion, forces[0], wrench[0]).shape == (12,)
-
-
-def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit() -> None:
-    p = random_parameters(rng())
-    platform = StewartPlatform(p)
-    motion = random_motion(p, rng(), 20_000)
-    forces = rng().uniform(-1000.0, 1000.0, (20_000, 6))
-    rows = motion.rows.copy()
-    forward_dynamics.solve(
-        platform.constants, rows, forces, np.zeros((1, 6)), STILL,
-        np.empty(forward_dynamics.WORK))
-    assert np.array_equal(platform.forward_dynamics(motion, forces).rows, rows)
-
-
-@pytest.mark.parametrize(('forces', 'wrench', 'text'), [
-    (np.zeros(5), None, 'forces: shape (5,): must end in (6,)'),
-    ([np.nan] * 6, None, 'forces[0]: nan: must be finite'),
-    (np.zeros((4, 6)), None, 'motion (3,), forces (4,)'),
-    (np.zeros(6), np.zeros(5), 'wrench: shape (5,)'),
-    ([1e308] * 6, None, 'overflow')])
-def test_arguments_of_wrong_shape_are_rejected(forces: Any, wrench: Any, text: str) -> None:
-    p = random_parameters(rng())
-    with pytest.raises(MotionError) as error:
-        StewartPlatform(p).forward_dynamics(random_motion(p, rng(), 3), forces, wrench)
-    assert text in str(error.value)
 
 
 def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:

@@ -110,11 +110,6 @@ def test_good_hexapods_give_no_warnings(name: str) -> None:
     assert likely_mistakes(Parameters(HEXAPODS[name])) == ()
 
 
-@pytest.mark.parametrize('file', ['ship_hexapod', 'telescope'])
-def test_files_of_the_package_give_no_warning(file: str) -> None:
-    assert likely_mistakes(Parameters.from_yaml(ROOT / 'config' / f'{file}.yaml')) == ()
-
-
 def test_random_hexapods_give_no_warning() -> None:
     for seed in range(20):
         assert likely_mistakes(random_parameters(np.random.default_rng(seed))) == ()
@@ -172,8 +167,6 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
     'one base joint in mm': (
         {'geometry.base_joints': BASE * np.where(np.arange(6) == 1, 1e3, 1.0)[:, None]}, [
             'geometry.platform_joints: ']),
-    'the platform joints in cm and limits': (
-        {'geometry.platform_joints': 1e2 * TOP}, ['no level pose has all legs within']),
     'limits in mm': (
         {'limits.length_min': 950.0, 'limits.length_max': 1650.0}, [
             'limits.length_min: 950 m, but the joints are 0.9 m from their center: in mm?',
@@ -187,31 +180,22 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         'limits.force_max: [0.2] N: six such legs cannot carry the platform, 1.47e+03 N: in kN?']),
     'the zero length in mm': ({'geometry.zero_length': 950.0}, [
         'geometry.zero_length: 950 m, but the joints are 0.9 m from their center: in mm?']),
-    'the zero length in mm, no limits': ({'geometry.zero_length': 950.0, **NO_LIMITS}, [
-        'geometry.zero_length: 950 m, but']),
     'the characteristic length in mm': ({'singularity.characteristic_length': 600.0}, [
         'singularity.characteristic_length: 600 m, but']),
     'inertia in g mm^2': ({'platform.inertia': 1e9 * INERTIA}, [
         'platform.inertia: 2.2e+10 kg m^2 at most, a radius of gyration of 1.21e+04 m, but the '
         'platform joints are 0.6 m from their center: in g mm^2 or kg mm^2?']),
-    'inertia in kg mm^2': ({'platform.inertia': 1e6 * INERTIA}, ['in g mm^2 or kg mm^2?']),
-    'inertia in kg cm^2': ({'platform.inertia': 1e4 * INERTIA}, ['in g mm^2 or kg mm^2?']),
-    'inertia scaled twice': ({'platform.inertia': 1e-9 * INERTIA}, ['scaled twice']),
     'inertia of no body': ({'platform.inertia': [13.0, 0.0, 0.0, 14.0, 0.0, 40.0]}, [
         'platform.inertia: principal moments [13, 14, 40] kg m^2: no body has one larger than '
         'the sum of the other two']),
     'a center of mass in mm': ({'platform.center_of_mass': [20.0, -10.0, 120.0]}, [
         'platform.center_of_mass: [20, -10, 120] m is 122 m from the middle of the platform '
         'joints']),
-    'a center of mass from the floor, in mm': (
-        {'platform.center_of_mass': [0.0, 0.0, 1100.0]}, ['platform.center_of_mass: [0, 0, 1.1']),
     'a cylinder in mm': ({'legs.cylinder.center_of_mass': 350.0}, [
         'legs.cylinder.center_of_mass: 350 m from the base joint, but no leg is over 1.65 m']),
     'a piston longer than the leg': (
         {'legs.piston.center_of_mass': [0.4, 0.4, 0.4, 0.4, 1.7, 0.4]}, [
             'legs.piston.center_of_mass: 1.7 m from the platform joint, but no leg is over 1.65']),
-    'a piston far behind its joint': ({'legs.piston.center_of_mass': -0.9}, [
-        'legs.piston.center_of_mass: -0.9 m from the platform joint']),
     'a piston with the other sign': ({'legs.piston.center_of_mass': -0.4}, [
         'legs.piston.center_of_mass: -0.4 m: behind the platform joint: a sign? It counts from '
         'this joint toward the base']),
@@ -250,8 +234,6 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
     'a cylinder in g': ({'legs.cylinder.mass': 12e3}, [
         'legs.cylinder.mass: 12000 kg, with legs.cylinder.inertia a radius of gyration of '
         '0.00736 m, but the longest leg is 1.65 m: in g?']),
-    'one piston in g': ({'legs.piston.mass': [6.0, 6.0, 6.0, 6e3, 6.0, 6.0]}, [
-        'legs.piston.mass: 6000 kg, with']),
     'no reflected mass': ({'actuator.reflected_mass': None}, [
         'actuator.reflected_mass: missing, but limits.velocity_max is given: it is '
         'J (2 pi / lead)^2 of rotor and screw; write 0.0 for a drive that has none']),
@@ -296,16 +278,12 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         'number is ']),
     'a quarter turn, no limits': ({'geometry.platform_joints': TOP @ QUARTER.T, **NO_LIMITS}, [
         'geometry: singular at home (the axes parallel, at any height): the condition number']),
-    'a quarter turn, no lengths at all': (
-        {'geometry.platform_joints': TOP @ QUARTER.T, 'geometry.zero_length': 0.0, **NO_LIMITS}, [
-            'geometry: singular at home (the axes parallel, at any height)']),
 }
 
 
 # Slips that are reported by more than one line.
 SEVERAL = {'all joints in mm', 'all joints in mm of a hexapod as long as a street',
-           'the base joints in mm', 'one base joint in mm',
-           'the platform joints in cm and limits', 'limits in mm'}
+           'the base joints in mm', 'one base joint in mm', 'limits in mm'}
 
 
 @pytest.mark.parametrize('name', SLIPS)
@@ -483,12 +461,6 @@ def test_a_wrong_sign_is_found(table, joint, axis):
     assert odd.joint in twins
     if len(twins) == 1:
         assert odd.expected == pytest.approx(good[joint], abs=2e-3)
-
-
-def test_a_swapped_digit_is_found():
-    joints = PLATFORM['geometry.base_joints'].copy()
-    joints[1, 0] = -0.2871 * 3.0
-    assert odd_joint(joints).joint == 1
 
 
 @pytest.mark.parametrize('table', TABLES)

@@ -22,7 +22,6 @@ import pickle
 import re
 from typing import Any
 
-from hypothesis import given, strategies as st
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -125,14 +124,6 @@ def test_the_quaternion_of_one_matrix_is_that_of_many() -> None:
         assert np.array_equal(np.abs(exact), [*axis, 0.0])
 
 
-@given(st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(
-    lambda q: np.linalg.norm(q) > 1e-3))
-def test_any_quaternion_is_converted_both_ways_up_to_its_sign(numbers: list[float]) -> None:
-    quaternion = np.array(numbers) / np.linalg.norm(numbers)
-    back = to_quaternion(of_quaternion(quaternion))
-    assert abs(np.dot(back, quaternion)) == pytest.approx(1.0, abs=1e-14)
-
-
 def test_rotations_take_any_leading_shape() -> None:
     angles = rng().uniform(-1.0, 1.0, (2, 3, 3))
     for function, tail in ((from_euler, (3, 3)), (euler_rate_matrix, (3, 3)),
@@ -180,7 +171,6 @@ def test_arrays_are_copied_and_their_views_read_only() -> None:
 
 @pytest.mark.parametrize(('arguments', 'texts'), [
     (([0.0, 0.0], UPRIGHT), ['position: shape (2,)', 'must end in (3,)']),
-    ((0.0, UPRIGHT), ['position: shape ()', 'must end in (3,)']),
     ((np.zeros(3), np.zeros(9)), ['rotation: shape (9,)', 'must end in (3, 3)']),
     (([0.0, np.nan, 0.0], UPRIGHT), ['position[1]: nan', 'must be finite']),
     ((np.zeros(3), UPRIGHT, [[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]]),
@@ -192,9 +182,6 @@ def test_arrays_are_copied_and_their_views_read_only() -> None:
     ((np.zeros((2, 3)), UPRIGHT, np.zeros((3, 3))),
      ['do not fit', 'position (2,)', 'linear_velocity (3,)']),
     ((['a', 'b', 'c'], UPRIGHT), ['position: a value of type list: not an array of real numbers']),
-    (([[0.0, 0.0, 0.0], [0.0]], UPRIGHT), ['position: ', 'not an array of real numbers']),
-    ((object(), UPRIGHT), ['position: a value of type object: not an array of real numbers']),
-    ((None, UPRIGHT), ['position: None: not an array of real numbers']),
     (([0.0, 0.0, 1.0 + 2.0j], UPRIGHT), ['position: ', 'real numbers', 'complex128']),
     (([0.0, 0.0, 1.0], UPRIGHT, {'x': 1.0}), ['linear_velocity: a value of type dict: ']),
 ])
@@ -204,18 +191,6 @@ def test_bad_arguments_are_rejected_with_index_and_rule(
         Motion(*arguments)
     for text in texts:
         assert text in str(caught.value)
-
-
-@pytest.mark.parametrize(('arguments', 'text'), [
-    (([0.0, 0.0, 1.0], [0.0, 0.0]), 'angles: shape (2,)'),
-    (([0.0, 0.0, 1.0], None), 'angles: None: not an array'),
-    (([0.0, 0.0, 1.0], np.zeros(3), None, [0.0, np.inf, 0.0]), 'angle_rates[1]: inf'),
-    (([0.0, 0.0, 1.0], np.zeros((2, 3)), None, np.zeros((3, 3))), 'do not fit each other'),
-    (([0.0, 0.0, 1.0], np.zeros(3), None, None, None, [[0.0]]), 'angle_accelerations: shape'),
-])
-def test_bad_euler_angles_are_rejected(arguments: Any, text: str) -> None:
-    with pytest.raises(MotionError, match=re.escape(text)):
-        Motion.from_euler(*arguments)
 
 
 def test_a_rotation_rounded_as_in_messages_is_accepted() -> None:
@@ -281,12 +256,6 @@ def test_constructors_take_any_leading_shape() -> None:
     (lambda: Pose(POSITION, np.diag([1.0, 1.0, -1.0])),
      'is a reflection: its determinant is -1, must be +1 (is an axis mirrored, or are two '
      'columns exchanged?)'),
-    (lambda: Pose(POSITION, 1.1 * UPRIGHT), 'is not a rotation: R^T R is 0.21 off the identity'),
-    (lambda: Pose([np.nan, 0.0, 0.0], UPRIGHT), 'position[0]: nan: must be finite'),
-    (lambda: Pose({'x': 1.0}, UPRIGHT), 'position: a value of type dict: not an array'),
-    (lambda: Pose(POSITION, UPRIGHT + 0j), 'rotation: a value of type ndarray: not an array of '
-     'real numbers: its type is complex128'),
-    (lambda: Pose([POSITION, POSITION], [UPRIGHT] * 3), 'position (2,), rotation (3,)'),
     (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 0.0, 1.01]), 'length 1.01, must be'),
     (lambda: Pose.from_quaternion(POSITION, [0.0] * 4), 'length 0, must be within 0.001 of 1'),
     (lambda: Pose.from_quaternion(POSITION, [1e308] * 4), 'length inf, must be'),
@@ -295,6 +264,9 @@ def test_constructors_take_any_leading_shape() -> None:
     (lambda: Pose.from_matrix([np.eye(4), np.ones((4, 4))]),
      'matrix[1]: its last row is [1.0, 1.0, 1.0, 1.0]: must be [0, 0, 0, 1]'),
     (lambda: Pose.from_euler(POSITION, None), 'angles: None: not an array of real numbers'),
+    (lambda: Motion.from_euler(POSITION, [0.0, 0.0], None, None), 'angles: shape (2,)'),
+    (lambda: Motion.from_euler(POSITION, [0.0] * 3, None, [0.0, np.inf, 0.0]),
+     'angle_rates[1]: inf'),
     (lambda: Motion.from_pose(POSITION), 'pose: a value of type list: must be a Pose or a Motion'),
 ])
 def test_bad_arguments_are_rejected_in_one_line(make: Any, text: str) -> None:

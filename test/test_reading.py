@@ -318,28 +318,6 @@ def test_large_models_take_time_in_proportion_to_their_size(text, tmp_path):
     assert time.process_time() - begun < 20.0  # quadratic: minutes
 
 
-@pytest.mark.parametrize('encoding', ['utf-16', 'utf-16-le', 'iso-8859-1'])
-@pytest.mark.parametrize('text', [
-    '<?xml version="1.0" encoding="{}"?><!DOCTYPE a [<!ENTITY b "c">]><robot name="\u00fc"/>',
-    '<?xml version="1.0" encoding="{}"?><mujoco model="\u00fc"/>'])
-def test_other_encodings_than_utf_8_are_rejected(text, encoding, tmp_path):
-    path = tmp_path / 'file.xml'
-    path.write_bytes(text.format(encoding).encode(encoding))
-    with pytest.raises(StewartError, match='cannot be read: not UTF-8|not XML: not well'):
-        read_hexapod(path)
-
-
-def test_irregular_and_large_files_are_rejected_at_once(tmp_path):
-    os.mkfifo(tmp_path / 'pipe')
-    with (tmp_path / 'sparse').open('wb') as file:
-        file.truncate(10 ** 11)
-    for path, why in ((tmp_path / 'pipe', 'not a regular file'), (tmp_path, 'Is a directory'),
-                      (Path('/dev/zero'), 'not a regular file'),
-                      (tmp_path / 'sparse', 'larger than 20000000 bytes')):
-        with pytest.raises(StewartError, match=why):
-            read_hexapod(path)
-
-
 @pytest.mark.parametrize(('text', 'why'), [
     ('<worldbody><replicate count="100000000"><body><geom size="1"/></body></replicate>'
      '</worldbody>', 'not loaded within'),

@@ -20,12 +20,12 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 import csv
 from dataclasses import replace
+import io
 import json
 import math
 import os
 from pathlib import Path
 import re
-import resource
 import signal
 import subprocess
 import sys
@@ -57,7 +57,7 @@ from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.platform_arguments import motion_rows
-from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
+from stewart_dynamics.program import BAD_INPUT, DONE, INTERRUPTED, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
 from stewart_dynamics.replay.recorded_model import (
@@ -313,38 +313,6 @@ def test_the_table_has_time_and_pose(name: str, replayed: dict[str, Outputs]) ->
             motion.rotation[n], abs=1e-12)
 
 
-@pytest.mark.parametrize('name', BAGS)
-def test_rosbags_reads_what_mcap_reads(name: str, replayed: dict[str, Outputs]) -> None:
-    outputs = replayed[name]
-    by_rosbags: dict[str, list[tuple[int, Any]]] = defaultdict(list)
-    with AnyReader([outputs.folder / 'bag']) as reader:
-        for connection, when, data in reader.messages():
-            by_rosbags[connection.topic].append(
-                (when, reader.deserialize(data, connection.msgtype)))
-    assert {t: [when for when, _ in of] for t, of in by_rosbags.items()} == {
-        t: [when for when, _ in of] for t, of in outputs.messages.items()}
-    for topic, of in by_rosbags.items():
-        for (_, ours), (_, theirs) in zip(of, outputs.messages[topic], strict=True):
-            if hasattr(ours, 'effort'):
-                assert nanoseconds(ours) == nanoseconds(theirs)
-                for field in ('position', 'velocity', 'effort'):
-                    assert np.array_equal(getattr(ours, field), getattr(theirs, field))
-            elif hasattr(ours, 'wrench'):
-                assert nanoseconds(ours) == nanoseconds(theirs)
-                assert six_of(ours) == six_of(theirs)
-            elif hasattr(ours, 'transforms'):
-                for one, other in zip(ours.transforms, theirs.transforms, strict=True):
-                    assert nanoseconds(one) == nanoseconds(other)
-                    assert (one.header.frame_id, one.child_frame_id) == (
-                        other.header.frame_id, other.child_frame_id)
-                    for part, names in (('translation', 'xyz'), ('rotation', 'xyzw')):
-                        for name in names:
-                            assert getattr(getattr(one.transform, part), name) == getattr(
-                                getattr(other.transform, part), name)
-            else:
-                assert np.array_equal(ours.data, theirs.data)
-
-
 def test_the_warning_is_written_at_every_change(replayed: dict[str, Outputs]) -> None:
     topic = f'{NODE}/singularity_warning'
     assert [m.data for _, m in replayed['clear'].messages[topic]] == [False]
@@ -561,14 +529,6 @@ def test_a_bag_that_loops_is_followed_with_a_notice(
     assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 100
 
 
-def test_other_topics_do_not_matter(tmp_path: Path) -> None:
-    of = motion(5)
-    of.insert(2, ('/elsewhere/chatter', RECORDED, b'\0\1\0\0\1\0\0\0\0'))
-    bag = write_bag(tmp_path / 'bag', of, chatter='std_msgs/msg/String')
-    assert run(bag, tmp_path / 'out') == DONE
-    assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 5
-
-
 def test_another_name_of_the_node(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/hexapod')
     assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE
@@ -722,8 +682,7 @@ def test_a_bag_of_ros_1_gives_the_same(
 
 
 @pytest.mark.parametrize('arguments', [
-    [], ['bag'], ['--params', 'x.yaml'], ['bag', '--params', 'x.yaml', '--nonsense'],
-    ['bag', '--params', 'x.yaml', '--params', 'y.yaml']])
+    [], ['bag', '--params', 'x.yaml', '--params', 'y.yaml']])
 def test_bad_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(arguments)
@@ -762,12 +721,6 @@ def test_a_point_in_a_name_is_no_suffix(tmp_path: Path) -> None:
         'fleet.csv', 'index.html', *(bag.name for bag in bags)]
 
 
-def test_the_current_folder_has_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(write_bag(tmp_path / 'here', motion(3)))
-    assert run(Path('.'), tmp_path / 'out') == DONE
-    assert (tmp_path / 'out' / 'here' / 'legs.csv').exists()
-
-
 def test_a_bad_bag_is_reported_and_the_others_are_replayed(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     good = [write_bag(tmp_path / name, motion(3)) for name in ('one', 'two')]
@@ -782,20 +735,25 @@ def test_a_bad_bag_is_reported_and_the_others_are_replayed(
 
 # Damaged bags
 
-def damaged_bag(file: Path) -> Path:
-    """Write a bag of 100 setpoints in chunks, and damage a byte of a chunk in the middle."""
+def chunked_bag(file: Path, number: int, chunk_size: int) -> Path:
+    """Write a bag of setpoints in chunks of a size [bytes]."""
     with file.open('wb') as stream:
-        writer = McapWriter(stream, chunk_size=4000, compression=CompressionType.NONE)
+        writer = McapWriter(stream, chunk_size=chunk_size, compression=CompressionType.NONE)
         writer.start('ros2')
         channels = {}
         for topic in TOPICS:
             definition, _ = STORE.generate_msgdef(INPUT_TYPES[topic], ros_version=2)
             schema = writer.register_schema(INPUT_TYPES[topic], 'ros2msg', definition.encode())
             channels[topic] = writer.register_channel(f'{NODE}/{topic}', 'cdr', schema)
-        for topic, when, data in motion(100):
+        for topic, when, data in motion(number):
             writer.add_message(channels[topic], when, data, when)
         writer.finish()
-    with file.open('rb') as stream:
+    return file
+
+
+def damaged_bag(file: Path) -> Path:
+    """Write a bag of 100 setpoints, and damage a byte of a chunk in the middle."""
+    with chunked_bag(file, 100, 4000).open('rb') as stream:
         summary = make_reader(stream).get_summary()
     assert summary is not None
     chunks = summary.chunk_indexes
@@ -861,9 +819,6 @@ def test_it_runs_as_a_program(tmp_path: Path, replayed: dict[str, Outputs]) -> N
     for name in BAGS:
         assert (tmp_path / 'out' / name / 'legs.csv').read_bytes() == (
             replayed[name].folder / 'legs.csv').read_bytes()
-    rejection = run_apart(tmp_path / 'none', '--params', PARAMS)
-    assert (rejection.returncode, rejection.stdout) == (BAD_INPUT, '')
-    assert rejection.stderr.count('\n') == 1
 
 
 def test_the_results_are_readable_by_all(tmp_path: Path) -> None:
@@ -884,8 +839,8 @@ def test_it_needs_no_ros() -> None:
 
 @pytest.fixture(scope='module')
 def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a bag that takes many seconds where nothing is compiled."""
-    return write_bag(tmp_path_factory.mktemp('bags') / 'long', motion(12000))
+    """Return a bag that takes many seconds where nothing is compiled, a part of one each chunk."""
+    return chunked_bag(tmp_path_factory.mktemp('bags') / 'long.mcap', 12000, 100_000)
 
 
 def begun(bag: Path, out: Path) -> subprocess.Popen[str]:
@@ -931,19 +886,6 @@ def test_an_interrupted_replay_leaves_nothing(long_bag: Path, tmp_path: Path) ->
     assert not list((tmp_path / 'out').iterdir())
 
 
-@pytest.mark.parametrize('size', [0, 100_000])
-def test_a_full_disk_leaves_nothing(size: int, tmp_path: Path) -> None:
-    # writing a file beyond this size fails, as on a disk without room
-    done = run_apart(
-        ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path / 'out', '--no-report',
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
-    assert done.returncode == BAD_INPUT
-    assert 'Traceback' not in done.stderr
-    assert done.stderr.count('\n') == 1
-    assert 'too large' in done.stderr
-    assert not list((tmp_path / 'out').iterdir())
-
-
 @pytest.mark.parametrize(('error', 'text'), [
     (MemoryError('Unable to allocate 3. GiB'), 'out of memory: Unable to allocate 3. GiB'),
     (MemoryError(), 'out of memory'),
@@ -981,18 +923,6 @@ def test_the_library_raises_what_the_program_prints(tmp_path: Path) -> None:
     assert not result.summary['limit_met']
     assert not rejections(result)
     assert json.loads((tmp_path / 'out' / 'summary.json').read_text()) == result.summary
-
-
-def test_exceeded_limits_are_named(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / 'hexapod.yaml'
-    text = PARAMS.read_text(encoding='utf-8')
-    file.write_text(text.replace('force_max: 6000.0', 'force_max: 500.0'))
-    for params, text in ((PARAMS, 'all limits held'),
-                         (file, 'limits.force_max, 500 N, exceeded by leg_4')):
-        assert main([str(ROOT / 'bags' / 'clear'), '--params', str(params),
-                     '--output', str(tmp_path / params.stem), '--no-report']) == 0
-        assert text in capsys.readouterr().out
 
 
 def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
@@ -1139,17 +1069,6 @@ def test_summary_and_report_are_written(tmp_path: Path) -> None:
     assert summary['parameters']['platform.mass'] == 150.0
 
 
-def keys_of(value: Any, prefix: str = '') -> set[str]:
-    """Return the keys of a document, those of legs, sources and axes by one of them."""
-    found: set[str] = set()
-    for key, inner in value.items() if isinstance(value, dict) else ():
-        if prefix not in ('inputs.topics', 'parameters'):
-            found |= {key} | keys_of(inner, f'{prefix}.{key}'.strip('.'))
-    if isinstance(value, list) and value:
-        found |= keys_of(value[0], prefix)
-    return found
-
-
 def test_without_a_report(tmp_path: Path) -> None:
     assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
     assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
@@ -1231,31 +1150,29 @@ def test_a_signal_at_the_start_or_end_is_no_traceback(
     assert (done.returncode, done.stderr) == (code, f'stewart_replay: {text}\n')
 
 
-def test_an_interrupt_while_results_are_replaced_keeps_some(tmp_path: Path) -> None:
-    # at the second of the two renames
-    program = (
-        'import pathlib, sys\nfrom stewart_dynamics.replay import main\n'
-        'rename, done = pathlib.Path.rename, []\n'
-        'def interrupted(self, to):\n'
-        '    done.append(to)\n'
-        '    if len(done) == 2: raise KeyboardInterrupt\n'
-        '    return rename(self, to)\n'
-        'main(sys.argv[1:])\npathlib.Path.rename = interrupted\n'
-        "sys.exit(main([*sys.argv[1:], '--force']))")
-    done = subprocess.run(
-        [sys.executable, '-c', program, str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS),
-         '--output', str(tmp_path), '--no-report'], capture_output=True, text=True, timeout=300)
-    assert done.returncode == 130
+def test_an_interrupt_while_results_are_replaced_keeps_some(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
+    rename, done = Path.rename, []
+
+    def interrupted(path: Path, to: Path) -> Path:
+        done.append(to)
+        if len(done) == 2:
+            raise KeyboardInterrupt
+        return rename(path, to)
+
+    monkeypatch.setattr(Path, 'rename', interrupted)
+    assert run(ROOT / 'bags' / 'clear', tmp_path, '--force') == INTERRUPTED
     assert len(rows_of(tmp_path / 'clear')) == 1001
     assert [path.name for path in tmp_path.iterdir()] == ['clear']
 
 
-def test_names_that_the_terminal_cannot_encode(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'ü', motion(3))
-    done = run_apart(bag, '--params', PARAMS, '--output', tmp_path / 'out', '--no-report',
-                     env={**os.environ, 'PYTHONIOENCODING': 'ascii'})
-    assert (done.returncode, done.stderr) == (DONE, '')
-    assert '3 setpoints' in done.stdout
+def test_names_that_the_terminal_cannot_encode(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding='ascii', write_through=True)
+    monkeypatch.setattr(sys, 'stdout', terminal)
+    assert run(write_bag(tmp_path / 'ü', motion(3)), tmp_path / 'out') == DONE
+    assert b'\\xfc:\n3 setpoints' in terminal.buffer.getvalue()
 
 
 def test_options_without_effect_are_rejected(
@@ -1351,13 +1268,6 @@ def test_measured_forces_give_the_external_load(
         peak = found['external_wrench'][f'force_{axis}']
         assert peak['peak_n'] == pytest.approx(value, rel=1e-9)
         assert peak['peak_at_s'] >= 0.99
-    documented = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')
-    summary = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())
-    names = set(PARAMETERS['joints'])
-    names |= {f'{kind}_{axis}{unit}' for kind, unit in (('force', '_n'), ('moment', '_n_m'))
-              for axis in 'xyz' for unit in ('', unit)}
-    for key in keys_of(summary) - names:
-        assert re.search(rf'[`.]{key}\b', documented), key
 
 
 def test_the_page_names_files_that_a_bag_runs_through(tmp_path: Path) -> None:

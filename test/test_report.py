@@ -356,15 +356,6 @@ def test_rejected_messages_have_seconds_since_the_start(tmp_path: Path) -> None:
         assert shown in text, shown
 
 
-def test_figures_are_those_of_the_paper_by_name(tmp_path: Path) -> None:
-    given = trajectory('clear')
-    given.write(tmp_path / 'report.html')
-    page = (tmp_path / 'report.html').read_text(encoding='utf-8')
-    assert 'figure ${figure} of the paper' in page
-    assert "titled('Platform at initial and final position', 16)" in page
-    assert 'Fig. ' not in page[page.index('<script id="own">'):]
-
-
 def test_numbers_have_one_style_of_thousands() -> None:
     space = '\u202f'
     assert [number(value, 1) for value in (-999.96, 1000.0, 12345.67, -1234567.8, 0.04)] == [
@@ -637,16 +628,6 @@ def test_a_spike_does_not_set_the_scale_and_the_full_range_can_be_shown(
     report.check()
 
 
-def test_a_click_on_a_time_moves_the_cursor_there(opened: Callable[..., Opened]) -> None:
-    given = trajectory('singular')
-    report = opened(given)
-    at = given.summary()['legs']['leg_5']['force_peak_at_s']
-    report.page.locator('#peaks tbody tr').nth(4).locator('button').nth(1).click()
-    report.until(f'time.cursor === {at!r}')
-    report.until(f"document.getElementById('now').textContent.startsWith('t = {at:.3f} s')")
-    report.check()
-
-
 def test_a_click_on_a_time_scrolls_to_its_plot(opened: Callable[..., Opened]) -> None:
     report = opened(trajectory('singular'))
     report.see('plot_lengths')
@@ -660,6 +641,7 @@ def test_a_click_on_a_time_scrolls_to_its_plot(opened: Callable[..., Opened]) ->
                  '.getBoundingClientRect();'
                  ' return box.top >= 0 && box.bottom <= innerHeight; })()')
     assert report.page.evaluate('time.cursor') == when
+    report.until(f"document.getElementById('now').textContent.startsWith('t = {when:.3f} s')")
     begin, end = report.page.evaluate('time.range')
     assert begin < when < end and end - begin == pytest.approx(1.0)
     report.check()

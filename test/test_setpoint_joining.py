@@ -35,10 +35,10 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.setpoints.inputs import (
-    ACCEL, COMBINED, POSE, SampleReader, TWIST, WRENCH, WrenchInput)
+    ACCEL, COMBINED, POSE, SampleReader, TWIST, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (
-    DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, Rejections, TOO_OLD, TWICE,
+    DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, TOO_OLD, TWICE,
     WRONG_FRAME)
 from stewart_dynamics.setpoints.sample_joining import WAITING
 from stewart_dynamics.setpoints.step import Setpoint
@@ -109,26 +109,6 @@ def test_topics_are_joined_in_any_order(order: Sequence[str]) -> None:
     assert setpoint.motion[12:] == tuple(range(1, 13))
     assert not feed.counts
     assert not feed.notices
-
-
-@pytest.mark.parametrize('order', ORDERS)
-def test_a_topic_may_be_far_ahead_of_the_others(order: Sequence[str]) -> None:
-    feed = Feed()
-    stamps = [n * 10 * MS for n in range(1, 101)]
-    for topic in order[:2]:
-        for stamp in stamps:
-            assert feed.sample(topic, stamp) is None
-    answers = [feed.sample(order[2], stamp) for stamp in stamps]
-    assert [answer.stamp for answer in answers if answer] == stamps
-    assert not feed.counts
-
-
-def test_stamps_a_nanosecond_apart_are_not_joined() -> None:
-    feed = Feed()
-    feed.sample(POSE, SECOND)
-    feed.sample(TWIST, SECOND)
-    assert feed.sample(ACCEL, SECOND + 1) is None
-    assert feed.sample(ACCEL, SECOND)
 
 
 @pytest.mark.parametrize('order', ORDERS)
@@ -263,19 +243,6 @@ def test_another_base_frame_is_the_only_one() -> None:
     assert setpoints.take(POSE, messages.pose(SECOND, frame='sol élevé'), lambda: NOW)
 
 
-def test_a_wrench_is_read_without_setpoints() -> None:
-    rejections = Rejections(lambda rejection, details: None)
-    wrench_input = WrenchInput(PARAMETERS, rejections)
-    assert wrench_input.wrench == NO_WRENCH
-    for _ in range(2):
-        wrench_input.take(messages.wrench(5, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)))
-        wrench_input.take(messages.wrench(5, (NAN, 2.0, 3.0, 4.0, 5.0, 6.0)))
-        wrench_input.take(messages.wrench(5, frame='map'))
-        assert wrench_input.wrench == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-    assert rejections.counts == {Rejection(WRENCH, NOT_FINITE): 2,
-                                 Rejection(WRENCH, WRONG_FRAME): 2}
-
-
 @pytest.mark.parametrize(('reason', 'said'), [
     (NOT_FINITE, 'setpoint/pose rejected: not finite: nan'),
     (NOT_JOINED, 'setpoint/pose dropped: not all topics had its stamp: nan'),
@@ -360,15 +327,6 @@ def test_a_stray_old_sample_of_one_topic_resets_nothing(topic: str) -> None:
     # and older samples are still rejected
     assert feed.sample(POSE, 10 * SECOND + 5 * MS) is None
     assert feed.counts[POSE, TOO_OLD] == 1
-
-
-def test_a_restart_drops_samples_waiting_from_before_it() -> None:
-    feed = Feed()
-    assert feed.whole(10 * SECOND)
-    feed.sample(POSE, 10 * SECOND + 10 * MS)
-    assert feed.whole(SECOND)
-    assert feed.counts == {(POSE, NOT_JOINED): 1}
-    assert feed.whole(SECOND + 10 * MS)
 
 
 def test_negative_stamps_are_stamps() -> None:
@@ -608,26 +566,6 @@ def test_only_stamps_within_the_tolerance_are_joined(
             assert answer.stamp in (NOW, *marks)
             assert max(marks) - min(marks) <= 2 * tolerance * MS
             assert answer.stamp != NOW or marks == [0.0, 0.0, 0.0]
-
-
-@given(st.lists(st.tuples(st.sampled_from([POSE, COMBINED]), st.binary(max_size=240)),
-                max_size=20))
-def test_random_bytes_are_rejected_without_an_exception(sequence: list[tuple[str, bytes]]) -> None:
-    for source, of in (('pose', POSE), ('combined', COMBINED)):
-        feed = Feed(source=source)
-        answered = sum(feed(of, b'\0\1\0\0' + data) is not None
-                       for topic, data in sequence if topic == of)
-        assert answered + sum(feed.counts.values()) == feed.given[of]
-
-
-def test_wrenches_of_any_bytes_never_raise() -> None:
-    random = rng()
-    setpoints = Setpoints(PARAMETERS, lambda rejection, details: None, lambda text: None)
-    good = messages.wrench(SECOND, (1, 2, 3, 4, 5, 6))
-    for _ in range(500):
-        setpoints.take_wrench(_garbage(random, good))
-        assert np.all(np.isfinite(setpoints.wrench))
-    assert sum(setpoints.counts.values()) > 100
 
 
 # Many at once

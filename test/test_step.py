@@ -137,35 +137,6 @@ def test_every_limit_that_is_exceeded_is_listed_and_no_other(limit: str, factor:
             Exceedance(limit, leg, values[leg], bounds[leg]) for leg in (0, 4)))
 
 
-@pytest.mark.parametrize(('limit', 'quantity', 'outward'), [
-    ('limits.length_min', 'lengths', 1.0), ('limits.length_max', 'lengths', -1.0),
-    ('limits.velocity_max', 'rates', -1.0), ('limits.force_max', 'demanded_forces', -1.0)])
-def test_rounding_exceeds_no_limit_and_what_is_more_does(
-        limit: str, quantity: str, outward: float) -> None:
-    """A bound an ulp either side of the value is held; the same rule for one and for many."""
-    for setpoint, wrench in rows(PARAMETERS, 20):
-        values = np.abs(getattr(answered(STEP, setpoint, wrench), quantity))
-        batch = Batch(np.array([STAMP]), np.array([setpoint.motion]), np.array([wrench]),
-                      np.zeros(1, dtype=bool), np.array([STAMP]))
-        for bound, exceeded in (
-                (np.nextafter(values, 0.0), 0), (values, 0), (np.nextafter(values, np.inf), 0),
-                (values * (1.0 + 1e-8 * outward), 6), (values * (1.0 - 1e-8 * outward), 0)):
-            step = Step(PARAMETERS.replaced({limit: bound}))
-            output = answered(step, setpoint, wrench)
-            assert [each.limit for each in output.exceedances] == [limit] * exceeded
-            assert step.many(batch, None).exceeding.tolist() == [exceeded > 0]
-
-
-def test_several_limits_are_listed_together() -> None:
-    step = Step(PARAMETERS.replaced({
-        'limits.length_min': 0.001, 'limits.length_max': 0.002, 'limits.velocity_max': 1e-9,
-        'limits.force_max': 1e-9}))
-    setpoint, wrench = rows(PARAMETERS, 1)[0]
-    limits = [exceedance.limit for exceedance in answered(step, setpoint, wrench).exceedances]
-    assert limits == (['limits.length_max'] * 6 + ['limits.velocity_max'] * 6
-                      + ['limits.force_max'] * 6)
-
-
 # Actions on limits, and jumps
 
 RATE = 0.5  # a leg's limit [m/s]
@@ -233,15 +204,6 @@ def test_a_force_that_is_clipped_suppresses_nothing() -> None:
     output, = both_ways(step, [HOME])
     assert output.exceedances
     assert output.forces == pytest.approx([1.0] * 6)
-
-
-def test_a_pose_in_millimetres_is_never_answered_with_forces() -> None:
-    step = Step(PARAMETERS.replaced({
-        'limits.length_max': 1.32, 'limits.action': 'suppress_forces'}))
-    for scale in (1e3, 1e2, 10.0):
-        output, = both_ways(step, [at(0.92 * scale, 0.0)])
-        assert output.forces is None
-        assert {each.limit for each in output.exceedances} == {'limits.length_max'}
 
 
 @pytest.mark.parametrize('action', ['warn', 'suppress_forces'])

@@ -510,24 +510,9 @@ def test_energy_of_a_leg_that_drives_and_brakes() -> None:
     assert abs(leg['power_peak_w']) == pytest.approx(25.0, rel=1e-6)
 
 
-def test_the_time_in_a_gap_is_left_out() -> None:
-    found = values(6, seconds=[0.0, 0.1, 0.2, 9.2, 9.3, 9.4], demanded=2.0)
-    assert found['setpoints']['gaps'] == 1
-    assert found['setpoints']['gaps_s'] == pytest.approx(9.0)
-    assert found['setpoints']['duration_s'] == 9.4
-    assert found['legs']['b']['energy_driving_j'] == pytest.approx(2.0 * 0.4)
-    assert found['legs']['b']['power_mean_w'] == pytest.approx(2.0)
-
-
 def test_slow_setpoints_are_no_gaps() -> None:
     assert values(5, seconds=[0.0, 2.0, 4.0, 6.0, 25.0])['setpoints']['gaps'] == 0
     assert values(5, seconds=[0.0, 2.0, 4.0, 6.0, 27.0])['setpoints']['gaps'] == 1
-
-
-def test_a_single_setpoint_has_an_rms_and_no_energy() -> None:
-    leg = values(1, demanded=-3.0, rates=2.0)['legs']['b']
-    assert (leg['force_rms_n'], leg['power_mean_w']) == (3.0, -6.0)
-    assert (leg['energy_driving_j'], leg['energy_braking_j']) == (0.0, 0.0)
 
 
 def test_without_a_setpoint_there_is_nothing() -> None:
@@ -570,36 +555,6 @@ def test_crossings_are_interpolated(determinants: list[float], crossings: list[f
     found = singularity(len(determinants), det=determinants)
     assert found['crossings_at_s'] == pytest.approx(crossings)
     assert found['crossings'] == len(crossings)
-
-
-@pytest.mark.parametrize(('determinants', 'restart', 'crossings'), [
-    ([1.0, -1.0], 1, 0), ([1.0, 0.0, -1.0], 1, 0), ([1.0, 0.0, -1.0], 2, 0),
-    ([1.0, -1.0, -1.0], 2, 1), ([1.0, 1.0, 0.0, 0.0, -1.0], 1, 1), ([1.0, -1.0], 0, 1)])
-@pytest.mark.parametrize('edges', [(), (1,), (2,), (1, 2)])
-def test_a_restart_is_no_crossing(
-        determinants: list[float], restart: int, crossings: int, edges: tuple[int, ...]) -> None:
-    restarts = np.arange(len(determinants)) == restart
-    found = Samples(len(determinants), det=determinants, restarts=restarts).summary(
-        hexapod(), edges).values()['singularity']
-    assert found['crossings'] == crossings
-
-
-def test_a_motion_through_a_singularity_crosses_when_it_does() -> None:
-    p = symmetric_parameters()
-    time = np.linspace(0.0, 1.0, 101)
-    turn = 1.5 + 0.123 * time  # the hexapod is singular at a quarter turn
-    rows = np.zeros((101, MOTION))
-    rows[:, 2] = 1.0
-    rows[:, 3], rows[:, 4] = np.cos(turn), -np.sin(turn)
-    rows[:, 6], rows[:, 7] = np.sin(turn), np.cos(turn)
-    rows[:, 11], rows[:, 17] = 1.0, 0.123
-    setpoints = batch(np.round(time * SECOND).astype(np.int64), motions=rows)
-    summary = Summary(p)
-    summary.add(time, setpoints, Step(p).many(setpoints, None), BaseWrench(p).many(setpoints))
-    found = summary.values()['singularity']
-    assert found['crossings_at_s'] == pytest.approx([(math.pi / 2.0 - 1.5) / 0.123], abs=1e-4)
-    assert found['warnings'] == 1
-    assert found['warnings_from_to_s'][0][0] < found['crossings_at_s'][0]
 
 
 # The table
@@ -767,18 +722,6 @@ def test_setpoints_without_a_known_base_are_counted_and_have_no_forces() -> None
     both = Samples(4, demanded=demanded, base_wrenches=loads, base_unknown=[0, 1, 0, 0])
     assert ("in 1 setpoint: J_inv cannot be solved; in 1 setpoint: the base's motion is not known"
             in ' '.join(table_of(both, limited).split()))
-
-
-def test_the_base_wrench_is_summed_up_by_magnitude_and_component() -> None:
-    loads = np.zeros((3, 6))
-    loads[:, 2], loads[1, :2], loads[2, 3] = -4.0, (3.0, 0.0), -7.0
-    found = values(3, base_wrenches=loads)['base_wrench']
-    assert found['force'] == {
-        'rms_n': pytest.approx(math.sqrt(0.5 * 16.0 + 25.0 * 0.5 + 0.0)), 'mean_n': 4.5,
-        'peak_n': 5.0, 'peak_at_s': 1.0}
-    assert found['force_z'] == {'rms_n': 4.0, 'mean_n': -4.0, 'peak_n': -4.0, 'peak_at_s': 0.0}
-    assert (found['moment_x']['peak_n_m'], found['moment']['peak_n_m']) == (-7.0, 7.0)
-    assert found['moment']['peak_at_s'] == 2.0
 
 
 def test_a_limit_is_exceeded_only_above_its_tolerance() -> None:

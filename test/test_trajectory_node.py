@@ -230,10 +230,9 @@ def test_a_looped_motion_goes_back_and_forth_until_a_signal(start: Start, tmp_pa
     assert rows[300, 0] == pytest.approx(0.2, abs=1e-15)
 
 
-def test_the_motion_begins_without_subscribers_after_start_timeout(
-        domain: int, tmp_path: Path, start: Start) -> None:
+def test_the_motion_begins_without_subscribers_after_start_timeout(begin: Start) -> None:
     # They are on another node's topics: these have no subscribers.
-    trajectory = start(MOTION.format(kind='hold', more='start_timeout: 0.1'),
+    trajectory = begin(MOTION.format(kind='hold', more='start_timeout: 0.1'),
                        'target:=nobody', 'motion.duration:=0.1', ENDS)
     assert trajectory.program.wait() == 0
     assert 'hold motion at 200 Hz to nobody, 21 setpoints' in trajectory.program.stderr

@@ -99,6 +99,9 @@ def test_a_replay_on_a_full_disk_keeps_the_results_that_were_there(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = [f'{ROOT / "bags" / "clear"}', '--params', f'{PLATFORM}', '--output',
                  f'{tmp_path / "out"}']
+    with full_disk():
+        assert replay(arguments) == 2
+    assert not list((tmp_path / 'out').iterdir())
     assert replay(arguments) == 0
     before = {path: path.read_bytes() for path in tmp_path.rglob('*') if path.is_file()}
     capsys.readouterr()
