@@ -468,16 +468,6 @@ def test_no_answer_is_drawn_twice_at_whatever_rate(fresh: Start) -> None:
     assert len(seen) > 50
 
 
-def test_without_a_rate_there_is_no_such_topic(fresh: Start) -> None:
-    node = fresh('visualization_rate:=0.0')
-    node.until_active()
-    node.answer()
-
-    writers = node.peer.node.count_publishers
-    node.until(lambda: writers(f'{NODE}/leg_forces') == 1, 'its topics are known')
-    assert writers(f'{NODE}/markers') == 0
-
-
 def test_a_later_subscriber_gets_no_earlier_markers(fresh: Start) -> None:
     node = fresh()
     node.until_active()

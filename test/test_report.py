@@ -26,7 +26,6 @@ import json
 from pathlib import Path
 import re
 import shutil
-import subprocess
 import sys
 import time
 from typing import Any, TYPE_CHECKING
@@ -35,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from stewart_dynamics import Motion, Parameters
+from stewart_dynamics import Motion, Parameters, StewartError
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import BASE, NO_BASE
@@ -46,7 +45,7 @@ from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline
 from stewart_dynamics.reporting.colors import LEG_COLORS, ROLES
-from stewart_dynamics.reporting.pages import digits, number, thousands
+from stewart_dynamics.reporting.pages import digits, number, plotly_script, thousands
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 
@@ -412,23 +411,15 @@ def test_a_contact_of_one_sample_has_no_end(tmp_path: Path) -> None:
     assert 'one sample' in text
 
 
-def test_missing_plotly_is_reported_in_one_line(tmp_path: Path) -> None:
+def test_missing_plotly_is_reported_in_one_line(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # an entry that is None is how Python itself marks a module that cannot be imported
-    script = ("import sys; sys.modules['plotly'] = None\n"
-              'from pathlib import Path\n'
-              'from stewart_dynamics import Parameters\n'
-              'from stewart_dynamics.errors import StewartError\n'
-              'from stewart_dynamics.replay.bag_report import Report\n'
-              f'report = Report(Parameters.from_yaml({str(CONFIG / "platform.yaml")!r}))\n'
-              'try:\n'
-              '    report.write(Path(sys.argv[1]), {})\n'
-              'except StewartError as exc:\n'
-              '    print(exc)\n')
+    monkeypatch.setitem(sys.modules, 'plotly', None)
+    plotly_script.cache_clear()
     path = tmp_path / 'report.html'
-    done = subprocess.run([sys.executable, '-c', script, path], capture_output=True, text=True,
-                          check=True)
-    assert 'pip install plotly' in done.stdout
-    assert done.stdout.count('\n') == 1
+    with pytest.raises(StewartError, match='pip install plotly') as caught:
+        Report(PARAMETERS).write(path, {})
+    assert '\n' not in str(caught.value)
     assert not path.exists()
 
 
