@@ -117,7 +117,11 @@ def run_program(name: str, program: Callable[[Sequence[str] | None], int],
     Run a program that imports its libraries itself, and return its exit code.
 
     Without arguments, those of the command line, signals are ignored afterwards: the process ends.
+    OpenBLAS, which numpy loads, gets one thread unless the environment says otherwise: the
+    matrices are small, and its threads wait for each other on a busy computer.
     """
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
     def end_at_once(number: int, frame: object) -> None:
         """End while libraries are imported: numpy turns an exception into another one."""
         os.write(2, f'{name}: interrupted\n'.encode())

@@ -17,7 +17,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import os
 from pathlib import Path
+import subprocess
+import sys
 
 import numpy as np
 from numpy.typing import NDArray
@@ -242,3 +245,16 @@ def test_a_bag_without_measured_legs_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(BagError, match='has no topic /stewart_dynamics/measured_legs'):
         find_topics(recording, '/stewart_dynamics', None, None)
     recording.close()
+
+
+def test_small_matrices_are_multiplied_in_one_thread() -> None:
+    code = ('import os\n'
+            'from stewart_dynamics.program import run_program\n'
+            'def threads(arguments):\n'
+            '    import numpy\n'
+            '    return len(os.listdir("/proc/self/task"))\n'
+            'raise SystemExit(run_program("program", threads, []))\n')
+    environment = {name: value for name, value in os.environ.items()
+                   if name != 'OPENBLAS_NUM_THREADS'}
+    assert subprocess.run([sys.executable, '-c', code], env=environment, check=False,
+                          ).returncode == 1
