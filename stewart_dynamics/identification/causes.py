@@ -23,7 +23,7 @@ low rate from the filtered motion.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -73,6 +73,26 @@ class Cause(NamedTuple):
         return self.text.format(' '.join(f'{each:{sign}.3g}' for each in values))
 
 
+class _Part(NamedTuple):
+    """Columns (N, 6, m) with a description, and their causes as in ``Cause``."""
+
+    what: str
+    columns: Array
+    text: str
+    """``{}`` stands for the amounts, ``@`` for a word of each cause."""
+    factor: float = 1.0
+    measure: Callable[[Array], Any] = np.asarray
+    groups: Sequence[tuple[str, slice]] = (('', slice(None)),)
+    """The word and the columns of each cause."""
+
+    def causes(self, first: int) -> Iterator[Cause]:
+        """Yield the causes, with the index of the first column."""
+        places = np.arange(first, first + self.columns.shape[-1])
+        for word, columns in self.groups:
+            yield Cause(self.what, places[columns], self.text.replace('@', word), self.factor,
+                        self.measure)
+
+
 class Causes:
     """
     Columns of all possible causes in some extracts, with the parameters of a fit.
@@ -98,64 +118,89 @@ class Causes:
         self._size = float(p['singularity.characteristic_length'])
         self._whole = linear_parameters(p)
         self._whole[unknowns.linear] = self._theta[:len(unknowns.linear)]
-        self.all: tuple[Cause, ...] = ()
+        self._each = [(f' of {leg}', slice(n, n + 1)) for n, leg in enumerate(p['joints'])]
+        self._each_and_all = [*self._each, ('', slice(None))]
 
-    def columns(self, extract: Extract, first: int) -> Array:
-        """Return an array (N, 6, m) for an extract that begins with the sample ``first``."""
-        parts = dict(self._parts(extract, first))
-        if not self.all:
-            starts = np.cumsum([0, *(each.shape[-1] for each in parts.values())])
-            places = {name: np.arange(a, b) for name, (a, b) in zip(
-                parts, pairwise(starts), strict=True)}
-            self.all = tuple(self._causes(places))
-        return np.concatenate(list(parts.values()), axis=-1)
+    def columns(self, extract: Extract, first: int) -> tuple[Array, tuple[Cause, ...]]:
+        """Return columns (N, 6, m) for an extract that begins with the sample ``first``."""
+        lengths = extract.legs[..., 0]
+        poses = self._platform.forward_kinematics(lengths, Pose.of_rows(extract.poses))
+        parts = [*self._of_forces(extract, poses, first),
+                 *(self._of_geometry(extract, poses) if self._geometry else ())]
+        causes: list[Cause] = []
+        count = 0
+        for part in parts:
+            causes += part.causes(count)
+            count += part.columns.shape[-1]
+        return np.concatenate([part.columns for part in parts], axis=-1), tuple(causes)
 
-    def _parts(self, extract: Extract, first: int) -> Iterator[tuple[str, Array]]:
+    def _of_forces(self, extract: Extract, poses: Pose, first: int) -> Iterator[_Part]:
+        """Yield forces that depend on the motion and on time."""
         platform, whole = self._platform, self._whole
         lengths, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
-        poses = platform.forward_kinematics(lengths, Pose.of_rows(extract.poses))
         rows = motions(platform, poses, rates, accelerations)
         matrix = platform.regressors(rows)
         predicted = extract.regressor @ self._theta + extract.known
 
-        yield 'offset', _by_leg(np.ones((len(rows), 6, 1)))
+        yield _Part('offset', _by_leg(np.ones((len(rows), 6, 1))),
+                    'a constant offset of the efforts@, {} N', groups=self._each_and_all)
         gravity = self._tilt.derivative(np.zeros(2))
-        yield 'tilt', np.stack([
-            platform.regressors_at_rest(rows, axis[None]) @ whole for axis in gravity.T], axis=-1)
-        yield 'reflected_mass', matrix[..., REFLECTED_MASS]
-        yield 'leg_mass', np.stack([
+        yield _Part('tilt', np.stack([
+            platform.regressors_at_rest(rows, axis[None]) @ whole for axis in gravity.T], axis=-1),
+            'a base tilted by {} degrees', np.degrees(1.0), np.linalg.norm)
+        yield _Part('reflected_mass', matrix[..., REFLECTED_MASS],
+                    'another actuator.reflected_mass@, {} kg', groups=self._each_and_all)
+        yield _Part('leg_mass', np.stack([
             sum(matrix[..., part] @ whole[part] for part in parts)
             for parts in ((CYLINDER_FIRST, CYLINDER_SECOND),
-                          (PISTON_MASS, PISTON_FIRST, PISTON_SECOND))], axis=-1)
-        yield 'viscous_friction', matrix[..., VISCOUS_FRICTION]
-        slip = _by_leg(extract.slip)
-        yield 'coulomb_friction', slip[..., :6]
-        for n in range(1, SLIP):
-            yield f'stribeck_friction {n}', slip[..., 6 * n:6 * n + 6]
-        yield 'load_friction', slip[..., :6] * np.abs(predicted)[..., None]
-        yield 'quadratic_friction', _by_leg((rates * np.abs(rates))[..., None])
-        yield 'gain', _by_leg(predicted[..., None])
-        yield 'scale', predicted[..., None]
-        yield 'delay', _by_leg(extract.efforts[..., 1:2])
+                          (PISTON_MASS, PISTON_FIRST, PISTON_SECOND))], axis=-1),
+            'other leg masses, cylinders and pistons {} %', 100.0)
+        yield _Part('viscous_friction', matrix[..., VISCOUS_FRICTION],
+                    'another actuator.viscous_friction, {} N s/m')
+        coulomb, *stribeck = (_by_leg(extract.slip[..., n:n + 1]) for n in range(SLIP))
+        yield _Part('coulomb_friction', coulomb, 'another actuator.coulomb_friction, {} N')
+        for columns in stribeck:
+            yield _Part('stribeck_friction', columns, 'Stribeck friction, {} N at low rates',
+                        measure=np.mean)
+        yield _Part('load_friction', coulomb * np.abs(predicted)[..., None],
+                    'friction that depends on the load, {} % of it', 100.0, np.mean)
+        yield _Part('quadratic_friction', _by_leg((rates * np.abs(rates))[..., None]),
+                    'friction that grows with the square of the rate, {} N s^2/m^2',
+                    measure=np.mean)
+        yield _Part('gain', _by_leg(predicted[..., None]),
+                    'another gain of the efforts@, {} %', 100.0, groups=self._each)
+        yield _Part('scale', predicted[..., None],
+                    'efforts that are by {} % larger than the forces', 100.0)
+        yield _Part('delay', _by_leg(extract.efforts[..., 1:2]),
+                    'another delay of the efforts@, {} ms', -1e3, groups=self._each)
         beyond = np.maximum(np.abs(predicted) - _SATURATED * self._largest, 0.0)
-        yield 'saturation', (-np.sign(predicted) * beyond)[..., None]
-        at = (first + np.arange(len(rows))) / self._samples
-        for n, change in enumerate(self._changes):
-            yield f'payload {n}', matrix[..., :4] * (at >= change)[:, None, None]
-        late = (at - 0.5)[:, None, None]
-        yield 'friction_drift', late * np.stack([
-            matrix[..., part].sum(axis=-1) for part in (VISCOUS_FRICTION, COULOMB_FRICTION)],
-            axis=-1)
-        yield 'offset_drift', _by_leg(np.ones((len(rows), 6, 1))) * late
-        yield 'platform', matrix[..., :10]
+        yield _Part('saturation', (-np.sign(predicted) * beyond)[..., None],
+                    f'saturation of the efforts at about {self._largest:.4g} N')
+        yield _Part('platform', matrix[..., :10], 'platform parameters that are not identified')
         x = (lengths - lengths.mean(axis=0)) / self._size
         v = rates / (np.sqrt(np.mean(rates ** 2)) + 1e-300)
-        yield f'{UNKNOWN} pose', _by_leg(np.stack([x, x ** 2, x ** 3], axis=-1))
-        yield f'{UNKNOWN} rate', _by_leg(np.stack([np.abs(v), x * v, v ** 3], axis=-1))
-        if self._geometry:
-            yield from self._by_geometry(extract, poses)
+        yield _Part(UNKNOWN, _by_leg(np.stack([x, x ** 2, x ** 3], axis=-1)),
+                    'forces that depend on the pose')
+        yield _Part(UNKNOWN, _by_leg(np.stack([np.abs(v), x * v, v ** 3], axis=-1)),
+                    'forces that depend on the rate')
 
-    def _by_geometry(self, extract: Extract, poses: Pose) -> Iterator[tuple[str, Array]]:
+        at = (first + np.arange(len(rows))) / self._samples
+        changes = self._changes
+        words = [(f'at about {100.0 * change:.0f} %', slice(4 * n, 4 * n + 4))
+                 for n, change in enumerate(changes)]
+        words += [(f'between {100.0 * one:.0f} and {100.0 * other:.0f} %', slice(4 * n, 4 * n + 8))
+                  for n, (one, other) in enumerate(pairwise(changes))]
+        yield _Part('payload', np.concatenate([
+            matrix[..., :4] * (at >= change)[:, None, None] for change in changes], axis=-1),
+            'a payload that changes @ of the time, {} kg', measure=_mass, groups=words)
+        late = (at - 0.5)[:, None, None]
+        yield _Part('friction_drift', late * np.stack([
+            matrix[..., part].sum(axis=-1) for part in (VISCOUS_FRICTION, COULOMB_FRICTION)],
+            axis=-1), 'friction that changes with time')
+        yield _Part('offset_drift', _by_leg(np.ones((len(rows), 6, 1))) * late,
+                    'offsets of the efforts that change with time, {} N')
+
+    def _of_geometry(self, extract: Extract, poses: Pose) -> Iterator[_Part]:
         """Yield derivatives of the forces by zero lengths and joint coordinates [N/m]."""
         p, step = self._platform.parameters, _STEP * self._size
         lengths, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
@@ -166,66 +211,17 @@ class Causes:
                 motions(platform, found, rates, accelerations)) @ self._whole
 
         there = forces(self._platform, lengths)
-        yield 'zero_length', np.stack([
+        yield _Part('zero_length', np.stack([
             (forces(self._platform, lengths + change) - there) / step
-            for change in step * np.eye(6)], axis=-1)
+            for change in step * np.eye(6)], axis=-1),
+            'another geometry.zero_length@, {} mm', 1e3, groups=self._each_and_all)
         for end in ('base', 'platform'):
             name = f'geometry.{end}_joints'
-            yield f'{end}_joint', np.stack([
+            yield _Part('joint', np.stack([
                 (forces(StewartPlatform(p.replaced({name: p[name] + change})), lengths) - there)
-                / step for change in step * np.eye(18).reshape(18, 6, 3)], axis=-1)
-
-    def _causes(self, places: dict[str, Integers]) -> Iterator[Cause]:
-        joints = self._platform.parameters['joints']
-        of_legs = (
-            ('offset', 'a constant offset of the efforts{}, {{}} N', 1.0),
-            ('reflected_mass', 'another actuator.reflected_mass{}, {{}} kg', 1.0),
-            ('gain', 'another gain of the efforts{}, {{}} %', 100.0),
-            ('delay', 'another delay of the efforts{}, {{}} ms', -1e3),
-            *((('zero_length', 'another geometry.zero_length{}, {{}} mm', 1e3),)
-              if self._geometry else ()))
-        for what, text, factor in of_legs:
-            for leg, place in zip(joints, places[what], strict=True):
-                yield Cause(what, np.array([place]), text.format(f' of {leg}'), factor)
-            if what in ('offset', 'reflected_mass', 'zero_length'):
-                yield Cause(what, places[what], text.format(''), factor)
-
-        def of_all(what: str, text: str, factor: float = 1.0,
-                   measure: Callable[[Array], Any] = np.asarray) -> Cause:
-            return Cause(what.partition(' ')[0], places[what], text, factor, measure)
-
-        yield of_all('tilt', 'a base tilted by {} degrees', np.degrees(1.0), np.linalg.norm)
-        yield of_all('leg_mass', 'other leg masses, cylinders and pistons {} %', 100.0)
-        for n in range(1, SLIP):
-            yield of_all(f'stribeck_friction {n}', 'Stribeck friction, {} N at low rates',
-                         measure=np.mean)
-        yield of_all('load_friction', 'friction that depends on the load, {} % of it', 100.0,
-                     np.mean)
-        yield of_all('quadratic_friction',
-                     'friction that grows with the square of the rate, {} N s^2/m^2',
-                     measure=np.mean)
-        yield of_all('scale', 'efforts that are by {} % larger than the forces', 100.0)
-        yield of_all('saturation', f'saturation of the efforts at about {self._largest:.4g} N')
-        yield of_all('friction_drift', 'friction that changes with time')
-        yield of_all('offset_drift', 'offsets of the efforts that change with time, {} N')
-        yield of_all('platform', 'platform parameters that are not identified')
-        yield of_all('viscous_friction', 'another actuator.viscous_friction, {} N s/m')
-        yield of_all('coulomb_friction', 'another actuator.coulomb_friction, {} N')
-        yield of_all(f'{UNKNOWN} pose', 'forces that depend on the pose')
-        yield of_all(f'{UNKNOWN} rate', 'forces that depend on the rate')
-        for n, change in enumerate(self._changes):
-            yield Cause('payload', places[f'payload {n}'], (
-                f'a payload that changes at about {100.0 * change:.0f} % of the time, {{}} kg'),
-                1.0, _mass)
-        for n, (one, other) in enumerate(pairwise(self._changes)):
-            yield Cause('payload', np.concatenate(
-                [places[f'payload {n}'], places[f'payload {n + 1}']]), (
-                f'a payload that changes between {100.0 * one:.0f} and {100.0 * other:.0f} % of '
-                'the time, {} kg'), 1.0, _mass)
-        for end in ('base', 'platform') if self._geometry else ():
-            for n, leg in enumerate(joints):
-                yield Cause('joint', places[f'{end}_joint'][3 * n:3 * n + 3], (
-                    f'another {end} joint of {leg}, moved by {{}} mm'), 1e3)
+                / step for change in step * np.eye(18).reshape(18, 6, 3)], axis=-1),
+                f'another {end} joint@, moved by {{}} mm', 1e3, groups=[
+                    (word, slice(3 * n, 3 * n + 3)) for n, (word, _) in enumerate(self._each)])
 
 
 def _mass(amounts: Array) -> Array:

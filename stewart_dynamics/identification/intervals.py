@@ -105,8 +105,7 @@ def _by_frequency(weighted: Array, residuals: Array) -> Array:
     size = 1 << (2 * many - 1).bit_length()
     r = np.fft.rfft(residuals, size, axis=0)
     spectra = np.einsum('fi,fj->fij', r, r.conj()) / many
-    width = max(1, round(_SMOOTHING * size))
-    smooth = _smoothed(spectra, width)
+    smooth = smoothed(spectra, max(1, round(_SMOOTHING * size)))
     e = np.fft.rfft(weighted, size, axis=0)
     # one-sided: all frequencies except the first and the last count twice
     twice = np.full(len(e), 2.0)
@@ -116,9 +115,10 @@ def _by_frequency(weighted: Array, residuals: Array) -> Array:
     return np.asarray(middle.real / size)
 
 
-def _smoothed(spectra: Array, width: int) -> Array:
-    """Return the running mean over 2 width + 1 frequencies, fewer at both ends."""
+def smoothed(spectra: Array, width: int) -> Array:
+    """Return the running mean over 2 width + 1 frequencies, mirrored at both ends."""
+    width = min(width, len(spectra) - 1)
     whole = np.concatenate([spectra[width:0:-1].conj(), spectra, spectra[-2:-width - 2:-1].conj()])
     sums = np.cumsum(np.concatenate([np.zeros((1, *spectra.shape[1:])), whole]), axis=0)
-    smooth: Array = (sums[2 * width + 1:] - sums[:-2 * width - 1]) / (2 * width + 1)
-    return smooth[:len(spectra)]
+    mean: Array = (sums[2 * width + 1:] - sums[:-2 * width - 1]) / (2 * width + 1)
+    return mean

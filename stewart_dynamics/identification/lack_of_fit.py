@@ -21,7 +21,8 @@ are fitted at once. With the columns of the fit projected out, the scores s = C^
 mean and the covariance N = C^H S^-1 C if the model is right; so s^T N^-1 s is chi-squared
 distributed with as many degrees of freedom as columns (a score test: Rao 1948,
 doi:10.1017/S0305004100023987). The cause that explains most is selected first; further causes are
-added to it until nothing significant is left.
+added to it until nothing significant is left. Directions of which the projection leaves little are
+not tested: noise of lengths and rates in the columns of the fit is all that remains there.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.causes import Cause, Causes, UNKNOWN
 from stewart_dynamics.identification.extraction import Extract, Extracts, SAMPLES
 from stewart_dynamics.identification.fit import directions, Fit
+from stewart_dynamics.identification.intervals import smoothed
 from stewart_dynamics.identification.sums import residual_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -48,19 +50,21 @@ _MOST = 16
 _NOTICE = 7.0
 # Maximum number of causes that are named.
 _CAUSES = 3
-# Columns with a smaller fraction left after projection are explained by the fit.
-_IN_THE_FIT = 1e-8
+# Directions with a smaller fraction of their squares left after projection are not tested.
+_IN_THE_FIT = 1e-3
 # Standard deviations above which the slower causes are tested as well.
 _SUSPICIOUS = 4.0
 # Highest frequency used, relative to the cut-off; half width of the smoothing of spectra, relative
 # to the sampling rate, and its minimum in frequencies.
 _BAND, _SMOOTHING, _FEWEST = 0.9, 0.0125, 8
-_COLLINEAR = 1e-7
+# Least variance of a residual that the fit of all causes leaves, of 2 in each frequency.
+_LEAST_FREE = 2e-3
 # The form of a cause, as that of Stribeck's curve, is known less well than its amount: intervals
 # are widened by this multiple of the change of each unknown.
 _WIDENING = 1.5
-# Penalty on the statistic for each column of a cause.
-_PENALTY = 4.0
+# Penalty on the statistic for each column of a cause; a cause with this part of the likeliest
+# one's gain is named beside it.
+_PENALTY, _AS_LIKELY = 4.0, 0.9
 
 
 class Found(NamedTuple):
@@ -74,6 +78,11 @@ class Found(NamedTuple):
     deviations: float
     """Standard deviations of a normal distribution with the same probability."""
     places: Integers
+
+    @property
+    def gain(self) -> float:
+        """Return the statistic less the penalty."""
+        return self.statistic - _PENALTY * self.columns
 
 
 class LackOfFit(NamedTuple):
@@ -113,87 +122,99 @@ IDENTIFY = {'offset': 'offset', 'tilt': 'tilt', 'reflected_mass': 'reflected_mas
             'viscous_friction': 'viscous_friction', 'coulomb_friction': 'coulomb_friction'}
 
 
+class _Explained(NamedTuple):
+    """The part of the residuals that k columns explain."""
+
+    amounts: Array
+    """(k,) least-squares amounts"""
+    statistic: float
+    freedom: int
+    """Number of their directions that are not in the fit."""
+
+
 class _Scores(NamedTuple):
-    """Sums of m columns with the fit's columns projected out."""
+    """Sums of m columns, divided by their sizes, with the fit's columns projected out."""
 
     normal: Array
-    """(m, m), the covariance of the scores"""
+    """(m, m), the covariance of the scores; the projection leaves this of 1 on the diagonal"""
     scores: Array
+    """(m,)"""
+    sizes: Array
     """(m,)"""
     squares: float
     """Sum of squared residuals."""
 
+    @classmethod
+    def of(cls, sums: Array, inner: int) -> _Scores:
+        """Return them from sums of the fit's inner columns, m columns and the residuals."""
+        along = _inverse(sums[:inner, :inner]) @ sums[:inner]
+        left = (sums - sums[:inner].T @ along)[inner:, inner:]
+        sizes = np.sqrt(np.diag(sums)[inner:-1])
+        scale = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
+        return cls(scale[:, None] * left[:-1, :-1] * scale, scale * left[:-1, -1], scale,
+                   float(sums[-1, -1]))
+
+    def explained(self, places: Integers) -> _Explained:
+        """Return what some columns explain."""
+        inverse, freedom = self._inverse(places)
+        amounts = inverse @ self.scores[places]
+        return _Explained(self.sizes[places] * amounts, float(self.scores[places] @ amounts),
+                          freedom)
+
     def without(self, places: Integers) -> _Scores:
         """Return the sums with some columns added to the fit."""
-        along = _inverse(self.normal[np.ix_(places, places)]) @ self.normal[places]
-        normal = self.normal - self.normal[places].T @ along
-        scores = self.scores - along.T @ self.scores[places]
-        free = np.diag(normal) > _IN_THE_FIT * np.diag(self.normal)
-        free[places] = False
-        return _Scores(normal * np.outer(free, free), scores * free, self.squares)
+        along = self._inverse(places)[0] @ self.normal[places]
+        return self._replace(normal=self.normal - self.normal[places].T @ along,
+                             scores=self.scores - along.T @ self.scores[places])
 
-    def amounts(self, places: Integers) -> Array:
-        """Return the least-squares amounts of some columns."""
-        amounts: Array = _inverse(self.normal[np.ix_(places, places)]) @ self.scores[places]
-        return amounts
-
-    def statistic(self, places: Integers) -> tuple[float, int]:
-        """Return the statistic of some columns and its degrees of freedom."""
-        sizes = np.sqrt(np.diag(self.normal)[places])
-        usable = sizes > 0.0
-        if not usable.any():
-            return 0.0, 0
-        places, sizes = places[usable], sizes[usable]
-        values, vectors = np.linalg.eigh(
-            self.normal[np.ix_(places, places)] / np.outer(sizes, sizes))
-        sound = values > _COLLINEAR
-        parts = (vectors.T @ (self.scores[places] / sizes))[sound]
-        return float(np.sum(parts ** 2 / values[sound])), int(np.count_nonzero(sound))
+    def _inverse(self, places: Integers) -> tuple[Array, int]:
+        """Return the inverse of the covariance of some scores, and its rank."""
+        values, vectors = np.linalg.eigh(self.normal[np.ix_(places, places)])
+        tested = values > _IN_THE_FIT
+        inverse: Array = vectors[:, tested] / values[tested] @ vectors[:, tested].T
+        return inverse, int(np.count_nonzero(tested))
 
 
 def lack_of_fit(platform: StewartPlatform, extracts: Extracts, unknowns: Unknowns, fit: Fit,
                 ) -> LackOfFit | None:
     """Return the lack of fit with its likeliest causes; None if nothing significant is left."""
+    def tested(geometry: bool) -> tuple[Sequence[Cause], _Scores, Array, _Scores]:
+        causes = Causes(platform, unknowns, fit, _selected(extracts), geometry)
+        return _scores(causes, extracts, unknowns, fit)
+
     try:
-        for geometry in (False, True):
-            causes = Causes(platform, unknowns, fit, _selected(extracts), geometry)
-            scores, follow, squares = _scores(causes, extracts, unknowns, fit)
-            if not geometry and max(each.deviations for each in _tested(causes.all, scores)) < (
-                    _SUSPICIOUS):
-                return None
+        causes, scores, _, _ = tested(geometry=False)
+        if not _ranked(causes, scores, _SUSPICIOUS):
+            return None
+        causes, scores, follow, plain = tested(geometry=True)
     except (PoseError, SingularityError):
         return None
-    found: list[Found] = []
-    others: tuple[Found, ...] = ()
-    taken: Integers = np.zeros(0, dtype=np.int64)
-    now = scores
-    for turn in range(_CAUSES + 1):
-        ranked = sorted((each for each in _tested(causes.all, now) if each.deviations > _NOTICE),
-                        key=lambda each: each.columns * _PENALTY - each.statistic)
-        if not ranked or turn == _CAUSES:
-            break
-        if not turn:
-            gain = 0.9 * (ranked[0].statistic - _PENALTY * ranked[0].columns)
-            others = tuple(each for each in ranked[1:] if each.what != ranked[0].what
-                           and each.statistic - _PENALTY * each.columns > gain)
-        found.append(ranked[0])
-        taken = np.union1d(taken, ranked[0].places)
-        now = scores.without(taken)
-    if not found:
+    likely = ranked = _ranked(causes, scores, _NOTICE)
+    if not likely:
         return None
-    amounts = scores.amounts(taken)
-    first = squares.statistic(found[0].places)[0] / squares.squares
-    return LackOfFit(tuple(found), others, _WIDENING * np.abs(follow[:, taken] @ amounts),
-                     math.sqrt(max(0.0, 1.0 - first)), bool(ranked) or found[0].what == UNKNOWN)
+    found: list[Found] = []
+    while ranked and len(found) < _CAUSES:
+        found.append(ranked[0])
+        taken: Integers = np.unique(np.concatenate([each.places for each in found]))
+        ranked = _ranked(causes, scores.without(taken), _NOTICE)
+    best = found[0]
+    others = tuple(each for each in likely if each.what != best.what
+                   and each.gain > _AS_LIKELY * best.gain)
+    of_best = plain.explained(best.places).statistic / plain.squares
+    shifts = np.abs(follow[:, taken] @ scores.explained(taken).amounts)
+    return LackOfFit(tuple(found), others, _WIDENING * shifts,
+                     math.sqrt(max(0.0, 1.0 - of_best)), bool(ranked) or best.what == UNKNOWN)
 
 
-def _tested(causes: Sequence[Cause], scores: _Scores) -> Iterator[Found]:
+def _ranked(causes: Sequence[Cause], scores: _Scores, significance: float) -> list[Found]:
+    """Return the significant causes, the likeliest first."""
+    found = []
     for cause in causes:
-        statistic, freedom = scores.statistic(cause.places)
-        if freedom:
-            text = cause.described(scores.amounts(cause.places))
-            yield Found(cause.what, text, statistic, freedom, deviations(statistic, freedom),
-                        cause.places)
+        amounts, statistic, freedom = scores.explained(cause.places)
+        if freedom and deviations(statistic, freedom) > significance:
+            found.append(Found(cause.what, cause.described(amounts), statistic, freedom,
+                               deviations(statistic, freedom), cause.places))
+    return sorted(found, key=lambda each: -each.gain)
 
 
 def deviations(statistic: float, freedom: int) -> float:
@@ -213,50 +234,44 @@ def _selected(extracts: Extracts) -> Iterator[Extract]:
 
 
 def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
-            ) -> tuple[_Scores, Array, _Scores]:
-    """Return weighted sums, derivatives of unknowns by columns (k, m), and plain sums."""
-    theta, bags = unknowns.theta(fit.values), len(fit.delays)
+            ) -> tuple[Sequence[Cause], _Scores, Array, _Scores]:
+    """
+    Return the causes, weighted sums, derivatives of unknowns by columns (k, m), and plain sums.
+
+    The spectra of all extracts are weighted by leg, as in the fit, and kept in a file. The
+    residuals that are left when all causes are fitted to them give the weights of each frequency.
+    """
     known = fit.identifiability.known
-    inner = known.shape[1] + bags  # known directions, then the delays
+    of_causes: Sequence[Cause] = ()
+    inner = known.shape[1] + len(fit.delays)  # known directions, then the delays
+    lengths: list[int] = []
+    gram: Array = np.zeros(())
+    plain: Array = np.zeros(())
     with tempfile.TemporaryFile() as file:
-        gram: Array = np.zeros(())
-        plain: Array = np.zeros(())
-        lengths: list[int] = []
         for extract in _selected(extracts):
             bag, used = extract.bag, extract.used[..., None]
             columns = extract.columns * used
-            e = columns @ directions(unknowns, fit.values, fit.delays[bag],
-                                     bool(fit.delay_errors[bag]))
-            delays = np.zeros((*e.shape[:2], bags))
+            e = columns @ directions(
+                unknowns, fit.values, fit.delays[bag], bool(fit.delay_errors[bag]))
+            delays = np.zeros((*e.shape[:2], len(fit.delays)))
             delays[..., bag] = e[..., -1]
-            residuals = columns @ residual_of(theta, fit.delays[bag])
-            of_causes = causes.columns(extract, sum(lengths)) * used
-            whole = np.concatenate(
-                [e[..., :-1] @ known, delays, of_causes, residuals[..., None]], axis=-1)
+            added, of_causes = causes.columns(extract, sum(lengths))
+            residuals = columns @ residual_of(unknowns.theta(fit.values), fit.delays[bag])
             sizes = np.sqrt(fit.variances[bag])[:, None]
-            spectra = _spectra(whole / sizes)
-            flat = spectra.reshape(-1, spectra.shape[-1])
-            gram = gram + flat.T @ flat
-            flat = (sizes * spectra).reshape(flat.shape)
-            plain = plain + flat.T @ flat
+            spectra = _spectra(np.concatenate([
+                e[..., :-1] @ known, delays, added * used, residuals[..., None]], axis=-1) / sizes)
+            gram, plain = gram + _gram(spectra), plain + _gram(sizes * spectra)
             np.save(file, spectra)
-            lengths.append(len(whole))
-        # First weight by leg alone, as in the fit, then by the spectra of the residuals.
-        inverse = _inverse(gram[:-1, :-1])
-        rest = inverse @ gram[:-1, -1]
+            lengths.append(len(columns))
         file.seek(0)
-        weighted = np.zeros_like(gram)
+        inverse = _inverse(gram[:-1, :-1])
+        weighted: Array = np.zeros(())
         for samples in lengths:
-            flat = _whitened(np.load(file), rest, inverse, samples).reshape(-1, len(gram))
-            weighted += flat.T @ flat
+            weighted = weighted + _gram(
+                _whitened(np.load(file), inverse @ gram[:-1, -1], inverse, samples))
     follow = -_inverse(gram[:inner, :inner]) @ gram[:inner, inner:-1]
-
-    def beside_the_fit(sums: Array) -> _Scores:
-        found = _Scores(sums[:-1, :-1], sums[:-1, -1], float(sums[-1, -1])).without(
-            np.arange(inner))
-        return found._replace(normal=found.normal[inner:, inner:], scores=found.scores[inner:])
-
-    return (beside_the_fit(weighted), known @ follow[:known.shape[1]], beside_the_fit(plain))
+    return (of_causes, _Scores.of(weighted, inner), known @ follow[:known.shape[1]],
+            _Scores.of(plain, inner))
 
 
 def _spectra(columns: Array) -> Array:
@@ -270,6 +285,12 @@ def _spectra(columns: Array) -> Array:
     return parts
 
 
+def _gram(spectra: Array) -> Array:
+    flat = spectra.reshape(-1, spectra.shape[-1])
+    gram: Array = flat.T @ flat
+    return gram
+
+
 def _whitened(spectra: Array, rest: Array, inverse: Array, samples: int) -> Array:
     """Return the columns (F, 2, 6, m), whitened by the residuals of a fit with all causes."""
     left = spectra[..., -1] - spectra[..., :-1] @ rest
@@ -277,8 +298,8 @@ def _whitened(spectra: Array, rest: Array, inverse: Array, samples: int) -> Arra
     flat = spectra[..., :-1].reshape(-1, len(rest))
     free = 1.0 - np.sum((flat @ inverse) * flat, axis=1).reshape(left.shape)
     width = max(_FEWEST, round(_SMOOTHING * samples))
-    power, share = (_smoothed(each.sum(axis=1), width) for each in (left ** 2, free))
-    deviations = np.sqrt(power / np.maximum(share, 1e-3 * 4 * width) + 1e-30)
+    power, share = (smoothed(each.sum(axis=1), width) for each in (left ** 2, free))
+    deviations = np.sqrt(power / np.maximum(share, _LEAST_FREE) + 1e-30)
     white = left / deviations[:, None]
     along = white.reshape(-1, 6)
     correlation = along.T @ along
@@ -288,15 +309,6 @@ def _whitened(spectra: Array, rest: Array, inverse: Array, samples: int) -> Arra
     root = vectors / np.sqrt(np.maximum(values, 0.05)) @ vectors.T
     result: Array = root @ (spectra / deviations[:, None, :, None])
     return result
-
-
-def _smoothed(values: Array, width: int) -> Array:
-    """Return running sums (F, 6) over 2 width + 1 frequencies, mirrored at both ends."""
-    width = min(width, len(values) - 1)
-    whole = np.concatenate([values[width:0:-1], values, values[-2:-width - 2:-1]])
-    sums = np.cumsum(np.concatenate([np.zeros((1, values.shape[1])), whole]), axis=0)
-    smooth: Array = sums[2 * width + 1:] - sums[:-2 * width - 1]
-    return smooth
 
 
 def _inverse(matrix: Array) -> Array:
