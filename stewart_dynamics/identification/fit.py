@@ -65,26 +65,24 @@ class Fit(NamedTuple):
     """Names of parameters that would be inconsistent or negative without the bounds."""
 
 
-def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None, prior: float | None = None,
+def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None,
         cutoffs: Array | None = None) -> Fit:
     """
     Return the unknowns that fit the samples of B bags best.
 
-    ``noise`` (6, n, n) are the sums of the noise in the regressor alone. ``prior`` is the standard
-    error of the file's values as a fraction of the scales; without it they do not count. Delays
-    are estimated if the cut-off frequencies of the bags (B,) [Hz] are given, else zero.
+    ``noise`` (6, n, n) are the sums of the noise in the regressor alone. Delays are estimated if
+    the cut-off frequencies of the bags (B,) [Hz] are given, else zero.
     """
-    found = _fit(sums, unknowns, unknowns.scales, noise, prior, cutoffs)
+    found = _fit(sums, unknowns, unknowns.scales, noise, cutoffs)
     unknown = found.identifiability.known_shares < LEAST_SHARE
     if not unknown.any():
         return found
     # Weakly identifiable parameters keep the value from the file.
-    found = _fit(sums, unknowns, np.where(unknown, _HELD, 1.0) * unknowns.scales, noise, prior,
-                 cutoffs)
+    found = _fit(sums, unknowns, np.where(unknown, _HELD, 1.0) * unknowns.scales, noise, cutoffs)
     return found._replace(values=np.where(unknown, unknowns.start, found.values))
 
 
-def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, prior: float | None,
+def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None,
          cutoffs: Array | None) -> Fit:
     values = unknowns.start.copy()
     bags = len(sums.counts)
@@ -95,11 +93,9 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
     for _ in range(_STEPS):
         information, steps, of_noise = _information(
             sums, unknowns, values, delays, variances, noise, cutoffs)
-        if prior is not None:
-            strength = strength_of(unknowns, prior)
-            information = information._replace(
-                matrix=information.matrix + strength,
-                vector=information.vector + strength @ unknowns.start)
+        information = information._replace(
+            matrix=information.matrix + unknowns.strength,
+            vector=information.vector + unknowns.strength @ unknowns.start)
         solution = solve(information, unknowns.start, scales, of_noise)
         change = solution.values - values
         largest = float(np.max(np.abs(change) / unknowns.scales, initial=0.0))
@@ -125,14 +121,8 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
                information.matrix, at_bound)
 
 
-def strength_of(unknowns: Unknowns, prior: float | None) -> Array:
-    """Return the information (k, k) of the file's values; zero without a prior."""
-    return np.diag(np.zeros(len(unknowns.scales)) if prior is None else (
-        prior * unknowns.scales) ** -2.0)
-
-
 def shift_of_noise(clean: Sums, noisy: Sums, unknowns: Unknowns, found: Fit,
-                   cutoffs: Array | None = None, prior: float | None = None) -> Array:
+                   cutoffs: Array | None) -> Array:
     """
     Return the bias (k,) of the unknowns by noise of lengths and rates, to first order.
 
@@ -145,7 +135,7 @@ def shift_of_noise(clean: Sums, noisy: Sums, unknowns: Unknowns, found: Fit,
     for sums in (clean, noisy):
         information, _, _ = _information(
             sums, unknowns, found.values, found.delays, found.variances, None, cutoffs)
-        inner = known.T @ (information.matrix + strength_of(unknowns, prior)) @ known
+        inner = known.T @ (information.matrix + unknowns.strength) @ known
         steps.append(known @ np.linalg.pinv(inner, hermitian=True) @ (
             known.T @ (information.vector - information.matrix @ found.values)))
     shift: Array = steps[1] - steps[0]

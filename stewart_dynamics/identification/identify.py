@@ -42,7 +42,7 @@ from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (
     LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
-from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs, Topics
+from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
@@ -71,25 +71,27 @@ _SEED = 20221
 
 
 class BagRead(NamedTuple):
-    """Data of a bag that was read, besides its extracts."""
+    """Data of a bag that was read, besides its extracts, by the names of identification.json."""
 
-    path: Path
-    topics: Topics
+    bag: Path
     samples: int
     seconds: float
-    period: float
-    cutoff: float
+    period_s: float
+    cutoff_hz: float
     rates: bool
-    lag: float
-    """Time by which the efforts were shifted beforehand [s]; delays of the fit are added."""
-    rejected: dict[str, int]
-    windows_left_out: int
+    pieces_left_out: int
     """Number of windows between gaps that are too short for the filters."""
-    stops: int
-    outliers: int
-    deviations: tuple[float, float]
+    samples_at_stops: int
+    samples_outliers: int
+    noise_of_lengths_m: float
+    noise_of_rates_m_s: float | None
+    delay_s: float
+    """Time by which the efforts were shifted beforehand; delays of the fit are added."""
+    rejected: dict[str, int]
     missing: list[str]
     notices: list[str]
+    legs: str = ''
+    efforts: str = ''
 
 
 class Residuals(NamedTuple):
@@ -153,7 +155,7 @@ class Identification:
                 parameters['drive.torque_constant'] if options.motor_current else 1.0)
         self.parameters, self._options = parameters, options
         self.platform = StewartPlatform(parameters)
-        self.unknowns = Unknowns(parameters, options.kinds)
+        self.unknowns = Unknowns(parameters, options.kinds, options.prior)
         self.extracts = Extracts()
         self.bags: list[BagRead] = []
         self._first: tuple[Extraction, Window] | None = None
@@ -178,9 +180,8 @@ class Identification:
                        else ', '.join(f'{count} messages {why}' for why, count in
                                       legs.rejected.items()) or 'no messages'))
             self.bags[-1] = bag._replace(
-                topics=topics, samples=legs.samples, rejected=dict(legs.rejected),
-                missing=list(recording.missing),
-                notices=[*recording.notices, *bag.notices])
+                **topics._asdict(), samples=legs.samples, rejected=dict(legs.rejected),
+                missing=list(recording.missing), notices=[*recording.notices, *bag.notices])
 
     def add(self, path: Path, windows: Iterable[Window]) -> BagRead | None:
         """Add the windows of a bag; return None if none of them is usable."""
@@ -214,16 +215,16 @@ class Identification:
             if is_first:
                 self._add_noise(extraction, window, last)
             self._speeds = extraction.speeds
-            rates = np.abs(last.extract.legs[..., 1])
+            speeds = np.abs(last.extract.legs[..., 1])
             counts.update({
                 'samples': len(window.positions), 'stops': last.stops,
-                'outliers': int(np.count_nonzero(window.outliers)), 'rates': rates.size,
-                'slow rates': int(np.count_nonzero(
-                    rates < self.parameters['actuator.coulomb_velocity']))})
+                'outliers': int(np.count_nonzero(window.outliers)), 'speeds': speeds.size,
+                'slow': int(np.count_nonzero(
+                    speeds < self.parameters['actuator.coulomb_velocity']))})
             end = window.begin + round(len(window.positions) * window.period * 1e9)
         if extraction is None or last is None:
             return None
-        period = window.period
+        period, rates = window.period, window.rates is not None
         if extraction.cutoff < options.cutoff:
             notices.append(f'sampled at {1.0 / period:.4g} Hz: the cut-off frequency is '
                            f'{extraction.cutoff:.3g} Hz')
@@ -231,16 +232,16 @@ class Identification:
         if (self.extracts.samples - before) * extraction.step * period < short:
             notices.append(f'less than {short:.3g} s are left by the filters: intervals are too '
                            'narrow for so short a recording')
-        inside = counts['slow rates'] / counts['rates']
+        inside = counts['slow'] / counts['speeds']
         if inside > _MOST_INSIDE and any(
                 'coulomb_friction' in name for name in self.unknowns.names):
             notices.append(
                 f'{100.0 * inside:.0f} % of the rates are below actuator.coulomb_velocity: '
                 'Coulomb friction is linear there, and its value depends on that parameter')
         self.bags.append(BagRead(
-            path, Topics('', ''), counts['samples'], (end - begin) * 1e-9, period,
-            extraction.cutoff, window.rates is not None, lag * period, {}, counts['left out'],
-            counts['stops'], counts['outliers'], last.deviations, [], notices))
+            path, counts['samples'], (end - begin) * 1e-9, period, extraction.cutoff,
+            rates, counts['left out'], counts['stops'], counts['outliers'], last.deviations[0],
+            last.deviations[1] if rates else None, lag * period, {}, [], notices))
         return self.bags[-1]
 
     def _extraction(self, window: Window) -> Extraction:
@@ -271,7 +272,8 @@ class Identification:
         self.platform = StewartPlatform(self.parameters)
         _, below = self._lag(self._extraction(window), window)
         if below < _BETTER * misfit:
-            self.unknowns = Unknowns(self.parameters, self._options.kinds)
+            self.unknowns = Unknowns(
+                self.parameters, self._options.kinds, self._options.prior)
             return True
         self.parameters, self.platform = parameters, platform
         return False
@@ -302,27 +304,27 @@ class Identification:
         """Fit all bags and return the result."""
         options, unknowns, extracts = self._options, self.unknowns, self.extracts
         if extracts.samples < _FEWEST:
-            raise BagError(f'{self.bags[0].path}: {extracts.samples} samples are left after '
+            raise BagError(f'{self.bags[0].bag}: {extracts.samples} samples are left after '
                            f'the filters: must be at least {_FEWEST}')
         sums = sums_of(extracts)
         if sums.counts.sum(axis=0).min() < _FEWEST:
-            raise BagError(f'{self.bags[0].path}: nothing to identify from: '
-                           f'{sum(bag.stops for bag in self.bags)} samples are at an end stop or '
-                           'at limits.force_max')
+            raise BagError(f'{self.bags[0].bag}: nothing to identify from: '
+                           f'{sum(bag.samples_at_stops for bag in self.bags)} samples are at an '
+                           'end stop or at limits.force_max')
         unsound = 6 * extracts.samples - int(sums.counts.sum())
         clean, noisy, grams, samples = zip(*self._noises, strict=True)
         noise = sum(grams) * (extracts.samples / sum(samples))
-        found = fit(sums, unknowns, noise, options.prior, self._cutoffs)
+        found = fit(sums, unknowns, noise, self._cutoffs)
         outliers = self._leave_out_outliers(found)
         if outliers:
             sums = sums_of(extracts)
-            found = fit(sums, unknowns, noise, options.prior, self._cutoffs)
-        likely = [*of_delay(bag.lag + delay for bag, delay in zip(
+            found = fit(sums, unknowns, noise, self._cutoffs)
+        likely = [*of_delay(bag.delay_s + delay for bag, delay in zip(
                       self.bags, found.delays, strict=True)),
                   *of_efforts(sums, unknowns, self.parameters, self._per_effort is not None)]
-        errors = errors_of(extracts, sums, unknowns, found, options.prior)
-        shift = shift_of_noise(Sums.stacked(clean), Sums.stacked(noisy), unknowns, found,
-                               self._cutoffs, options.prior)
+        errors = errors_of(extracts, sums, unknowns, found)
+        shift = shift_of_noise(
+            Sums.stacked(clean), Sums.stacked(noisy), unknowns, found, self._cutoffs)
         errors = errors._replace(covariance=errors.covariance + np.outer(shift, shift))
         residuals = Residuals.of(sums, unknowns, found)
         lack = lack_of_fit(self.platform, extracts, unknowns, found)
@@ -337,7 +339,7 @@ class Identification:
 
     @property
     def _cutoffs(self) -> Array | None:
-        return np.array([bag.cutoff for bag in self.bags]) if self._options.delay else None
+        return np.array([bag.cutoff_hz for bag in self.bags]) if self._options.delay else None
 
     def _leave_out_outliers(self, found: Fit) -> int:
         """Deselect efforts with outlying residuals; return their number."""
@@ -359,7 +361,7 @@ class Identification:
 
     def _validation(self, noise: Array) -> Residuals | None:
         """Return the residuals at the end of each bag with a fit to the rest."""
-        part, options = self._options.hold_out, self._options
+        part = self._options.hold_out
         ends = [bag.seconds * (1.0 - part) for bag in self.bags]
 
         def part_of(held_out: bool) -> Sums:
@@ -369,7 +371,7 @@ class Identification:
         test, train = part_of(True), part_of(False)
         if min(test.counts.sum(axis=0)) < _FEWEST or min(train.counts.sum(axis=0)) < _FEWEST:
             return None
-        found = fit(train, self.unknowns, noise * (1.0 - part), options.prior, self._cutoffs)
+        found = fit(train, self.unknowns, noise * (1.0 - part), self._cutoffs)
         return Residuals.of(test, self.unknowns, found)
 
     def close(self) -> None:

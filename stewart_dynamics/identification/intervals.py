@@ -35,7 +35,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.extraction import Extracts
-from stewart_dynamics.identification.fit import directions, Fit, strength_of, without_delay
+from stewart_dynamics.identification.fit import directions, Fit, without_delay
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 
@@ -53,9 +53,8 @@ class Errors(NamedTuple):
     delays: Array
 
 
-def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit,
-              prior: float | None = None) -> Errors:
-    """Return the standard errors of a fit to the sums of extracts, with the prior of the fit."""
+def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit) -> Errors:
+    """Return the standard errors of a fit to the sums of extracts."""
     theta, many = unknowns.theta(fit.values), len(fit.values)
     e_of_bags, alongs, alone = [], [], []
     for bag, delay in enumerate(fit.delays):
@@ -84,7 +83,7 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit,
     score = np.concatenate(scores) if scores else np.zeros((1, many))
     by_blocks = score.T @ score * len(score) / max(len(score) - 1, 1)
     known = fit.identifiability.known
-    inner = known.T @ (fit.matrix + strength_of(unknowns, prior)) @ known
+    inner = known.T @ (fit.matrix + unknowns.strength) @ known
     bread = known @ np.linalg.pinv(inner, hermitian=True) @ known.T
     candidates = [bread @ middle @ bread for middle in (by_frequency, by_blocks)]
     larger = np.sqrt(np.maximum(*(np.maximum(np.diag(each), 0.0) for each in candidates)))

@@ -23,9 +23,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
-from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, ROTATION, TWIST
+from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Stride of the poses that are computed in sequence; they are the guesses of the others.
@@ -79,24 +79,12 @@ def motions(platform: StewartPlatform, poses: Pose, rates: Array, accelerations:
     """
     Return rows of motion (N, MOTION) for poses, leg rates and leg accelerations (N, 6).
 
-    ``J_inv X' = L'`` and ``J_inv X'' = L'' - J_inv' X'``; the last term is the leg
-    acceleration at this twist without platform acceleration.
+    ``J_inv X' = L'`` and ``J_inv X'' = L'' - J_inv' X'``.
     """
-    p = platform.parameters
     rows = np.zeros((len(poses.rows), MOTION))
     rows[:, POSE] = poses.rows[:, POSE]
     j_inv = platform.inverse_jacobian(poses)
-    twists = np.linalg.solve(j_inv, rates[..., None])[..., 0]
-    rows[:, TWIST] = twists
-    rotation = rows[:, ROTATION].reshape(-1, 3, 3)
-    arms = np.einsum('nij,lj->nli', rotation, p['geometry.platform_joints'])
-    omega = twists[:, None, 3:]
-    joint_rates = twists[:, None, :3] + np.cross(omega, arms)
-    lengths = np.linalg.norm(
-        rows[:, None, :3] + arms - p['geometry.base_joints'], axis=-1)
-    # L'' = s . x'' + |x' across the leg|^2 / L
-    across = np.sum(joint_rates ** 2, axis=-1) - rates ** 2
-    drift = (np.einsum('nli,nli->nl', j_inv[:, :, :3], np.cross(omega, np.cross(omega, arms)))
-             + across / lengths)
-    rows[:, ACCELERATION] = np.linalg.solve(j_inv, (accelerations - drift)[..., None])[..., 0]
+    rows[:, TWIST] = np.linalg.solve(j_inv, rates[..., None])[..., 0]
+    drift = platform.inverse_jacobian_rate(Motion.of_rows(rows)) @ rows[:, TWIST, None]
+    rows[:, ACCELERATION] = np.linalg.solve(j_inv, accelerations[..., None] - drift)[..., 0]
     return rows

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
-import math
 import textwrap
 from typing import Any
 
@@ -54,16 +53,9 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
         'version': VERSION, 'software': software(),
         'date': datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ'),
         'bags': [{
-            'bag': str(bag.path), 'legs': bag.topics.legs, 'efforts': bag.topics.efforts,
-            'samples': bag.samples, 'seconds': bag.seconds, 'period_s': bag.period,
-            'cutoff_hz': bag.cutoff, 'rates': bag.rates,
-            'rejected': bag.rejected, 'pieces_left_out': bag.windows_left_out,
-            'samples_at_stops': bag.stops, 'samples_outliers': bag.outliers,
-            'noise_of_lengths_m': bag.deviations[0], 'noise_of_rates_m_s': _plain(
-                bag.deviations[1]),
-            'delay_s': float(delay + bag.lag) if error else None,
+            **bag._asdict(), 'bag': str(bag.bag),
+            'delay_s': float(delay + bag.delay_s) if error else None,
             'delay_standard_error_s': float(error) if error else None,
-            'missing': bag.missing, 'notices': bag.notices,
         } for bag, delay, error in zip(
             found.bags, found.fit.delays, found.errors.delays, strict=True)],
         'options': {
@@ -112,10 +104,6 @@ def _residuals(joints: Sequence[str], residuals: Residuals) -> dict[str, Any]:
     return {'legs': {joint: {key: float(values[leg]) for key, values in rms.items()}
                      for leg, joint in enumerate(joints)},
             **{key: float(np.sqrt(np.mean(values ** 2))) for key, values in rms.items()}}
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:

@@ -73,7 +73,8 @@ class Unknowns:
     """
     The k parameters to be identified: those of KINDS in ``kinds``.
 
-    The file's parameters give the scales, and the values of all other parameters.
+    The file's parameters give the scales, and the values of all other parameters. ``prior`` is
+    the standard error of the file's values by the scales; without it they do not count.
 
     Attributes
     ----------
@@ -93,10 +94,13 @@ class Unknowns:
         Indices of the leg parameters: after the platform's, before the tilt.
     tilt : Tilt or None
         Rotation of gravity; None: not to be identified.
+    strength : (k, k)
+        Information of the file's values; zero without a prior.
 
     """
 
-    def __init__(self, parameters: Parameters, kinds: Sequence[str] = DEFAULT) -> None:
+    def __init__(self, parameters: Parameters, kinds: Sequence[str] = DEFAULT,
+                 prior: float | None = None) -> None:
         self._parameters = p = parameters
         self._theta = linear_parameters(p)
         of_platform = np.zeros(PLATFORM, dtype=bool)
@@ -125,6 +129,8 @@ class Unknowns:
         self.scales: Array = np.concatenate([
             _platform_scales(p)[self._platform], _leg_scales(p)[legs],
             np.full(len(of_tilt), _TILT)])
+        self.strength: Array = np.diag(
+            np.zeros(len(self.scales)) if prior is None else (prior * self.scales) ** -2.0)
         mass, size = p['platform.mass'], _size(p)
         self.inertial_scales: Array = mass * np.repeat([1.0, size, size ** 2], [1, 3, 6])
         self.linear_scales: Array = np.concatenate([self.inertial_scales, _leg_scales(p)[legs]])
