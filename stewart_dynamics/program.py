@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 import io
 import os
 from pathlib import Path
@@ -183,6 +183,11 @@ def add_results(parser: argparse.ArgumentParser, default: str, strict: str) -> N
                         help=f'folder of the results (default: {default})')
     parser.add_argument('--force', action='store_true', help='replace results that exist')
     parser.add_argument('--strict', action='store_true', help=f'exit code 1 when {strict}')
+
+
+def arguments_of(given: argparse.Namespace, names: Container[str]) -> dict[str, Any]:
+    """Return the arguments with these names."""
+    return {name: value for name, value in vars(given).items() if name in names}
 
 
 def frequency(text: str) -> float:

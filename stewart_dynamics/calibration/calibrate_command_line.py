@@ -24,7 +24,7 @@ from stewart_dynamics.calibration import design_command
 from stewart_dynamics.program import (
     add_results, between, DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
 from stewart_dynamics.replay.replay_options import NODE
-from stewart_dynamics.reporting.estimates import FIXED, HOLD_OUT, IDENTIFIED
+from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 
 NOT_ALL_IDENTIFIED = 1
 _PROGRAM = Program('stewart_calibrate')
@@ -123,9 +123,7 @@ def _run(given: argparse.Namespace) -> int:
     if missing:
         _PROGRAM.complain(f'{given.poses}: part of it could not be read: {"; ".join(missing)}')
         return PARTLY_READ
-    everything = all(each['state'] in (IDENTIFIED, FIXED) for each in result['parameters'])
-    return NOT_ALL_IDENTIFIED if given.strict and not (
-        everything and result['lack_of_fit'] is None) else DONE
+    return NOT_ALL_IDENTIFIED if given.strict and not is_complete(result) else DONE
 
 
 def _names(text: str) -> tuple[str, ...]:

@@ -27,7 +27,7 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification.identification_options import (
     DesignOptions, IdentificationOptions)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.program import between, whole
+from stewart_dynamics.program import arguments_of, between, whole
 
 if TYPE_CHECKING:
     from stewart_dynamics.identification.design import Design
@@ -46,7 +46,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
                             'parameter file')
     group.add_argument('--duration', type=between(2.0, 3600.0), default=default.duration,
                        metavar='S', help='of the motion (default: %(default)g)')
-    group.add_argument('--highest-frequency', type=between(0.01, 100.0),
+    group.add_argument('--highest-frequency', dest='frequency', type=between(0.01, 100.0),
                        default=default.frequency, metavar='HZ',
                        help='of the motion, below --cutoff (default: %(default)g)')
     group.add_argument('--harmonics', type=whole(1, 50), default=default.harmonics, metavar='N',
@@ -78,17 +78,14 @@ def run(given: argparse.Namespace, parameters: Parameters) -> None:
         check_free, remove_abandoned, whole_folder)
     from tqdm import tqdm
 
-    if given.highest_frequency > given.cutoff:
-        raise StewartError(f'--highest-frequency {given.highest_frequency:g} Hz: must be at most '
+    if given.frequency > given.cutoff:
+        raise StewartError(f'--highest-frequency {given.frequency:g} Hz: must be at most '
                            f'--cutoff, {given.cutoff:g} Hz: nothing above passes the filter')
     folder = given.output or Path('designed')
     options = IdentificationOptions(force=given.force)
     check_free(folder, options, TRAJECTORY)
     remove_abandoned([folder])
-    asked = DesignOptions(
-        given.identify, given.duration, given.highest_frequency, given.harmonics, given.amplitude,
-        given.center and tuple(given.center), given.noise, given.rate, given.generations,
-        given.seed)
+    asked = DesignOptions(**arguments_of(given, DesignOptions._fields))
     print(f'designing a motion of {asked.duration:g} s in {asked.generations} generations: takes '
           'about half a minute on an idle computer, minutes on a loaded one',
           file=sys.stderr, flush=True)

@@ -25,9 +25,10 @@ from stewart_dynamics.identification.identification_options import (
     CUTOFF, IdentificationOptions)
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
 from stewart_dynamics.program import (
-    add_results, between, DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
+    add_results, arguments_of, between, DONE, interrupt_on_signals, node_name, PARTLY_READ,
+    Program)
 from stewart_dynamics.replay.replay_options import NODE
-from stewart_dynamics.reporting.estimates import HOLD_OUT
+from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 
 NOT_ALL_IDENTIFIED = 1
 _PROGRAM = Program('stewart_identify')
@@ -60,7 +61,8 @@ def _arguments() -> argparse.ArgumentParser:
                              'the node takes')
     add_results(parser, 'identified', 'a requested parameter is not identifiable')
     parser.set_defaults(output=None)  # --design has another one
-    parser.add_argument('--no-report', action='store_true', help='write no report.html')
+    parser.add_argument('--no-report', dest='report', action='store_false',
+                        help='write no report.html')
     topics = parser.add_argument_group('topics')
     topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
                         help=f'name before the usual topic, NAME/measured_legs (default: {NODE})')
@@ -69,7 +71,7 @@ def _arguments() -> argparse.ArgumentParser:
     topics.add_argument('--efforts', metavar='TOPIC',
                         help='another JointState with the efforts, at stamps of its own')
     what = parser.add_argument_group('what is identified, and how')
-    what.add_argument('--identify', type=_kinds, default=DEFAULT, metavar='LIST',
+    what.add_argument('--identify', dest='kinds', type=_kinds, default=DEFAULT, metavar='LIST',
                       help=f'of {", ".join(KINDS)}, with commas (default: {",".join(DEFAULT)}); '
                            'tilt is the direction of gravity, for a base that is not level')
     motors = what.add_mutually_exclusive_group()
@@ -87,7 +89,7 @@ def _arguments() -> argparse.ArgumentParser:
     what.add_argument('--hold-out', type=between(0.0, 0.9), default=HOLD_OUT, metavar='PART',
                       help='end of each bag that validates a fit to the rest; 0: none '
                            f'(default: {HOLD_OUT:g})')
-    what.add_argument('--no-delay', action='store_true',
+    what.add_argument('--no-delay', dest='delay', action='store_false',
                       help='efforts are not delayed; by default the delay is estimated')
     what.add_argument('--accept-mistakes', action='store_true',
                       help='write results although a mistake is likely')
@@ -104,10 +106,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
-    options = IdentificationOptions(
-        given.node, given.measured, given.efforts, given.identify, given.motor_torque,
-        given.motor_current, given.cutoff, given.prior, given.hold_out, not given.no_delay,
-        given.accept_mistakes, not given.no_report, given.force)
+    options = IdentificationOptions(**arguments_of(given, IdentificationOptions._fields))
     parameters = Parameters.from_yaml(given.params, given.node)
     if given.design:
         design_command.run(given, parameters)
@@ -124,10 +123,7 @@ def _run(given: argparse.Namespace) -> int:
         _PROGRAM.complain(text)
     if missing:
         return PARTLY_READ
-    everything = all(each['state'] == 'identified' and not each['at_bound']
-                     for each in result['parameters'])
-    return NOT_ALL_IDENTIFIED if given.strict and not (
-        everything and result['lack_of_fit'] is None) else DONE
+    return NOT_ALL_IDENTIFIED if given.strict and not is_complete(result) else DONE
 
 
 def _kinds(text: str) -> tuple[str, ...]:

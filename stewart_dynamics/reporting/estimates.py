@@ -182,6 +182,13 @@ def grouped(names: Sequence[str]) -> list[str]:
             for begin, ends in groups.items()]
 
 
+def is_complete(result: Mapping[str, Any]) -> bool:
+    """Return whether the model fits, and all parameters are identified within bounds or fixed."""
+    return result['lack_of_fit'] is None and all(
+        each['state'] in (IDENTIFIED, FIXED) and not each['at_bound']
+        for each in result['parameters'])
+
+
 def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of the template ``estimates.html``."""
     def drawn(each: Mapping[str, Any]) -> dict[str, Any]:
