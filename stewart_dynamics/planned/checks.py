@@ -134,7 +134,7 @@ class Checks:
         self._rises = np.zeros(6)
 
     def check(self, samples: Samples) -> list[int]:
-        """Check samples and what lies between them; return after which closer ones are needed."""
+        """Check samples and between them; return after which of them closer ones are needed."""
         self._check_joints(samples)
         unclear = {*self._check_motors(samples), *self._check_clearance(samples)}
         finite = np.isfinite(samples.results).all(axis=1)

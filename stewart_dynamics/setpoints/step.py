@@ -319,30 +319,29 @@ class Step:
             State of the previous output; None for the first setpoint.
 
         """
-        stamp = setpoint.stamp
-        singularity, followed_at, followed, windings = before or State()
-        elapsed = math.inf
-        if stamp > followed_at and not setpoint.restart:
-            elapsed = (stamp - followed_at) * 1e-9 + (
-                self._slack if setpoint.stamped else self._slack_of_arrival)
+        before = before or State()
+        stamp, since, elapsed = setpoint.stamp, 0.0, math.inf
+        if stamp > before.stamp and not setpoint.restart:
+            since = (stamp - before.stamp) * 1e-9
+            elapsed = since + (self._slack if setpoint.stamped else self._slack_of_arrival)
         _GIVEN.pack_into(
             self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
-            *(setpoint.base or NO_BASE), *(singularity or _FIRST).numbers,
-            *(followed or _NO_LENGTHS), elapsed, setpoint.restart,
+            *(setpoint.base or NO_BASE), *(before.singularity or _FIRST).numbers,
+            *(before.lengths or _NO_LENGTHS), elapsed, setpoint.restart,
             -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
         self._solve()
         written = _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
         if not written[_ANSWERED.start]:
             return None
-        lengths, rates, demanded = written[LENGTHS], written[RATES], written[FORCES]
-        forces = written[_FORCES] if written[_FORCES.start] == written[_FORCES.start] else None
-        after = Singularity.of(written[_AFTER])
-        solved = demanded[0] == demanded[0]
-        jumped = written[_JUMPED.start] > 0.0
-        exceedances = self._limits.exceeded(
-            lengths, rates, demanded if solved else None) if written[_EXCEEDING.start] else ()
-        if jumped and followed:
-            exceedances += self._limits.jumps(lengths, followed, elapsed)
+        lengths, rates = written[LENGTHS], written[RATES]
+        demanded = None if math.isnan(written[FORCES.start]) else written[FORCES]
+        forces = None if math.isnan(written[_FORCES.start]) else written[_FORCES]
+        singularity, jumped = Singularity.of(written[_AFTER]), written[_JUMPED.start] > 0.0
+        exceedances = (self._limits.exceeded(lengths, rates, demanded)
+                       if written[_EXCEEDING.start] else ())
+        if jumped and before.lengths:
+            exceedances += self._limits.jumps(lengths, before.lengths, elapsed)
+        # Limits that are not checked by machine code.
         of_pose: tuple[Exceedance, ...] = ()
         angles: tuple[float, ...] = ()
         if self._angles_of_one is not None:
@@ -352,54 +351,31 @@ class Step:
         if self._clearance_of_one is not None:
             clearances, nearest = self._clearance_of_one()
             of_pose += self._limits.exceeded_clearance(clearances, nearest)
-        motors: tuple[float, ...] = ()
-        of_motors: tuple[Exceedance, ...] = ()
-        if self._motors is not None:
-            since = 0.0 if elapsed == math.inf else (stamp - followed_at) * 1e-9
-            motors, of_motors, after_it = self._motors(since, windings)
-            windings = windings if jumped else after_it
+        motors, of_motors, windings = self._motors(since, before.windings) if (
+            self._motors is not None) else ((), (), before.windings)
         if self._limits_suppress and (of_pose or of_motors and motors[RUNNING.start]):
             forces = None
         return Output(
-            stamp, lengths, rates, demanded if solved else None, forces,
-            written[UNIT_LOAD_FORCES], written[DETERMINANT], written[DETERMINANT_RATE],
-            written[CONDITION], after,
-            singularity is None or after.warning != singularity.warning,
+            stamp, lengths, rates, demanded, forces, written[UNIT_LOAD_FORCES],
+            written[DETERMINANT], written[DETERMINANT_RATE], written[CONDITION], singularity,
+            before.singularity is None or singularity.warning != before.singularity.warning,
             exceedances + of_pose + of_motors, angles, clearances, motors,
-            State(after, followed_at, followed, windings) if jumped
-            else State(after, stamp, lengths, windings))
+            before._replace(singularity=singularity) if jumped
+            else State(singularity, stamp, lengths, windings))
 
     def many(self, setpoints: Batch, before: State | None) -> Outputs:
         """Return the outputs of a sequence of setpoints, as calls for one setpoint would."""
-        results = self._platform.solve(
-            setpoints.motions, setpoints.wrenches, setpoints.bases)
-        n_setpoints = len(results)
-        singularity, stamp, lengths, windings = before or State()
-        state = np.array((singularity or _FIRST).numbers)
-        followed_at, followed = np.array([stamp]), np.array(lengths or _NO_LENGTHS)
-        forces, states = np.empty((n_setpoints, 6)), np.empty((n_setpoints, STATE))
-        answered, exceeding, jumped = (np.empty(n_setpoints, dtype=bool) for _ in range(3))
-        slack = np.full(n_setpoints, self._slack)
-        if setpoints.stamped is not None:
-            slack[~setpoints.stamped] = self._slack_of_arrival
-        check_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
-                   slack, state, followed_at, followed, results, forces, states, answered,
-                   exceeding, jumped)
-        stamps, motions = setpoints.stamps, setpoints.motions
-        restarts = setpoints.restarts
+        before = before or State()
+        outputs = self._checked(setpoints, before)
+        answered, forces, exceeding = outputs.answered, outputs.forces, outputs.exceeding
+        motions, restarts = setpoints.motions, setpoints.restarts
         if not answered.all():
             # If one cannot be answered, the next one is the restart.
+            motions = motions[answered]
             restarts = np.diff(np.cumsum(restarts)[answered], prepend=0) > 0
-            stamps, motions, results, forces = (
-                stamps[answered], motions[answered], results[answered], forces[answered])
-            states, exceeding, jumped = states[answered], exceeding[answered], jumped[answered]
-        warnings = states[:, CAUSE] > 0.0
-        changed = np.empty(len(states), dtype=bool)
-        changed[:1] = singularity is None or warnings[:1] != singularity.warning
-        changed[1:] = warnings[1:] != warnings[:-1]
-        angles = np.empty((len(states), 0)) if self._angles is None else self._angles(motions)
-        clearances = (
-            np.empty((len(states), 0)) if self._clearance is None else self._clearance(motions))
+        none: Array = np.empty((len(forces), 0))
+        angles = none if self._angles is None else self._angles(motions)
+        clearances = none if self._clearance is None else self._clearance(motions)
         of_poses = {name: angles[:, ANGLES[name]] for name in self._limits.of_joints}
         if self._clearance is not None:
             of_poses[CLEARANCE_MIN] = clearances
@@ -408,20 +384,48 @@ class Step:
             exceeding |= exceeded
             if self._limits_suppress:
                 forces[exceeded] = np.nan
-        motors: Array = np.empty((len(states), 0))
+        motors, windings = none, before.windings
         if self._motors is not None:
             motors, windings = self._motors.many(
-                times_followed(stamps, restarts, jumped, stamp), jumped, motions, results, forces,
-                windings)
+                times_followed(outputs.stamps, restarts, outputs.jumped, before.stamp),
+                outputs.jumped, motions, outputs.results, forces, windings)
             exceeding |= motors[:, EXCEEDING.start] > 0.0
             if self._limits_suppress:
                 forces[motors[:, RUNNING.start] > 0.0] = np.nan
             motors[np.isnan(forces[:, 0]), TORQUES] = np.nan
+        return outputs._replace(joint_angles=angles, clearances=clearances, motors=motors,
+                                state=outputs.state._replace(windings=windings))
+
+    def _checked(self, setpoints: Batch, before: State) -> Outputs:
+        """Return the outputs as far as machine code checks them: no joints, no motors."""
+        results = self._platform.solve(
+            setpoints.motions, setpoints.wrenches, setpoints.bases)
+        number = len(results)
+        state = np.array((before.singularity or _FIRST).numbers)
+        followed_at = np.array([before.stamp])
+        followed = np.array(before.lengths or _NO_LENGTHS)
+        forces, states = np.empty((number, 6)), np.empty((number, STATE))
+        answered, exceeding, jumped = (np.empty(number, dtype=bool) for _ in range(3))
+        slack = np.full(number, self._slack)
+        if setpoints.stamped is not None:
+            slack[~setpoints.stamped] = self._slack_of_arrival
+        check_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
+                   slack, state, followed_at, followed, results, forces, states, answered,
+                   exceeding, jumped)
+        stamps = setpoints.stamps
+        if not answered.all():
+            stamps, results, forces, states, exceeding, jumped = (
+                each[answered] for each in (stamps, results, forces, states, exceeding, jumped))
+        singularity = before.singularity
+        warnings = states[:, CAUSE] > 0.0
+        changed = np.empty(len(states), dtype=bool)
+        changed[:1] = singularity is None or warnings[:1] != singularity.warning
+        changed[1:] = warnings[1:] != warnings[:-1]
         if len(states):
             singularity = Singularity.of(states[-1].tolist())
         a, b, c, d, e, f = followed.tolist()
+        none = np.empty((len(states), 0))
         return Outputs(
-            answered, stamps, results, forces, states, changed, exceeding, jumped, angles,
-            clearances, motors,
-            State(singularity, int(followed_at[0]), None if a != a else (a, b, c, d, e, f),
-                  windings))
+            answered, stamps, results, forces, states, changed, exceeding, jumped, none, none,
+            none, State(singularity, int(followed_at[0]),
+                        None if math.isnan(a) else (a, b, c, d, e, f)))
