@@ -180,6 +180,30 @@ def test_a_changed_source_is_compiled_anew(kept: Path, folder: Path) -> None:
     assert is_kept('scaled_sums')
 
 
+def test_modules_compiled_by_one_process_depend_on_their_own_sources_only(
+        kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module that does not compile leaves the others compiled."""
+    monkeypatch.setattr(os, 'cpu_count', lambda: 1)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    for name in SIGNS:
+        file_of(kept, name).unlink()
+    (tmp_path / 'unsuitable.py').write_text("""
+from stewart_dynamics.compilation.functions import entry_point
+
+@entry_point('f8[::1]')
+def unsuitable(numbers):
+    numbers[0] = sorted(3.0)
+""")
+    functions = [imported(name) for name in ('unsuitable', *SIGNS)]
+    with pytest.warns(RuntimeWarning, match='^unsuitable cannot be compiled: '):
+        prepare(functions)
+    assert [each.compiled for each in functions] == [False, True, True]
+    sources = [file_of(kept, name).read_bytes()[32:].partition(b'\n')[0] for name in SIGNS]
+    assert [b'/scaled_sums.py' in each for each in sources] == [True, False]
+    assert [b'/negative_sums.py' in each for each in sources] == [False, True]
+    assert all(b'compilation/compiler.py' in each for each in sources)
+
+
 def test_if_no_file_can_be_written_the_function_works_with_a_warning(
         kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('STEWART_DYNAMICS_CACHE_DIR', str(file_of(kept) / 'within'))

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-The program that compiles the entry points of one module; ``machine_code`` starts it.
+The program that compiles the entry points of modules; ``machine_code`` starts it.
 
-It writes a file: a line with the source files that it has read, on which the machine code depends,
+It writes a file for each module: a line with the source files that the machine code depends on,
 and an object file. A function is a symbol there, of the type ``void (int64_t *block)``, named by
 its module and its own name; ``functions.EntryPoint`` lays out the block. Only C's mathematical
 functions are called from there, nothing of Python or numba: no memory is allocated, and a function
@@ -24,6 +24,7 @@ that could raise an exception is rejected.
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable
 import gc
 from importlib import import_module
@@ -50,10 +51,16 @@ _SIGNATURE = 'void(CPointer(voidptr))'
 
 
 def object_file(module: str) -> bytes:
-    """Return the object file of a module's entry points, for this processor."""
+    """
+    Return the object file of a module's entry points, for this processor.
+
+    Functions that an earlier module has called already are not compiled again.
+    """
     entries = [each for each in vars(import_module(module)).values()
                if isinstance(each, EntryPoint) and each.function.__module__ == module]
-    for function, inline in (CALLED | {each.function: False for each in entries}).items():
+    CALLED.update((each.function, False) for each in entries)
+    while CALLED:
+        function, inline = CALLED.popitem()
         # error_model 'numpy': a division by zero gives inf or nan; an exception would be a branch
         # that keeps a loop from becoming vector code.
         register_jitable(error_model='numpy', forceinline=inline, no_cfunc_wrapper=True,
@@ -75,7 +82,7 @@ def object_file(module: str) -> bytes:
     for function in whole.functions:
         if function.is_declaration and not function.name.startswith('llvm.') and not hasattr(
                 math, function.name):
-            raise SystemExit(f'needs {function.name}, which machine code cannot call')
+            raise TypeError(f'needs {function.name}, which machine code cannot call')
     return cast('bytes', machine.emit_object(whole))
 
 
@@ -100,8 +107,25 @@ def from_block(block):
     return cast('Callable[[Any], None]', names['from_block'])
 
 
-def main(parent: int, module: str, target: str) -> None:
-    """Compile a module into a file; end when the parent process ends."""
+def _add_sources(module: str, found: dict[str, str]) -> None:
+    """Add the source files of a module and of all that it imports from the same packages."""
+    file = getattr(sys.modules.get(module), '__file__', None)
+    if not file or module in found:
+        return
+    found[module] = file.removeprefix(f'{PACKAGE}{os.sep}')
+    names = [module.rpartition('.')[0]]
+    for node in ast.parse(Path(file).read_bytes()).body:
+        if isinstance(node, ast.Import):
+            names += (each.name for each in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names += (node.module, *(f'{node.module}.{each.name}' for each in node.names))
+    for name in names:
+        if name.partition('.')[0] in ('stewart_dynamics', module.partition('.')[0]):
+            _add_sources(name, found)
+
+
+def main(parent: int, modules: list[str], folder: str) -> None:
+    """Compile modules into files, several processes beside one another; end with the parent."""
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(_POLL_SECONDS)
@@ -109,10 +133,19 @@ def main(parent: int, module: str, target: str) -> None:
 
     Thread(target=watch, daemon=True).start()
     gc.disable()  # the process ends soon, and the collector takes a tenth of the time
-    code = object_file(module)
-    packages = 'stewart_dynamics', module.partition('.')[0]
-    paths = '\t'.join(str(each.__file__).removeprefix(f'{PACKAGE}{os.sep}')
-                      for name, each in sys.modules.items()
-                      if name.partition('.')[0] in packages and each.__file__)
-    Path(f'{target}.new').write_bytes(paths.encode() + b'\n' + code)
-    Path(f'{target}.new').rename(target)
+    for module in modules:
+        try:
+            Path(folder, module).touch(exist_ok=False)
+        except FileExistsError:
+            continue  # another process compiles it
+        try:
+            code = object_file(module)
+            sources: dict[str, str] = {}
+            _add_sources(__name__, sources)
+            _add_sources(module, sources)
+            new = Path(folder, f'{module}.new')
+            new.write_bytes('\t'.join(sources.values()).encode() + b'\n' + code)
+            new.rename(new.with_suffix('.code'))
+        except Exception as exc:
+            reason = str(exc).strip().rpartition('\n')[2]
+            Path(folder, f'{module}.error').write_text(reason)

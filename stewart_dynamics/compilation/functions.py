@@ -15,7 +15,7 @@
 """
 Marks of the functions that are compiled, and how Python calls their machine code.
 
-numba compiles all entry points of a module at once, in a process of its own (``compiler``);
+numba compiles all entry points of a module at once, in other processes (``compiler``);
 programs load the machine code (``machine_code``) and never import numba. Where nothing can be
 compiled, the functions run as plain Python and give the same bits: no fast-math flag is set, so
 the compiler may neither reorder a sum nor fuse a product into it, and a sample computed in a
@@ -27,7 +27,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 import ctypes
 from functools import partial, update_wrapper
-import os
 from struct import pack, unpack
 from threading import Thread
 from typing import Any, cast, TypeVar
@@ -112,7 +111,7 @@ class EntryPoint:
 
     def _prepared(self) -> Callable[..., object]:
         if self._call is None:
-            machine_code.prepare(self.__module__)
+            machine_code.prepare([self.__module__])
             self._address = machine_code.address(self.__module__, self.function.__name__)
             if self._address:
                 native = ctypes.CFUNCTYPE(None)(self._address)  # lets other threads run
@@ -148,26 +147,7 @@ class EntryPoint:
 
 def prepare(functions: Iterable[EntryPoint]) -> None:
     """Load the machine code of functions; compile missing modules side by side."""
-    missing = [each for each in {each.__module__ for each in functions}
-               if not machine_code.load(each)]
-    remaining = iter(missing)  # shared by the threads
-    errors: list[RuntimeWarning] = []
-
-    def work() -> None:
-        for module in remaining:
-            try:
-                machine_code.prepare(module)
-            except RuntimeWarning as exc:  # where warnings are errors
-                errors.append(exc)
-
-    # Daemons instead of a pool: an interrupted program would wait for a pool.
-    threads = [Thread(target=work, daemon=True) for _ in missing[:os.cpu_count()]]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    if errors:
-        raise errors[0]
+    machine_code.prepare(each.__module__ for each in functions)
 
 
 class Preparation:

@@ -23,13 +23,14 @@ can have written it. Any other file is ignored, and replaced after the compilati
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import cache, partial
 from hashlib import sha256
 from importlib.metadata import distributions
 from importlib.util import find_spec
+import inspect
 import os
 from pathlib import Path
 import stat
@@ -48,6 +49,8 @@ _UNCOMPILED = ('the dynamics run uncompiled, with the same results but about a t
 PACKAGE = Path(__file__).parents[1]
 # The compiler optimizes the whole by itself. Users' settings of numba would be kept on disk.
 _NUMBA_SETTINGS = {'NUMBA_OPT': '1', 'NUMBA_LOOP_VECTORIZE': '0'}
+# numba imports these if they are there; they would take half of the time of a short compilation.
+_UNUSED = {'coverage': None, 'scipy': None}
 _LARGEST = 1 << 24  # bytes of a file; those of the package have less than 200 kB
 _DIGEST_SIZE = 32
 
@@ -105,21 +108,25 @@ def load(module: str) -> bool:
         _load(module, code) for folder in _folders() if (code := _kept(folder, module)))
 
 
-def prepare(module: str) -> None:
-    """Load a module's machine code, or compile it, which takes seconds."""
-    with _compiling[module]:
-        if load(module):
-            return
-        announce(f'compiling {module} for this processor: this takes seconds, only this once')
-        try:
-            code = _compile(module)
-        except (OSError, TypeError) as exc:  # TypeError: Python does not know where it is
-            _engines[module] = None
-            warnings.warn(f'{module} cannot be compiled: {exc}: {_UNCOMPILED}', RuntimeWarning,
-                          stacklevel=2)
-            return
-        _load(module, code)
-        _keep(module, code)
+def prepare(modules: Iterable[str]) -> None:
+    """Load the machine code of modules; compile the missing modules, which takes seconds."""
+    wanted = sorted(each for each in set(modules) if not load(each))
+    warned = []
+    with ExitStack() as locks:
+        for module in wanted:  # in the same order in all threads
+            locks.enter_context(_compiling[module])
+        missing = [each for each in wanted if not load(each)]
+        for module in missing:
+            announce(f'compiling {module} for this processor: this takes seconds, only this once')
+        for module, code, reason in _compiled(missing) if missing else ():
+            if code:
+                _load(module, code)
+                warned.append(_keep(module, code))
+            else:
+                _engines[module] = None
+                warned.append(f'{module} cannot be compiled: {reason}: {_UNCOMPILED}')
+    for text in filter(None, warned):  # last: where warnings are errors, they end the call
+        warnings.warn(text, RuntimeWarning, stacklevel=2)
 
 
 def target_machine() -> Any:
@@ -150,25 +157,37 @@ def _load(module: str, code: bytes) -> bool:
     return True
 
 
-def _compile(module: str) -> bytes:
-    """Return the compiler's answer: a line with the sources that it has read, an object file."""
+def _compiled(modules: Sequence[str]) -> Iterator[tuple[str, bytes, str]]:
+    """Yield modules, their code as the compiler answers it, and if there is no code the reason."""
     # The compiler reads this copy of the package, whatever the present folder is.
     paths = [str(PACKAGE.parent), *(os.path.abspath(path) for path in sys.path if path)]
-    with TemporaryDirectory() as folder:
-        target = Path(folder, 'answer')
-        settings = {name: text for name, text in os.environ.items() if name[:6] != 'NUMBA_'}
-        # In a session of its own, so that signals of the terminal do not reach it. It answers in
-        # a file, since Python may be configured to print at its start.
-        done = subprocess.run(
-            [sys.executable, '-I', '-c', f'import sys; sys.path = {paths!r}; from {__package__}.'
-             f'compiler import main; main{os.getpid(), module, str(target)!r}'],
-            cwd=folder, env=settings | _NUMBA_SETTINGS, stdin=subprocess.DEVNULL,
-            capture_output=True, check=False, start_new_session=True)
-        try:
-            return target.read_bytes()
-        except OSError as exc:
-            text = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]
-            raise OSError(text or f'{exc}') from exc
+    settings = {name: text for name, text in os.environ.items() if name[:6] != 'NUMBA_'}
+    codes, reasons = dict[str, bytes](), dict[str, str]()
+    reason = 'the compiler has ended without an answer'
+    try:
+        # The largest source first, so that all processes end at about the same time.
+        order = sorted(modules, key=lambda each: -len(inspect.getsource(sys.modules[each])))
+        with TemporaryDirectory() as folder, ExitStack() as stack:
+            programs = []
+            for _ in order[:os.cpu_count()]:
+                # In a session of its own, so that signals of the terminal do not reach it.
+                programs.append(program := subprocess.Popen(
+                    [sys.executable, '-I', '-S', '-c', f'import sys; sys.path = {paths!r}; '
+                     f'sys.modules.update({_UNUSED!r}); from {__package__}.compiler import main; '
+                     f'main{os.getpid(), order, folder!r}'],
+                    cwd=folder, env=settings | _NUMBA_SETTINGS, stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, errors='replace',
+                    start_new_session=True))
+                stack.callback(program.wait)
+                stack.callback(program.kill)  # first: where a signal handler has raised
+            for program in programs:
+                reason = program.communicate()[1].strip().rpartition('\n')[2] or reason
+            codes = {each.stem: each.read_bytes() for each in Path(folder).glob('*.code')}
+            reasons = {each.stem: each.read_text() for each in Path(folder).glob('*.error')}
+    except (OSError, TypeError) as exc:  # TypeError: Python does not know where it is
+        reason = str(exc)
+    for module in modules:
+        yield module, codes.get(module, b''), reasons.get(module, reason)
 
 
 # -- files ----------------------------------------------------------------------------------------
@@ -216,8 +235,8 @@ def folder_to_write() -> Path:
     return folder
 
 
-def _keep(module: str, code: bytes) -> None:
-    """Write the code of a module; RuntimeWarning if that is not possible."""
+def _keep(module: str, code: bytes) -> str:
+    """Write the code of a module; return why that is not possible, or nothing."""
     path = folder_to_write() / _file_name(module)
     # Renamed when it is complete: other processes read and write the same file.
     new = path.with_name(f'{path.name}.tmp.{uuid4().hex[:16]}')
@@ -229,7 +248,8 @@ def _keep(module: str, code: bytes) -> None:
     except OSError as exc:
         with suppress(OSError):
             new.unlink(missing_ok=True)
-        warnings.warn(NOT_KEPT.format(reason=exc.strerror), RuntimeWarning, stacklevel=3)
+        return NOT_KEPT.format(reason=exc.strerror)
+    return ''
 
 
 def _file_name(module: str) -> str:
