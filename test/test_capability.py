@@ -295,6 +295,31 @@ def test_a_leg_that_stays_close_to_its_limits_does_not_end_the_travel(gap: float
             home, [0.0, 0.0, 0.0, *turn], pivot) == free
 
 
+def gimbals(radius: float, spacing: float, first: float) -> Array:
+    """Return joints (6, 3) in three pairs on a circle, the pairs 120 degrees apart."""
+    half = math.asin(0.5 * spacing / radius)
+    angles = [first + 2.0 * math.pi / 3.0 * pair + side * half
+              for pair in range(3) for side in (-1.0, 1.0)]
+    return np.array([[radius * math.cos(angle), radius * math.sin(angle), 0.0]
+                     for angle in angles])
+
+
+def test_travels_of_a_published_hexapod_are_the_stated_ones() -> None:
+    """SIMONA Research Simulator of TU Delft: geometry of its software, travels as stated."""
+    upper, lower = gimbals(1.6, 0.2, math.pi / 3.0), gimbals(1.65, 0.6, 0.0)
+    nearest = [int(np.linalg.norm(lower - joint, axis=1).argmin()) for joint in upper]
+    platform = StewartPlatform(PLATFORM.parameters.replaced({
+        'geometry.base_joints': lower[nearest].ravel(),
+        'geometry.platform_joints': upper.ravel(),
+        'limits.length_min': 2.131, 'limits.length_max': 3.281}))
+    found = Capability(platform).travel(
+        Pose([0.0, 0.0, 2.39], np.eye(3)), np.concatenate([np.eye(6), -np.eye(6)])).value
+    moved, turned = found.reshape(2, 2, 3)[:, 0], np.degrees(found.reshape(2, 2, 3)[:, 1])
+    assert moved == pytest.approx(
+        np.array([[0.981, 1.031, 0.636], [1.259, 1.031, 0.678]]), abs=7e-4)
+    assert turned == pytest.approx(np.array([[25.9, 24.3, 41.6], [25.9, 23.7, 41.6]]), abs=0.05)
+
+
 def test_a_travel_from_outside_the_limits_is_zero() -> None:
     home = PLATFORM.home_pose()
     outside = Pose(home.position + [0.0, 0.0, 5.0], home.rotation)

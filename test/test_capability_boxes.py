@@ -82,6 +82,7 @@ def excesses(platform: StewartPlatform, poses: Pose, side: float) -> dict[str, A
                                      solved.condition_number - stop, np.inf)[:, None]}
     if p['limits.length_max'] is not None:
         found['length_max'] = solved.lengths - p['limits.length_max']
+    if p['limits.length_min'] is not None:
         found['length_min'] = p['limits.length_min'] - solved.lengths
     if p['limits.base_joint_angle_max'] is not None:
         for name, angles in zip(OF_JOINTS, platform.joint_angles(poses), strict=True):

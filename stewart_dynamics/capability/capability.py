@@ -196,7 +196,7 @@ class Capability:
 
         in_parts(solve, self.platform.constants, rows, copies(directions, shape),
                  copies(pivots, shape), values, codes, legs,
-                 scratch=(travel.SCRATCH + sum(map(len, self._plates)), travel.LEG))
+                 scratch=travel.memory_of(self._plates))
         if np.isnan(values).any():
             at = int(np.isnan(values).argmax())
             where = list(map(int, np.unravel_index(at, shape))) if shape else ''
@@ -212,7 +212,7 @@ class Capability:
 
         Lengths, joint angles, clearance of the legs, the condition number up to
         ``singularity.stop_condition``, and the sign of det(J), by branch and bound
-        (``capability.box``). The work is bounded: a box that is within the limits, but too near to
+        (``capability.box_cells``). The work is bounded: a box that is within the limits, but too near to
         a singularity, may be answered with ``certain`` False and a worst pose whose excess is
         negative.
 

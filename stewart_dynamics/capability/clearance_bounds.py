@@ -33,7 +33,9 @@ the hull of the base joint and of either end contains it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
+from typing import NamedTuple
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import compiled, inlined
@@ -41,16 +43,14 @@ from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE, between, f
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, norm, put3, read3, scale, subtract, Vector3)
 
-# A corner: where it is, its derivatives by the coordinates, and bounds of the rest, in the base
-# frame and in a frame that turns with the platform; and its arm where it is of the platform.
-RATES, STILL, TURNING, ARM, CORNER = 3, 21, 22, 23, 26
+# Columns of a corner: where it is, its derivatives by the coordinates, and bounds of the rest, in
+# the base frame and in a frame that turns with the platform; its arm where it is of the platform.
+PLACE, RATES, STILL, TURNING, ARM, CORNER = 0, 3, 21, 22, 23, 26
 # Corners of a leg: base joint, end of the cylinder (twice: no longer than the leg, as it is), and
 # platform joint. The plates of base and platform follow those of six legs.
 BASE_JOINT, CYLINDER, CYLINDER_END, PLATFORM_JOINT, OF_LEG = 0, 1, 2, 3, 4
 PLATES = 6 * OF_LEG
-# Rows behind the corners: derivatives of the rotation, and of n.
-MORE = 2
-BODIES = 4
+PAIRS_OF_BODIES = 4
 """Largest number of pairs of bodies of two legs."""
 
 FOLLOWING, STAYING, ROTATING = 0, 1, 2
@@ -65,34 +65,64 @@ Body = tuple[int, int, int]
 """First corner, step to the next one, and end."""
 
 
+class Bodies(NamedTuple):
+    """Cylinders, pistons and plates, by their corners."""
+
+    shapes: Array
+    """(6, 3), as in ``leg_clearance``."""
+    corners: Array
+    """(M, CORNER)"""
+    base_corners: int
+    """Number of corners of the base's plate."""
+    spins: Array
+    """(C, 3...): angular velocity of the platform by each coordinate."""
+    n_rates: Array
+    """(C, 3...): derivative of n by each coordinate."""
+
+
+def rows_of(plates: Sequence[Array], coordinates: int) -> int:
+    """Return the rows of the memory of ``bodies_in``."""
+    return PLATES + sum(map(len, plates)) + 2 * coordinates
+
+
 @inlined
-def bodies(shapes: Array, corners: Array, base_corners: int, leg: int, other: int, pair: int,
-           ) -> tuple[bool, Body, Body, float]:
+def bodies_in(memory: Array, coordinates: int, shapes: Array, base_corners: int) -> Bodies:
+    """Return bodies whose corners, and what is known of the coordinates, are in a memory."""
+    spins = len(memory) - 2 * coordinates
+    return Bodies(shapes, memory[:spins], base_corners, memory[spins:spins + coordinates],
+                  memory[spins + coordinates:])
+
+
+@inlined
+def is_given(bodies: Bodies, other: int) -> bool:
+    """Return whether there is a leg or plate."""
+    if other == PLATFORM:
+        return len(bodies.corners) > PLATES + bodies.base_corners
+    return other != BASE or bodies.base_corners > 0
+
+
+@inlined
+def pair_of(bodies: Bodies, leg: int, other: int, pair: int) -> tuple[bool, Body, Body, float]:
     """
-    Return whether there is such a pair, two bodies of a leg and a leg or plate, and their radii.
+    Return whether there is such a pair, a body of a leg, one of a leg or plate, and their radii.
 
     Parameters
     ----------
-    shapes : (6, 3)
-        As in ``leg_clearance``.
-    corners : (M, CORNER)
-        Corners of the legs and plates.
-    base_corners : int
-        Corners of the base's plate.
+    bodies : Bodies
+        All bodies.
     leg, other, pair : int
-        Leg, other leg or plate, and 0 to BODIES - 1.
+        Leg, other leg or plate, and 0 to PAIRS_OF_BODIES - 1.
 
     """
-    first = OF_LEG * leg
+    first, shapes = OF_LEG * leg, bodies.shapes
     cylinder = (first, CYLINDER, first + CYLINDER + 1)
     piston = (first, PLATFORM_JOINT, first + OF_LEG)
-    plate = PLATES + base_corners
+    plate = PLATES + bodies.base_corners
     if other == PLATFORM:
-        end = len(corners) - MORE
-        return pair == 0 and end > plate, cylinder, (plate, 1, end), shapes[leg, 0]
+        return pair == 0, cylinder, (plate, 1, len(bodies.corners)), shapes[leg, 0]
     if other == BASE:
         out = (first + CYLINDER_END, 1, first + OF_LEG)
-        return pair == 0 and base_corners > 0, out, (PLATES, 1, plate), shapes[leg, 2]
+        return pair == 0, out, (PLATES, 1, plate), shapes[leg, 2]
     second = OF_LEG * other
     return (True, cylinder if pair & 1 else piston,
             (second, CYLINDER, second + CYLINDER + 1) if pair & 2 else (
@@ -102,12 +132,18 @@ def bodies(shapes: Array, corners: Array, base_corners: int, leg: int, other: in
 
 
 @inlined
+def between_corners(corners: Array, p: int, q: int) -> Vector3:
+    """Return the vector from corner q to corner p."""
+    return subtract(read3(corners[p], PLACE), read3(corners[q], PLACE))
+
+
+@inlined
 def shortest(corners: Array, a: Body, b: Body) -> Vector3:
     """Return the shortest vector from body b to body a, which is a segment."""
-    p, p_end = read3(corners[a[0]], 0), read3(corners[a[2] - 1], 0)
+    p, p_end = read3(corners[a[0]], PLACE), read3(corners[a[2] - 1], PLACE)
     if b[2] - b[0] > b[1] + 1:
         return from_plate(corners, b[0], b[2], p, p_end, math.inf)
-    return between(p, p_end, read3(corners[b[0]], 0), read3(corners[b[2] - 1], 0))
+    return between(p, p_end, read3(corners[b[0]], PLACE), read3(corners[b[2] - 1], PLACE))
 
 
 @inlined
@@ -115,20 +151,21 @@ def _support(corners: Array, body: Body, n: Vector3) -> int:
     """Return the corner of a body that is farthest against n."""
     best, lowest = body[0], math.inf
     for k in range(body[0], body[2], body[1]):
-        along = dot(n, read3(corners[k], 0))
+        along = dot(n, read3(corners[k], PLACE))
         if along < lowest:
             best, lowest = k, along
     return best
 
 
 @compiled
-def follow(corners: Array, a: Body, b: Body, n: Vector3, coordinates: int, how: int) -> None:
+def follow(bodies: Bodies, a: Body, b: Body, n: Vector3, how: int) -> None:
     """Write the derivatives of n, from body b to body a, by the coordinates."""
-    turn, rates = corners[len(corners) - 2], corners[len(corners) - 1]
+    corners, rates = bodies.corners, bodies.n_rates
+    coordinates = len(rates)
     if how != FOLLOWING:
         for k in range(coordinates):
-            put3(rates, RATES + 3 * k, scale(
-                1.0 if how == ROTATING else 0.0, cross(read3(turn, RATES + 3 * k), n)))
+            put3(rates[k], 0, scale(
+                1.0 if how == ROTATING else 0.0, cross(read3(bodies.spins[k], 0), n)))
         return
     x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
     e = cross(n, (1.0 if x <= min(y, z) else 0.0, 1.0 if y < x and y <= z else 0.0,
@@ -137,35 +174,35 @@ def follow(corners: Array, a: Body, b: Body, n: Vector3, coordinates: int, how: 
     f = cross(n, e)
     ee, ef, ff = _RIDGE, 0.0, _RIDGE
     for k in range(coordinates):
-        put3(rates, RATES + 3 * k, (0.0, 0.0, 0.0))
+        put3(rates[k], 0, (0.0, 0.0, 0.0))
     for body, sign in ((a, 1.0), (b, -1.0)):
         nearest = _support(corners, body, scale(sign, n))
         for other in range(body[0], body[2], body[1]):
-            q = subtract(read3(corners[other], 0), read3(corners[nearest], 0))
+            q = between_corners(corners, other, nearest)
             length = norm(q)
             if other == nearest or not abs(dot(n, q)) < _NEAR * length:
                 continue
             q_e, q_f = dot(q, e) / length, dot(q, f) / length
             ee, ef, ff = ee + q_e * q_e, ef + q_e * q_f, ff + q_f * q_f
             for k in range(coordinates):
-                at = RATES + 3 * k
-                falling = dot(n, subtract(
-                    read3(corners[other], at), read3(corners[nearest], at))) / length
-                rates[at] -= falling * q_e
-                rates[at + 1] -= falling * q_f
+                falling = dot(n, relative_rate(corners, other, nearest, k)) / length
+                rates[k, 0] -= falling * q_e
+                rates[k, 1] -= falling * q_f
     scaling = 1.0 / (ee * ff - ef * ef)
     for k in range(coordinates):
-        at = RATES + 3 * k
-        r_e, r_f = rates[at], rates[at + 1]
-        put3(rates, at, add(scale(scaling * (ff * r_e - ef * r_f), e),
-                            scale(scaling * (ee * r_f - ef * r_e), f)))
+        r_e, r_f = rates[k, 0], rates[k, 1]
+        put3(rates[k], 0, add(scale(scaling * (ff * r_e - ef * r_f), e),
+                              scale(scaling * (ee * r_f - ef * r_e), f)))
 
 
 @inlined
-def corner_pair(corners: Array, p: int, q: int, n: Vector3, k: int) -> tuple[Vector3, float]:
-    """Return the derivatives of p - q, and of n . (p - q), by a coordinate."""
-    at = RATES + 3 * k
-    moved = subtract(read3(corners[p], at), read3(corners[q], at))
-    follows = read3(corners[len(corners) - 1], at)
-    return moved, dot(n, moved) + dot(follows, subtract(read3(corners[p], 0),
-                                                        read3(corners[q], 0)))
+def relative_rate(corners: Array, p: int, q: int, k: int) -> Vector3:
+    """Return the derivative of p - q by a coordinate."""
+    return subtract(read3(corners[p], RATES + 3 * k), read3(corners[q], RATES + 3 * k))
+
+
+@inlined
+def slope_along(bodies: Bodies, p: int, q: int, n: Vector3, k: int) -> float:
+    """Return the derivative of n . (p - q) by a coordinate."""
+    return dot(n, relative_rate(bodies.corners, p, q, k)) + dot(
+        read3(bodies.n_rates[k], 0), between_corners(bodies.corners, p, q))

@@ -24,8 +24,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.capability import box as boxes
-from stewart_dynamics.capability.clearance_bounds import CORNER, MORE, PLATES
+from stewart_dynamics.capability import box_condition
+from stewart_dynamics.capability.box_cells import CELL, DEPTH, EXCESS, FOUND, LEG, POINT, UPPER
+from stewart_dynamics.capability.box_clearance import clearance_in_box, PAIRS
+from stewart_dynamics.capability.box_condition import condition_in_box
+from stewart_dynamics.capability.box_legs import legs_in_box
+from stewart_dynamics.capability.clearance_bounds import CORNER, rows_of
 from stewart_dynamics.capability.travel import CLEARANCE_MIN
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
@@ -116,10 +120,10 @@ class Boxes:
         self._nearest = float(bounds[CLEARANCE_MIN, 0])
         self._row, self._pivot = row, pivot
         self._stop = min(platform.parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
-        self._legs = np.empty((6, boxes.LEG))
-        self._cells = np.empty((boxes.DEPTH + 1, boxes.CELL))
-        self._rows = np.empty((7, boxes.ROWS))
-        self._corners = np.empty((PLATES + sum(map(len, plates)) + MORE, CORNER))
+        self._legs = np.empty((6, LEG))
+        self._cells = np.empty((DEPTH + 2, CELL))
+        self._work = np.empty((7, box_condition.WORK))
+        self._corners = np.empty((rows_of(plates, 6), CORNER))
 
     def reachable(self, ranges: Array) -> Reachable:
         """Return whether a box (6, 2) is within the limits."""
@@ -164,42 +168,42 @@ class Boxes:
 
     def _worst_of_legs(self, box: Array) -> _Proof:
         """Return the worst pose of lengths and joint angles, and whether limits are kept."""
-        found = np.zeros((24, boxes.FOUND))
-        boxes.legs_in_box(
+        found = np.zeros((24, FOUND))
+        legs_in_box(
             self._platform.constants, self._axes, self._bounds, self._row, self._pivot, box,
             _MOST_OF_LEGS, self._legs, self._cells, found)
-        limited = np.isfinite(found[:, boxes.EXCESS])
+        limited = np.isfinite(found[:, EXCESS])
         sizes = np.where(limited, self._bounds.ravel(), 1.0)
-        parts = np.where(limited, found[:, boxes.EXCESS] / sizes, -math.inf)
+        parts = np.where(limited, found[:, EXCESS] / sizes, -math.inf)
         at = int(parts.argmax())
-        certain = bool(np.all(found[:, boxes.UPPER] <= TOLERANCE * sizes))
-        return _Proof(Worst(self.poses(found[at, boxes.POINT]), at % 6, _CODES[at // 6],
-                            float(found[at, boxes.EXCESS])), certain, float(parts[at]))
+        certain = bool(np.all(found[:, UPPER] <= TOLERANCE * sizes))
+        return _Proof(Worst(self.poses(found[at, POINT]), at % 6, _CODES[at // 6],
+                            float(found[at, EXCESS])), certain, float(parts[at]))
 
     def _worst_clearance(self, box: Array, coarse: float = _COARSE) -> _Proof:
         """Return the worst pose by clearance of the legs, and whether the limit is kept."""
-        found = np.empty((len(boxes.PAIRS), boxes.FOUND))
-        boxes.clearance_in_box(
+        found = np.empty((len(PAIRS), FOUND))
+        clearance_in_box(
             self._platform.constants, self._axes, self._shapes, *self._plates, self._nearest,
             self._row, self._pivot, box, _MOST_OF_CLEARANCE, coarse, self._legs, self._cells,
             self._corners, found)
-        at = int(found[:, boxes.EXCESS].argmax())
-        excess = float(found[at, boxes.EXCESS])
-        certain = bool(np.all(found[:, boxes.UPPER] <= TOLERANCE * self._nearest))
+        at = int(found[:, EXCESS].argmax())
+        excess = float(found[at, EXCESS])
+        certain = bool(np.all(found[:, UPPER] <= TOLERANCE * self._nearest))
         size = self._platform.parameters['singularity.characteristic_length']
-        return _Proof(Worst(self.poses(found[at, boxes.POINT]), boxes.PAIRS[at][0],
+        return _Proof(Worst(self.poses(found[at, POINT]), PAIRS[at][0],
                             'leg_clearance_min',
                             excess), certain, excess / size)
 
     def _worst_condition(self, box: Array) -> _Proof:
         """Return the worst pose by condition number, and whether it stays below its limit."""
-        found, count = np.empty(boxes.FOUND), np.empty(1, dtype=np.int64)
-        boxes.condition_in_box(
+        found, count = np.empty(FOUND), np.empty(1, dtype=np.int64)
+        condition_in_box(
             self._platform.constants, self._axes, self._row, self._pivot, box, self._stop,
-            _MOST_OF_CONDITION, self._legs, self._cells, self._rows, found, count)
-        excess = float(found[boxes.EXCESS])
-        return _Proof(Worst(self.poses(found[boxes.POINT]), -1, 'singularity', excess),
-                      bool(found[boxes.UPPER] == 0.0), excess / self._stop)
+            _MOST_OF_CONDITION, self._legs, self._cells, self._work, found, count)
+        excess = float(found[EXCESS])
+        return _Proof(Worst(self.poses(found[POINT]), -1, 'singularity', excess),
+                      bool(found[UPPER] == 0.0), excess / self._stop)
 
     def poses(self, points: Array) -> Pose:
         """Return the poses of translations and rotation vectors (..., 6)."""

@@ -26,7 +26,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags import blocks, mcap_scan
-from stewart_dynamics.capability import box, travel
+from stewart_dynamics.capability import box_condition, box_legs, travel
 from stewart_dynamics.datasheet import claimed_box, ratings, workspace
 from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
@@ -81,7 +81,8 @@ _SLOWEST = 1.0
 STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
 
 # The machine code that every datasheet needs.
-FUNCTIONS = (travel.travels, box.legs_in_box, inverse_dynamics.solve, regressor.regressors,
+FUNCTIONS = (travel.travels, box_legs.legs_in_box, box_condition.condition_in_box,
+             inverse_dynamics.solve, regressor.regressors,
              *blocks.FUNCTIONS, mcap_scan.scan)
 
 
