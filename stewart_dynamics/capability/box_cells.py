@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Cells of a box of ranges, and what the parts of a hexapod do in them; compiled.
+Cells of a box of ranges, and the motion of a hexapod in them; compiled.
 
 A pose of the box is a translation ``d`` of the pivot and a rotation vector ``r``, base axes. The
 leg of a platform joint at ``a`` from the pivot is ``l = c + d + exp(r) a`` with a constant ``c``.

@@ -212,9 +212,9 @@ class Capability:
 
         Lengths, joint angles, clearance of the legs, the condition number up to
         ``singularity.stop_condition``, and the sign of det(J), by branch and bound
-        (``capability.box_cells``). The work is bounded: a box that is within the limits, but too near to
-        a singularity, may be answered with ``certain`` False and a worst pose whose excess is
-        negative.
+        (``capability.box_cells``). The work is bounded: a box that is within the limits, but too
+        near to a singularity, may be answered with ``certain`` False and a worst pose whose excess
+        is negative.
 
         Parameters
         ----------

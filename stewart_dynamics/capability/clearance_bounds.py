@@ -87,7 +87,7 @@ def rows_of(plates: Sequence[Array], coordinates: int) -> int:
 
 @inlined
 def bodies_in(memory: Array, coordinates: int, shapes: Array, base_corners: int) -> Bodies:
-    """Return bodies whose corners, and what is known of the coordinates, are in a memory."""
+    """Return bodies whose corners, and rates by the coordinates, are in a memory."""
     spins = len(memory) - 2 * coordinates
     return Bodies(shapes, memory[:spins], base_corners, memory[spins:spins + coordinates],
                   memory[spins + coordinates:])

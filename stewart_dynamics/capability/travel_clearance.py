@@ -40,7 +40,7 @@ from stewart_dynamics.mechanics.rows import ROTATION
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, norm, put3, read3, read9, rotate, scale, subtract, Vector3)
 
-_MOST_STEPS = 40_000_000
+_MOST_STEPS = 1_000_000
 # Some clearances stay the same along a travel: rounding errors are below this part of the size.
 _EXACT = 1e-14
 # Other directions are tried where a step is below this part of it.
@@ -50,7 +50,7 @@ _NEAR = 0.01
 @compiled
 def prepare_plates(bodies: Bodies, base: Array, platform: Array, pose: Array, way: Way,
                    pivot: Array) -> None:
-    """Write what is constant of the corners of the plates."""
+    """Write the constant numbers of the corners of the plates."""
     put3(bodies.spins[0], 0, way.turn)
     rotation = read9(pose, ROTATION.start)
     for n in range(len(base)):
