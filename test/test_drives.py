@@ -417,12 +417,3 @@ def test_force_breakdown_and_identified_masses_with_drives() -> None:
     found = unknowns.parameters(np.full(6, 40.0))
     assert (found['actuator.reflected_mass'] == 40.0).all()
     assert 'drive.motor_inertia' not in found.given
-
-
-def test_a_written_file_has_the_drives_that_were_given(tmp_path: Path) -> None:
-    inertia = {'actuator.screw_lead': 0.005, 'drive.motor_inertia': 1e-4,
-               'actuator.reflected_mass': None}
-    for p, drives in ((HEXAPOD, ()), (HEXAPOD.replaced(inertia), ('drive.motor_inertia',))):
-        p.to_yaml(tmp_path / 'written.yaml')
-        read = Parameters.from_yaml(tmp_path / 'written.yaml')
-        assert read == p and read.drives == p.drives == drives
