@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.frames.rotation import (
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.messages.joint_state import joint_state_layout
-from stewart_dynamics.messages.transforms import transforms
+from stewart_dynamics.messages.standard import transforms
 from stewart_dynamics.parameters.table import Parameters
 
 JOINT_STATES = 'joint_states'

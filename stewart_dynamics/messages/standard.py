@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The messages of std_msgs that the hot path reads and writes, and rosgraph_msgs/Clock."""
+"""Messages of std_msgs, rosgraph_msgs/Clock and tf2_msgs/TFMessage."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from struct import Struct
 
 from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.messages.cdr import (
-    aligned8, check_encapsulation, COUNT, LITTLE_ENDIAN, MalformedError, ORDERS, put_text,
-    READ_ERRORS, sequence, short_sequence)
+    aligned8, check_encapsulation, COUNT, LITTLE_ENDIAN, MalformedError, ORDERS, put_count,
+    put_text, READ_ERRORS, sequence, short_sequence)
 from stewart_dynamics.messages.layout import Layout
 
 _FLOAT64 = Struct('<4sd')
@@ -81,3 +81,29 @@ def float64_values(data: bytes) -> tuple[float, ...]:
 # To write many of them at once.
 FLOAT64_ARRAY = Layout(float64_array((0.0,) * 6), [(20, 6)], stamps=())
 FLOAT64 = Layout(float64(0.0), [(4, 1)], stamps=())
+
+
+def transforms(frames: Sequence[tuple[str, str]]) -> Layout:
+    """
+    Return the layout of a TFMessage of the transforms between frames.
+
+    Its parts are the transforms: x y z [m] and the quaternion's x y z w.
+
+    Parameters
+    ----------
+    frames : sequence of (frame, child)
+        The frames of each transform.
+
+    """
+    body = bytearray(LITTLE_ENDIAN)
+    put_count(body, len(frames))
+    stamps, numbers = [], []
+    for frame, child in frames:
+        stamps.append(len(body))
+        body += bytes(8)
+        put_text(body, frame)
+        put_text(body, child)
+        body += bytes((4 - len(body)) % 8)
+        numbers.append((len(body), 7))
+        body += bytes(7 * 8)
+    return Layout(bytes(body), numbers, stamps)

@@ -143,8 +143,9 @@ class OutputProcess:
         if error:
             raise pickle.loads(error)
         if code:
-            raise StewartError(f'{self._folder}: cannot be written: the process that writes it '
-                               f'was ended by signal {-code}')
+            how = f'was ended by signal {-code}' if code < 0 else f'ended with code {code}'
+            raise StewartError(
+                f'{self._folder}: cannot be written: the process that writes it {how}')
 
 
 def main() -> None:

@@ -35,8 +35,7 @@ from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import joint_state_layout
-from stewart_dynamics.messages.standard import string
-from stewart_dynamics.messages.transforms import transforms
+from stewart_dynamics.messages.standard import string, transforms
 from stewart_dynamics.parameters.table import Parameters
 
 TF_STATIC = '/tf_static'

@@ -24,6 +24,7 @@ whose calls of ROS then raise RCLError (https://github.com/ros2/rclpy/issues/128
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future, wait
 import os
 import signal
 from threading import Thread
@@ -64,24 +65,19 @@ class Signals:
 
         It runs in a thread of its own, which goes on after a signal until the process ends.
         """
-        results: list[Result] = []
-        errors: list[BaseException] = []
+        future: Future[Result] = Future()
 
         def run() -> None:
             try:
-                results.append(compute())
+                future.set_result(compute())
             except BaseException as exc:
-                errors.append(exc)
+                future.set_exception(exc)
 
-        thread = Thread(target=run, daemon=True)
-        thread.start()
-        while thread.is_alive():
+        Thread(target=run, daemon=True).start()
+        while not wait([future], _LOOK).done:
             if self.received:
                 raise KeyboardInterrupt
-            thread.join(_LOOK)
-        if errors:
-            raise errors[0]
-        return results[0]
+        return future.result()
 
     def _handle(self, number: int, frame: Any) -> None:
         self.received = True
