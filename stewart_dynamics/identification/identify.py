@@ -23,7 +23,7 @@ the end of each bag by a fit to the rest.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -162,7 +162,6 @@ class Identification:
         # For the first window of each bag: sums without and with more noise, the Gram matrix of
         # that noise in the regressor, and the number of samples.
         self._noises: list[tuple[Sums, Sums, Array, int]] = []
-        self._speeds: tuple[float, ...] | None = None
 
     def read(self, path: Path, progress: Callable[[int], None] | None = None) -> None:
         """Read a bag; raise BagError if it cannot be read, or contains no usable data."""
@@ -214,7 +213,6 @@ class Identification:
             self.extracts.add(len(self.bags), (window.begin - begin) * 1e-9, last.extract)
             if is_first:
                 self._add_noise(extraction, window, last)
-            self._speeds = extraction.speeds
             speeds = np.abs(last.extract.legs[..., 1])
             counts.update({
                 'samples': len(window.positions), 'stops': last.stops,
@@ -225,28 +223,34 @@ class Identification:
         if extraction is None or last is None:
             return None
         period, rates = window.period, window.rates is not None
-        if extraction.cutoff < options.cutoff:
-            notices.append(f'sampled at {1.0 / period:.4g} Hz: the cut-off frequency is '
-                           f'{extraction.cutoff:.3g} Hz')
-        short = _SHORT / extraction.cutoff
-        if (self.extracts.samples - before) * extraction.step * period < short:
-            notices.append(f'less than {short:.3g} s are left by the filters: intervals are too '
-                           'narrow for so short a recording')
-        inside = counts['slow'] / counts['speeds']
-        if inside > _MOST_INSIDE and any(
-                'coulomb_friction' in name for name in self.unknowns.names):
-            notices.append(
-                f'{100.0 * inside:.0f} % of the rates are below actuator.coulomb_velocity: '
-                'Coulomb friction is linear there, and its value depends on that parameter')
+        notices += self._notices(
+            extraction, period, (self.extracts.samples - before) * extraction.step * period,
+            counts['slow'] / counts['speeds'])
         self.bags.append(BagRead(
             path, counts['samples'], (end - begin) * 1e-9, period, extraction.cutoff,
             rates, counts['left out'], counts['stops'], counts['outliers'], last.deviations[0],
             last.deviations[1] if rates else None, lag * period, {}, [], notices))
         return self.bags[-1]
 
+    def _notices(self, extraction: Extraction, period: float, filtered: float, inside: float,
+                 ) -> Iterator[str]:
+        """Yield notices on a bag by its filtered time [s] and the share of rates in the band."""
+        if extraction.cutoff < self._options.cutoff:
+            yield (f'sampled at {1.0 / period:.4g} Hz: the cut-off frequency is '
+                   f'{extraction.cutoff:.3g} Hz')
+        short = _SHORT / extraction.cutoff
+        if filtered < short:
+            yield (f'less than {short:.3g} s are left by the filters: intervals are too narrow '
+                   'for so short a recording')
+        if inside > _MOST_INSIDE and any(
+                'coulomb_friction' in name for name in self.unknowns.names):
+            yield (f'{100.0 * inside:.0f} % of the rates are below actuator.coulomb_velocity: '
+                   'Coulomb friction is linear there, and its value depends on that parameter')
+
     def _extraction(self, window: Window) -> Extraction:
         cutoff = min(self._options.cutoff, 1.0 / (_FEWEST_SAMPLES * window.period))
-        return Extraction(self.platform, self.unknowns, window.period, cutoff, self._speeds)
+        speeds = self._first[0].speeds if self._first else None
+        return Extraction(self.platform, self.unknowns, window.period, cutoff, speeds)
 
     def _lag(self, extraction: Extraction, window: Window) -> tuple[int, float]:
         """Return the lag of the efforts in samples, and the squared misfit."""

@@ -155,7 +155,7 @@ class _Scores(NamedTuple):
                    float(sums[-1, -1]))
 
     def explained(self, places: Integers) -> _Explained:
-        """Return what some columns explain."""
+        """Return the part of the residuals that some columns explain."""
         inverse, freedom = self._inverse(places)
         amounts = inverse @ self.scores[places]
         return _Explained(self.sizes[places] * amounts, float(self.scores[places] @ amounts),

@@ -170,16 +170,13 @@ def of_fit(p: Parameters, extraction: Extraction, window: Window, fit: Fit,
             'account')))
     best = min(_BETTER, left)
     for a, b in combinations(range(6), 2):
-        order = list(range(6))
-        order[a], order[b] = b, a
-        for which in ('positions and efforts', 'efforts', 'positions'):
-            swapped = piece
-            if 'positions' in which:
-                swapped = swapped._replace(
-                    positions=piece.positions[:, order],
-                    rates=None if piece.rates is None else piece.rates[:, order])
-            if 'efforts' in which:
-                swapped = swapped._replace(efforts=piece.efforts[:, order])
+        order = [{a: b, b: a}.get(leg, leg) for leg in range(6)]
+        efforts, legs = piece.efforts[:, order], piece._replace(
+            positions=piece.positions[:, order],
+            rates=None if piece.rates is None else piece.rates[:, order])
+        for which, swapped in (('positions and efforts', legs._replace(efforts=efforts)),
+                               ('efforts', piece._replace(efforts=efforts)),
+                               ('positions', legs)):
             misfit = _tried(extraction, swapped, fit)
             if misfit < best * now:
                 found.append((misfit, 'swapped', f'the {which} of {joints[a]} and {joints[b]} '
