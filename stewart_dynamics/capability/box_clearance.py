@@ -30,33 +30,18 @@ from stewart_dynamics.capability.box_cells import (
     put_box, put_point, spin_of, TURN, turned, unit_of, UPPER)
 from stewart_dynamics.capability.clearance_bounds import (
     ARM, BASE_JOINT, between_corners, Bodies, bodies_in, Body, CYLINDER, follow, FOLLOWING,
-    is_given, OF_LEG, pair_of, PAIRS_OF_BODIES, PLACE, PLATES, PLATFORM_JOINT, RATES,
-    relative_rate, ROTATING, shortest, slope_along, STAYING, STILL, TURNING)
+    is_given, OF_LEG, pair_of, PAIRS_OF_BODIES, PLACE, PLATES, PLATFORM_JOINT,
+    put_plates, RATES, relative_rate, ROTATING, shortest, slope_along, STAYING, STILL, TURNING)
 from stewart_dynamics.capability.singular_values import BEND
 from stewart_dynamics.compilation.functions import compiled, entry_point
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import joints_of
 from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE
 from stewart_dynamics.mechanics.limits import TOLERANCE
-from stewart_dynamics.mechanics.rows import ROTATION
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, norm, put3, read3, read9, rotate, scale, subtract, Vector3)
+    add, cross, dot, norm, put3, read3, scale, subtract, Vector3)
 
 PAIRS = tuple((i, j) for i in range(6) for j in range(i + 1, 8))
 """Legs and the other legs and plates, in the order of ``clearance_in_box``."""
-
-
-@compiled
-def _prepare_plates(bodies: Bodies, base: Array, platform: Array, row: Array, pivot: Array,
-                    ) -> None:
-    """Write the corners of the base's plate, and the arms of those of the platform's."""
-    rotation = read9(row, ROTATION.start)
-    for n in range(len(base)):
-        corner = bodies.corners[PLATES + n]
-        corner[:] = 0.0
-        put3(corner, PLACE, read3(base[n], 0))
-    for n in range(len(platform)):
-        put3(bodies.corners[PLATES + len(base) + n], ARM,
-             rotate(rotation, subtract(read3(platform[n], 0), read3(pivot, 0))))
 
 
 @compiled
@@ -277,7 +262,7 @@ def clearance_in_box(constants: Array, axes: Array, shapes: Array, base: Array, 
     """
     bodies = bodies_in(memory, 6, shapes, len(base))
     prepare_legs(constants, axes, row, pivot, legs)
-    _prepare_plates(bodies, base, platform, row, pivot)
+    put_plates(bodies, base, platform, row, pivot)
     for pair in range(len(found)):
         found[pair, EXCESS] = found[pair, UPPER] = -math.inf
     pair = 0

@@ -40,8 +40,9 @@ from typing import NamedTuple
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import compiled, inlined
 from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE, between, from_plate, PLATFORM
+from stewart_dynamics.mechanics.rows import ROTATION
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, norm, put3, read3, scale, subtract, Vector3)
+    add, cross, dot, norm, put3, read3, read9, rotate, scale, subtract, Vector3)
 
 # Columns of a corner: where it is, its derivatives by the coordinates, and bounds of the rest, in
 # the base frame and in a frame that turns with the platform; its arm where it is of the platform.
@@ -91,6 +92,19 @@ def bodies_in(memory: Array, coordinates: int, shapes: Array, base_corners: int)
     spins = len(memory) - 2 * coordinates
     return Bodies(shapes, memory[:spins], base_corners, memory[spins:spins + coordinates],
                   memory[spins + coordinates:])
+
+
+@compiled
+def put_plates(bodies: Bodies, base: Array, platform: Array, row: Array, pivot: Array) -> None:
+    """Write the corners of the base's plate, and the arms of those of the platform's."""
+    rotation = read9(row, ROTATION.start)
+    for n in range(PLATES, len(bodies.corners)):
+        bodies.corners[n, :] = 0.0
+    for n in range(len(base)):
+        put3(bodies.corners[PLATES + n], PLACE, read3(base[n], 0))
+    for n in range(len(platform)):
+        put3(bodies.corners[PLATES + len(base) + n], ARM,
+             rotate(rotation, subtract(read3(platform[n], 0), read3(pivot, 0))))
 
 
 @inlined

@@ -26,14 +26,15 @@ from collections.abc import Sequence
 import math
 
 from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.capability.clearance_bounds import Bodies, bodies_in, is_given, rows_of
-from stewart_dynamics.capability.travel_clearance import end_of_clearance, prepare_plates
+from stewart_dynamics.capability.clearance_bounds import (
+    Bodies, bodies_in, is_given, put_plates, rows_of)
+from stewart_dynamics.capability.travel_clearance import end_of_clearance
 from stewart_dynamics.capability.travel_condition import end_of_condition
 from stewart_dynamics.capability.travel_legs import (
     BASE_ANGLE_MAX, end_of_leg, LEG, LENGTH_MAX, LENGTH_MIN, PLATFORM_ANGLE_MAX, prepare_legs,
     Way, way_of)
 from stewart_dynamics.compilation.functions import compiled, entry_point
-from stewart_dynamics.mechanics.vectors import norm
+from stewart_dynamics.mechanics.vectors import norm, put3
 
 CLEARANCE_MIN, SINGULARITY, NOTHING = 4, 5, 6
 """Codes of the limit that ends a travel, behind those of ``travel_legs``."""
@@ -120,6 +121,7 @@ def travels(constants: Array, axes: Array, bounds: Array, shapes: Array, base: A
     for n in range(len(poses)):
         way = way_of(directions[n])
         prepare_legs(constants, axes, poses[n], way, pivots[n], of_legs)
-        prepare_plates(bodies, base, platform, poses[n], way, pivots[n])
+        put_plates(bodies, base, platform, poses[n], pivots[n])
+        put3(bodies.spins[0], 0, way.turn)
         values[n], limits[n], legs[n] = _travel(
             constants, bounds, bodies, stop, of_legs, work, way)

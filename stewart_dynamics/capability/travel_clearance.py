@@ -36,32 +36,14 @@ from stewart_dynamics.compilation.functions import compiled
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
     characteristic_length_of, joints_of)
 from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE, PLATFORM
-from stewart_dynamics.mechanics.rows import ROTATION
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, norm, put3, read3, read9, rotate, scale, subtract, Vector3)
+    add, cross, dot, norm, put3, read3, scale, subtract, Vector3)
 
 _MOST_STEPS = 1_000_000
 # Some clearances stay the same along a travel: rounding errors are below this part of the size.
 _EXACT = 1e-14
 # Other directions are tried where a step is below this part of it.
 _NEAR = 0.01
-
-
-@compiled
-def prepare_plates(bodies: Bodies, base: Array, platform: Array, pose: Array, way: Way,
-                   pivot: Array) -> None:
-    """Write the constant numbers of the corners of the plates."""
-    put3(bodies.spins[0], 0, way.turn)
-    rotation = read9(pose, ROTATION.start)
-    for n in range(len(base)):
-        corner = bodies.corners[PLATES + n]
-        put3(corner, PLACE, read3(base[n], 0))
-        put3(corner, RATES, (0.0, 0.0, 0.0))
-        corner[STILL] = 0.0
-    for n in range(len(platform)):
-        corner = bodies.corners[PLATES + len(base) + n]
-        put3(corner, ARM, rotate(rotation, subtract(read3(platform[n], 0), read3(pivot, 0))))
-        corner[TURNING] = 0.0
 
 
 @compiled
