@@ -329,6 +329,15 @@ def test_a_stray_old_sample_of_one_topic_resets_nothing(topic: str) -> None:
     assert feed.counts[POSE, TOO_OLD] == 1
 
 
+def test_a_restart_drops_samples_waiting_from_before_it() -> None:
+    feed = Feed()
+    assert feed.whole(10 * SECOND)
+    feed.sample(POSE, 10 * SECOND + 10 * MS)
+    assert feed.whole(SECOND)
+    assert feed.counts == {(POSE, NOT_JOINED): 1}
+    assert feed.whole(SECOND + 10 * MS)
+
+
 def test_negative_stamps_are_stamps() -> None:
     feed = Feed()
     for stamp in (-2 ** 31 * SECOND, -SECOND, -1, 1, 2 ** 31 * SECOND - 1):
