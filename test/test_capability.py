@@ -304,8 +304,8 @@ def gimbals(radius: float, spacing: float, first: float) -> Array:
                      for angle in angles])
 
 
-def test_travels_of_a_published_hexapod_are_the_stated_ones() -> None:
-    """SIMONA Research Simulator of TU Delft: geometry of its software, travels as stated."""
+def test_travels_of_a_published_hexapod_are_those_given_for_it() -> None:
+    """SIMONA Research Simulator of TU Delft: geometry of its software, rounded travels."""
     upper, lower = gimbals(1.6, 0.2, math.pi / 3.0), gimbals(1.65, 0.6, 0.0)
     nearest = [int(np.linalg.norm(lower - joint, axis=1).argmin()) for joint in upper]
     platform = StewartPlatform(PLATFORM.parameters.replaced({
