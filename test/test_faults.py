@@ -459,27 +459,31 @@ def test_an_unconfigured_node_is_shut_down(start: Start) -> None:
                                for writer in node.writers.values()), 'it has no topics')
 
 
-def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
+def _send(node: DynamicsNode, many: int) -> None:
+    for _ in range(many):
+        node.send()
+
+
+def _until_all_answered(node: DynamicsNode, number: int) -> None:
+    node.until(lambda: len(node.raw['leg_states']) == number, 'all are answered')
+
+
+def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode) -> None:
     node = at_work
     before = len(node.raw['leg_states'])
-    feeder = Feeder(node, tmp_path, 250, 750)
-    feeder.begin()
     mass = float(node.platform.parameters['platform.mass'])
     names = list(node.platform.parameters)
-    masses = [mass]
-    while not feeder.ended:
-        masses.append(mass + len(masses) % 2)
-        assert node.set_parameters(platform__mass=masses[-1]).successful
+    for turn in range(1, 16):
+        _send(node, 30)  # on their way while the node is called
+        assert node.set_parameters(platform__mass=mass + turn % 2).successful
         assert len(node.call('describe_parameters', DescribeParameters.Request(
             names=names)).descriptors) == len(names)
         assert node.state == 'active'
         assert not node.set_parameters(platform__mass=0.0).successful
+        _until_all_answered(node, before + 30 * turn)
     assert not node.change(Transition.TRANSITION_ACTIVATE)
     assert says('transition rejected: ', node.program.stderr)
     assert node.set_parameters(platform__mass=mass).successful
-    feeder.end()
-    assert len(masses) > 10
-    node.until(lambda: len(node.raw['leg_states']) == before + 750, 'all are answered')
     # Each with one mass or the other, and never with a part of each.
     either = {bits(node.result_of(HOME, platform=StewartPlatform(
         node.platform.parameters.replaced({'platform.mass': each}))).forces)
@@ -494,15 +498,13 @@ def test_a_stopped_subscriber_costs_no_setpoint(at_work: DynamicsNode, tmp_path:
                      **_by_udp(tmp_path))
     markers = f'{NODE}/markers'
     node.until(lambda: node.peer.node.count_subscribers(markers) == 1, 'the viewer is there')
-    before = len(node.raw['leg_states'])
-    feeder = Feeder(node, tmp_path / 'feeder', 250, 750)
-    feeder.begin()
-    _until_answered(node, feeder)
+    node.answer()
     viewer.process.send_signal(signal.SIGSTOP)
     try:
-        node.until(lambda: feeder.ended, 'all are sent')
-        feeder.end()
-        node.until(lambda: len(node.raw['leg_states']) == before + 750, 'all are answered')
+        before = len(node.raw['leg_states'])
+        for turn in range(1, 26):
+            _send(node, 30)
+            _until_all_answered(node, before + 30 * turn)
     finally:
         viewer.process.send_signal(signal.SIGCONT)
         viewer.stop()
