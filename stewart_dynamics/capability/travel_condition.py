@@ -49,6 +49,8 @@ _MOST_STEPS, _TRIALS = 1_000_000, 100
 # Part of the way to the root that is tried first, part of an interval that is tried where the
 # whole is not proven, and rounding errors of t.
 _PART, _SHORTER, _ULPS = 0.98, 0.8, 4e-16
+# Rounding errors keep condition numbers below; squares of larger limits overflow.
+_LARGEST_STOP = 1e20
 
 
 class _At(NamedTuple):
@@ -158,6 +160,7 @@ def end_of_condition(constants: Array, legs: Array, way: Way, stop: float, end: 
 
     And whether that is decided, or t is only the part that is proven.
     """
+    stop = min(stop, _LARGEST_STOP)
     at = _at(constants, legs, way, stop, 0.0, 0.0, work)
     if at.room <= 0.0:
         return 0.0, True
