@@ -385,7 +385,7 @@ def test_with_exclusive_setpoints_a_killed_publisher_counts_until_it_is_removed(
 
 @pytest.mark.slow
 def test_a_killed_node_answers_again_after_a_restart(start: Start, tmp_path: Path) -> None:
-    killed = start()
+    killed = start(**_by_udp(tmp_path))
     killed.until_active()
     feeder = Feeder(killed, tmp_path, 100)
     feeder.begin()
