@@ -209,7 +209,7 @@ def clear(options: argparse.Namespace) -> Rows:
     poses = max(options.poses // 10, 1)
     for seed in range(options.boxes // 4):
         platform, pose, random = near(seed)
-        box = np.stack([-random.uniform(0.1, 1.0, 6), random.uniform(0.1, 1.0, 6)], axis=1)
+        box = boxes.some_ranges(random)
         found = Capability(platform).reachable_factor(box, pose)
         if found.limit != 'leg_clearance_min' or found.value == 0.0:
             continue
@@ -282,7 +282,7 @@ def times_of_boxes(options: argparse.Namespace) -> Rows:
             tight += not larger.certain and larger.worst.excess > 0.0
     for seed in range(options.boxes // 4):
         platform, pose, random = near(seed)
-        box = np.stack([-random.uniform(0.1, 1.0, 6), random.uniform(0.1, 1.0, 6)], axis=1)
+        box = boxes.some_ranges(random)
         begin = time.process_time()
         found = Capability(platform).reachable_factor(box, pose)
         if found.limit == 'leg_clearance_min':

@@ -35,6 +35,11 @@ KINDS = 'lengths', 'joints', 'condition', 'lines'
 SAMPLES = 20_000
 
 
+def some_ranges(random: np.random.Generator) -> Array:
+    """Return ranges (6, 2) about zero."""
+    return np.stack([-random.uniform(0.1, 1.0, 6), random.uniform(0.1, 1.0, 6)], axis=1)
+
+
 def case(seed: int) -> tuple[StewartPlatform, Pose, Array, Array]:
     """Return a random hexapod with limits of a kind, a pose, a box of ranges and a pivot."""
     random, kind = rng(seed), KINDS[seed % len(KINDS)]
@@ -56,7 +61,7 @@ def case(seed: int) -> tuple[StewartPlatform, Pose, Array, Array]:
             'singularity.stop_condition': stop, 'singularity.warn_condition': stop,
             'limits.length_min': None, 'limits.length_max': None}))
     size = size_of(p)
-    box = np.stack([-random.uniform(0.1, 1.0, 6), random.uniform(0.1, 1.0, 6)], axis=1)
+    box = some_ranges(random)
     box[:3] *= size
     if kind == 'lines':
         box[random.permutation(6)[:4]] = 0.0

@@ -35,7 +35,7 @@ from stewart_dynamics.planned.checks import LIMIT
 from stewart_dynamics.planned.trajectory import check_planned_trajectory
 from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
 from test_capability import limited, moved, random_travel
-from test_capability_boxes import poses_in
+from test_capability_boxes import poses_in, some_ranges
 from test_capability_workspace import inside
 
 SHAPE = dict(zip(LEG_SHAPE, (0.04, 0.7, 0.02), strict=True))
@@ -361,7 +361,7 @@ def test_no_pose_of_a_box_that_is_reachable_has_legs_too_near() -> None:
     for seed in range(8):
         platform, pose, random = near(seed)
         p, capability = platform.parameters, Capability(platform)
-        box = np.stack([-random.uniform(0.1, 1.0, 6), random.uniform(0.1, 1.0, 6)], axis=1)
+        box = some_ranges(random)
         found = capability.reachable_factor(box, pose)
         limiting += found.limit == 'leg_clearance_min' and found.value > 0.0
         for factor in (1.0, 2.0):

@@ -30,7 +30,7 @@ from stewart_dynamics.capability.box_cells import (
     put_box, put_point, spin_of, TURN, turned, unit_of, UPPER)
 from stewart_dynamics.capability.clearance_bounds import (
     ARM, BASE_JOINT, between_corners, Bodies, bodies_in, Body, CYLINDER, follow, FOLLOWING,
-    is_given, OF_LEG, pair_of, PAIRS_OF_BODIES, PLACE, PLATES, PLATFORM_JOINT,
+    is_given, OF_LEG, pair_of, pairs_with, PLACE, PLATES, PLATFORM_JOINT,
     put_plates, RATES, relative_rate, ROTATING, shortest, slope_along, STAYING, STILL, TURNING)
 from stewart_dynamics.capability.singular_values import BEND
 from stewart_dynamics.compilation.functions import compiled, entry_point
@@ -172,10 +172,8 @@ def _clearance(constants: Array, bodies: Bodies, legs: Array, i: int, j: int, ce
     else:
         _put_plate(constants, bodies, legs, place, j)
     clearance = bound = math.inf
-    for pair in range(PAIRS_OF_BODIES):
-        given, a, b, radii = pair_of(bodies, i, j, pair)
-        if not given:
-            continue
+    for pair in range(pairs_with(j)):
+        a, b, radii = pair_of(bodies, i, j, pair)
         vector = shortest(bodies.corners, a, b)
         distance = norm(vector)
         clearance = min(clearance, distance - radii)

@@ -51,8 +51,6 @@ PLACE, RATES, STILL, TURNING, ARM, CORNER = 0, 3, 21, 22, 23, 26
 # platform joint. The plates of base and platform follow those of six legs.
 BASE_JOINT, CYLINDER, CYLINDER_END, PLATFORM_JOINT, OF_LEG = 0, 1, 2, 3, 4
 PLATES = 6 * OF_LEG
-PAIRS_OF_BODIES = 4
-"""Largest number of pairs of bodies of two legs."""
 
 FOLLOWING, STAYING, ROTATING = 0, 1, 2
 """How n changes."""
@@ -116,16 +114,22 @@ def is_given(bodies: Bodies, other: int) -> bool:
 
 
 @inlined
-def pair_of(bodies: Bodies, leg: int, other: int, pair: int) -> tuple[bool, Body, Body, float]:
+def pairs_with(other: int) -> int:
+    """Return the number of pairs of bodies of a leg and another leg or plate."""
+    return 4 if other < 6 else 1
+
+
+@inlined
+def pair_of(bodies: Bodies, leg: int, other: int, pair: int) -> tuple[Body, Body, float]:
     """
-    Return whether there is such a pair, a body of a leg, one of a leg or plate, and their radii.
+    Return a body of a leg, one of a leg or plate, and the sum of their radii.
 
     Parameters
     ----------
     bodies : Bodies
         All bodies.
     leg, other, pair : int
-        Leg, other leg or plate, and 0 to PAIRS_OF_BODIES - 1.
+        Leg, other leg or plate, and which pair of theirs.
 
     """
     first, shapes = OF_LEG * leg, bodies.shapes
@@ -133,12 +137,12 @@ def pair_of(bodies: Bodies, leg: int, other: int, pair: int) -> tuple[bool, Body
     piston = (first, PLATFORM_JOINT, first + OF_LEG)
     plate = PLATES + bodies.base_corners
     if other == PLATFORM:
-        return pair == 0, cylinder, (plate, 1, len(bodies.corners)), shapes[leg, 0]
+        return cylinder, (plate, 1, len(bodies.corners)), shapes[leg, 0]
     if other == BASE:
         out = (first + CYLINDER_END, 1, first + OF_LEG)
-        return pair == 0, out, (PLATES, 1, plate), shapes[leg, 2]
+        return out, (PLATES, 1, plate), shapes[leg, 2]
     second = OF_LEG * other
-    return (True, cylinder if pair & 1 else piston,
+    return (cylinder if pair & 1 else piston,
             (second, CYLINDER, second + CYLINDER + 1) if pair & 2 else (
                 second, PLATFORM_JOINT, second + OF_LEG),
             (shapes[leg, 0] if pair & 1 else shapes[leg, 2])

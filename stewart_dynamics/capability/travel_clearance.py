@@ -27,7 +27,7 @@ import math
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.clearance_bounds import (
     ARM, BASE_JOINT, between_corners, Bodies, Body, CYLINDER, follow, FOLLOWING, OF_LEG, pair_of,
-    PAIRS_OF_BODIES, PLACE, PLATES, PLATFORM_JOINT, RATES, relative_rate, ROTATING, shortest,
+    pairs_with, PLACE, PLATES, PLATFORM_JOINT, RATES, relative_rate, ROTATING, shortest,
     slope_along, STAYING, STILL, TURNING)
 from stewart_dynamics.capability.singular_values import BEND
 from stewart_dynamics.capability.travel_legs import (
@@ -146,10 +146,8 @@ def _room(constants: Array, bodies: Bodies, legs: Array, way: Way, approach: flo
     else:
         _put_plate(constants, bodies, legs, way, j, t)
     margin, step = math.inf, longest
-    for pair in range(PAIRS_OF_BODIES):
-        given, a, b, radii = pair_of(bodies, i, j, pair)
-        if not given:
-            continue
+    for pair in range(pairs_with(j)):
+        a, b, radii = pair_of(bodies, i, j, pair)
         vector = shortest(bodies.corners, a, b)
         distance = norm(vector)
         margin = min(margin, distance - radii - bound)

@@ -32,7 +32,7 @@ from stewart_dynamics.setpoints.step import Outputs
 
 # Beginnings of text that spreadsheet programs execute.
 _FORMULA = ('=', '+', '-', '@', '\t', '\r', '\n')
-# Rows from which on a second process formats them: it takes 0.1 s to start.
+# Ends of rows without and with a warning.
 _ENDS = (b',0\n', b',1\n')
 
 
