@@ -39,7 +39,7 @@ _NO_BASE: Array = np.array([NO_BASE])
 
 
 def solve(constants: Array, motions: Array, wrenches: Array | None = None,
-          bases: Array | None = None) -> Array:
+          bases: Array | None = None, condition: bool = True) -> Array:
     """
     Return the rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
 
@@ -53,12 +53,15 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None,
         External wrenches at the platform's origin, base axes [N, N m]; one row for all.
     bases : (N, BASE) or (1, BASE), optional
         Rows of the base's motion, one row for all; without them it is still.
+    condition : bool
+        Whether the condition number is computed.
 
     """
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     bases = _NO_BASE if bases is None else compact(bases)
-    results, sound = np.empty((len(motions), RESULT)), np.empty(len(motions), dtype=bool)
+    results = np.empty((len(motions), RESULT))
+    sound = np.empty(len(motions) if condition else 0, dtype=bool)
     in_parts(inverse_dynamics.solve, constants, motions, wrenches, bases, results, sound,
              scratch=(inverse_dynamics.TILE,))
     return results

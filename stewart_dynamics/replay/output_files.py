@@ -132,6 +132,7 @@ class OutputProcess:
     def _send(self, what: Any) -> None:
         try:
             pickle.dump(what, self._blocks, protocol=5)
+            self._blocks.flush()  # else the process waits for the end of a block until the next
         except BrokenPipeError:
             self._end()
 

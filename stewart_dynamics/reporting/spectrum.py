@@ -28,7 +28,10 @@ Its import takes longer than the spectra of a million samples, and only
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+import math
+import os
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import NamedTuple
@@ -44,6 +47,8 @@ SHORTEST, LONGEST = 2 ** 6, 2 ** 15
 ENOUGH = 4
 # A step in time that differs by less than this part from a multiple of the usual one is even.
 _EVEN = 0.01
+# Rows of the file that are read at once.
+_ROWS = 2 ** 15
 # Intervals on the logarithmic axis of which the lowest and the highest line are drawn.
 INTERVALS = 600
 
@@ -100,91 +105,109 @@ class Spectrum:
             Values of every channel.
 
         """
+        self._file.seek(0, os.SEEK_END)
         self._file.write(np.column_stack((seconds, values.T)).tobytes())
 
     def density(self) -> Density | None:
         """Return the spectra so far; None if there are too few samples."""
-        if not self._file.tell():
+        steps = np.diff(next(self._blocks(), np.zeros((1, 1)))[1:FIRST + 1, 0])
+        if not np.any(steps > 0.0):
             return None
-        self._file.flush()
-        rows = np.memmap(self._file, np.float64, 'r').reshape(-1, self._columns)
-        steps = np.diff(rows[:, 0], prepend=rows[0, 0])
-        first = steps[1:FIRST]
-        if not np.any(first > 0.0):
-            return None
-        usual = float(np.median(first[first > 0.0]))
-        # Places of the samples, in units of the usual step.
-        places = steps / usual
-        multiples = np.maximum(np.round(places), 1.0)
-        even = np.abs(places - multiples) <= _EVEN
-        places[even] = multiples[even]
-        gaps: Flags = (steps <= 0.0) | (steps > longest_step(first, self._timeout))
-        finite: Flags = np.all(np.isfinite(rows[:, 1:]), axis=1)
-        begins = gaps | ~finite
-        begins[1:] |= ~finite[:-1]
-        at = np.append(np.flatnonzero(begins), len(rows))
-        runs = []
-        for begin, end in zip(at[:-1], at[1:], strict=True):
-            if finite[begin]:
-                places[begin] = 0.0
-                np.cumsum(places[begin:end], out=places[begin:end])
-                runs.append((places[begin:end], rows[begin:end, 1:]))
-        length = _length_for([_even_samples(run) for run, _ in runs])
+        usual = float(np.median(steps[steps > 0.0]))
+        longest = longest_step(steps, self._timeout)
+        runs: list[int] = []  # their numbers of samples
+        for begins, samples in (counted := _Runs(self._blocks(), usual, longest)):
+            runs += [0] * begins
+            runs[-1] += len(samples)
+        length = _length_for(runs)
         if not length:
             return None
-        powers = np.sum([_powers(run, values, length) for run, values in runs], axis=0)
-        segments = sum(_segments(_even_samples(run), length) for run, _ in runs)
+        window: Array = 0.5 - 0.5 * np.cos(2.0 * np.pi / length * np.arange(length))
+        powers = np.zeros((self._columns - 1, length // 2 + 1))
+        for segment in _segments(_Runs(self._blocks(), usual, longest), length):
+            for channel, power in zip(np.array(segment.T), powers, strict=True):
+                spectrum = np.fft.rfft((channel - channel.mean()) * window)
+                power += spectrum.real ** 2 + spectrum.imag ** 2
+        segments = _count(runs, length)
         # of both signs of the frequency, except at the Nyquist rate
-        density: Array = 2.0 * usual / (segments * np.sum(_window(length) ** 2)) * powers[:, 1:]
+        density: Array = 2.0 * usual / (segments * np.sum(window ** 2)) * powers[:, 1:]
         density[:, -1] *= 0.5
         return Density(
             np.arange(1, length // 2 + 1) / (length * usual), np.sqrt(density), segments,
-            length * usual, np.count_nonzero(~even & ~gaps) / max(np.count_nonzero(~gaps), 1))
+            length * usual, counted.uneven / max(counted.steps, 1))
+
+    def _blocks(self) -> Iterator[Array]:
+        """Yield rows of time and values, each block behind the last row of the one before."""
+        self._file.seek(0)
+        last = np.full((1, self._columns), np.nan)
+        while block := self._file.read(_ROWS * last.nbytes):
+            rows = np.concatenate((last, np.frombuffer(block).reshape(-1, self._columns)))
+            last = rows[-1:]
+            yield rows
 
 
-def _even_samples(places: Array) -> int:
-    """Return the number of samples at whole places in a run."""
-    return int(places[-1]) + 1
+class _Runs:
+    """
+    Yields the runs of samples without a gap, in pieces: whether a run begins, samples (K, C).
+
+    The samples are at even times, ``usual`` apart; a step longer than ``longest`` is a gap.
+    """
+
+    def __init__(self, blocks: Iterator[Array], usual: float, longest: float) -> None:
+        self._blocks, self._usual, self._longest = blocks, usual, longest
+        self.steps = self.uneven = 0
+        """Numbers of steps in time that are no gaps, and of those that were not even."""
+
+    def __iter__(self) -> Iterator[tuple[bool, Array]]:
+        """Yield them."""
+        place, following = 0.0, 0  # of the last sample, in units of the usual step; the next whole
+        for rows in self._blocks:
+            steps = np.diff(rows[:, 0])
+            finite: Flags = np.all(np.isfinite(rows), axis=1)
+            is_step = (steps > 0.0) & (steps <= self._longest)
+            steps /= self._usual
+            multiples = np.maximum(np.round(steps), 1.0)
+            even = np.abs(steps - multiples) <= _EVEN
+            steps[even] = multiples[even]
+            self.steps += np.count_nonzero(is_step)
+            self.uneven += np.count_nonzero(is_step & ~even)
+            breaks = np.flatnonzero(~(is_step & finite[:-1] & finite[1:])).tolist()
+            # First the run that the row in front belongs to.
+            for begin, end in pairwise([-1, *breaks, len(steps)]):
+                if not finite[begin + 1] or (begin < 0 and not end):
+                    continue
+                places = np.cumsum(np.append(place if begin < 0 else 0.0, steps[begin + 1:end]))
+                whole = np.arange(following if begin < 0 else 0, math.floor(places[-1]) + 1)
+                place, following = places[-1], whole[-1] + 1 if len(whole) else following
+                values = rows[begin + 1:end + 1, 1:]
+                if len(whole) and np.array_equal(places[-len(whole):], whole):
+                    yield begin >= 0, values[-len(whole):]
+                else:
+                    yield begin >= 0, np.column_stack(
+                        [np.interp(whole, places, column) for column in values.T])
 
 
-def _segments(samples: int, length: int) -> int:
-    """Return the number of segments of a length in samples."""
-    return max((samples - length) // (length // 2) + 1, 0)
+def _segments(runs: Iterable[tuple[bool, Array]], length: int) -> Iterator[Array]:
+    """Yield the segments (length, C) of runs in pieces; they overlap by half."""
+    waiting: Array = np.empty((0, 0))
+    for begins, samples in runs:
+        waiting = samples if begins else np.concatenate((waiting, samples))
+        while len(waiting) >= length:
+            yield waiting[:length]
+            waiting = waiting[length // 2:]
+
+
+def _count(runs: Iterable[int], length: int) -> int:
+    """Return the number of segments of a length in runs of these numbers of samples."""
+    return sum(max((samples - length) // (length // 2) + 1, 0) for samples in runs)
 
 
 def _length_for(runs: Sequence[int]) -> int:
     """Return the length of segments for runs of these numbers of samples; 0: too few."""
     length = LONGEST
-    while length > SHORTEST and sum(_segments(run, length) for run in runs) < ENOUGH:
+    while length > SHORTEST and _count(runs, length) < ENOUGH:
         length //= 2
-    return length if sum(_segments(run, length) for run in runs) else 0
-
-
-def _window(length: int) -> Array:
-    window: Array = 0.5 - 0.5 * np.cos(2.0 * np.pi / length * np.arange(length))
-    return window
-
-
-def _powers(places: Array, values: Array, length: int) -> Array:
-    """
-    Return the sums of the squares of the spectra of all segments of a run (C, length / 2 + 1).
-
-    The places (N,) of the samples (N, C) are in units of the usual step, the first is 0.
-    """
-    powers = np.zeros((values.shape[1], length // 2 + 1))
-    window = _window(length)
-    # One after the other: they fit into the processor's cache.
-    for n in range(_segments(_even_samples(places), length)):
-        whole = np.arange(n * (length // 2), n * (length // 2) + length, dtype=float)
-        first, last = np.searchsorted(places, whole[[0, -1]])
-        is_even = np.array_equal(places[first:last + 1], whole)
-        part = slice(first if is_even else max(first - 1, 0), last + 1)
-        for channel, power in zip(np.array(values[part].T), powers, strict=True):
-            if not is_even:
-                channel = np.interp(whole, places[part], channel)
-            spectrum = np.fft.rfft((channel - channel.mean()) * window)
-            power += spectrum.real ** 2 + spectrum.imag ** 2
-    return powers
+    return length if _count(runs, length) else 0
 
 
 def drawn(frequencies: Array, amplitudes: Array) -> tuple[Array, Array]:

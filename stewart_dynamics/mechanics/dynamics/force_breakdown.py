@@ -22,6 +22,7 @@ hexapod reduced to its source.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -152,22 +153,23 @@ class ForceBreakdownRows:
         unknown = ~(results[:, CONDITION] < UNSOLVABLE_CONDITION)
         if bases is not None:
             unknown = unknown | np.isnan(bases[:, -1])
-        by.wrench[:] = 0.0 if wrenches is None else batch.solve(
+        solve = partial(batch.solve, condition=False)
+        by.wrench[:] = 0.0 if wrenches is None else solve(
             self._weightless, rows, wrenches)[:, FORCES]
 
         rows[:, ACCELERATION] = motions[:, ACCELERATION]
-        by.platform_inertia[:] = batch.solve(self._platform_only, rows)[:, FORCES]
-        by.leg_inertia[:] = (batch.solve(self._weightless, rows)[:, FORCES]
+        by.platform_inertia[:] = solve(self._platform_only, rows)[:, FORCES]
+        by.leg_inertia[:] = (solve(self._weightless, rows)[:, FORCES]
                              - by.platform_inertia)
 
         rows[:, ACCELERATION] = 0.0
         rows[:, TWIST] = motions[:, TWIST]
-        results = batch.solve(self._weightless, rows)
+        results = solve(self._weightless, rows)
         by.velocity[:] = results[:, FORCES]
         # By the friction law: as a difference it would lose its digits near a singularity.
         own = np.empty((len(rows), 6))
         friction(results[:, RATES].copy(), *self._friction, own)
         by.friction[:] = own
         by.base_motion[:] = 0.0 if bases is None else (
-            batch.solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)
+            solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)
         forces[unknown] = np.nan

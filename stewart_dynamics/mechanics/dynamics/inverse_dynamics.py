@@ -295,14 +295,15 @@ def solve(constants: Array, motions: Array, wrenches: Array, bases: Array, resul
     results : (N, RESULT)
         Written: lengths [m], rates [m/s], forces [N], forces under a unit load, det(J) [m^3],
         d(det)/dt [m^3/s] and the condition number.
-    sound : (N,)
-        Written: whether all numbers are finite and J_inv can be solved.
+    sound : (N,) or (0,)
+        Written: whether all numbers are finite and J_inv can be solved. If it has no entries, the
+        condition number, which takes half of the time, is not computed: its column is arbitrary.
     tile : (TILE,)
         Scratch memory.
 
     """
     many = len(motions)
-    one_wrench, one_base = len(wrenches) == 1, len(bases) == 1
+    one_wrench, one_base, checked = len(wrenches) == 1, len(bases) == 1, len(sound) > 0
     for first in range(0, many, LANES):
         lanes = min(LANES, many - first)
         moving = False
@@ -318,11 +319,13 @@ def solve(constants: Array, motions: Array, wrenches: Array, bases: Array, resul
                 _put_base(constants, tile, k, bases[0 if one_base else first + k])
             _tile_base_loads(constants, tile, lanes)
         _tile_dynamics(constants, tile, lanes)
-        _tile_eigenvalues(tile, lanes)
+        if checked:
+            _tile_eigenvalues(tile, lanes)
         for k in range(lanes):
             finite = True
             for n in range(RESULT):
                 result = tile[_RESULT + n * LANES + k]
                 results[first + k, n] = result
                 finite = finite and math.isfinite(result)
-            sound[first + k] = finite and results[first + k, CONDITION] < UNSOLVABLE_CONDITION
+            if checked:
+                sound[first + k] = finite and results[first + k, CONDITION] < UNSOLVABLE_CONDITION
