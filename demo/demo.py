@@ -44,7 +44,7 @@ from stewart_dynamics.mechanics.rows import (
     DETERMINANT, FORCES, JOINT_ANGLES, LENGTHS, MOTION, RATES, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.setpoints.step import Batch, Outputs
 from tqdm import tqdm
@@ -145,14 +145,14 @@ def report(demo: Demo, parameters: Parameters) -> str:
     states[:, CAUSE] = [changed > 0 and demo.warnings[changed - 1][1] for changed in changes]
     every, none = np.ones(many, dtype=bool), np.zeros(many, dtype=bool)
     summary = Summary(parameters)
-    summary.add(
+    summary.add(Answered(
         (stamps - stamps[0]) * 1e-9,
         Batch(stamps, np.full((many, MOTION), np.nan), np.zeros((1, 6)), none,
               stamps),
         Outputs(every, stamps, results, forces, states, none, none,
                 none, np.full((many, JOINT_ANGLES), np.nan), np.empty((many, 0)),
                 np.empty((many, 0))),
-        np.full((many, 6), np.nan))
+        np.full((many, 6), np.nan)))
     return '\n'.join(summary_lines(summary.values()))
 
 

@@ -34,7 +34,7 @@ from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
 from stewart_dynamics.setpoints.step import Outputs
-from test_output import base_wrenches_of, LEGS, turning
+from test_output import answered, base_wrenches_of, LEGS, turning
 
 RESULTS = 27
 
@@ -46,10 +46,6 @@ def motions_of(number: int) -> NDArray[np.float64]:
     for n, quaternion in enumerate(np.random.default_rng(number).normal(size=(number, 4))):
         motions[n, 3:12] = Rotation.from_quat(quaternion).as_matrix().ravel()
     return motions
-
-
-def seconds_of(number: int) -> NDArray[np.float64]:
-    return np.arange(number) / 7.0
 
 
 def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
@@ -77,8 +73,7 @@ def check_tables(folder: Path, blocks: list[Outputs]) -> None:
     for table in tables:
         for outputs in blocks:
             number = len(outputs.stamps)
-            table.write(seconds_of(number), motions_of(number), outputs,
-                        base_wrenches_of(outputs))
+            table.write(answered(outputs, outputs.stamps, motions_of(number)))
         table.close()
     head, rows = read_csv(folder / 'legs.csv')
     parquet = pyarrow.parquet.read_table(folder / 'legs.parquet')
@@ -87,7 +82,7 @@ def check_tables(folder: Path, blocks: list[Outputs]) -> None:
     at = 0
     for outputs in blocks:
         number = len(outputs.stamps)
-        seconds, motions = seconds_of(number), motions_of(number)
+        seconds, motions = np.arange(number) / 7.0, motions_of(number)
         quaternions = to_quaternion(motions[:, 3:12].reshape(-1, 3, 3))
         for n in range(number):
             row, same = rows[at], [column[at] for column in columns]
@@ -150,7 +145,8 @@ def test_numbers_at_the_edges(tmp_path: Path) -> None:
 def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> None:
     legs = ('größe', 'a "leg"', 'one, two', 'line\nbreak', ' ', "'=1+1'")
     writer = table(tmp_path, legs)
-    writer.write(seconds_of(2), motions_of(2), turning(2), base_wrenches_of(turning(2)))
+    outputs = turning(2)
+    writer.write(answered(outputs, outputs.stamps, motions_of(2)))
     writer.close()
     if table is CsvTable:
         head, rows = read_csv(tmp_path / 'legs.csv')
@@ -179,7 +175,8 @@ def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
 @pytest.mark.parametrize('table', [CsvTable, ParquetTable])
 def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
     writer = table(tmp_path, LEGS)
-    writer.write(seconds_of(0), motions_of(0), turning(0), base_wrenches_of(turning(0)))
+    outputs = turning(0)
+    writer.write(answered(outputs, outputs.stamps, motions_of(0)))
     writer.close()
     file, = tmp_path.iterdir()
     if table is CsvTable:
@@ -193,7 +190,7 @@ def test_parquet_is_written_in_groups_of_many_rows(tmp_path: Path) -> None:
     outputs = turning(1000)
     table = ParquetTable(tmp_path, LEGS)
     for _ in range(100):
-        table.write(seconds_of(1000), motions_of(1000), outputs, base_wrenches_of(outputs))
+        table.write(answered(outputs, outputs.stamps, motions_of(1000)))
     table.close()
     file = pyarrow.parquet.ParquetFile(tmp_path / 'legs.parquet')
     assert file.metadata.num_rows == 100_000

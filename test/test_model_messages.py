@@ -28,7 +28,7 @@ from stewart_dynamics import Parameters
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.leg_joints import mounts
-from stewart_dynamics.replay.recorded_model import MODEL_TYPES
+from stewart_dynamics.replay.output import MODEL_TYPES
 
 STAMP = 1_700_000_000_123_456_789
 

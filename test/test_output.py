@@ -38,8 +38,8 @@ from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.replay.output import OutputBag
-from stewart_dynamics.replay.recorded_model import RecordedModel
+from stewart_dynamics.replay.output import OutputBag, RecordedModel
+from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 import yaml  # type: ignore[import-untyped]
@@ -74,11 +74,19 @@ def base_wrenches_of(outputs: Outputs) -> Array:
     return wrenches
 
 
+def answered(outputs: Outputs, times: NDArray[np.int64], motions: Array) -> Answered:
+    """Return outputs as a block."""
+    n = len(outputs.stamps)
+    return Answered(np.arange(n) / 7.0, Batch(
+        outputs.stamps, motions, np.zeros((n, 6)), np.zeros(n, dtype=bool), times), outputs,
+        base_wrenches_of(outputs))
+
+
 def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]]) -> Path:
     bag = OutputBag(folder, NODE, OutputMessages(PARAMETERS),
                     RecordedModel(PARAMETERS, 'hexapod'), 0.0)
     for times, outputs in blocks:
-        bag.write(times, np.zeros((len(times), MOTION)), outputs, base_wrenches_of(outputs))
+        bag.write(answered(outputs, times, np.zeros((len(times), MOTION))))
     bag.close()
     return folder
 

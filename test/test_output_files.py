@@ -19,15 +19,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.replay_options import Options
-from stewart_dynamics.setpoints.step import Batch
-from test_legs_table import motions_of, seconds_of
-from test_output import base_wrenches_of, PARAMETERS, times_of, turning
+from test_legs_table import motions_of
+from test_output import answered, PARAMETERS, times_of, turning
 
 BLOCK = 100
 
@@ -40,9 +38,7 @@ def started(kind: type[OutputFiles] | type[OutputProcess], folder: Path,
 
 def write_block(files: OutputFiles | OutputProcess, first: int = 0) -> None:
     outputs = turning(BLOCK, first)
-    files.write(seconds_of(BLOCK), Batch(
-        outputs.stamps, motions_of(BLOCK), np.zeros((BLOCK, 6)), np.zeros(BLOCK, dtype=bool),
-        times_of(BLOCK, first)), outputs, base_wrenches_of(outputs))
+    files.write(answered(outputs, times_of(BLOCK, first), motions_of(BLOCK)))
 
 
 def test_the_process_writes_the_same_files(tmp_path: Path) -> None:

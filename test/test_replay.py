@@ -60,7 +60,7 @@ from stewart_dynamics.mechanics.platform_arguments import motion_rows
 from stewart_dynamics.program import BAD_INPUT, DONE, INTERRUPTED, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
-from stewart_dynamics.replay.recorded_model import (
+from stewart_dynamics.replay.output import (
     MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
 from stewart_dynamics.replay.summary import Summary

@@ -42,7 +42,7 @@ from stewart_dynamics.reference_motion.motion import motion_at, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.replay.bag_report import Report, share_plotly
 from stewart_dynamics.replay.residuals import Comparison
-from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import measured_headline
 from stewart_dynamics.reporting.colors import LEG_COLORS, ROLES
 from stewart_dynamics.reporting.pages import digits, number, plotly_script, thousands
@@ -84,8 +84,8 @@ class Given:
     def summary(self, **changes: Any) -> dict[str, Any]:
         """Return what summary.json would hold."""
         summary = Summary(self.parameters)
-        summary.add(self.seconds, self.setpoints, self.outputs, self.base_wrenches,
-                    self.breakdown)
+        summary.add(Answered(
+            self.seconds, self.setpoints, self.outputs, self.base_wrenches, self.breakdown))
         return {
             'version': 1, 'software': 'stewart_dynamics 0.1.0', 'bag': 'bags/example', 'run': '',
             'complete': True, 'missing': [], 'notices': [],
@@ -98,8 +98,8 @@ class Given:
     def report(self, measured: bool = False) -> Report:
         report = Report(self.parameters, measured)
         if len(self.seconds):
-            report.add(self.seconds, self.setpoints, self.outputs, self.base_wrenches,
-                       self.breakdown)
+            report.add(Answered(
+                self.seconds, self.setpoints, self.outputs, self.base_wrenches, self.breakdown))
         return report
 
     def write(self, path: Path, **changes: Any) -> dict[str, Any]:
@@ -182,8 +182,8 @@ def test_a_million_setpoints_fit_into_ten_megabytes(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).standard_normal((4, 5000, 6))
     for n in range(200):
         seconds = 5.0 * n + block.seconds
-        report.add(seconds, block.setpoints, block.outputs, block.base_wrenches,
-                   block.breakdown)
+        report.add(Answered(
+            seconds, block.setpoints, block.outputs, block.base_wrenches, block.breakdown))
         report.add_measured(seconds, *noise[:3])
     path = tmp_path / 'report.html'
     report.write(path, block.summary())
@@ -230,9 +230,10 @@ def test_angles_are_those_of_the_paper_and_continue_past_half_a_turn(tmp_path: P
     given = Given(seconds, motion.rows)
     report = Report(PARAMETERS)
     for part in (slice(0, 150), slice(150, 151), slice(151, 400)):
-        report.add(seconds[part], given.setpoints.chosen(part),
-                   Outputs(*(each[part] for each in given.outputs)), given.base_wrenches[part],
-                   given.breakdown[part])
+        report.add(Answered(
+            seconds[part], given.setpoints.chosen(part),
+            Outputs(*(each[part] for each in given.outputs)), given.base_wrenches[part],
+            given.breakdown[part]))
     report.write(tmp_path / 'report.html', given.summary())
     data = data_of(tmp_path / 'report.html')
     drawn = np.stack([curve_of(data, 'angles', n)[1] for n in range(3)], axis=1)

@@ -39,7 +39,7 @@ from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT, WRENC
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE, TIME, UNSOLVABLE_CONDITION
 from stewart_dynamics.replay.residuals import AXES
 from stewart_dynamics.replay.statements import cards
-from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.reporting.block_statistics import LISTED
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
@@ -136,9 +136,10 @@ class Samples:
         summary = Summary(parameters)
         for first, end in zip([0, *edges], [*edges, many], strict=True):
             part = slice(first, end)
-            summary.add(self.seconds[part], setpoints.chosen(part),
-                        Outputs(*(each[part] for each in outputs)), self.base_wrenches[part],
-                        None if self.breakdown is None else self.breakdown[part])
+            summary.add(Answered(
+                self.seconds[part], setpoints.chosen(part),
+                Outputs(*(each[part] for each in outputs)), self.base_wrenches[part],
+                None if self.breakdown is None else self.breakdown[part]))
         return summary
 
 
@@ -406,8 +407,9 @@ def test_it_can_be_read_before_the_end() -> None:
     summary = Summary(parameters)
     for first in range(0, 40, 10):
         part = slice(first, first + 10)
-        summary.add(samples.seconds[part], setpoints.chosen(part),
-                    Outputs(*(each[part] for each in outputs)), samples.base_wrenches[part])
+        summary.add(Answered(
+            samples.seconds[part], setpoints.chosen(part),
+            Outputs(*(each[part] for each in outputs)), samples.base_wrenches[part]))
         assert summary.values()['setpoints']['answered'] == first + 10
         assert summary.values() == summary.values()
 
@@ -420,8 +422,9 @@ def test_it_summarizes_the_outputs_of_the_step() -> None:
     outputs = Step(p).many(setpoints, None)
     summary = Summary(p)
     base_wrenches = BaseWrench(p).many(setpoints)
-    summary.add(np.arange(200) * 1.0, setpoints, outputs, base_wrenches,
-                ForceBreakdownRows(p)(setpoints.motions, setpoints.wrenches))
+    summary.add(Answered(
+        np.arange(200) * 1.0, setpoints, outputs, base_wrenches,
+        ForceBreakdownRows(p)(setpoints.motions, setpoints.wrenches)))
     found = summary.values()
     assert 0 < len(found['limits']) == np.any(np.abs(outputs.demanded_forces) > 2000.0,
                                               axis=0).sum()
@@ -451,9 +454,10 @@ def test_it_keeps_no_samples() -> None:
     def held_after(blocks: int) -> int:
         for n in range(blocks):
             # new arrays: any that the summary keeps would be counted
-            summary.add(samples.seconds + n, setpoints.chosen(np.arange(2000)),
-                        Outputs(*map(np.copy, outputs)), samples.base_wrenches.copy(),
-                        samples.breakdown.copy())
+            summary.add(Answered(
+                samples.seconds + n, setpoints.chosen(np.arange(2000)),
+                Outputs(*map(np.copy, outputs)), samples.base_wrenches.copy(),
+                samples.breakdown.copy()))
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()
@@ -681,8 +685,9 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     samples = Samples(3, rates=0.0, breakdown=1.0)
     parameters = hexapod(**LIMITS)
     summary = Summary(parameters, quasi_static=True)
-    summary.add(samples.seconds, batch(samples.stamps), samples.outputs(),
-                samples.base_wrenches, samples.breakdown)
+    summary.add(Answered(
+        samples.seconds, batch(samples.stamps), samples.outputs(), samples.base_wrenches,
+        samples.breakdown))
     found = summary.values()
     leg = found['legs']['b']
     assert {key for key, value in leg.items() if value is None} == {
@@ -698,8 +703,8 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     assert 'limits.velocity_max could not be checked' in text
     assert 'all limits held' not in text
     without = Summary(hexapod(**{'limits.force_max': 5.0}), quasi_static=True)
-    without.add(samples.seconds, batch(samples.stamps), samples.outputs(),
-                samples.base_wrenches)
+    without.add(Answered(
+        samples.seconds, batch(samples.stamps), samples.outputs(), samples.base_wrenches))
     assert not without.values()['limit_met']
 
 

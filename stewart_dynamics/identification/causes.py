@@ -33,8 +33,7 @@ from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.identification.extraction import Extract, SLIP
 from stewart_dynamics.identification.fit import Fit
 from stewart_dynamics.identification.kinematics import motions
-from stewart_dynamics.identification.tilt import Tilt
-from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.unknowns import Tilt, Unknowns
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_SECOND, linear_parameters, PISTON_FIRST,
     PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, VISCOUS_FRICTION)

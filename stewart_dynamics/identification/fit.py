@@ -19,6 +19,11 @@ Gauss-Newton steps: forces are linear in theta, whose elements for the platform 
 its mass, center of mass and inertia. The delay of the efforts of each bag is estimated jointly
 and eliminated. The noise of each leg in each bag is estimated from its residuals. Unidentifiable
 parameters keep their values (``mechanics.least_squares``).
+
+Fitted values are projected onto physically consistent ones, in the metric of the information: mass
+and friction are not negative, and the platform's pseudo-inertia is positive definite
+(``mechanics.dynamics.pseudo_inertia``). If least squares violate this, the platform's ten
+parameters are fitted again in log-Cholesky parameters, which always describe a physical body.
 """
 
 from __future__ import annotations
@@ -27,10 +32,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.identification.physical import consistent
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.identification.sums import delayed_by, residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
+    from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue)
 from stewart_dynamics.mechanics.least_squares import (
     Identifiability, Information, LEAST_SHARE, no_information, solve)
 
@@ -44,6 +50,9 @@ _TIMES_NOISE = 10.0
 _HELD = 1e-6
 # Lower bound of the residuals' deviation, reached with exact efforts, relative to the efforts.
 _SMALLEST_DEVIATION = 1e-8
+# Relative distance to the bound below which a body is a point or a rod within rounding.
+_SMALLEST_BODY = 1e-6
+_BODY_STEPS = 200
 
 
 class Fit(NamedTuple):
@@ -195,3 +204,71 @@ def _variances(sums: Sums, unknowns: Unknowns, values: Array, delays: Array) -> 
     least = _SMALLEST_DEVIATION ** 2 * float(np.mean(sums.effort_squares() / used))
     variances: Array = np.maximum(squares / used, max(least, np.finfo(float).tiny))
     return variances
+
+
+def consistent(unknowns: Unknowns, values: Array, information: Array,
+               ) -> tuple[Array, tuple[str, ...]]:
+    """Return values (k,) within all bounds, and the names of those that violated one."""
+    # Unidentifiable parameters are held with a standard error of their scale.
+    matrix = information + np.diag(unknowns.scales ** -2.0)
+    beyond: list[str] = []
+    free: Flags = np.ones(len(values), dtype=bool)
+    found = values
+    for _ in range(len(values)):
+        negative = [n for n in unknowns.not_negative() if found[n] < 0.0 and free[n]]
+        if not negative:
+            break
+        beyond += [unknowns.names[n] for n in negative]
+        free[negative] = False
+        found = _held(matrix, values, free)
+    many = unknowns.many_of_platform
+    if many and smallest_eigenvalue(unknowns.inertial(found)) < _SMALLEST_BODY:
+        beyond += unknowns.names[:many]
+        found = _as_body(unknowns, found, matrix)
+    return found, tuple(beyond)
+
+
+def _held(matrix: Array, values: Array, free: Flags) -> Array:
+    """Return the values with some at zero and the others at their conditional optimum."""
+    at_zero = np.where(free, values, 0.0)
+    change = at_zero - values
+    shift = np.linalg.solve(matrix[np.ix_(free, free)], matrix[np.ix_(free, ~free)]
+                            @ change[~free])
+    at_zero[free] = values[free] - shift
+    return at_zero
+
+
+def _as_body(unknowns: Unknowns, values: Array, matrix: Array) -> Array:
+    """Return the nearest values with a physical platform, in the metric of information."""
+    units = unknowns.inertial_scales
+
+    def candidate(eta: Array) -> Array:
+        return unknowns.with_inertial(values, units * from_log_cholesky(eta))
+
+    many = unknowns.many_of_platform
+    scales = unknowns.scales[:many]
+    metric = matrix[:many, :many]
+    eta = log_cholesky(unknowns.inertial(unknowns.start) / units)
+    found = candidate(eta)
+    damping = 1e-3
+    for _ in range(_BODY_STEPS):
+        off = (found - values)[:many]
+        scaled = unknowns.derivative(found)[:10, :many] * scales / units[:, None]
+        derivative = scales[:, None] * np.linalg.pinv(scaled) @ log_cholesky_derivative(eta)
+        normal = derivative.T @ metric @ derivative
+        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12),
+                               -derivative.T @ metric @ off)
+        eta_next = eta + np.clip(step, -1.0, 1.0)
+        following = candidate(eta_next)
+        nearer = (following - values)[:many]
+        cost, next_cost = off @ metric @ off, nearer @ metric @ nearer
+        if next_cost > cost:
+            damping *= 10.0
+            if damping > 1e12:
+                break
+            continue
+        eta, found, damping = eta_next, following, damping / 3.0
+        if cost - next_cost < 1e-12 * cost or smallest_eigenvalue(
+                unknowns.inertial(found)) < _SMALLEST_BODY:
+            break
+    return found

@@ -100,8 +100,7 @@ def _arguments() -> argparse.ArgumentParser:
 def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import find_bags
-    from stewart_dynamics.identification.one_run import FUNCTIONS, run
-    from stewart_dynamics.identification.results import result_text
+    from stewart_dynamics.identification.results import FUNCTIONS, result_text, run
     from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 

@@ -12,31 +12,102 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Result of an identification: identification.json, comments of identified.yaml, terminal."""
+"""
+One identification and its results: identified.yaml, identification.json, report.html, terminal.
+
+Files are renamed only when all are complete. Like the replay's report the page needs no network:
+plotly.js is included, numbers are base64 of typed arrays.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from datetime import datetime, timezone
+from pathlib import Path
 import textwrap
 from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.bags import blocks, mcap_scan
+from stewart_dynamics.bags.find import bytes_of
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.identification.extraction import Extracts
 from stewart_dynamics.identification.identification_options import IdentificationOptions
-from stewart_dynamics.identification.identify import Identified, Residuals
+from stewart_dynamics.identification.identify import (
+    Identification, Identified, Residuals)
 from stewart_dynamics.identification.lack_of_fit import Found
+from stewart_dynamics.identification.sums import residual_of, shifted_by
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics, regressor
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.fingerprint import plain_parameters, software
 from stewart_dynamics.replay.statements import plural
+from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.estimates import (
-    combined, estimate, IDENTIFIED, NOT_IDENTIFIABLE, not_identifiable_lines, states_of,
-    table_lines)
+    combined, estimate, IDENTIFIED, justified, NOT_IDENTIFIABLE, not_identifiable_lines,
+    page_values, states_of, table_lines)
+from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
+from stewart_dynamics.reporting.results_folder import (
+    check_free, IDENTIFICATION, remove_abandoned, whole_folder)
+from stewart_dynamics.reporting.spectrum import drawn, Spectrum
+from stewart_dynamics.whole_file import write_files, write_json
+from tqdm import tqdm
 
 # Version of identification.json; increased when the meaning of a key changes.
 VERSION = 1
+
+_TEMPLATES = Path(__file__).with_name('templates')
+# Largest number of samples in the curves of the report; later samples are not drawn.
+_MOST = 12_000
+
+# Functions that every identification needs as machine code.
+FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,
+             friction.friction, *blocks.FUNCTIONS, mcap_scan.scan)
+
+
+def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: IdentificationOptions,
+        warn: Callable[[str], None]) -> dict[str, Any]:
+    """
+    Identify from bags into a folder; return the content of identification.json.
+
+    ``warn`` is called with likely mistakes that were accepted. Raises StewartError if a bag cannot
+    be used, or a mistake is likely: nothing is written.
+    """
+    check_free(folder, options, IDENTIFICATION)
+    remove_abandoned([folder])
+    with closing(Identification(parameters, options)) as work:
+        with tqdm(total=sum(map(bytes_of, bags)), unit='B', unit_scale=True, disable=None,
+                  leave=False, dynamic_ncols=True) as bar:
+            for bag in bags:
+                work.read(bag, bar.update)
+        found = work.result()
+        for likely in found.likely:
+            if not options.accept_mistakes:
+                raise StewartError(f'{bags[0]}: {likely.text}; nothing is written '
+                                   '(--accept-mistakes writes)')
+            warn(f'warning: {likely.text}')
+        result = document(found, options)
+        with whole_folder(folder, options, IDENTIFICATION) as partial:
+            _rounded(found).to_yaml(
+                partial / 'identified.yaml', comments(result, found.unknowns))
+            write_json(partial / IDENTIFICATION, result)
+            if options.report:
+                write_report(partial / 'report.html', work.extracts, found, result)
+    return result
+
+
+def _rounded(found: Identified) -> Parameters:
+    """Return the parameters rounded to the digits that the intervals justify."""
+    errors = np.sqrt(np.maximum(np.diag(found.errors.covariance), 0.0))
+    try:
+        return found.unknowns.parameters(justified(found.fit.values, errors))
+    except StewartError:  # a body at its bound may not be rounded
+        return found.parameters
 
 
 def document(found: Identified, options: IdentificationOptions) -> dict[str, Any]:
@@ -177,3 +248,50 @@ def _bags(result: Mapping[str, Any]) -> list[str]:
         lines.append(f'{plural(result["efforts_outliers"], "filtered effort")} left out as '
                      'outliers')
     return lines
+
+
+# -- the report -----------------------------------------------------------------------------------
+
+def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapping[str, Any],
+                 ) -> None:
+    """Write the page of a result, with the content of identification.json."""
+    legs = list(found.parameters['joints'])
+    curves, spectra = _curves(extracts, found)
+    data = {'legs': legs, 'colors': LEG_COLORS,
+            'curves': [base64_of(column, '<f4') for column in curves.T], 'spectra': spectra}
+    script = plotly_script()
+    bag = result['bags'][0]['bag']
+    text = page(
+        _TEMPLATES, 'identification', [script], document=True, r=result,
+        name=Path(bag).name or bag, **page_values(result), legs=legs, plotly=script, data=data,
+        two_sided=TWO_SIDED, samples=len(curves), most=_MOST)
+    write_files({path: text})
+
+
+def _curves(extracts: Extracts, found: Identified) -> tuple[Array, list[dict[str, str]]]:
+    """Return times, efforts and forces before and after (M, 19), and spectra of residuals."""
+    u = found.unknowns
+    before, after = u.theta(u.start), u.theta(found.fit.values)
+    timeout = found.parameters['setpoint.timeout']
+    spectrum = Spectrum(12, timeout)
+    curves: list[Array] = []
+    count, elapsed = 0, 0.0
+    for extract in extracts:
+        delay = found.fit.delays[extract.bag]
+        effort = extract.efforts @ shifted_by(delay)
+        residuals = [extract.columns @ residual_of(theta, delay) for theta in (before, after)]
+        times = elapsed + extract.times - extract.times[0]
+        spectrum.add(times, np.concatenate(residuals, axis=1).T)
+        elapsed = float(times[-1]) + 10.0 * timeout  # no step between bags
+        if count < _MOST:
+            rows = np.concatenate(
+                [extract.times[:, None], effort, effort - residuals[0], effort - residuals[1]],
+                axis=1)[:_MOST - count]
+            curves.append(np.concatenate([rows, np.full((1, 19), np.nan)]))
+            count += len(rows)
+    density = spectrum.density()
+    spectra = [] if density is None else [
+        dict(zip(('frequencies', 'values'), (
+            base64_of(each, '<f4') for each in drawn(density.frequencies, amplitudes)),
+            strict=True)) for amplitudes in density.amplitudes]
+    return np.concatenate(curves), spectra

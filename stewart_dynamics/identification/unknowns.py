@@ -18,7 +18,10 @@ Parameters to be identified, with the names and definitions of the parameter fil
 The platform is described by mass, center of mass and inertia about it, so that unidentifiable
 parameters keep the values of the file. Forces are linear in ten inertial parameters that are
 functions of these. Leg parameters are linear themselves: mass, first and second moment of each
-part. The tilt of gravity comes last; its change multiplies the gravity-dependent parameters.
+part. The tilt of gravity comes last: forces are linear in gravity,
+``f = Y theta + sum_i d_i G_i theta`` with d the change of gravity and G_i the part of Y due to one
+unit of gravity along axis i, so products of the change with the gravity-dependent parameters are
+further linear parameters, exact for a tilt of any size.
 """
 
 from __future__ import annotations
@@ -30,11 +33,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.identification.tilt import Tilt
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, FIRST_MOMENT,
     LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS,
     PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
+from stewart_dynamics.mechanics.kinematics.home_pose import turns_about
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
 
@@ -67,6 +70,44 @@ _TILT = 0.1
 _ACCELERATION = 10.0
 # Rate at which the scale of friction equals that share, relative to sqrt(acceleration size).
 _RATE = 0.1
+
+
+class Tilt:
+    """
+    Gravity of the parameter file (3,) [m/s^2], rotated about two base axes.
+
+    These are the two of x, y and z most perpendicular to gravity, which is rotated about the first
+    of them, then about the second.
+    """
+
+    def __init__(self, gravity: Array) -> None:
+        self._gravity = gravity
+        along = int(np.argmax(np.abs(gravity)))
+        self._axes = [axis for axis in range(3) if axis != along]
+        self.names = tuple(f'gravity.tilt_{"xyz"[axis]}' for axis in self._axes)
+
+    def gravity(self, angles: Array) -> Array:
+        """Return gravity, shape (3,), rotated by angles (2,) [rad]."""
+        first, second = self._turns(angles)
+        turned: Array = second @ first @ self._gravity
+        return turned
+
+    def change(self, angles: Array) -> Array:
+        """Return the difference (3,) of rotated gravity and the file's value."""
+        return self.gravity(angles) - self._gravity
+
+    def derivative(self, angles: Array) -> Array:
+        """Return the derivative of gravity with respect to the angles, (3, 2)."""
+        first, second = self._turns(angles)
+        about = np.eye(3)[self._axes]
+        turned = first @ self._gravity
+        return np.stack([second @ np.cross(about[0], turned),
+                         np.cross(about[1], second @ turned)], axis=-1)
+
+    def _turns(self, angles: Array) -> tuple[Array, Array]:
+        first, second = (turns_about(axis, np.array([angle]))[0]
+                         for axis, angle in zip(self._axes, angles, strict=True))
+        return first, second
 
 
 class Unknowns:

@@ -42,6 +42,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
+from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
@@ -51,7 +52,6 @@ from stewart_dynamics.reporting.plots import (
 from stewart_dynamics.reporting.results_folder import DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
-from stewart_dynamics.setpoints.step import Batch, Outputs
 from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')
@@ -84,9 +84,10 @@ class Report:
         self._angles: Array = np.zeros((1, 3))
         self._operating = OperatingPoints() if parameters.drives else None
 
-    def add(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
-            breakdown: Array) -> None:
-        """Add setpoints, at least one, and their outputs, see Summary.add."""
+    def add(self, block: Answered) -> None:
+        """Add setpoints, at least one, with their breakdown."""
+        seconds, setpoints, outputs, base_wrenches, breakdown = block
+        assert breakdown is not None
         motions, forces = setpoints.motions, outputs.demanded_forces
         with np.errstate(over='ignore'):
             powers = forces * outputs.rates

@@ -28,7 +28,7 @@ import orjson
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.setpoints.step import Outputs
+from stewart_dynamics.replay.summary import Answered
 
 # Beginnings of text that spreadsheet programs execute.
 _FORMULA = ('=', '+', '-', '@', '\t', '\r', '\n')
@@ -77,9 +77,9 @@ class Table(ABC):
         self._quasi_static = quasi_static
         self._open(folder / self.FILE, column_names(legs, joint_angles, clearance))
 
-    def write(self, seconds: Array, motions: Array, outputs: Outputs,
-              base_wrenches: Array) -> None:
-        """Write the rows of N setpoints, see Summary.add; motions (N, MOTION)."""
+    def write(self, block: Answered) -> None:
+        """Write the rows of N setpoints."""
+        outputs, motions = block.outputs, block.setpoints.motions
         if not len(outputs.stamps):
             return
         rates, determinant_rates = outputs.rates, outputs.determinant_rates
@@ -87,9 +87,9 @@ class Table(ABC):
             rates = np.full_like(rates, np.nan)
             determinant_rates = np.full_like(determinant_rates, np.nan)
         numbers = np.column_stack([
-            seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
+            block.seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
             outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
-            outputs.determinants, determinant_rates, outputs.conditions, base_wrenches,
+            outputs.determinants, determinant_rates, outputs.conditions, block.base_wrenches,
             outputs.joint_angles, outputs.clearances])
         self._write(outputs.stamps, numbers, outputs.warnings)
 

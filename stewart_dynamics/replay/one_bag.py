@@ -46,7 +46,7 @@ from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.recorded_efforts import Efforts
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison
-from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
 from stewart_dynamics.setpoints import base_wrench, inputs, step
@@ -176,7 +176,6 @@ class _Run:
         self._comparison = None if options.measured is None else Comparison(parameters)
         self._efforts = Efforts(parameters['joints'])
         self.report: Report | None = None
-        self._breakdown: ForceBreakdownRows | None = None
         if options.report:
             self.report = Report(parameters, options.measured is not None, folder)
             self._breakdown = ForceBreakdownRows(parameters)
@@ -290,16 +289,16 @@ class _Run:
         self._state = outputs.state
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
-        base_wrenches = self._base_wrench.many(setpoints)
-        seconds = self._seconds(setpoints.stamps)
-        breakdown = None if self._breakdown is None else self._breakdown(
-            setpoints.motions, setpoints.wrenches, setpoints.bases)
-        self._files.write(seconds, setpoints, outputs, base_wrenches)
-        self._summary.add(seconds, setpoints, outputs, base_wrenches, breakdown)
-        if self.report is not None and breakdown is not None:
-            self.report.add(seconds, setpoints, outputs, base_wrenches, breakdown)
+        block = Answered(self._seconds(setpoints.stamps), setpoints, outputs,
+                         self._base_wrench.many(setpoints))
+        self._files.write(block)
+        if self.report is not None:
+            block = block._replace(breakdown=self._breakdown(
+                setpoints.motions, setpoints.wrenches, setpoints.bases))
+            self.report.add(block)
+        self._summary.add(block)
         if self._comparison is not None:
-            self._compared(self._comparison.add_setpoints(seconds, setpoints, outputs))
+            self._compared(self._comparison.add_setpoints(block.seconds, setpoints, outputs))
         return len(setpoints.stamps)
 
     def _seconds(self, stamps: Stamps) -> Array:

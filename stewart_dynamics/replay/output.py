@@ -13,7 +13,13 @@
 # limitations under the License.
 
 
-"""The output bag of a replay: the topics of the node, in MCAP."""
+"""
+The output bag of a replay: the topics of the node, and the hexapod as a model, in MCAP.
+
+The model is the URDF, and the transforms of all its links, as robot_state_publisher publishes
+them: Foxglove and RViz need nothing else. The joint positions are those that the node publishes,
+but for rounding: many are computed at once.
+"""
 
 from __future__ import annotations
 
@@ -30,15 +36,34 @@ from mcap.opcode import Opcode
 from mcap.records import (
     Channel, ChunkIndex, DataEnd, Footer, Header, McapRecord, Schema, Statistics)
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.arrays import Array, Bytes, Stamps
 from stewart_dynamics.bags.mcap_file import MAGIC
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.model import JOINT_STATES, LinkTransforms, TF
+from stewart_dynamics.description.urdf import urdf
+from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
+from stewart_dynamics.mechanics.rows import POSITION, ROTATION
+from stewart_dynamics.messages import type_names
+from stewart_dynamics.messages.joint_state import joint_state_layout
 from stewart_dynamics.messages.layout import at_any_byte
-from stewart_dynamics.replay.recorded_model import (
-    MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
+from stewart_dynamics.messages.standard import string, transforms
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.setpoints.output_messages import OutputMessages, Written
 from stewart_dynamics.setpoints.step import Outputs
 import yaml  # type: ignore[import-untyped]
+
+TF_STATIC = '/tf_static'
+ROBOT_DESCRIPTION = '/robot_description'
+
+MODEL_TYPES = {
+    JOINT_STATES: type_names.JOINT_STATE,
+    TF: type_names.TF_MESSAGE,
+    TF_STATIC: type_names.TF_MESSAGE,
+    ROBOT_DESCRIPTION: type_names.STRING,
+}
 
 _LIBRARY = 'stewart_dynamics'
 # Late subscribers get their last message, in `ros2 bag play`, too.
@@ -47,6 +72,39 @@ _LATCHED = 'singularity_warning', TF_STATIC, ROBOT_DESCRIPTION
 _HEAD = 31
 # Opcode, length, times of first and last message, size, checksum, no compression, size.
 _CHUNK_HEAD = Struct('<BQQQQIIQ')
+
+
+class RecordedModel:
+    """
+    Writes the messages of a hexapod, which has a name in the URDF.
+
+    Raises ParameterError if two joints or links of the URDF would have the same name.
+    """
+
+    def __init__(self, parameters: Parameters, name: str) -> None:
+        self._urdf = urdf(Hexapod(parameters), name)
+        self._joints = TreeJoints(parameters)
+        self._links = LinkTransforms(self._urdf)
+        self._positions = joint_state_layout(self._joints.names, ['position'])
+        self._moving = transforms(self._links.moving)
+        self._fixed = transforms(self._links.fixed)
+
+    def of_beginning(self, stamp: int) -> Iterator[tuple[str, NDArray[np.void]]]:
+        """Yield topics and messages (1,) of the constant parts, at a stamp [ns]."""
+        yield TF_STATIC, self._fixed.write(
+            np.array([stamp]), *self._links.at_fixed[:, None])
+        text = string(self._urdf)
+        yield ROBOT_DESCRIPTION, np.frombuffer(text, dtype=f'V{len(text)}')
+
+    def of_rows(self, stamps: Stamps, poses: Array) -> Iterator[tuple[str, NDArray[np.void]]]:
+        """Yield topics and messages (N,) of stamps (N,) [ns] and rows of motion (N, MOTION)."""
+        if not len(stamps):
+            return
+        positions = self._joints.positions(
+            poses[:, POSITION], poses[:, ROTATION].reshape(-1, 3, 3))
+        yield JOINT_STATES, self._positions.write(stamps, positions)
+        yield TF, self._moving.write(
+            stamps, *np.moveaxis(self._links.at(positions), 1, 0))
 
 
 class OutputBag:
@@ -99,20 +157,15 @@ class OutputBag:
         self._file.write(MAGIC + _bytes(Header(profile='ros2', library=_LIBRARY)))
         self._file.write(self._declarations())
 
-    def write(self, times: Stamps, motions: Array, outputs: Outputs, base_wrenches: Array,
-              ) -> None:
-        """
-        Write a chunk: the messages of setpoints.
-
-        They are recorded at times (N,) [ns]; for motions (N, MOTION), outputs and base wrenches
-        see Summary.add.
-        """
+    def write(self, block: Answered) -> None:
+        """Write a chunk: the messages of setpoints."""
+        times, outputs = block.setpoints.times, block.outputs
         if not len(times):
             return
         groups = [group for group in (
             *self._messages.of_outputs(outputs),
-            self._messages.of_base_wrenches(outputs.stamps, base_wrenches),
-            *self._of_model(times, motions, outputs)) if len(group[1])]
+            self._messages.of_base_wrenches(outputs.stamps, block.base_wrenches),
+            *self._of_model(times, block.setpoints.motions, outputs)) if len(group[1])]
         sizes = np.zeros((len(times), len(groups)), dtype=np.int64)
         for n, (_, which, messages) in enumerate(groups):
             sizes[which, n] = _HEAD + messages.dtype.itemsize

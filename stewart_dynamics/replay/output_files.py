@@ -30,17 +30,15 @@ import subprocess
 import sys
 from typing import Any
 
-from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import unexpected
 from stewart_dynamics.replay.legs_table import kind_of_table
-from stewart_dynamics.replay.output import OutputBag
-from stewart_dynamics.replay.recorded_model import RecordedModel
+from stewart_dynamics.replay.output import OutputBag, RecordedModel
 from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.setpoints.output_messages import OutputMessages
-from stewart_dynamics.setpoints.step import Batch, Outputs
 
 _PROGRAM = ('import sys; sys.path[:] = sys.argv[1:]; '
             'from stewart_dynamics.replay.output_files import main; main()')
@@ -77,11 +75,10 @@ class OutputFiles:
         self._bag = OutputBag(folder / 'bag', options.node, OutputMessages(parameters), model,
                               parameters['visualization_rate'])
 
-    def write(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
-              ) -> None:
-        """Write setpoints; see Summary.add."""
-        self._bag.write(setpoints.times, setpoints.motions, outputs, base_wrenches)
-        self._table.write(seconds, setpoints.motions, outputs, base_wrenches)
+    def write(self, block: Answered) -> None:
+        """Write setpoints."""
+        self._bag.write(block)
+        self._table.write(block)
 
     def close(self) -> None:
         """Complete the files."""
@@ -111,10 +108,9 @@ class OutputProcess:
             fcntl(self._blocks, F_SETPIPE_SZ, _PIPE)
         self._send((folder, parameters, options, quasi_static))
 
-    def write(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
-              ) -> None:
+    def write(self, block: Answered) -> None:
         """Send setpoints; raises the error of earlier ones."""
-        self._send((seconds, setpoints, outputs, base_wrenches))
+        self._send(block)
 
     def close(self) -> None:
         """Complete the files."""
@@ -155,7 +151,7 @@ def main() -> None:
     try:
         files = OutputFiles(*pickle.load(blocks))
         while (block := pickle.load(blocks)) is not None:
-            files.write(*block)
+            files.write(block)
         files.close()
     except (EOFError, pickle.UnpicklingError):
         pass  # the replay was killed

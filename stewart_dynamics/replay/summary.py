@@ -50,12 +50,17 @@ _BASE_WRENCH = (
 _BASE_UNITS = ('n', 'n_m', 'n', 'n', 'n', 'n_m', 'n_m', 'n_m')
 
 
-class _Block(NamedTuple):
+class Answered(NamedTuple):
+    """A block of N answered setpoints, for summary, report, output bag and table."""
+
     seconds: Array
+    """(N,) since the first setpoint of the bag [s]; it does not advance where stamps jump back."""
     setpoints: Batch
     outputs: Outputs
     base_wrenches: Array
-    breakdown: Array | None
+    """Wrench of the hexapod on its base (N, 6) [N, N m]; nan: not known."""
+    breakdown: Array | None = None
+    """The demanded forces by source (N, 7, 6): sample, source, leg [N]."""
 
 
 class Summary:
@@ -79,7 +84,7 @@ class Summary:
         self._exceeded = {
             name: Exceeded(name in MINIMA)
             for name in self._limits.bounds if not (quasi_static and name == VELOCITY_MAX)}
-        self._held: list[_Block] = []
+        self._held: list[Answered] = []
         self._gap: float | None = None
         self._stamps: tuple[int, int] | None = None
         self._answered = self._restarts = self._gaps = self._unsolved = self._suppressed = 0
@@ -110,29 +115,10 @@ class Summary:
         self._source_squares = Integral(6 * len(self._sources))
         self._has_breakdown = False
 
-    def add(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
-            breakdown: Array | None = None) -> None:
-        """
-        Add a block of samples.
-
-        Parameters
-        ----------
-        seconds : (N,)
-            Time since the first setpoint of the bag [s]; it does not advance where stamps
-            jump back.
-        setpoints : Batch
-            The answered setpoints.
-        outputs : Outputs
-            Their outputs.
-        base_wrenches : (N, 6)
-            Wrench of the hexapod on its base [N, N m]; nan: not known.
-        breakdown : (N, 7, 6), optional
-            The demanded forces by source: sample, source, leg [N].
-
-        """
-        if not len(seconds):
+    def add(self, block: Answered) -> None:
+        """Add a block of samples."""
+        if not len(block.seconds):
             return
-        block = _Block(seconds, setpoints, outputs, base_wrenches, breakdown)
         if self._gap is not None:
             self._add(block)
             return
@@ -150,7 +136,7 @@ class Summary:
         for block in held:
             self._add(block)
 
-    def _add(self, block: _Block) -> None:
+    def _add(self, block: Answered) -> None:
         seconds, setpoints, outputs, base_wrenches, breakdown = block
         steps = self._steps(seconds, setpoints)
         lengths, rates, demanded = outputs.lengths, outputs.rates, outputs.demanded_forces
