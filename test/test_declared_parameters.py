@@ -35,7 +35,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
-from referees import ROOT
+from referees import ROOT, symmetric_parameters
 from rosgraph_msgs.msg import Clock
 
 from stewart_dynamics import ParameterError, Parameters
@@ -43,7 +43,7 @@ from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.parameters.table import PARAMETERS
 from stewart_dynamics.reference_motion.parameters import (
     REFERENCE_MOTION_PARAMETERS, ReferenceMotionParameters)
-from stewart_dynamics.ros.declared_parameters import declare_parameters
+from stewart_dynamics.ros.declared_parameters import declare_parameters, log_changes
 from stewart_dynamics.ros.rclpy_workarounds import reject_impossible_times
 
 SECONDS = 30.0
@@ -316,3 +316,11 @@ def test_a_file_for_another_node_is_named(declared: Any, tmp_path: Path) -> None
         declared(LifecycleNode, Parameters, str(file), 'base_frame:=world')
     assert str(caught.value) == (f"{file}: is for stewart_dynamic, not for '/stewart_dynamics': "
                                  "rename the section, or use '/**'")
+
+
+def test_a_change_from_a_default_is_logged_with_it() -> None:
+    before = symmetric_parameters()
+    assert 'external_wrench.cutoff' not in before.given
+    changed = before.replaced({'external_wrench.cutoff': 5.0})
+    assert [text for _, text, _ in log_changes(before, changed)] == [
+        'external_wrench.cutoff: 10.0 -> 5.0']

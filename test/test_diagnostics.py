@@ -21,12 +21,14 @@ from typing import Any
 
 from hypothesis import given, strategies as st
 import pytest
-from referees import symmetric_parameters
+from referees import ROOT, symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
+from stewart_dynamics.node.diagnostics.outcomes import (
+    PayloadDiagnostics, PlannedTrajectoryDiagnostics)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, LogLine, OK, STALE, Status, WARN)
+    ERROR, LogLine, OK, STALE, Status, StatusPart, WARN)
 from stewart_dynamics.ros.repeated_log import SECONDS, Series
 from stewart_dynamics.setpoints.inputs import ACCEL, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
@@ -659,3 +661,11 @@ def test_first_and_last_are_logged_and_none_is_lost(events: list[tuple[str, floa
         lines = [line for line in said if line.startswith(kind)]
         assert lines[0] == f'{kind} {own[0]}.'
         assert lines[-1].startswith(f'{kind} {own[-1]}.')
+
+
+def test_the_page_of_the_node_names_each_status() -> None:
+    page = (ROOT / 'docs/node.md').read_text(encoding='utf-8')
+    table = page.partition('| status | contents |')[2].partition('\n\n')[0]
+    parts = [*StatusPart.__subclasses__(), PayloadDiagnostics, PlannedTrajectoryDiagnostics]
+    assert set(re.findall(r'^\| ([a-z ]+) \|', table, re.MULTILINE)) == {
+        part.name for part in parts if part.name}

@@ -185,6 +185,16 @@ def test_a_rejection_is_reported_and_counted() -> None:
     assert dict(now.values)['rejected, measured_legs: lacks one of the joints'] == '11'
 
 
+def test_rejections_after_an_overload_are_named() -> None:
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
+    felt(diagnostics, 1.0, OVER)
+    diagnostics.heard(1.5)
+    diagnostics.rejected(Rejection(MEASURED_LEGS, MISSING_JOINTS), 'leg_6', 1.5)
+    now = status(diagnostics, 1.5)
+    assert (now.level, now.message) == (
+        STALE, 'no wrench: measured_legs: lacks one of the joints (leg_6)')
+
+
 # The diagnostics of the base: levels, words and log lines, at chosen times
 
 PARAMETERS = symmetric_parameters().replaced({'base.source': 'imu', 'base.timeout': 0.1})

@@ -290,7 +290,8 @@ def test_a_sound_environment_is_let_be(environment: Callable[..., None],
     ({'OPENSSL_CONF': ''}, "OPENSSL_CONF: '': has no VerifyMode = Require"),
     ({'OPENSSL_CONF': '{tmp}/key.pem'}, "OPENSSL_CONF: '{tmp}/key.pem': has no VerifyMode"),
     ({'OPENSSL_CONF': '{tmp}/none'}, 'OPENSSL_CONF: {tmp}/none: cannot be read: No such file'),
-    ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}, 'set it to SYSTEM_DEFAULT'),
+    ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}, 'Set it to SYSTEM_DEFAULT'),
+    ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEMDEFAULT'}, 'Set it to SYSTEM_DEFAULT'),
     ({'ROS_LOCALHOST_ONLY': '1'}, 'and ROS_LOCALHOST_ONLY not at all'),
 ])
 def test_an_open_environment_is_rejected(environment: Callable[..., None], tmp_path: Path,
@@ -301,6 +302,19 @@ def test_an_open_environment_is_rejected(environment: Callable[..., None], tmp_p
     environment(**changes)
     with pytest.raises(StewartError, match=re.escape(text.replace('{tmp}', str(tmp_path)))):
         check_environment(['--enclave', '/mine'])
+
+
+def test_a_profile_that_another_replaces_is_rejected(
+        environment: Callable[..., None], tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    environment(**TLS)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'DEFAULT_FASTRTPS_PROFILES.xml').touch()
+    environment(SKIP_DEFAULT_XML_FILE='1')
+    check_environment([])
+    environment(SKIP_DEFAULT_XML_FILE='true')  # which Fast DDS ignores
+    with pytest.raises(StewartError, match=r'is replaced by DEFAULT_FASTRTPS_PROFILES\.xml'):
+        check_environment([])
 
 
 def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],

@@ -259,7 +259,7 @@ def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool
 
 def log_changes(before: Parameters, after: Parameters) -> Iterator[tuple[int, str, None]]:
     """Yield log lines for changed values and for new likely mistakes, as ``RepeatedLog`` takes."""
-    changes = [f'{name}: {before.given.get(name)} -> {value}'
+    changes = [f'{name}: {before.given.get(name, before[name])} -> {value}'
                for name, value in after.given.items() if value != before.given.get(name)]
     if changes:
         yield INFO, '; '.join(changes), None

@@ -33,6 +33,10 @@ from xml.etree import ElementTree
 from stewart_dynamics.errors import StewartError
 
 _OLD, _NEW = 'FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'
+# Discovery ranges with which a profile keeps its transports; ROS takes any other for LOCALHOST.
+_RANGES = ('', 'SYSTEM_DEFAULT', 'SUBNET', 'OFF')
+# Files of profiles that Fast DDS 2 and 3 load from the working folder.
+_REPLACING = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
 _VARIABLE = re.compile(r'\$\{([A-Z_][A-Z0-9_]*)\}')  # in the syntax of Fast DDS
 _COMMENT = re.compile('<!--.*?-->', re.DOTALL)
 _KEY_FILES = ('private_key_file', 'cert_chain_file', 'verify_file')
@@ -139,14 +143,8 @@ def _check_profile(path: Path) -> None:
         lambda found: os.environ[found[1]], element.text or '').strip())
         for element in root.iter()]
     kinds = {kind for kind, _ in elements}
-    on_localhost = (os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST'
-                    or os.environ.get('ROS_LOCALHOST_ONLY') == '1')
-    if (on_localhost and ('useBuiltinTransports', 'false') in elements
-            and kinds & {'interfaceWhiteList', 'tls'}):
-        raise StewartError(f'{PROFILES}: {path}: is not in effect where '
-                           'ROS_AUTOMATIC_DISCOVERY_RANGE is LOCALHOST, which adds shared memory '
-                           'and UDP on all addresses: set it to SYSTEM_DEFAULT, and '
-                           'ROS_LOCALHOST_ONLY not at all')
+    if ('useBuiltinTransports', 'false') in elements and kinds & {'interfaceWhiteList', 'tls'}:
+        _check_that_nothing_replaces(path)
     for kind, name in elements:
         if kind in _KEY_FILES:
             _read(Path(name), f'{PROFILES}: {path}: {kind}')
@@ -155,6 +153,20 @@ def _check_profile(path: Path) -> None:
         if not name or not _ASKS_FOR_CERTIFICATES.search(_read(Path(name), 'OPENSSL_CONF')):
             raise StewartError(f"OPENSSL_CONF: '{name}': has no VerifyMode = Require: every "
                                'process could connect to the port of the profile')
+
+
+def _check_that_nothing_replaces(path: Path) -> None:
+    """Raise StewartError where ROS or Fast DDS adds transports to those of the profile."""
+    discovery = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
+    if discovery not in _RANGES or os.environ.get('ROS_LOCALHOST_ONLY') == '1':
+        raise StewartError(f'{PROFILES}: {path}: is not in effect where '
+                           'ROS_AUTOMATIC_DISCOVERY_RANGE is LOCALHOST, as which ROS reads '
+                           'unknown values, too: it adds shared memory and UDP on all addresses. '
+                           'Set it to SYSTEM_DEFAULT, and ROS_LOCALHOST_ONLY not at all')
+    for name in _REPLACING:
+        if os.environ.get('SKIP_DEFAULT_XML_FILE') != '1' and Path(name).exists():
+            raise StewartError(f'{PROFILES}: {path}: is replaced by {name} in the working folder '
+                               'where SKIP_DEFAULT_XML_FILE is not 1')
 
 
 def _read(path: Path, what: str) -> str:

@@ -26,6 +26,7 @@ from stewart_dynamics.parameters.table import Parameters
 
 _QUANTITIES = {'external_wrench.force_max': ('force', 'N'),
                'external_wrench.moment_max': ('moment', 'N m')}
+_REJECTED, _OVERLOAD = '', 'overload'  # causes of a level
 _COMPONENTS = ('force x (N)', 'force y (N)', 'force z (N)', 'moment x (N m)', 'moment y (N m)',
                'moment z (N m)')
 
@@ -36,7 +37,7 @@ class ExternalWrenchDiagnostics(StatusPart):
     name = 'external wrench'
 
     def __init__(self, parameters: Parameters) -> None:
-        super().__init__()
+        super().__init__(_OVERLOAD, _REJECTED)
         self._joints = parameters['joints']
         self._timeout = parameters['setpoint.timeout']
         self._begun = self._heard = self._used_at = self._estimated_at = NEVER
@@ -72,7 +73,7 @@ class ExternalWrenchDiagnostics(StatusPart):
         self._estimated += 1
         self._estimated_at = now
         self.held.see(Level(ERROR if estimate.overloads else OK,
-                            ', '.join(map(_words, estimate.overloads))), now)
+                            ', '.join(map(_words, estimate.overloads))), now, _OVERLOAD)
         return self.held.level(now) != self._reported
 
     def level(self, now: float) -> int:
@@ -103,14 +104,14 @@ class ExternalWrenchDiagnostics(StatusPart):
 
     def state(self, now: float) -> Level:
         """Return the present level and its cause."""
-        held = self.held.at(now)
         if not self._is_stale(now):
+            held = self.held.at(now)
             return Level(held.level, held.message or 'no overload')
         silent = now - self._heard
         return Level(STALE, 'no wrench: ' + (
             f'measured_legs silent for {silent:.1f} s' if silent > self._timeout
-            else held.message or 'measurements are farther apart than setpoint.timeout, '
-            f'{self._timeout:g} s'))
+            else self.held.of(_REJECTED, now).message
+            or f'measurements are farther apart than setpoint.timeout, {self._timeout:g} s'))
 
     def _numbers(self, estimate: Estimate) -> list[tuple[str, str]]:
         values = []
