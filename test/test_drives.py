@@ -29,7 +29,7 @@ from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import Motion, ParameterError, Parameters, SingularityError, StewartPlatform
 from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.mechanics.drives.heat import rms_torques, temperature_rises
+from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions
 
@@ -325,21 +325,6 @@ def test_windings_warm_exactly_while_the_heat_is_held() -> None:
                              atol=1e-12).y[0, -1]
             assert rises[n + 1, leg] == pytest.approx(rise, rel=1e-9)
     assert np.isnan(temperature_rises(driven(HEXAPOD, random), times, heat)).all()
-
-
-def test_rms_torques_over_a_window() -> None:
-    random = rng()
-    times = np.cumsum(random.uniform(0.01, 0.1, 50))
-    torques = random.normal(size=(50, 6))
-    fine = np.linspace(times[0], times[-1], 400001)
-    squares = np.array([np.interp(fine, times, torques[:, leg]) for leg in range(6)]).T ** 2
-    for window in (0.4, np.inf):
-        found = rms_torques(times, torques, window)
-        for n in (0, 1, 7, 30, 49):
-            inside = (fine >= times[n] - window) & (fine <= times[n])
-            assert found[n] == pytest.approx(
-                np.sqrt(squares[inside].mean(axis=0)), rel=2e-3, abs=1e-3)
-    assert rms_torques(times[:1], torques[:1]) == pytest.approx(np.abs(torques[:1]))
 
 
 def test_without_a_lead_nothing_is_known_and_a_singular_sample_raises() -> None:

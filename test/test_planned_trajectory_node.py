@@ -21,19 +21,17 @@ from collections.abc import Callable
 
 import numpy as np
 from running import (
-    bits, DynamicsNode, header, HOME, log_lines, nanoseconds, NODE, Planner, Sample,
-    wrench_message)
+    bits, DynamicsNode, header, HOME, nanoseconds, NODE, Planner, Sample, wrench_message)
 from sensor_msgs.msg import JointState
 from stewart_dynamics import approach, StewartPlatform
 from trajectory_msgs.msg import JointTrajectory
 
 Start = Callable[..., DynamicsNode]
 
-OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
+OK = bytes([0])
 
 RISEN = HOME._replace(position=(0.01, -0.02, 1.13))
 MOTION = [HOME, RISEN, HOME._replace(position=(0.02, 0.0, 1.1)), HOME]
-TOO_HIGH = HOME._replace(position=(0.0, 0.0, 1.9))
 
 
 def check(answer: JointTrajectory, samples: list[Sample], platform: StewartPlatform,
@@ -71,26 +69,6 @@ def test_a_trajectory_is_answered_with_the_bits_of_the_library(fresh: Start) -> 
                'the load has come')
     planner.send(MOTION, step=500_000_000)
     check(planner.until_answered(2), MOTION, node.platform, load)
-
-
-def test_a_rejected_trajectory_is_not_answered_and_the_next_one_is(fresh: Start) -> None:
-    node = fresh()
-    node.until_active()
-    planner = Planner(node)
-    for number in (1, 2):
-        planner.send([HOME, TOO_HIGH], step=1_000_000_000)
-        planner.until_rejected('rejected: at ', number)
-        values = node.values('planned trajectory')
-        assert values['rejected: a limit is exceeded'] == str(number)
-        assert values['accepted'] == str(number - 1)
-        assert 0.0 < float(values['rejected at (s)']) < 1.0
-        assert values['leg'] in node.status('planned trajectory').message
-        planner.send(MOTION, step=500_000_000)
-        check(planner.until_answered(number), MOTION, node.platform)
-        node.until_status('planned trajectory', OK, 'accepted')
-    line = log_lines(node.program.stderr, 'ERROR')[0]
-    assert 'planned trajectory rejected: at ' in line
-    assert ' limits.' in line
 
 
 def test_setpoints_are_answered_while_trajectories_are_in_work(fresh: Start) -> None:

@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The compiled functions on batches; large batches are divided among all processors."""
+"""
+Results and leg lengths of batches; large batches are divided among all processors.
+
+Leg lengths alone (1) are computed in plain numpy: nothing has to be compiled for them.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +31,9 @@ from numpy.typing import NDArray
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
-from stewart_dynamics.mechanics.rows import NO_BASE, RESULT, WRENCH
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import joints_of
+from stewart_dynamics.mechanics.rows import NO_BASE, POSE, RESULT, WRENCH
+from stewart_dynamics.mechanics.vectors import add, dot, rotate, subtract
 
 # Samples for one thread at least: a millisecond of work, far more than the start of a thread.
 _SAMPLES_FOR_A_THREAD = 4096
@@ -65,6 +71,21 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None,
     in_parts(inverse_dynamics.solve, constants, motions, wrenches, bases, results, sound,
              scratch=(inverse_dynamics.TILE,))
     return results
+
+
+def leg_lengths(constants: Array, poses: Array) -> Array:
+    """
+    Return the lengths (..., 6) [m] of the legs in poses (..., POSE), unchecked.
+
+    All legs and samples go side by side through the operations of ``bodies.leg_line``, and get
+    the same bits.
+    """
+    numbers: Any = [poses[..., n, None] for n in range(POSE.stop)]  # arrays for scalars
+    legs: Any = np.arange(6)
+    base_joints, platform_joints = joints_of(constants, legs)
+    leg = subtract(add(numbers[:3], rotate(numbers[3:], platform_joints)), base_joints)
+    lengths: Array = np.sqrt(dot(leg, leg))
+    return lengths
 
 
 def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[Any],

@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.mechanics import batch, stiffness
 from stewart_dynamics.mechanics.arguments import (
@@ -40,7 +40,6 @@ from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
-from stewart_dynamics.mechanics.kinematics.inverse_kinematics import leg_lengths
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.platform_arguments import (
@@ -149,26 +148,29 @@ class StewartPlatform:
         result = self._single.inverse_dynamics(motion, wrench, base) if known else None
         if result is not None:
             return InverseDynamics(result)
+        _, _, results, unsolvable, shape = self._solved(motion, wrench, base, singular)
+        results[unsolvable, FORCES] = np.nan
+        return InverseDynamics(results.reshape(*shape, RESULT))
+
+    def _solved(
+            self, motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
+            singular: str) -> tuple[Array, tuple[Array, Array], Array, Integers, tuple[int, ...]]:
+        """Return rows of motion, of wrenches and base, of results; the unsolvable; the shape."""
         rows, wrenches, bases, shape = loaded(motion, wrench, base)
         results = self.solve(rows, wrenches, bases)
         check_finite('motion', results.reshape(*shape, RESULT), len(shape))
-        unsolvable = find_unsolvable(rows, results, shape, singular)
-        if len(unsolvable):
-            results[unsolvable, FORCES] = np.nan
-        return InverseDynamics(results.reshape(*shape, RESULT))
+        return (rows, (wrenches, bases), results, find_unsolvable(rows, results, shape, singular),
+                shape)
 
     def force_breakdown(
             self, motion: Motion, wrench: ArrayLike | None = None,
             base: BaseMotion | None = None, *,
             singular: Literal['raise', 'nan'] = 'raise') -> ForceBreakdown:
         """Return the leg forces by source; arguments and errors are ``inverse_dynamics``'s."""
-        rows, wrenches, bases, shape = loaded(motion, wrench, base)
-        results = self.solve(rows, wrenches, bases)
-        check_finite('motion', results.reshape(*shape, RESULT), len(shape))
-        unsolvable = find_unsolvable(rows, results, shape, singular)
+        rows, loads, _, unsolvable, shape = self._solved(motion, wrench, base, singular)
         if self._breakdown is None:
             self._breakdown = ForceBreakdownRows(self.parameters)
-        forces = self._breakdown(rows, wrenches, None if base is None else bases)
+        forces = self._breakdown(rows, loads[0], None if base is None else loads[1])
         known = forces.copy()
         known[unsolvable] = 0.0
         check_finite('motion', known.reshape(*shape, len(SOURCES), 6), len(shape))
@@ -205,10 +207,7 @@ class StewartPlatform:
         derivatives by small turns of gravity about the base's x and y axes, with this hexapod's
         parameters; their linear parameters are zero.
         """
-        rows, _, bases, shape = loaded(motion, None, base)
-        results = self.solve(rows, None, bases)
-        check_finite('motion', results.reshape(*shape, RESULT), len(shape))
-        find_unsolvable(rows, results, shape, 'raise')
+        rows, (_, bases), _, _, shape = self._solved(motion, None, base, 'raise')
         matrix = self.regressors(rows, bases).reshape(*shape, 6, LINEAR)
         names = names_of(self.parameters)
         if tilt:
@@ -312,7 +311,7 @@ class StewartPlatform:
         """Return the six leg lengths at a pose, (..., 6) [m]."""
         check_kind(pose, Pose, Motion)
         with np.errstate(all='ignore'):
-            lengths = leg_lengths(self.constants, pose.rows)
+            lengths = batch.leg_lengths(self.constants, pose.rows)
         return check_finite('leg lengths', lengths, len(pose.shape))
 
     def forward_kinematics(self, lengths: ArrayLike, guess: Pose | Motion | None = None) -> Pose:

@@ -64,9 +64,18 @@ class BaseInput:
             lambda text: noticed(f'base: {text}'))
         self._timeout = round(parameters['base.timeout'] * 1e9)
         self._restart = round(parameters['setpoint.timeout'] * 1e9)
+        gravity: Any = tuple(parameters['gravity'].tolist())
+
+        def of_pose(stamp: int, values: Any) -> _Row:
+            return row_of_pose(values[3:12], gravity)
+
+        def of_motion(stamp: int, values: Any) -> _Row:
+            return row_of_motion(
+                values[3:12], values[18:21], values[15:18], values[21:24], gravity)
+
         self._row_of: Callable[[int, _Row], _Row] = (
             _OfImu(parameters) if source == 'imu' else
-            _OfMotion(parameters) if source == 'motion' else _OfPose(parameters))
+            of_motion if source == 'motion' else of_pose)
         self._samples: deque[tuple[int, _Row]] = deque(maxlen=_KEPT)
 
     @property
@@ -181,24 +190,6 @@ class BaseInput:
         now, then = values[sample], values[before]
         rows[known] = np.where(step[:, None] > 0.0, now + (now - then) * part[:, None], now)
         return rows
-
-
-class _OfPose:
-    """Converts a pose to the row of a base at rest with this tilt."""
-
-    def __init__(self, parameters: Parameters) -> None:
-        self._gravity: Any = tuple(parameters['gravity'].tolist())
-
-    def __call__(self, stamp: int, values: Any) -> _Row:
-        return row_of_pose(values[3:12], self._gravity)
-
-
-class _OfMotion(_OfPose):
-    """Converts pose, twist and acceleration in the world frame to a row."""
-
-    def __call__(self, stamp: int, values: Any) -> _Row:
-        return row_of_motion(values[3:12], values[18:21], values[15:18], values[21:24],
-                             self._gravity)
 
 
 class _OfImu:

@@ -74,35 +74,3 @@ def temperature_rises(p: Parameters, times: Array, heat: Array, first: Array | N
         warm(compact(times), compact(heat), p['drive.thermal_resistance'],
              p['drive.thermal_time_constant'], rises)
     return rises
-
-
-def rms_torques(times: Array, torques: Array, window: float = np.inf) -> Array:
-    """
-    Return the RMS torques (N, 6) [N m] over a window up to each time, linear in between.
-
-    Where fewer times precede, the window begins at the first one.
-
-    Parameters
-    ----------
-    times : (N,)
-        Strictly increasing [s].
-    torques : (N, 6)
-        [N m]
-    window : float
-        [s]
-
-    """
-    steps = np.diff(times)[:, None]
-    a, b = torques[:-1], torques[1:]
-    squares = np.concatenate([np.zeros((1, torques.shape[1])), np.cumsum(
-        steps * (a * a + a * b + b * b) / 3.0, axis=0)])
-    begin = np.maximum(times - window, times[0])
-    at = np.clip(np.searchsorted(times, begin, 'right') - 1, 0, max(len(times) - 2, 0))
-    found = np.abs(torques)
-    if len(times) > 1:
-        into = (begin - times[at])[:, None]
-        c = torques[at] + (torques[at + 1] - torques[at]) * into / steps[at]
-        before = squares[at] + into * (torques[at] ** 2 + torques[at] * c + c * c) / 3.0
-        span = (times - begin)[1:, None]
-        found[1:] = np.sqrt(np.maximum(squares - before, 0.0)[1:] / span)
-    return found
