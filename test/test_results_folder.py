@@ -120,14 +120,18 @@ def test_an_empty_folder_is_not_the_current_one(
     assert capsys.readouterr().err.endswith("error: argument --output: '': must name a folder\n")
 
 
-@pytest.mark.parametrize('other', ['summary.json', 'flight/summary.json', 'identification.json'])
-def test_results_of_another_program_are_not_replaced(tmp_path: Path, other: str) -> None:
+@pytest.mark.parametrize('other', [
+    'summary.json', 'flight/summary.json', 'identification.json', 'notes.txt'])
+def test_files_of_others_are_not_replaced(tmp_path: Path, other: str) -> None:
     sheet = tmp_path / 'sheet'
-    (sheet / other).parent.mkdir(parents=True)
-    with pytest.raises(BagError, match='is not a folder of a datasheet'):
-        check_free(sheet, Options(force=True), DATASHEET)
+    sheet.mkdir()
+    for force in (False, True):  # --force is advised only where it helps
+        with pytest.raises(BagError, match='is not a folder of a datasheet'):
+            check_free(sheet, Options(force=force), DATASHEET)
     (sheet / DATASHEET).touch()
     check_free(sheet, Options(force=True), DATASHEET)
+    (sheet / other).parent.mkdir(exist_ok=True)
     (sheet / other).touch()
-    with pytest.raises(BagError, match=f'sheet: contains .*{other}: it is not replaced'):
+    with pytest.raises(BagError, match=f'sheet: contains .*{other.partition("/")[0]}, which is '
+                                       'not part of a datasheet: it is not replaced'):
         check_free(sheet, Options(force=True), DATASHEET)

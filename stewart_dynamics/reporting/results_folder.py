@@ -49,9 +49,16 @@ DATASHEET_PAGE, REPORT_PAGE = 'datasheet.html', 'report.html'
 DATASHEETS, REPLAYS = 'datasheet', 'replayed'
 """Folders of their results if no other is given."""
 
-_KINDS = {RESULT: 'replay results', IDENTIFICATION: 'results of an identification',
-          DATASHEET: 'a datasheet', CALIBRATION: 'results of a calibration',
-          'trajectory.yaml': 'a designed motion', 'poses.csv': 'designed poses'}
+# For the file by which a folder is known: the kind of folder, and all that a program writes there.
+_KINDS = {
+    RESULT: ('replay results', {RESULT, 'report.html', 'legs.csv', 'legs.parquet', 'bag',
+                                'bag/bag.mcap', 'bag/metadata.yaml'}),
+    IDENTIFICATION: ('results of an identification',
+                     {IDENTIFICATION, 'identified.yaml', 'report.html'}),
+    DATASHEET: ('a datasheet', {DATASHEET, 'datasheet.html', 'workspace.csv'}),
+    CALIBRATION: ('results of a calibration', {CALIBRATION, 'calibrated.yaml', 'report.html'}),
+    'trajectory.yaml': ('a designed motion', {'trajectory.yaml'}),
+    'poses.csv': ('designed poses', {'poses.csv', 'trajectory.csv'})}
 
 _REPLACED = '.replaced'
 _PARTIAL = re.compile(
@@ -164,12 +171,13 @@ def check_free(folder: Path, options: Writing, result: str = RESULT) -> None:
     """Raise BagError if results must not be written there."""
     if not folder.exists():
         return
+    kind, files = _KINDS[result]
+    if not (folder / result).is_file():
+        raise BagError(f'{folder}: exists already and is not a folder of {kind}: it is not '
+                       'replaced')
     if not options.force:
         raise BagError(f'{folder}: exists already; --force replaces results')
-    if not (folder / result).is_file():
-        raise BagError(f'{folder}: exists already and is not a folder of {_KINDS[result]}: it is '
-                       'not replaced')
-    for part in (folder, *(each for each in folder.iterdir() if each.is_dir())):
-        for name, kind in _KINDS.items():
-            if (part / name).is_file() and (part != folder or name != result):
-                raise BagError(f'{folder}: contains {kind}, {part / name}: it is not replaced')
+    for path in folder.rglob('*'):
+        if path.relative_to(folder).as_posix() not in files:
+            raise BagError(f'{folder}: contains {path}, which is not part of {kind}: it is not '
+                           'replaced')
