@@ -37,7 +37,7 @@ from stewart_dynamics.messages.cdr import MalformedError, STAMPS_END
 from stewart_dynamics.messages.joint_state import (
     JointStateError, JointStateReader, JointStateWriter)
 from stewart_dynamics.messages.setpoint import (
-    combined, layout_of, pose, StampedWriter, twist, wrench)
+    combined, layout_of, pose, StampedWriter, twist)
 from stewart_dynamics.messages.standard import (
     boolean, clock, float64, float64_array, float64_values)
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
@@ -47,7 +47,7 @@ READERS = {
     'geometry_msgs/msg/PoseStamped': pose,
     'geometry_msgs/msg/TwistStamped': twist,
     'geometry_msgs/msg/AccelStamped': twist,
-    'geometry_msgs/msg/WrenchStamped': wrench,
+    'geometry_msgs/msg/WrenchStamped': twist,
     'trajectory_msgs/msg/MultiDOFJointTrajectory': combined,
 }
 LENGTHS = {kind: {pose: 7, combined: 19}.get(reader, 6)

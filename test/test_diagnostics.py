@@ -631,15 +631,6 @@ def test_frequent_events_are_logged_every_five_seconds_with_their_number() -> No
     assert series.over(100.0) == []
 
 
-def test_kinds_do_not_hide_each_other() -> None:
-    series = Series()
-    assert series.add('a', 'one', 0.0) == 'one'
-    assert series.add('b', 'two', 0.0) == 'two'
-    assert series.add('a', 'three', 1.0) is None
-    assert series.over(SECONDS) == []
-    assert series.over(1.0 + SECONDS) == ['three (the last of 2)']
-
-
 def test_two_in_a_series_that_are_far_apart_are_both_logged() -> None:
     series = Series()
     assert series.add('a', 'one', 0.0) == 'one'

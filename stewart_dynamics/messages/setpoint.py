@@ -40,12 +40,7 @@ def pose(data: bytes) -> Stamped:
 
 
 def twist(data: bytes) -> Stamped:
-    """Read a geometry_msgs/TwistStamped or AccelStamped: linear and angular x y z."""
-    return stamped(data, SIX)
-
-
-def wrench(data: bytes) -> Stamped:
-    """Read a geometry_msgs/WrenchStamped: force and torque x y z."""
+    """Read a TwistStamped, AccelStamped or WrenchStamped: two vectors x y z."""
     return stamped(data, SIX)
 
 

@@ -58,10 +58,11 @@ class BaseInput:
         source = parameters['base.source']
         self.topics = BASE_SOURCES[source]
         """Topics of the base; empty if the base is fixed."""
-        self._joining = SampleJoining(
+        self.joining = SampleJoining(
             self.topics, None if source == 'imu' else parameters['world_frame'],
             parameters['setpoint.sync_tolerance'], parameters['base.timeout'], rejections,
             lambda text: noticed(f'base: {text}'))
+        """Joins the samples of the topics."""
         self._timeout = round(parameters['base.timeout'] * 1e9)
         self._restart = round(parameters['setpoint.timeout'] * 1e9)
         gravity: Any = tuple(parameters['gravity'].tolist())
@@ -93,7 +94,7 @@ class BaseInput:
 
     def take(self, topic: str, data: bytes, now: Callable[[], int]) -> bool:
         """Use a message, see ``Setpoints.take``; return whether it completes a sample."""
-        sample = self._joining.take(topic, data, now)
+        sample = self.joining.take(topic, data, now)
         if sample is None:
             return False
         if sample.restart or (self._samples and sample.stamp <= self._samples[-1][0]):
@@ -127,19 +128,11 @@ class BaseInput:
         """Discard samples later than the stamp [ns] of a setpoint that is a restart."""
         if self._samples and self._samples[-1][0] > stamp + self._restart:
             self._samples.clear()
-            self._joining.restart('before setpoints restarted')
-
-    def forget_layouts(self) -> None:
-        """Learn the layout again, from the next valid message of each topic."""
-        self._joining.forget_layouts()
-
-    def end(self, why: str) -> None:
-        """Drop and count waiting samples: no more messages arrive."""
-        self._joining.end(why)
+            self.joining.restart('before setpoints restarted')
 
     def join_many(self, messages: Messages, places: Mapping[str, Integers]) -> Joined | None:
         """Join messages, see ``SampleJoining.join_many``."""
-        return self._joining.join_many(messages, places) if self.topics else _NOTHING
+        return self.joining.join_many(messages, places) if self.topics else _NOTHING
 
     def accept(self, joined: Joined, places: Mapping[str, Integers], stamps: Stamps,
                completed: Integers) -> Array | None:
@@ -163,7 +156,7 @@ class BaseInput:
         """
         if not self.topics:
             return None
-        self._joining.accept(joined, places)
+        self.joining.accept(joined, places)
         old = len(self._samples)
         new = [(stamp, self._row_of(stamp, tuple(values))) for stamp, values in zip(
             joined.stamps.tolist(), joined.motions.tolist(), strict=True)]

@@ -32,7 +32,7 @@ from stewart_dynamics.mechanics.frames.rotation import from_quaternion, quaterni
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
-from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
+from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
 from stewart_dynamics.setpoints.rejections import (
@@ -69,7 +69,7 @@ BASE_SOURCES = {'fixed': (), 'pose': (BASE_POSE,), 'motion': (BASE_POSE, BASE_TW
                 'imu': (BASE_IMU,)}
 
 _READERS: dict[str, Callable[[bytes], Stamped]] = {
-    POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: wrench,
+    POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: twist,
     BASE_POSE: pose, BASE_TWIST: twist, BASE_ACCEL: twist, BASE_IMU: imu}
 
 # Indices of an IMU's angular velocity, specific force, and the first entries of their

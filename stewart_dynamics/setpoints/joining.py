@@ -122,7 +122,7 @@ class Setpoints:
             return joined
         self._wrench_input.reader.forget_layout()
         self._joining.forget_layouts()
-        self.base.forget_layouts()
+        self.base.joining.forget_layouts()
         setpoints = []
         times = []
         for topic, time, data in messages.each():
@@ -151,7 +151,7 @@ class Setpoints:
     def end(self, why: str) -> None:
         """Drop and count waiting samples: no more messages arrive."""
         self._joining.end(why)
-        self.base.end(why)
+        self.base.joining.end(why)
 
     def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
         """Count and report messages that are not used."""
