@@ -17,7 +17,7 @@
 One MCAP file, whole, cut short or damaged: its valid messages in the order of time.
 
 Chunks are found by the index if its checksum is correct. Otherwise the records are followed from
-the beginning to the first damaged one; nothing after it is read.
+the beginning to the first damaged one; nothing after it is read. Format: https://mcap.dev/spec.
 """
 
 from __future__ import annotations
@@ -36,26 +36,113 @@ from mcap.records import Channel, Chunk, ChunkIndex, Footer, Schema, Statistics
 from mcap.stream_reader import StreamReader
 import numpy as np
 
-from stewart_dynamics.arrays import Integers
+from stewart_dynamics.arrays import Bytes, Integers
 from stewart_dynamics.bags.blocks import (
     compact, cost, described, IN_A_BLOCK, LARGEST_CHUNK, LATEST, merged, split)
-from stewart_dynamics.bags.mcap_scan import HEAD, IGNORED, NUMBERS, Scan, scanned
+from stewart_dynamics.compilation.functions import compiled, entry_point
 from stewart_dynamics.errors import BagError, one_line, shown
 from stewart_dynamics.messages.recorded import Messages
 import zstandard
 
 MAGIC = b'\x89MCAP0\r\n'
 
+# Opcode and length in front of each record.
+HEAD = 9
+# Possible channel numbers; the entry of those whose messages are skipped.
+NUMBERS, IGNORED = 1 << 16, -1
+# Bit n: records with the opcode n may occur between the first and the last one.
+_DATA = sum(1 << opcode for opcode in (
+    Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK,
+    Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA))
 _FOOTER = HEAD + 20 + len(MAGIC)
 _DATA_END = bytes([Opcode.DATA_END, 4, 0, 0, 0, 0, 0, 0, 0])
 _LARGEST_INDEX = 1 << 28
 _WINDOW = 1 << 20
 _MOST_WAITING = 1 << 27
-_OPCODES = {Schema: Opcode.SCHEMA, Channel: Opcode.CHANNEL}
 _ANY_TOPIC = np.zeros(NUMBERS, np.int64)
-_IN_CHUNK = np.isin(np.arange(256), [Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE])
-_IN_DATA = _IN_CHUNK | np.isin(np.arange(256), [
-    Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA])
+
+
+class Scan(NamedTuple):
+    """Records found in a sequence of bytes, without the messages that are skipped."""
+
+    kinds: Integers
+    """(K,): the number of the topic of a message; minus the opcode of another record."""
+    values: Integers
+    """(K,): the time of a message [ns]; the first two bytes of another: number of a channel."""
+    starts: Integers
+    """(K,): start of the data of a message, or of the content of another record."""
+    sizes: Integers
+    """(K,): length of the data or content [bytes]."""
+    data: Bytes
+    end: int
+    """End of the last record."""
+
+
+@compiled
+def _integer(data: Bytes, at: int, size: int) -> np.int64:
+    """Return the little-endian integer at a place; 0 if it is not in the data."""
+    value = np.int64(0)
+    if at + size <= len(data):
+        for k in range(size):
+            value |= np.int64(data[at + k]) << np.int64(8 * k)
+    return value
+
+
+@entry_point('u1[::1]', 'i8[::1]', 'i8[:,::1]', 'i8[::1]')
+def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> None:
+    """
+    List the messages of some channels, and all records that are not messages.
+
+    Parameters
+    ----------
+    data : (M,)
+        The bytes of the records. The scan ends where the fields that it reads are not in them,
+        where the lengths in a message or a message index are inconsistent, or where a record
+        begins that does not belong to the data.
+    numbers : (65536,)
+        Number of the topic of each channel, or IGNORED.
+    found : (4, K)
+        Output: see Scan. Records beyond K are only counted.
+    totals : (2,)
+        In: the second is the end that no record may exceed. Output: K and end, see Scan.
+
+    """
+    count = at = 0
+    while at + 9 <= len(data):
+        opcode, begin, length = np.int64(data[at]), at + 9, _integer(data, at + 1, 8)
+        # Fields up to this offset are read.
+        needed = 22 if opcode == 5 else 6 if opcode == 7 else 2 if opcode in (3, 4) else 0
+        if opcode > 12 or not _DATA >> opcode & 1 or begin + needed > len(data) or not (
+                needed <= length <= totals[1] - begin):
+            break
+        if opcode == 7 and _integer(data, begin + 2, 4) != length - 6:
+            break
+        kind, value, skipped = -opcode, _integer(data, begin, 2), 0
+        if opcode == 5:
+            kind, value, skipped = numbers[value], _integer(data, begin + 6, 8), 22
+        if opcode != 5 or kind >= 0:
+            if count < found.shape[1]:
+                found[0, count] = kind
+                found[1, count] = value if value >= 0 else np.int64(9223372036854775807)
+                found[2, count] = begin + skipped
+                found[3, count] = length - skipped
+            count += 1
+        at = int(begin + length)
+    totals[0], totals[1] = count, at
+
+
+def scanned(data: bytes, numbers: Integers, limit: int) -> Scan:
+    """Return the records in these bytes that end before a limit, see ``scan``."""
+    array = np.frombuffer(data, np.uint8)
+    room = 8192  # for most chunks this is enough, and they are scanned once
+    while True:
+        found, totals = np.empty((4, room), np.int64), np.array([0, limit])
+        scan(array, numbers, found, totals)
+        count, end = totals.tolist()
+        if count <= room:
+            kinds, values, starts, sizes = found[:, :count]
+            return Scan(kinds, values, starts, sizes, array, end)
+        room = count
 
 
 class _Piece(NamedTuple):
@@ -200,8 +287,7 @@ class McapFile:
         """Follow the records to the end of the data; return where messages are."""
         chunks, runs, at = list[_Piece](), list[_Piece](), len(MAGIC)
         while True:
-            found = scanned(
-                self._read_at(at, _WINDOW), _ANY_TOPIC, _IN_DATA, self._size - at)
+            found = scanned(self._read_at(at, _WINDOW), _ANY_TOPIC, self._size - at)
             if not found.end:
                 break
             self._declare(found, at)
@@ -242,8 +328,9 @@ class McapFile:
 
     def _declare(self, found: Scan, offset: int | None = None) -> None:
         """Keep topics and types, the first of each number, of a chunk or of records there."""
-        for kind, known in ((Schema, self._types), (Channel, self._channels)):
-            which = np.flatnonzero(found.kinds == -_OPCODES[kind])
+        for opcode, kind, known in ((Opcode.SCHEMA, Schema, self._types),
+                                    (Opcode.CHANNEL, Channel, self._channels)):
+            which = np.flatnonzero(found.kinds == -opcode)
             numbers, firsts = np.unique(found.values[which], return_index=True)
             for number, n in zip(numbers.tolist(), which[firsts].tolist(), strict=True):
                 if number in known:
@@ -265,8 +352,7 @@ class McapFile:
             if piece.length > LARGEST_CHUNK:
                 raise ValueError(f'{piece.length} bytes, at most {LARGEST_CHUNK} are read')
             data = (self._unpacked if piece.is_chunk else self._read_at)(piece.start, piece.length)
-            found = scanned(data, numbers, _IN_CHUNK if piece.is_chunk else _IN_DATA,
-                            len(data))
+            found = scanned(data, numbers, len(data))
             if found.end != len(data):
                 raise ValueError('its records are inconsistent')
         except Exception as exc:  # damaged bytes: the decompressors raise any exception

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.bags import blocks, mcap_scan
+from stewart_dynamics.bags import recording
 from stewart_dynamics.capability import box_condition, box_legs, travel
 from stewart_dynamics.datasheet import claimed_box, ratings, workspace
 from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
@@ -83,7 +83,7 @@ STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
 # The machine code that every datasheet needs.
 FUNCTIONS = (travel.travels, box_legs.legs_in_box, box_condition.condition_in_box,
              inverse_dynamics.solve, regressor.regressors,
-             *blocks.FUNCTIONS, mcap_scan.scan)
+             *recording.FUNCTIONS)
 
 
 def write_datasheet(parameters: Parameters, order: Order, folder: Path, options: Options,

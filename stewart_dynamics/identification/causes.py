@@ -50,6 +50,8 @@ _SATURATED = 0.97
 _STEP = 1e-4
 UNKNOWN = 'unknown'
 
+_Part = tuple[Array, list['Cause']]
+
 
 class Cause(NamedTuple):
     """A possible cause of a lack of fit."""
@@ -72,24 +74,17 @@ class Cause(NamedTuple):
         return self.text.format(' '.join(f'{each:{sign}.3g}' for each in values))
 
 
-class _Part(NamedTuple):
-    """Columns (N, 6, m) with a description, and their causes as in ``Cause``."""
+def _part(what: str, columns: Array, text: str, factor: float = 1.0,
+          measure: Callable[[Array], Any] = np.asarray,
+          groups: Sequence[tuple[str, slice]] = (('', slice(None)),)) -> _Part:
+    """
+    Return columns (N, 6, m) with their causes; the indices are those among these columns.
 
-    what: str
-    columns: Array
-    text: str
-    """``{}`` stands for the amounts, ``@`` for a word of each cause."""
-    factor: float = 1.0
-    measure: Callable[[Array], Any] = np.asarray
-    groups: Sequence[tuple[str, slice]] = (('', slice(None)),)
-    """The word and the columns of each cause."""
-
-    def causes(self, first: int) -> Iterator[Cause]:
-        """Yield the causes, with the index of the first column."""
-        places = np.arange(first, first + self.columns.shape[-1])
-        for word, columns in self.groups:
-            yield Cause(self.what, places[columns], self.text.replace('@', word), self.factor,
-                        self.measure)
+    Each group has a word, for which ``@`` stands in the text, and some of the columns.
+    """
+    places = np.arange(columns.shape[-1])
+    return columns, [Cause(what, places[which], text.replace('@', word), factor, measure)
+                     for word, which in groups]
 
 
 class Causes:
@@ -128,10 +123,10 @@ class Causes:
                  *(self._of_geometry(extract, poses) if self._geometry else ())]
         causes: list[Cause] = []
         count = 0
-        for part in parts:
-            causes += part.causes(count)
-            count += part.columns.shape[-1]
-        return np.concatenate([part.columns for part in parts], axis=-1), tuple(causes)
+        for columns, of_columns in parts:
+            causes += [each._replace(places=count + each.places) for each in of_columns]
+            count += columns.shape[-1]
+        return np.concatenate([columns for columns, _ in parts], axis=-1), tuple(causes)
 
     def _of_forces(self, extract: Extract, poses: Pose, first: int) -> Iterator[_Part]:
         """Yield forces that depend on the motion and on time."""
@@ -141,46 +136,46 @@ class Causes:
         matrix = platform.regressors(rows)
         predicted = extract.regressor @ self._theta + extract.known
 
-        yield _Part('offset', _by_leg(np.ones((len(rows), 6, 1))),
+        yield _part('offset', _by_leg(np.ones((len(rows), 6, 1))),
                     'a constant offset of the efforts@, {} N', groups=self._each_and_all)
         gravity = self._tilt.derivative(np.zeros(2))
-        yield _Part('tilt', np.stack([
+        yield _part('tilt', np.stack([
             platform.regressors_at_rest(rows, axis[None]) @ whole for axis in gravity.T], axis=-1),
             'a base tilted by {} degrees', np.degrees(1.0), np.linalg.norm)
-        yield _Part('reflected_mass', matrix[..., REFLECTED_MASS],
+        yield _part('reflected_mass', matrix[..., REFLECTED_MASS],
                     'another actuator.reflected_mass@, {} kg', groups=self._each_and_all)
-        yield _Part('leg_mass', np.stack([
+        yield _part('leg_mass', np.stack([
             sum(matrix[..., part] @ whole[part] for part in parts)
             for parts in ((CYLINDER_FIRST, CYLINDER_SECOND),
                           (PISTON_MASS, PISTON_FIRST, PISTON_SECOND))], axis=-1),
             'other leg masses, cylinders and pistons {} %', 100.0)
-        yield _Part('viscous_friction', matrix[..., VISCOUS_FRICTION],
+        yield _part('viscous_friction', matrix[..., VISCOUS_FRICTION],
                     'another actuator.viscous_friction, {} N s/m')
         coulomb, *stribeck = (_by_leg(extract.slip[..., n:n + 1]) for n in range(SLIP))
-        yield _Part('coulomb_friction', coulomb, 'another actuator.coulomb_friction, {} N')
+        yield _part('coulomb_friction', coulomb, 'another actuator.coulomb_friction, {} N')
         for columns in stribeck:
-            yield _Part('stribeck_friction', columns, 'Stribeck friction, {} N at low rates',
+            yield _part('stribeck_friction', columns, 'Stribeck friction, {} N at low rates',
                         measure=np.mean)
-        yield _Part('load_friction', coulomb * np.abs(predicted)[..., None],
+        yield _part('load_friction', coulomb * np.abs(predicted)[..., None],
                     'friction that depends on the load, {} % of it', 100.0, np.mean)
-        yield _Part('quadratic_friction', _by_leg((rates * np.abs(rates))[..., None]),
+        yield _part('quadratic_friction', _by_leg((rates * np.abs(rates))[..., None]),
                     'friction that grows with the square of the rate, {} N s^2/m^2',
                     measure=np.mean)
-        yield _Part('gain', _by_leg(predicted[..., None]),
+        yield _part('gain', _by_leg(predicted[..., None]),
                     'another gain of the efforts@, {} %', 100.0, groups=self._each)
-        yield _Part('scale', predicted[..., None],
+        yield _part('scale', predicted[..., None],
                     'efforts that are by {} % larger than the forces', 100.0)
-        yield _Part('delay', _by_leg(extract.efforts[..., 1:2]),
+        yield _part('delay', _by_leg(extract.efforts[..., 1:2]),
                     'another delay of the efforts@, {} ms', -1e3, groups=self._each)
         beyond = np.maximum(np.abs(predicted) - _SATURATED * self._largest, 0.0)
-        yield _Part('saturation', (-np.sign(predicted) * beyond)[..., None],
+        yield _part('saturation', (-np.sign(predicted) * beyond)[..., None],
                     f'saturation of the efforts at about {self._largest:.4g} N')
-        yield _Part('platform', matrix[..., :10], 'platform parameters that are not identified')
+        yield _part('platform', matrix[..., :10], 'platform parameters that are not identified')
         x = (lengths - lengths.mean(axis=0)) / self._size
         v = rates / (np.sqrt(np.mean(rates ** 2)) + 1e-300)
-        yield _Part(UNKNOWN, _by_leg(np.stack([x, x ** 2, x ** 3], axis=-1)),
+        yield _part(UNKNOWN, _by_leg(np.stack([x, x ** 2, x ** 3], axis=-1)),
                     'forces that depend on the pose')
-        yield _Part(UNKNOWN, _by_leg(np.stack([np.abs(v), x * v, v ** 3], axis=-1)),
+        yield _part(UNKNOWN, _by_leg(np.stack([np.abs(v), x * v, v ** 3], axis=-1)),
                     'forces that depend on the rate')
 
         at = (first + np.arange(len(rows))) / self._samples
@@ -189,14 +184,14 @@ class Causes:
                  for n, change in enumerate(changes)]
         words += [(f'between {100.0 * one:.0f} and {100.0 * other:.0f} %', slice(4 * n, 4 * n + 8))
                   for n, (one, other) in enumerate(pairwise(changes))]
-        yield _Part('payload', np.concatenate([
+        yield _part('payload', np.concatenate([
             matrix[..., :4] * (at >= change)[:, None, None] for change in changes], axis=-1),
             'a payload that changes @ of the time, {} kg', measure=_mass, groups=words)
         late = (at - 0.5)[:, None, None]
-        yield _Part('friction_drift', late * np.stack([
+        yield _part('friction_drift', late * np.stack([
             matrix[..., part].sum(axis=-1) for part in (VISCOUS_FRICTION, COULOMB_FRICTION)],
             axis=-1), 'friction that changes with time')
-        yield _Part('offset_drift', _by_leg(np.ones((len(rows), 6, 1))) * late,
+        yield _part('offset_drift', _by_leg(np.ones((len(rows), 6, 1))) * late,
                     'offsets of the efforts that change with time, {} N')
 
     def _of_geometry(self, extract: Extract, poses: Pose) -> Iterator[_Part]:
@@ -210,13 +205,13 @@ class Causes:
                 motions(platform, found, rates, accelerations)) @ self._whole
 
         there = forces(self._platform, lengths)
-        yield _Part('zero_length', np.stack([
+        yield _part('zero_length', np.stack([
             (forces(self._platform, lengths + change) - there) / step
             for change in step * np.eye(6)], axis=-1),
             'another geometry.zero_length@, {} mm', 1e3, groups=self._each_and_all)
         for end in ('base', 'platform'):
             name = f'geometry.{end}_joints'
-            yield _Part('joint', np.stack([
+            yield _part('joint', np.stack([
                 (forces(StewartPlatform(p.replaced({name: p[name] + change})), lengths) - there)
                 / step for change in step * np.eye(18).reshape(18, 6, 3)], axis=-1),
                 f'another {end} joint@, moved by {{}} mm', 1e3, groups=[

@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.bags import blocks, mcap_scan
+from stewart_dynamics.bags import recording
 from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification.extraction import Extracts
@@ -67,7 +67,7 @@ _MOST = 12_000
 
 # Functions that every identification needs as machine code.
 FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,
-             friction.friction, *blocks.FUNCTIONS, mcap_scan.scan)
+             friction.friction, *recording.FUNCTIONS)
 
 
 def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: IdentificationOptions,

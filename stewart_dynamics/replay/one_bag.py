@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, SECOND, Stamps
-from stewart_dynamics.bags import blocks, mcap_scan
+from stewart_dynamics.bags import recording as bag_recording
 from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
@@ -62,7 +62,7 @@ Progress = Callable[[int, int], None]
 
 # The machine code that every replay needs.
 FUNCTIONS = (
-    *step.FUNCTIONS, *base_wrench.FUNCTIONS, *blocks.FUNCTIONS, mcap_scan.scan)
+    *step.FUNCTIONS, *base_wrench.FUNCTIONS, *bag_recording.FUNCTIONS)
 
 # Starting a process takes as long as writing the outputs of a bag of this size [bytes].
 _LARGE = 32 << 20
