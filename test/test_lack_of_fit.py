@@ -16,13 +16,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 from recorded import about, fourier, HOME, MotionAt, Noise, Recorded, recorded
 from referees import rng
 
-from stewart_dynamics import Motion, StewartPlatform
+from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import Identified
 from stewart_dynamics.identification.kinematics import pose_near
@@ -30,6 +32,8 @@ from stewart_dynamics.identification.lack_of_fit import deviations
 from stewart_dynamics.identification.results import document, result_text
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 import wrong_models
 from wrong_models import (
     Case, CAUSES, GIVEN, identify, NOISE, RATE, SECONDS, simulated, true_hexapod)
@@ -173,6 +177,21 @@ def test_the_side_of_the_base_follows_from_the_efforts(
         'base']
     off = np.abs(found.fit.values - Unknowns(true).start)
     assert np.mean(off < TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))) > 0.8
+
+
+def test_efforts_in_another_unit_do_not_change_the_side() -> None:
+    # the file's legs, in N, fit efforts in kN better on the wrong side
+    p = Parameters.from_yaml(Path(__file__).parents[1] / 'config' / 'platform.yaml')
+    sine = ReferenceMotionParameters({
+        'motion.type': 'sine', 'motion.initial': (0.0, 0.0, 1.1, 0.0, 0.0, 0.0),
+        'motion.amplitude': (0.03, 0.03, 0.04, 0.04, 0.04, 0.06),
+        'motion.frequency': (0.231, 0.317, 0.173, 0.409, 0.271, 0.137),
+        'motion.phase': (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)})
+    times = np.arange(round(20.0 * RATE)) / RATE
+    forces = 1e-3 * StewartPlatform(p).inverse_dynamics(motion_at(sine, times)).forces
+    found = identify([recorded(p, lambda at: motion_at(sine, at), 20.0, RATE, 1,
+                               Noise(effort=5e-3, coloured=0.0, delay=0.0), forces)], given=p)
+    assert 'kN in place of N' in found.likely[0].text
 
 
 def test_lengths_of_a_platform_below_its_base_have_their_pose() -> None:

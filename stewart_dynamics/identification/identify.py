@@ -41,7 +41,7 @@ from stewart_dynamics.identification.intervals import Errors, errors_of
 from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (
-    LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
+    FAR, LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose, scale_of_efforts)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
@@ -274,13 +274,22 @@ class Identification:
         _, misfit = self._lag(self._extraction(window), window)
         self.parameters = parameters.replaced({'geometry.platform_side': NEGATIVE})
         self.platform = StewartPlatform(self.parameters)
-        _, below = self._lag(self._extraction(window), window)
-        if below < _BETTER * misfit:
+        extraction = self._extraction(window)
+        _, below = self._lag(extraction, window)
+        if below < _BETTER * misfit and self._of_this_model(extraction, window):
             self.unknowns = Unknowns(
                 self.parameters, self._options.kinds, self._options.prior)
             return True
         self.parameters, self.platform = parameters, platform
         return False
+
+    def _of_this_model(self, extraction: Extraction, window: Window) -> bool:
+        """Return whether the efforts are those of the file's model in any unit, or with -."""
+        piece = most_motion(window, extraction)
+        extract = extraction(piece, first_pose(extraction.platform, piece)).extract
+        scale, _ = scale_of_efforts(
+            Sums.of(extract.columns, extract.used), self.unknowns, platform_too=True)
+        return scale > 0.0 or 1.0 / FAR < -scale < FAR
 
     def _read_window(self, path: Path, extraction: Extraction, window: Window,
                      last: WindowRead | None) -> WindowRead:
@@ -313,8 +322,9 @@ class Identification:
         sums = sums_of(extracts)
         if sums.counts.sum(axis=0).min() < _FEWEST:
             raise BagError(f'{self.bags[0].bag}: nothing to identify from: '
-                           f'{sum(bag.samples_at_stops for bag in self.bags)} samples are at an '
-                           'end stop or at limits.force_max')
+                           f'{sum(bag.samples_at_stops for bag in self.bags)} samples are at or '
+                           'beyond limits.length_min, length_max or force_max: is '
+                           'geometry.zero_length right, and are the efforts in N?')
         unsound = 6 * extracts.samples - int(sums.counts.sum())
         clean, noisy, grams, samples = zip(*self._noises, strict=True)
         noise = sum(grams) * (extracts.samples / sum(samples))

@@ -45,7 +45,7 @@ from stewart_dynamics.reporting.estimates import LikelyMistake
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
 _NEAR = 1.35
 # A scale that differs from 1 by a larger ratio is a mistake; a smaller one is that of torques.
-_FAR, _TORQUES = 2.0, 0.05
+FAR, _TORQUES = 2.0, 0.05
 _FACTORS = ((1e-3, 'kN in place of N'), (-1.0 / STANDARD_GRAVITY[2], 'kgf in place of N'),
             (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
 # A residual above this fraction of the efforts starts the search for swapped legs.
@@ -98,8 +98,8 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, of_motors: bool,
     The scale of the efforts is estimated jointly with the platform from the file's leg parameters;
     without leg masses, from the forces of the file's platform.
     """
-    scale, error = _scale(sums, unknowns, platform_too=False)
-    by_file, _ = _scale(sums, unknowns, platform_too=True)
+    scale, error = scale_of_efforts(sums, unknowns, platform_too=False)
+    by_file, _ = scale_of_efforts(sums, unknowns, platform_too=True)
     if not np.isfinite(by_file) or by_file == 0.0:
         yield LikelyMistake('scale', 'all efforts are zero')
         return
@@ -107,7 +107,7 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, of_motors: bool,
             # the file's legs may be wrong, but not by this ratio
             not 0.1 < scale / by_file < 10.0):
         scale = by_file
-    elif (scale > 0.0) == (by_file > 0.0) and 1.0 / _FAR < abs(by_file) < _FAR:
+    elif (scale > 0.0) == (by_file > 0.0) and 1.0 / FAR < abs(by_file) < FAR:
         scale = by_file  # the platform's weight shows that the unit is right
     if scale < 0.0:
         other = '' if p['geometry.platform_side'] != AUTO else (
@@ -117,7 +117,7 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, of_motors: bool,
             f'the node do (they are {scale:.3g} times what the model computes)'
             f'{other}')
         return
-    if 1.0 / _FAR < scale < _FAR:
+    if 1.0 / FAR < scale < FAR:
         return
     lead, ratio = p['actuator.screw_lead'], p['drive.gear_ratio']
     torques = 'likely torques of the motors in place of forces: --motor-torque takes them'
@@ -189,7 +189,8 @@ def of_fit(p: Parameters, extraction: Extraction, window: Window, fit: Fit,
         yield LikelyMistake(*found[0][1:])
 
 
-def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, float]:
+def scale_of_efforts(sums: Sums, unknowns: Unknowns, platform_too: bool,
+                     ) -> tuple[float, float]:
     """Return the scale of the efforts by least squares, and its standard error."""
     many = len(unknowns.linear)  # a tilt does not change the scale
     theta = unknowns.theta(unknowns.start)
