@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-from recorded import about, fourier, HOME, MotionAt, Noise, Recorded, recorded
+from recorded import about, at_rest, fourier, HOME, MotionAt, Recorded, recorded
 from referees import rng
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
@@ -73,11 +73,10 @@ def test_a_right_model_gives_no_notice(seed: int) -> None:
     assert np.mean(off < TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))) > 0.8
 
 
-def test_noise_in_columns_that_the_fit_nearly_explains_is_no_lack_of_fit() -> None:
-    # Offsets of the legs are nearly the columns of mass and center of mass: noise distinguishes
-    # them.
-    bag = recorded(GIVEN, about([1.0, 0.0, 0.0]), SECONDS, RATE, 1, Noise())
-    assert identify([bag]).lack_of_fit is None
+@pytest.mark.parametrize('motion', [
+    at_rest, *map(about, np.eye(3))], ids=['at rest', 'about x', 'about y', 'about z'])
+def test_noise_of_lengths_in_the_columns_is_no_lack_of_fit(motion: MotionAt) -> None:
+    assert identify(simulated(Case(true_hexapod(1)), 1, motion)).lack_of_fit is None
 
 
 def test_identified_offsets_are_no_lack_of_fit() -> None:

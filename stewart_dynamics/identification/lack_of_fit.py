@@ -21,16 +21,21 @@ are fitted at once. With the columns of the fit projected out, the scores s = C^
 mean and the covariance N = C^H S^-1 C if the model is right; so s^T N^-1 s is chi-squared
 distributed with as many degrees of freedom as columns (a score test: Rao 1948,
 doi:10.1017/S0305004100023987). The cause that explains most is selected first; further causes are
-added to it until nothing significant is left. Directions of which the projection leaves little are
-not tested: noise of lengths and rates in the columns of the fit is all that remains there.
+added to it until nothing significant is left.
+
+Noise of lengths and rates is in the columns and, through those of the fit, in the residuals: both
+agree in it. What it adds to scores and covariance is estimated by adding as much noise again, and
+subtracted from the scores (corrected scores: Nakamura 1990, doi:10.1093/biomet/77.1.127).
+Directions that are mostly this noise, or of which the projection leaves little, are not tested.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 import math
 import tempfile
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,6 +57,8 @@ _NOTICE = 7.0
 _CAUSES = 3
 # Directions with a smaller fraction of their squares left after projection are not tested.
 _IN_THE_FIT = 1e-3
+# Nor are those with a larger fraction of their squares due to noise of lengths and rates.
+_NOISE = 0.5
 # Standard deviations above which the slower causes are tested as well.
 _SUSPICIOUS = 4.0
 # Highest frequency used, relative to the cut-off; half width of the smoothing of spectra, relative
@@ -137,22 +144,26 @@ class _Scores(NamedTuple):
 
     normal: Array
     """(m, m), the covariance of the scores; the projection leaves this of 1 on the diagonal"""
+    of_noise: Array
+    """(m, m), the part of it that is noise of lengths and rates"""
     scores: Array
-    """(m,)"""
+    """(m,), without what this noise adds to them"""
     sizes: Array
     """(m,)"""
     squares: float
     """Sum of squared residuals."""
 
     @classmethod
-    def of(cls, sums: Array, inner: int) -> _Scores:
+    def of(cls, sums: Array, of_noise: Array, inner: int) -> _Scores:
         """Return them from sums of the fit's inner columns, m columns and the residuals."""
-        along = _inverse(sums[:inner, :inner]) @ sums[:inner]
-        left = (sums - sums[:inner].T @ along)[inner:, inner:]
+        projection = np.hstack([
+            -(_inverse(sums[:inner, :inner]) @ sums[:inner, inner:]).T,
+            np.eye(len(sums) - inner)])
+        left, noise = (projection @ each @ projection.T for each in (sums, of_noise))
         sizes = np.sqrt(np.diag(sums)[inner:-1])
         scale = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
-        return cls(scale[:, None] * left[:-1, :-1] * scale, scale * left[:-1, -1], scale,
-                   float(sums[-1, -1]))
+        normal, of_noise = (scale[:, None] * each[:-1, :-1] * scale for each in (left, noise))
+        return cls(normal, of_noise, scale * (left - noise)[:-1, -1], scale, float(sums[-1, -1]))
 
     def explained(self, places: Integers) -> _Explained:
         """Return the part of the residuals that some columns explain."""
@@ -163,24 +174,33 @@ class _Scores(NamedTuple):
 
     def without(self, places: Integers) -> _Scores:
         """Return the sums with some columns added to the fit."""
-        along = self._inverse(places)[0] @ self.normal[places]
-        return self._replace(normal=self.normal - self.normal[places].T @ along,
-                             scores=self.scores - along.T @ self.scores[places])
+        projection = np.eye(len(self.scores))
+        projection[:, places] -= self.normal[:, places] @ self._inverse(places)[0]
+        return self._replace(normal=projection @ self.normal @ projection.T,
+                             of_noise=projection @ self.of_noise @ projection.T,
+                             scores=projection @ self.scores)
 
     def _inverse(self, places: Integers) -> tuple[Array, int]:
         """Return the inverse of the covariance of some scores, and its rank."""
-        values, vectors = np.linalg.eigh(self.normal[np.ix_(places, places)])
-        tested = values > _IN_THE_FIT
-        inverse: Array = vectors[:, tested] / values[tested] @ vectors[:, tested].T
-        return inverse, int(np.count_nonzero(tested))
+        block = np.ix_(places, places)
+        values, vectors = np.linalg.eigh(self.normal[block])
+        white = (vectors / np.sqrt(np.maximum(values, _IN_THE_FIT)))[:, values > _IN_THE_FIT]
+        shares, turned = np.linalg.eigh(white.T @ self.of_noise[block] @ white)
+        white = white @ turned[:, shares < _NOISE]
+        inverse: Array = white @ white.T
+        return inverse, white.shape[1]
 
 
-def lack_of_fit(platform: StewartPlatform, extracts: Extracts, unknowns: Unknowns, fit: Fit,
-                ) -> LackOfFit | None:
-    """Return the lack of fit with its likeliest causes; None if nothing significant is left."""
+def lack_of_fit(platform: StewartPlatform, extracts: Extracts, noisy: Extracts,
+                unknowns: Unknowns, fit: Fit) -> LackOfFit | None:
+    """
+    Return the lack of fit with its likeliest causes; None if nothing significant is left.
+
+    ``noisy`` has the first extract of each bag again, with more noise of lengths and rates.
+    """
     def tested(geometry: bool) -> tuple[Sequence[Cause], _Scores, Array, _Scores]:
-        causes = Causes(platform, unknowns, fit, _selected(extracts), geometry)
-        return _scores(causes, extracts, unknowns, fit)
+        causes = Causes(platform, unknowns, fit, _selected(extracts, len(extracts)), geometry)
+        return _scores(causes, extracts, noisy, unknowns, fit)
 
     try:
         causes, scores, _, _ = tested(geometry=False)
@@ -227,13 +247,13 @@ def deviations(statistic: float, freedom: int) -> float:
     return float((np.cbrt(statistic / freedom) - 1.0 + part) / math.sqrt(part))
 
 
-def _selected(extracts: Extracts) -> Iterator[Extract]:
-    """Yield the extracts that are tested, at most _MOST, evenly spread."""
-    tested = np.linspace(0, len(extracts) - 1, min(_MOST, len(extracts))).astype(int)
-    return (extract for n, extract in enumerate(extracts) if n in tested)
+def _selected(each: Iterable[Any], count: int) -> Iterator[Any]:
+    """Yield at most _MOST of some things, evenly spread."""
+    tested = np.linspace(0, count - 1, min(_MOST, count)).astype(int)
+    return (one for n, one in enumerate(each) if n in tested)
 
 
-def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
+def _scores(causes: Causes, extracts: Extracts, noisy: Extracts, unknowns: Unknowns, fit: Fit,
             ) -> tuple[Sequence[Cause], _Scores, Array, _Scores]:
     """
     Return the causes, weighted sums, derivatives of unknowns by columns (k, m), and plain sums.
@@ -244,34 +264,57 @@ def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
     known = fit.identifiability.known
     of_causes: Sequence[Cause] = ()
     inner = known.shape[1] + len(fit.delays)  # known directions, then the delays
-    lengths: list[int] = []
+
+    def spectra_of(extract: Extract, first: int) -> Array:
+        nonlocal of_causes
+        bag, used = extract.bag, extract.used[..., None]
+        columns = extract.columns * used
+        e = columns @ directions(
+            unknowns, fit.values, fit.delays[bag], bool(fit.delay_errors[bag]))
+        delays = np.zeros((*e.shape[:2], len(fit.delays)))
+        delays[..., bag] = e[..., -1]
+        added, of_causes = causes.columns(extract, first)
+        residuals = columns @ residual_of(unknowns.theta(fit.values), fit.delays[bag])
+        return _spectra(np.concatenate([
+            e[..., :-1] @ known, delays, added * used, residuals[..., None]],
+            axis=-1) / np.sqrt(fit.variances[bag])[:, None])
+
+    samples = 0
     gram: Array = np.zeros(())
     plain: Array = np.zeros(())
+    weighted: Array = np.zeros(())
+    of_noise: Array = np.zeros(())
     with tempfile.TemporaryFile() as file:
-        for extract in _selected(extracts):
-            bag, used = extract.bag, extract.used[..., None]
-            columns = extract.columns * used
-            e = columns @ directions(
-                unknowns, fit.values, fit.delays[bag], bool(fit.delay_errors[bag]))
-            delays = np.zeros((*e.shape[:2], len(fit.delays)))
-            delays[..., bag] = e[..., -1]
-            added, of_causes = causes.columns(extract, sum(lengths))
-            residuals = columns @ residual_of(unknowns.theta(fit.values), fit.delays[bag])
-            sizes = np.sqrt(fit.variances[bag])[:, None]
-            spectra = _spectra(np.concatenate([
-                e[..., :-1] @ known, delays, added * used, residuals[..., None]], axis=-1) / sizes)
-            gram, plain = gram + _gram(spectra), plain + _gram(sizes * spectra)
+        for extract in _selected(extracts, len(extracts)):
+            spectra = spectra_of(extract, samples)
+            gram = gram + _gram(spectra)
+            plain = plain + _gram(np.sqrt(fit.variances[extract.bag])[:, None] * spectra)
             np.save(file, spectra)
-            lengths.append(len(columns))
+            samples += len(extract.times)
         file.seek(0)
         inverse = _inverse(gram[:-1, :-1])
-        weighted: Array = np.zeros(())
-        for samples in lengths:
+        rest = inverse @ gram[:-1, -1]
+        for extract in _selected(extracts, len(extracts)):
+            spectra = np.load(file)
             weighted = weighted + _gram(
-                _whitened(np.load(file), inverse @ gram[:-1, -1], inverse, samples))
+                _whitened(spectra, spectra, rest, inverse, len(extract.times)))
+    noisy_samples = 0
+    for clean, more in _selected(zip(_first_of_bags(extracts), noisy, strict=True), len(noisy)):
+        spectra = spectra_of(clean, 0)
+        of_noise = of_noise + _gram(_whitened(
+            spectra_of(more._replace(used=clean.used), 0) - spectra, spectra, rest, inverse,
+            len(clean.times)))
+        noisy_samples += len(clean.times)
+    of_noise *= samples / noisy_samples
     follow = -_inverse(gram[:inner, :inner]) @ gram[:inner, inner:-1]
-    return (of_causes, _Scores.of(weighted, inner), known @ follow[:known.shape[1]],
-            _Scores.of(plain, inner))
+    return (of_causes, _Scores.of(weighted, of_noise, inner), known @ follow[:known.shape[1]],
+            _Scores.of(plain, np.zeros_like(plain), inner))
+
+
+def _first_of_bags(extracts: Extracts) -> Iterator[Extract]:
+    """Yield the first extract of each bag."""
+    for _, of_bag in groupby(extracts, lambda each: each.bag):
+        yield next(of_bag)
 
 
 def _spectra(columns: Array) -> Array:
@@ -291,8 +334,8 @@ def _gram(spectra: Array) -> Array:
     return gram
 
 
-def _whitened(spectra: Array, rest: Array, inverse: Array, samples: int) -> Array:
-    """Return the columns (F, 2, 6, m), whitened by the residuals of a fit with all causes."""
+def _whitened(columns: Array, spectra: Array, rest: Array, inverse: Array, samples: int) -> Array:
+    """Return columns (F, 2, 6, m), whitened by the residuals of a fit with all causes."""
     left = spectra[..., -1] - spectra[..., :-1] @ rest
     # The fit of the columns reduces the variance of a residual below the noise variance.
     flat = spectra[..., :-1].reshape(-1, len(rest))
@@ -307,7 +350,7 @@ def _whitened(spectra: Array, rest: Array, inverse: Array, samples: int) -> Arra
     correlation /= np.outer(sizes, sizes)
     values, vectors = np.linalg.eigh(correlation)
     root = vectors / np.sqrt(np.maximum(values, 0.05)) @ vectors.T
-    result: Array = root @ (spectra / deviations[:, None, :, None])
+    result: Array = root @ (columns / deviations[:, None, :, None])
     return result
 
 
