@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-from recorded import about, at_rest, fourier, HOME, MotionAt, Recorded, recorded
+from recorded import about, at_rest, fourier, HOME, MotionAt, Noise, Recorded, recorded
 from referees import rng
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform

@@ -46,11 +46,14 @@ _CHANGES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
 _MOST_BAGS = 6
 # Predicted forces above this fraction of the largest effort may be cut off by saturation.
 _SATURATED = 0.97
+# Number of instants at which products of factors over time are averaged.
+_INSTANTS = 1000
 # Finite-difference step of joint coordinates and zero lengths, relative to the platform's size.
 _STEP = 1e-4
 UNKNOWN = 'unknown'
 
-_Part = tuple[Array, list['Cause']]
+_Factors = Callable[[Array], Array]
+_Part = tuple[Array, list['Cause'], _Factors]
 
 
 class Cause(NamedTuple):
@@ -76,15 +79,17 @@ class Cause(NamedTuple):
 
 def _part(what: str, columns: Array, text: str, factor: float = 1.0,
           measure: Callable[[Array], Any] = np.asarray,
-          groups: Sequence[tuple[str, slice]] = (('', slice(None)),)) -> _Part:
+          groups: Sequence[tuple[str, slice]] = (('', slice(None)),),
+          over_time: _Factors = np.ones_like) -> _Part:
     """
     Return columns (N, 6, m) with their causes; the indices are those among these columns.
 
     Each group has a word, for which ``@`` stands in the text, and some of the columns.
+    ``over_time`` returns factors of the columns at times (N, 1), as fractions of all samples.
     """
     places = np.arange(columns.shape[-1])
     return columns, [Cause(what, places[which], text.replace('@', word), factor, measure)
-                     for word, which in groups]
+                     for word, which in groups], over_time
 
 
 class Causes:
@@ -115,21 +120,37 @@ class Causes:
         self._each = [(f' of {leg}', slice(n, n + 1)) for n, leg in enumerate(p['joints'])]
         self._each_and_all = [*self._each, ('', slice(None))]
 
-    def columns(self, extract: Extract, first: int) -> tuple[Array, tuple[Cause, ...]]:
-        """Return columns (N, 6, m) for an extract that begins with the sample ``first``."""
+    def columns(self, extract: Extract, first: int | None,
+                ) -> tuple[Array, tuple[Cause, ...], Array]:
+        """
+        Return columns (N, 6, m), the causes, and the means of products of factors over time.
+
+        The extract begins with the sample ``first``; with None the columns lack these factors.
+        """
         lengths = extract.legs[..., 0]
         poses = self._platform.forward_kinematics(lengths, Pose.of_rows(extract.poses))
-        parts = [*self._of_forces(extract, poses, first),
+        parts = [*self._of_forces(extract, poses),
                  *(self._of_geometry(extract, poses) if self._geometry else ())]
         causes: list[Cause] = []
         count = 0
-        for columns, of_columns in parts:
+        for columns, of_columns, _ in parts:
             causes += [each._replace(places=count + each.places) for each in of_columns]
             count += columns.shape[-1]
-        return np.concatenate([columns for columns, _ in parts], axis=-1), tuple(causes)
+        together = np.concatenate([columns for columns, _, _ in parts], axis=-1)
 
-    def _of_forces(self, extract: Extract, poses: Pose, first: int) -> Iterator[_Part]:
-        """Yield forces that depend on the motion and on time."""
+        def factors(begin: float, end: float, many: int) -> Array:
+            at = np.linspace(begin, end, many, endpoint=False)[:, None]
+            return np.hstack([np.broadcast_to(over_time(at), (many, columns.shape[-1]))
+                              for columns, _, over_time in parts])
+
+        whole = factors(0.0, 1.0, _INSTANTS)
+        if first is not None:
+            together *= factors(first / self._samples, (first + len(lengths)) / self._samples,
+                                len(lengths))[:, None]
+        return together, tuple(causes), whole.T @ whole / _INSTANTS
+
+    def _of_forces(self, extract: Extract, poses: Pose) -> Iterator[_Part]:
+        """Yield forces that depend on the motion, some of them on time as well."""
         platform, whole = self._platform, self._whole
         lengths, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
         rows = motions(platform, poses, rates, accelerations)
@@ -178,21 +199,19 @@ class Causes:
         yield _part(UNKNOWN, _by_leg(np.stack([np.abs(v), x * v, v ** 3], axis=-1)),
                     'forces that depend on the rate')
 
-        at = (first + np.arange(len(rows))) / self._samples
         changes = self._changes
         words = [(f'at about {100.0 * change:.0f} %', slice(4 * n, 4 * n + 4))
                  for n, change in enumerate(changes)]
         words += [(f'between {100.0 * one:.0f} and {100.0 * other:.0f} %', slice(4 * n, 4 * n + 8))
                   for n, (one, other) in enumerate(pairwise(changes))]
-        yield _part('payload', np.concatenate([
-            matrix[..., :4] * (at >= change)[:, None, None] for change in changes], axis=-1),
-            'a payload that changes @ of the time, {} kg', measure=_mass, groups=words)
-        late = (at - 0.5)[:, None, None]
-        yield _part('friction_drift', late * np.stack([
+        yield _part('payload', np.tile(matrix[..., :4], len(changes)),
+                    'a payload that changes @ of the time, {} kg', measure=_mass, groups=words,
+                    over_time=lambda at: np.where(at >= np.repeat(changes, 4), 1.0, 0.0))
+        yield _part('friction_drift', np.stack([
             matrix[..., part].sum(axis=-1) for part in (VISCOUS_FRICTION, COULOMB_FRICTION)],
-            axis=-1), 'friction that changes with time')
-        yield _part('offset_drift', _by_leg(np.ones((len(rows), 6, 1))) * late,
-                    'offsets of the efforts that change with time, {} N')
+            axis=-1), 'friction that changes with time', over_time=_late)
+        yield _part('offset_drift', _by_leg(np.ones((len(rows), 6, 1))),
+                    'offsets of the efforts that change with time, {} N', over_time=_late)
 
     def _of_geometry(self, extract: Extract, poses: Pose) -> Iterator[_Part]:
         """Yield derivatives of the forces by zero lengths and joint coordinates [N/m]."""
@@ -216,6 +235,11 @@ class Causes:
                 / step for change in step * np.eye(18).reshape(18, 6, 3)], axis=-1),
                 f'another {end} joint@, moved by {{}} mm', 1e3, groups=[
                     (word, slice(3 * n, 3 * n + 3)) for n, (word, _) in enumerate(self._each)])
+
+
+def _late(at: Array) -> Array:
+    """Return the time from the middle."""
+    return at - 0.5
 
 
 def _mass(amounts: Array) -> Array:

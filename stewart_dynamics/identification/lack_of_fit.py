@@ -263,17 +263,18 @@ def _scores(causes: Causes, extracts: Extracts, noisy: Extracts, unknowns: Unkno
     """
     known = fit.identifiability.known
     of_causes: Sequence[Cause] = ()
+    products: Array = np.zeros(())
     inner = known.shape[1] + len(fit.delays)  # known directions, then the delays
 
-    def spectra_of(extract: Extract, first: int) -> Array:
-        nonlocal of_causes
+    def spectra_of(extract: Extract, first: int | None) -> Array:
+        nonlocal of_causes, products
         bag, used = extract.bag, extract.used[..., None]
         columns = extract.columns * used
         e = columns @ directions(
             unknowns, fit.values, fit.delays[bag], bool(fit.delay_errors[bag]))
         delays = np.zeros((*e.shape[:2], len(fit.delays)))
         delays[..., bag] = e[..., -1]
-        added, of_causes = causes.columns(extract, first)
+        added, of_causes, products = causes.columns(extract, first)
         residuals = columns @ residual_of(unknowns.theta(fit.values), fit.delays[bag])
         return _spectra(np.concatenate([
             e[..., :-1] @ known, delays, added * used, residuals[..., None]],
@@ -300,12 +301,13 @@ def _scores(causes: Causes, extracts: Extracts, noisy: Extracts, unknowns: Unkno
                 _whitened(spectra, spectra, rest, inverse, len(extract.times)))
     noisy_samples = 0
     for clean, more in _selected(zip(_first_of_bags(extracts), noisy, strict=True), len(noisy)):
-        spectra = spectra_of(clean, 0)
+        spectra = spectra_of(clean, None)
         of_noise = of_noise + _gram(_whitened(
-            spectra_of(more._replace(used=clean.used), 0) - spectra, spectra, rest, inverse,
+            spectra_of(more._replace(used=clean.used), None) - spectra, spectra, rest, inverse,
             len(clean.times)))
         noisy_samples += len(clean.times)
     of_noise *= samples / noisy_samples
+    of_noise[inner:-1, inner:-1] *= products
     follow = -_inverse(gram[:inner, :inner]) @ gram[:inner, inner:-1]
     return (of_causes, _Scores.of(weighted, of_noise, inner), known @ follow[:known.shape[1]],
             _Scores.of(plain, np.zeros_like(plain), inner))
