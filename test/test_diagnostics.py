@@ -306,6 +306,24 @@ def test_a_clear_motion_is_ok() -> None:
     assert values['its leg'] in PARAMETERS['joints']
 
 
+def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None:
+    """With z down a platform stands where it would hang: the lengths are the same."""
+    around = {'limits__length_min': [1.0], 'limits__length_max': [1.4]}
+    x, y, z, *others = HOME.motion
+    below = output_of(HOME._replace(motion=(x, y, -z, *others)))
+    assert below.lengths == pytest.approx(CLEAR.lengths, rel=1e-12)
+    diagnostics = begun(**around)
+    for n in range(2):
+        answered(diagnostics, BEGIN + n, below)
+        of = status(diagnostics, 'singularity', BEGIN + n)
+        assert of.level == WARN
+        assert re.fullmatch(
+            rf'det\(J\) is -{CLEAR.determinant:.3g} m\^3, at home \+[\d.]+ m\^3: the motion '
+            'begins beyond a .*likely mistake: an axis of the other sign, or .*', of.message)
+    answered(above := begun(**around), BEGIN)
+    assert status(above, 'singularity', BEGIN).message == 'clear'
+
+
 @pytest.mark.parametrize(('cause', 'condition', 'time', 'message'), [
     (Cause.CONDITION, 30.0, 9.0, 'condition number 30 exceeds singularity.warn_condition, 20'),
     # The warning ends only below 0.8 of it, and the text is not of the number before.

@@ -550,6 +550,15 @@ def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:
     assert [len(m.effort) for _, m in outputs.messages[f'{NODE}/leg_states']] == [6, 0, 6]
 
 
+def test_a_bag_with_z_down_begins_beyond_a_singularity(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    of = [(topic, when,
+           messages.pose(when - RECORDED, (0.0, 0.0, -1.1)) if topic == POSE else data)
+          for topic, when, data in motion(2)]
+    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
+    assert 'the motion begins beyond a singularity; likely mistake' in capsys.readouterr().out
+
+
 # Exit codes
 
 def test_a_bag_without_answers_is_reported(

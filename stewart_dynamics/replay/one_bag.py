@@ -35,6 +35,7 @@ from stewart_dynamics.bags import recording as bag_recording
 from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
+from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
@@ -289,6 +290,9 @@ class _Run:
         self._state = outputs.state
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
+            at_home = determinant_at_home(self._parameters)
+            if mistake := other_side(float(outputs.determinants[0]), at_home):
+                self._notice(mistake)
         block = Answered(self._seconds(setpoints.stamps), setpoints, outputs,
                          self._base_wrench.many(setpoints))
         self._files.write(block)

@@ -124,6 +124,27 @@ def home_pose(parameters: Parameters) -> Pose:
     return Pose(positions[0], rotations[0])
 
 
+def determinant_at_home(parameters: Parameters) -> float:
+    """Return det(J) at home [m^3]; nan if the parameters give no home pose."""
+    try:
+        home = home_pose(parameters)
+    except ParameterError:
+        return math.nan
+    arms = parameters['geometry.platform_joints'] @ home.rotation.T
+    legs = home.position + arms - parameters['geometry.base_joints']
+    directions = legs / np.linalg.norm(legs, axis=1)[:, None]
+    return float(np.linalg.det(np.hstack([directions, np.cross(arms, directions)])))
+
+
+def other_side(determinant: float, at_home: float) -> str:
+    """Return the likely mistake if a motion begins with another sign of det(J), or nothing."""
+    if not determinant * at_home < 0.0:
+        return ''
+    return (f'det(J) is {determinant:+.3g} m^3, at home {at_home:+.3g} m^3: the motion begins '
+            'beyond a singularity; likely mistake: an axis of the other sign, or '
+            'geometry.platform_side')
+
+
 def homes(parameters: Parameters) -> tuple[Array, Array]:
     """
     Return possible home poses, the most likely first.

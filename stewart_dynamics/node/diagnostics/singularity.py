@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from stewart_dynamics.arrays import SECOND
+from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.periodic_report import (
     Answers, ERROR, Level, LogLine, OK_LEVEL, PERIOD, StatusPart, WARN)
@@ -68,6 +69,7 @@ class SingularityDiagnostics(StatusPart):
         self.parameters = parameters  # may be replaced at any time
         self._answers = answers
         self._output: Output | None = None
+        self._at_home, self._other_side = determinant_at_home(parameters), ''
         self._crossed = False  # with the last setpoint
         self._crossings: list[str] = []  # since the last report
         self._crossing_logged_at = -PERIOD
@@ -77,17 +79,21 @@ class SingularityDiagnostics(StatusPart):
     def answered(self, output: Output, now: float) -> bool:
         """Note an output; return whether it must be reported at once, at any level."""
         before, self._output = self._output, output
+        if before is None:
+            self._other_side = other_side(output.determinant, self._at_home)
         if output.condition > self._second_largest:
             self._second_largest = output.condition
             self._largest = max(self._largest, output.condition)
         state = singularity_state(output, self.parameters)
+        if state.level == OK_LEVEL.level and self._other_side:
+            state = Level(WARN, self._other_side)
         if output.singularity.cause is not Cause.CROSSED:
             self.held.see(state, now, _NEARNESS)
             if self._crossed:
                 self.held.see(OK_LEVEL, now, _CROSSING)
                 self._crossed = False
             return False
-        self._crossed = True
+        self._crossed, self._other_side = True, ''
         crossing = Level(ERROR, _crossing(before, output))
         self._crossings.append(crossing.message)
         self.held.see(crossing, now, _CROSSING)
