@@ -1105,7 +1105,7 @@ def test_force_replaces_results_and_nothing_else(
     capsys.readouterr()
     assert '--force replaces results' in rejected(
         capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path)
-    (tmp_path / 'clear' / 'of before').touch()
+    assert (tmp_path / 'clear' / 'report.html').exists()
     assert run(ROOT / 'bags' / 'clear', tmp_path, '--force') == DONE
     assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
         'bag', 'legs.csv', 'summary.json']
