@@ -19,7 +19,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Container, Iterable, Sequence
 from contextlib import suppress
-import ctypes
 import io
 import os
 from pathlib import Path
@@ -107,6 +106,8 @@ def _keep_freed_memory() -> None:
     Arrays of the same sizes come and go with each block of a bag; without this, a third of the
     time passes while the operating system clears their pages anew.
     """
+    import ctypes  # late, so that --help is fast
+
     # M_MMAP_THRESHOLD and M_TRIM_THRESHOLD of mallopt(3); the first is at its largest.
     for name, number, size in (('MMAP', -3, 1 << 25), ('TRIM', -1, 1 << 28)):
         os.environ.setdefault(f'MALLOC_{name}_THRESHOLD_', str(size))
