@@ -53,7 +53,7 @@ from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.messages import StateMessages
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
-from stewart_dynamics.simulator.plant_dynamics import advance, STATE_TWIST
+from stewart_dynamics.simulator.plant_dynamics import STATE_TWIST
 
 sys.path.append(str(HERE.parent / 'test'))
 from referees import energies, rng, smooth_motion  # noqa: E402, I100, I202
@@ -104,9 +104,7 @@ def period_rows(rounds: int) -> list[tuple[str, ...]]:
         commands = holding(plant.parameters)
         steps = f'{plant.steps} step{"s: no reflected mass" if plant.steps > 1 else ""}'
         for name, call in (
-                ('the compiled call', partial(
-                    advance, plant._constants, plant._stops, plant._limits.force_max, plant._loads,
-                    plant._state, plant._result, plant.steps, plant._step)),
+                ('the compiled call', plant._take_steps),
                 ('`Plant.advance`', partial(plant.advance, commands, NO_WRENCH)),
                 ('its four messages beside',
                  partial(published, StateMessages(plant.parameters), plant))):
