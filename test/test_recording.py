@@ -310,8 +310,10 @@ LAST = (1 << 63) - 1
     ((DECLARED, channel(65535, '/a'), channel(0, '/a'),
       chunk(message(0, 2) + message(3, 1) + message(65535, 1), 1)), [1, 1, 2], ''),
     ((DECLARED, *(chunk(message(2, time), time) for time in ((1 << 64) - 1, 1 << 63, LAST, 0))),
-     [0, LAST, LAST, LAST], '')], ids=[
-         'between chunks', 'two channels of a topic', 'times out of range'])
+     [0, LAST, LAST, LAST], ''),
+    ((DECLARED, chunk(message(2, 1) + chunk(message(2, 2), 2), 1), chunk(message(2, 3), 3)),
+     [3], 'its records are inconsistent')], ids=[
+         'between chunks', 'two channels of a topic', 'times out of range', 'chunk in a chunk'])
 def test_records_that_are_used_and_records_that_are_damage(
         records: tuple[bytes, ...], times: list[int], missing: str,
         tmp_path: Path) -> None:

@@ -50,10 +50,10 @@ MAGIC = b'\x89MCAP0\r\n'
 HEAD = 9
 # Possible channel numbers; the entry of those whose messages are skipped.
 NUMBERS, IGNORED = 1 << 16, -1
-# Bit n: records with the opcode n may occur between the first and the last one.
-_DATA = sum(1 << opcode for opcode in (
-    Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK,
-    Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA))
+# Bit n: records with the opcode n may occur in a chunk; between the first record and the last one.
+_IN_CHUNK = 1 << Opcode.SCHEMA | 1 << Opcode.CHANNEL | 1 << Opcode.MESSAGE
+_IN_DATA = (_IN_CHUNK | 1 << Opcode.HEADER | 1 << Opcode.CHUNK | 1 << Opcode.MESSAGE_INDEX
+            | 1 << Opcode.ATTACHMENT | 1 << Opcode.METADATA)
 _FOOTER = HEAD + 20 + len(MAGIC)
 _DATA_END = bytes([Opcode.DATA_END, 4, 0, 0, 0, 0, 0, 0, 0])
 _LARGEST_INDEX = 1 << 28
@@ -97,14 +97,15 @@ def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> N
     ----------
     data : (M,)
         The bytes of the records. The scan ends where the fields that it reads are not in them,
-        where the lengths in a message or a message index are inconsistent, or where a record
-        begins that does not belong to the data.
+        where the lengths in a message or a message index are inconsistent, or at an opcode that
+        is not valid.
     numbers : (65536,)
         Number of the topic of each channel, or IGNORED.
     found : (4, K)
         Output: see Scan. Records beyond K are only counted.
     totals : (2,)
-        In: the second is the end that no record may exceed. Output: K and end, see Scan.
+        In: bits of the valid opcodes, and the end that no record may exceed. Output: K and end,
+        see Scan.
 
     """
     count = at = 0
@@ -112,7 +113,7 @@ def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> N
         opcode, begin, length = np.int64(data[at]), at + 9, _integer(data, at + 1, 8)
         # Fields up to this offset are read.
         needed = 22 if opcode == 5 else 6 if opcode == 7 else 2 if opcode in (3, 4) else 0
-        if opcode > 12 or not _DATA >> opcode & 1 or begin + needed > len(data) or not (
+        if opcode > 12 or not totals[0] >> opcode & 1 or begin + needed > len(data) or not (
                 needed <= length <= totals[1] - begin):
             break
         if opcode == 7 and _integer(data, begin + 2, 4) != length - 6:
@@ -131,12 +132,12 @@ def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> N
     totals[0], totals[1] = count, at
 
 
-def scanned(data: bytes, numbers: Integers, limit: int) -> Scan:
+def scanned(data: bytes, numbers: Integers, valid: int, limit: int) -> Scan:
     """Return the records in these bytes that end before a limit, see ``scan``."""
     array = np.frombuffer(data, np.uint8)
     room = 8192  # for most chunks this is enough, and they are scanned once
     while True:
-        found, totals = np.empty((4, room), np.int64), np.array([0, limit])
+        found, totals = np.empty((4, room), np.int64), np.array([valid, limit])
         scan(array, numbers, found, totals)
         count, end = totals.tolist()
         if count <= room:
@@ -287,7 +288,8 @@ class McapFile:
         """Follow the records to the end of the data; return where messages are."""
         chunks, runs, at = list[_Piece](), list[_Piece](), len(MAGIC)
         while True:
-            found = scanned(self._read_at(at, _WINDOW), _ANY_TOPIC, self._size - at)
+            found = scanned(
+                self._read_at(at, _WINDOW), _ANY_TOPIC, _IN_DATA, self._size - at)
             if not found.end:
                 break
             self._declare(found, at)
@@ -352,7 +354,8 @@ class McapFile:
             if piece.length > LARGEST_CHUNK:
                 raise ValueError(f'{piece.length} bytes, at most {LARGEST_CHUNK} are read')
             data = (self._unpacked if piece.is_chunk else self._read_at)(piece.start, piece.length)
-            found = scanned(data, numbers, len(data))
+            found = scanned(data, numbers, _IN_CHUNK if piece.is_chunk else _IN_DATA,
+                            len(data))
             if found.end != len(data):
                 raise ValueError('its records are inconsistent')
         except Exception as exc:  # damaged bytes: the decompressors raise any exception
