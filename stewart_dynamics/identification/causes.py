@@ -46,14 +46,12 @@ _CHANGES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
 _MOST_BAGS = 6
 # Predicted forces above this fraction of the largest effort may be cut off by saturation.
 _SATURATED = 0.97
-# Number of instants at which products of factors over time are averaged.
-_INSTANTS = 1000
 # Finite-difference step of joint coordinates and zero lengths, relative to the platform's size.
 _STEP = 1e-4
 UNKNOWN = 'unknown'
 
-_Factors = Callable[[Array], Array]
-_Part = tuple[Array, list['Cause'], _Factors]
+Factors = Callable[[Array], Array]
+_Part = tuple[Array, list['Cause'], Factors]
 
 
 class Cause(NamedTuple):
@@ -80,7 +78,7 @@ class Cause(NamedTuple):
 def _part(what: str, columns: Array, text: str, factor: float = 1.0,
           measure: Callable[[Array], Any] = np.asarray,
           groups: Sequence[tuple[str, slice]] = (('', slice(None)),),
-          over_time: _Factors = np.ones_like) -> _Part:
+          over_time: Factors = np.ones_like) -> _Part:
     """
     Return columns (N, 6, m) with their causes; the indices are those among these columns.
 
@@ -104,14 +102,14 @@ class Causes:
         p = platform.parameters
         self._platform, self._geometry = platform, geometry
         self._theta = unknowns.theta(fit.values)
-        self._samples, self._largest = 0, 0.0
+        self.samples, self._largest = 0, 0.0
         begins: dict[int, int] = {}  # samples before each bag
         for extract in extracts:
-            begins.setdefault(extract.bag, self._samples)
-            self._samples += len(extract.times)
+            begins.setdefault(extract.bag, self.samples)
+            self.samples += len(extract.times)
             self._largest = max(self._largest, float(
                 np.abs(extract.efforts[..., 0]).max(initial=0.0)))
-        between = [begin / self._samples for begin in begins.values() if begin]
+        between = [begin / self.samples for begin in begins.values() if begin]
         self._changes = sorted({*_CHANGES, *(between if len(between) < _MOST_BAGS else ())})
         self._tilt = Tilt(p['gravity'])
         self._size = float(p['singularity.characteristic_length'])
@@ -120,34 +118,23 @@ class Causes:
         self._each = [(f' of {leg}', slice(n, n + 1)) for n, leg in enumerate(p['joints'])]
         self._each_and_all = [*self._each, ('', slice(None))]
 
-    def columns(self, extract: Extract, first: int | None,
-                ) -> tuple[Array, tuple[Cause, ...], Array]:
-        """
-        Return columns (N, 6, m), the causes, and the means of products of factors over time.
-
-        The extract begins with the sample ``first``; with None the columns lack these factors.
-        """
-        lengths = extract.legs[..., 0]
-        poses = self._platform.forward_kinematics(lengths, Pose.of_rows(extract.poses))
+    def columns(self, extract: Extract) -> tuple[Array, tuple[Cause, ...], Factors]:
+        """Return columns (N, 6, m) without their factors over time, the causes, these factors."""
+        poses = self._platform.forward_kinematics(
+            extract.legs[..., 0], Pose.of_rows(extract.poses))
         parts = [*self._of_forces(extract, poses),
                  *(self._of_geometry(extract, poses) if self._geometry else ())]
         causes: list[Cause] = []
-        count = 0
-        for columns, of_columns, _ in parts:
-            causes += [each._replace(places=count + each.places) for each in of_columns]
-            count += columns.shape[-1]
-        together = np.concatenate([columns for columns, _, _ in parts], axis=-1)
+        counts = [columns.shape[-1] for columns, _, _ in parts]
+        for first, (_, of_columns, _) in zip(np.cumsum([0, *counts[:-1]]), parts, strict=True):
+            causes += [each._replace(places=first + each.places) for each in of_columns]
 
-        def factors(begin: float, end: float, many: int) -> Array:
-            at = np.linspace(begin, end, many, endpoint=False)[:, None]
-            return np.hstack([np.broadcast_to(over_time(at), (many, columns.shape[-1]))
-                              for columns, _, over_time in parts])
+        def factors(at: Array) -> Array:
+            return np.hstack([np.broadcast_to(over_time(at[:, None]), (len(at), count))
+                              for (_, _, over_time), count in zip(parts, counts, strict=True)])
 
-        whole = factors(0.0, 1.0, _INSTANTS)
-        if first is not None:
-            together *= factors(first / self._samples, (first + len(lengths)) / self._samples,
-                                len(lengths))[:, None]
-        return together, tuple(causes), whole.T @ whole / _INSTANTS
+        return (np.concatenate([columns for columns, _, _ in parts], axis=-1), tuple(causes),
+                factors)
 
     def _of_forces(self, extract: Extract, poses: Pose) -> Iterator[_Part]:
         """Yield forces that depend on the motion, some of them on time as well."""

@@ -156,7 +156,7 @@ class Identification:
         self.parameters, self._options = parameters, options
         self.platform = StewartPlatform(parameters)
         self.unknowns = Unknowns(parameters, options.kinds, options.prior)
-        self.extracts, self.noisy = Extracts(), Extracts()
+        self.extracts, self._noisy = Extracts(), Extracts()
         self.bags: list[BagRead] = []
         self._first: tuple[Extraction, Window] | None = None
         # For the first window of each bag: sums without and with more noise, the Gram matrix of
@@ -306,7 +306,7 @@ class Identification:
         extract = read.extract
         noisy = extraction(window, first_pose(self.platform, window),
                            np.random.default_rng(_SEED)).extract
-        self.noisy.add(len(self.bags), 0.0, noisy)
+        self._noisy.add(len(self.bags), 0.0, noisy)
         change = noisy.regressor - extract.regressor
         self._noises.append((
             Sums.of(extract.columns, extract.used), Sums.of(noisy.columns, extract.used),
@@ -342,7 +342,7 @@ class Identification:
             Sums.stacked(clean), Sums.stacked(noisy), unknowns, found, self._cutoffs)
         errors = errors._replace(covariance=errors.covariance + np.outer(shift, shift))
         residuals = Residuals.of(sums, unknowns, found)
-        lack = lack_of_fit(self.platform, extracts, self.noisy, unknowns, found)
+        lack = lack_of_fit(self.platform, extracts, self._noisy, unknowns, found)
         if not likely:
             assert self._first is not None
             likely += of_fit(self.parameters, *self._first, found, lack, float(np.sqrt(
@@ -392,7 +392,7 @@ class Identification:
     def close(self) -> None:
         """Remove the temporary file."""
         self.extracts.close()
-        self.noisy.close()
+        self._noisy.close()
 
 
 def _margin(cutoff: float) -> float:

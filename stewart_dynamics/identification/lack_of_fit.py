@@ -41,7 +41,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
-from stewart_dynamics.identification.causes import Cause, Causes, UNKNOWN
+from stewart_dynamics.identification.causes import Cause, Causes, Factors, UNKNOWN
 from stewart_dynamics.identification.extraction import Extract, Extracts, SAMPLES
 from stewart_dynamics.identification.fit import directions, Fit
 from stewart_dynamics.identification.intervals import smoothed
@@ -64,6 +64,8 @@ _SUSPICIOUS = 4.0
 # Highest frequency used, relative to the cut-off; half width of the smoothing of spectra, relative
 # to the sampling rate, and its minimum in frequencies.
 _BAND, _SMOOTHING, _FEWEST = 0.9, 0.0125, 8
+# Number of instants at which products of factors over time are averaged.
+_INSTANTS = 1000
 # Least variance of a residual that the fit of all causes leaves, of 2 in each frequency.
 _LEAST_FREE = 2e-3
 # The form of a cause, as that of Stribeck's curve, is known less well than its amount: intervals
@@ -263,42 +265,46 @@ def _scores(causes: Causes, extracts: Extracts, noisy: Extracts, unknowns: Unkno
     """
     known = fit.identifiability.known
     of_causes: Sequence[Cause] = ()
-    products: Array = np.zeros(())
+    factors: Factors = np.ones_like
     inner = known.shape[1] + len(fit.delays)  # known directions, then the delays
 
-    def spectra_of(extract: Extract, first: int | None) -> Array:
-        nonlocal of_causes, products
+    def spectra_of(extract: Extract, at: Array | None) -> Array:
+        """Return the spectra of an extract at times, as fractions; None: without the factors."""
+        nonlocal of_causes, factors
         bag, used = extract.bag, extract.used[..., None]
         columns = extract.columns * used
         e = columns @ directions(
             unknowns, fit.values, fit.delays[bag], bool(fit.delay_errors[bag]))
         delays = np.zeros((*e.shape[:2], len(fit.delays)))
         delays[..., bag] = e[..., -1]
-        added, of_causes, products = causes.columns(extract, first)
+        added, of_causes, factors = causes.columns(extract)
+        if at is not None:
+            added *= factors(at)[:, None]
         residuals = columns @ residual_of(unknowns.theta(fit.values), fit.delays[bag])
         return _spectra(np.concatenate([
             e[..., :-1] @ known, delays, added * used, residuals[..., None]],
             axis=-1) / np.sqrt(fit.variances[bag])[:, None])
 
-    samples = 0
+    lengths: list[int] = []
     gram: Array = np.zeros(())
     plain: Array = np.zeros(())
     weighted: Array = np.zeros(())
     of_noise: Array = np.zeros(())
     with tempfile.TemporaryFile() as file:
         for extract in _selected(extracts, len(extracts)):
-            spectra = spectra_of(extract, samples)
+            first, many = sum(lengths), len(extract.times)
+            ends = first / causes.samples, (first + many) / causes.samples
+            spectra = spectra_of(extract, _between(*ends, many))
             gram = gram + _gram(spectra)
             plain = plain + _gram(np.sqrt(fit.variances[extract.bag])[:, None] * spectra)
             np.save(file, spectra)
-            samples += len(extract.times)
+            lengths.append(many)
         file.seek(0)
         inverse = _inverse(gram[:-1, :-1])
         rest = inverse @ gram[:-1, -1]
-        for extract in _selected(extracts, len(extracts)):
+        for samples in lengths:
             spectra = np.load(file)
-            weighted = weighted + _gram(
-                _whitened(spectra, spectra, rest, inverse, len(extract.times)))
+            weighted = weighted + _gram(_whitened(spectra, spectra, rest, inverse, samples))
     noisy_samples = 0
     for clean, more in _selected(zip(_first_of_bags(extracts), noisy, strict=True), len(noisy)):
         spectra = spectra_of(clean, None)
@@ -306,11 +312,18 @@ def _scores(causes: Causes, extracts: Extracts, noisy: Extracts, unknowns: Unkno
             spectra_of(more._replace(used=clean.used), None) - spectra, spectra, rest, inverse,
             len(clean.times)))
         noisy_samples += len(clean.times)
-    of_noise *= samples / noisy_samples
-    of_noise[inner:-1, inner:-1] *= products
+    of_noise *= causes.samples / noisy_samples
+    over_time = factors(_between(0.0, 1.0, _INSTANTS))
+    of_noise[inner:-1, inner:-1] *= over_time.T @ over_time / _INSTANTS
     follow = -_inverse(gram[:inner, :inner]) @ gram[:inner, inner:-1]
     return (of_causes, _Scores.of(weighted, of_noise, inner), known @ follow[:known.shape[1]],
             _Scores.of(plain, np.zeros_like(plain), inner))
+
+
+def _between(begin: float, end: float, many: int) -> Array:
+    """Return evenly spaced numbers, without the end."""
+    numbers: Array = np.linspace(begin, end, many, endpoint=False, dtype=float)
+    return numbers
 
 
 def _first_of_bags(extracts: Extracts) -> Iterator[Extract]:
