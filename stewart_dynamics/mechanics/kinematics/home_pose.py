@@ -36,6 +36,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import AUTO, NEGATIVE, Parameters, POSITIVE
@@ -120,7 +121,7 @@ def home_pose(parameters: Parameters) -> Pose:
             raise ParameterError(
                 'home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
                 'must give a length that the legs can have in a level pose')
-        positions, rotations = homes(parameters)
+        positions, rotations = _poses_at(parameters, shape, home)
     return Pose(positions[0], rotations[0])
 
 
@@ -130,10 +131,8 @@ def determinant_at_home(parameters: Parameters) -> float:
         home = home_pose(parameters)
     except ParameterError:
         return math.nan
-    arms = parameters['geometry.platform_joints'] @ home.rotation.T
-    legs = home.position + arms - parameters['geometry.base_joints']
-    directions = legs / np.linalg.norm(legs, axis=1)[:, None]
-    return float(np.linalg.det(np.hstack([directions, np.cross(arms, directions)])))
+    legs = lagrange.unchecked_legs(parameters, home.position, home.rotation)
+    return float(np.linalg.det(lagrange.inverse_jacobian(legs)))
 
 
 def other_side(determinant: float, at_home: float) -> str:
@@ -154,9 +153,13 @@ def homes(parameters: Parameters) -> tuple[Array, Array]:
     """
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)
-        home = home_of(parameters, shape, reach_of(parameters, shape))
-        return poses_of(parameters, shape, home.heights,
-                        turns_about(2, np.full(len(home.heights), home.yaw)))
+        return _poses_at(parameters, shape, home_of(
+            parameters, shape, reach_of(parameters, shape)))
+
+
+def _poses_at(p: Parameters, shape: Shape, home: Home) -> tuple[Array, Array]:
+    turns = turns_about(2, np.full(len(home.heights), home.yaw))
+    return poses_of(p, shape, home.heights, turns)
 
 
 def shape_of(p: Parameters) -> Shape:
