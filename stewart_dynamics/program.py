@@ -101,7 +101,7 @@ class Program:
 
 def _keep_freed_memory() -> None:
     """
-    Let glibc reuse freed memory, in this program and in those that it starts.
+    Let glibc reuse freed memory, here and in programs started, unless the environment says how.
 
     Arrays of the same sizes come and go with each block of a bag; without this, a third of the
     time passes while the operating system clears their pages anew.
@@ -110,7 +110,9 @@ def _keep_freed_memory() -> None:
 
     # M_MMAP_THRESHOLD and M_TRIM_THRESHOLD of mallopt(3); the first is at its largest.
     for name, number, size in (('MMAP', -3, 1 << 25), ('TRIM', -1, 1 << 28)):
-        os.environ.setdefault(f'MALLOC_{name}_THRESHOLD_', str(size))
+        if (variable := f'MALLOC_{name}_THRESHOLD_') in os.environ:
+            continue
+        os.environ[variable] = str(size)
         with suppress(AttributeError, OSError, TypeError):  # another C library
             ctypes.CDLL(None).mallopt(number, size)
 

@@ -51,12 +51,12 @@ DATASHEETS, REPLAYS = 'datasheet', 'replayed'
 
 # For the file by which a folder is known: the kind of folder, and all that a program writes there.
 _KINDS = {
-    RESULT: ('replay results', {RESULT, 'report.html', 'legs.csv', 'legs.parquet', 'bag',
+    RESULT: ('replay results', {RESULT, REPORT_PAGE, 'legs.csv', 'legs.parquet', 'bag',
                                 'bag/bag.mcap', 'bag/metadata.yaml'}),
     IDENTIFICATION: ('results of an identification',
-                     {IDENTIFICATION, 'identified.yaml', 'report.html'}),
-    DATASHEET: ('a datasheet', {DATASHEET, 'datasheet.html', 'workspace.csv'}),
-    CALIBRATION: ('results of a calibration', {CALIBRATION, 'calibrated.yaml', 'report.html'}),
+                     {IDENTIFICATION, 'identified.yaml', REPORT_PAGE}),
+    DATASHEET: ('a datasheet', {DATASHEET, DATASHEET_PAGE, 'workspace.csv'}),
+    CALIBRATION: ('results of a calibration', {CALIBRATION, 'calibrated.yaml', REPORT_PAGE}),
     'trajectory.yaml': ('a designed motion', {'trajectory.yaml'}),
     'poses.csv': ('designed poses', {'poses.csv', 'trajectory.csv'})}
 
