@@ -39,8 +39,7 @@ import numpy as np
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.executables import executable
 from stewart_dynamics.identification.extraction import Extraction, Extracts
-from stewart_dynamics.identification.fit import fit
-from stewart_dynamics.identification.intervals import errors_of
+from stewart_dynamics.identification.fit import errors_of, fit
 from stewart_dynamics.identification.sums import sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window

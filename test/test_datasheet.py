@@ -39,12 +39,10 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import main
 from stewart_dynamics.datasheet.datasheet import soft_legs
 from stewart_dynamics.datasheet.datasheet_text import (
-    between_setpoints, motion_verdict, rated_payload, setpoints_used)
-from stewart_dynamics.datasheet.figures import both_ways, down, LINEAR
+    between_setpoints, both_ways, down, LINEAR, motion_verdict, rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
-from stewart_dynamics.datasheet.payloads import Payloads
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
-from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS
+from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads
 from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, RecordedMotion, uses
 from stewart_dynamics.replay import main as replay
 from stewart_dynamics.replay.replay_options import Options

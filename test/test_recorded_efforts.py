@@ -28,7 +28,7 @@ import pytest
 from referees import rng
 
 from stewart_dynamics.errors import BagError
-from stewart_dynamics.replay.recorded_efforts import Efforts
+from stewart_dynamics.replay.residuals import Efforts
 
 SECOND = 1_000_000_000
 JOINTS = [f'leg_{n}' for n in range(1, 7)]

@@ -26,13 +26,11 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
-    between_setpoints, box_verdict, motion_verdict, rated_payload, setpoints_used)
-from stewart_dynamics.datasheet.figures import (
-    both_ways, DEGREE, down, limit_name, LINEAR, MM, span, unit_of)
+    between_setpoints, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
+    motion_verdict, rated_payload, setpoints_used, span, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
-from stewart_dynamics.datasheet.payloads import Payloads
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
-from stewart_dynamics.datasheet.ratings import AXES, grid, poses_of
+from stewart_dynamics.datasheet.ratings import AXES, grid, Payloads, poses_of
 from stewart_dynamics.datasheet.workspace import (
     Boundary, Frequencies, PLANES, rotations_over_height)
 from stewart_dynamics.parameters.table import inertia_matrix

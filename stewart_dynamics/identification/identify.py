@@ -35,9 +35,8 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, ParameterError, PoseError, SingularityError
 from stewart_dynamics.identification.extraction import Extraction, Extracts, WindowRead
 from stewart_dynamics.identification.filters import LowPass
-from stewart_dynamics.identification.fit import Fit, fit, shift_of_noise
+from stewart_dynamics.identification.fit import Errors, errors_of, Fit, fit, shift_of_noise
 from stewart_dynamics.identification.identification_options import IdentificationOptions
-from stewart_dynamics.identification.intervals import Errors, errors_of
 from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (

@@ -43,8 +43,7 @@ from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.causes import Cause, Causes, Factors, UNKNOWN
 from stewart_dynamics.identification.extraction import Extract, Extracts, SAMPLES
-from stewart_dynamics.identification.fit import directions, Fit
-from stewart_dynamics.identification.intervals import smoothed
+from stewart_dynamics.identification.fit import directions, Fit, smoothed
 from stewart_dynamics.identification.sums import residual_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform

@@ -44,9 +44,8 @@ from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEAS
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.fingerprint import fingerprint, plain_parameters, software, VERSION
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
-from stewart_dynamics.replay.recorded_efforts import Efforts
 from stewart_dynamics.replay.replay_options import code_of, Options
-from stewart_dynamics.replay.residuals import Comparison
+from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder

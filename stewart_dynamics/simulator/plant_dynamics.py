@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The motion of the platform under leg forces, integrated at a fixed step; compiled.
+The motion of the platform under leg forces or motor torques, integrated at a fixed step; compiled.
 
 The method is the classical Runge-Kutta method of fourth order, on position, quaternion and twist.
 After every step the quaternion is divided by its length, which keeps the order (Hairer, Lubich,
@@ -22,6 +22,11 @@ wrench are constant within a call, so that the work of a leg force is the force 
 of its leg's length, exactly, and an energy balance shows the error of the method alone. The
 motion of the base is given at begin, middle and end of a call, which are the stages of the method
 where a call is one step; with more steps it is the parabola through them.
+
+The load of a screw is (k torque - m_r L'') / c, see ``drives.motors``: under a torque a leg has
+the force k torque / c and the reflected mass m_r / c. c depends on the direction of the power,
+which is assumed, and assumed again where the load that follows contradicts it. The acceleration
+of a leg's twist, which adds little to the torque of its motor, is found by the same iteration.
 """
 
 from __future__ import annotations
@@ -30,19 +35,93 @@ import math
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
-from stewart_dynamics.mechanics.drives import torque_dynamics
 from stewart_dynamics.mechanics.drives.motors import (
-    COMMANDS as OF_MOTORS, MOTORS, put_motors, SPEEDS)
-from stewart_dynamics.mechanics.drives.torque_dynamics import torque_acceleration
+    clipped, COMMANDS as OF_MOTORS, curve_torque, motor_motion, MOTORS, put_motors, ratio_and_mass,
+    SPEEDS, torque_factor)
 from stewart_dynamics.mechanics.dynamics.base_load import moves
 from stewart_dynamics.mechanics.dynamics.bodies import leg_line
 from stewart_dynamics.mechanics.dynamics.forward_dynamics import acceleration
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS, put_reflected_mass
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, BASE, consecutive, MOTION, POSITION, ROTATION, TWIST)
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, Matrix3, norm, read3, scale, Vector3)
 from stewart_dynamics.simulator.end_stops import stop_force
+
+
+# Scratch memory of ``torque_acceleration``: constants with other reflected masses, forces, assumed
+# directions of the power, factors c, and torques for the twist of the legs.
+_CHANGED, _PUSHES, _POWER, _FACTOR, _OF_TWIST = consecutive(CONSTANTS, 6, 6, 6, 6)
+
+# Solutions until one is taken as it is; one or two are enough but where loads are near zero.
+_MOST_ATTEMPTS = 64
+# From this one on a single direction is changed at a time, which ends for every hexapod.
+_CAREFUL = 8
+# Relative change of the torque for the twist, above rounding errors.
+_UNCHANGED = 1e-14
+
+
+@compiled
+def _torque_acceleration(
+        constants: Array, drives: Array, torque_max: Array, curve: Array, motion: Array,
+        torques: Array, others: Array, wrench: Array, base: Array, work: Array, scratch: Array,
+        forces: Array) -> None:
+    """
+    Write the acceleration of a motion under motor torques, and the forces of the legs.
+
+    Parameters
+    ----------
+    constants, motion, wrench, base, work
+        As in ``forward_dynamics.acceleration``.
+    drives, torque_max, curve
+        As in ``motor_rows``; torques are clipped in place to those available.
+    torques : (6,)
+        [N m], + extends.
+    others : (6,)
+        Forces along the legs that do not pass through their screws [N].
+    scratch : (_OF_TWIST.stop,)
+        Scratch memory.
+    forces : (6,)
+        Written: forces of the legs as ``inverse_dynamics`` has them [N].
+
+    """
+    changed, pushes = scratch[_CHANGED], scratch[_PUSHES]
+    power, factor, of_twist = scratch[_POWER], scratch[_FACTOR], scratch[_OF_TWIST]
+    for n in range(CONSTANTS):
+        changed[n] = constants[n]
+    for n in range(6):
+        motion[ACCELERATION.start + n] = 0.0
+    for leg in range(6):
+        _, speed, _, rate, _ = motor_motion(constants, drives[leg], leg, motion)
+        torques[leg] = clipped(torques[leg], min(torque_max[leg], curve_torque(curve, speed)))
+        power[leg] = torques[leg] * rate
+        of_twist[leg] = 0.0
+    for attempt in range(_MOST_ATTEMPTS):
+        for leg in range(6):
+            ratio, mass = ratio_and_mass(drives[leg])
+            _, _, _, rate, _ = motor_motion(constants, drives[leg], leg, motion)
+            factor[leg] = torque_factor(drives[leg], power[leg], rate)
+            put_reflected_mass(changed, leg, mass / factor[leg])
+            pushes[leg] = ratio * (torques[leg] - of_twist[leg]) / factor[leg] + others[leg]
+        acceleration(changed, motion, pushes, wrench, base, work)
+        settled = True
+        for leg in range(6):
+            ratio, mass = ratio_and_mass(drives[leg])
+            _, _, speed_rate, rate, acc = motor_motion(constants, drives[leg], leg, motion)
+            load = (ratio * (torques[leg] - of_twist[leg]) - mass * acc) / factor[leg]
+            forces[leg] = load + mass * acc
+            own = mass / ratio / ratio * (speed_rate - ratio * acc)
+            if abs(own - of_twist[leg]) > _UNCHANGED * abs(torques[leg]):
+                settled = False
+            of_twist[leg] = own
+            if (load * rate > 0.0) != (power[leg] > 0.0) and (
+                    settled or attempt < _CAREFUL):
+                power[leg] = load * rate
+                settled = False
+        if settled:
+            break
+
 
 # The state: position, quaternion x y z w, linear and angular velocity, base axes.
 STATE_POSITION, STATE_QUATERNION, STATE_TWIST = consecutive(3, 4, 6)
@@ -60,7 +139,7 @@ COMMANDS, WRENCH, BASE_BEGIN, BASE_MIDDLE, BASE_END = consecutive(6, 6, BASE, BA
 LOADS = BASE_END.stop
 # Scratch memory.
 _MOTION, _FORCES, _AFTER, _SLOPE, _MEAN, _BASE, _STOPS, _TORQUES, _DRIVES = consecutive(
-    MOTION, 6, STATE, STATE, STATE, BASE, 6, 6, torque_dynamics.SCRATCH)
+    MOTION, 6, STATE, STATE, STATE, BASE, 6, 6, _OF_TWIST.stop)
 SCRATCH = _DRIVES.stop
 
 # In one step the platform may turn by at most this [rad], and a platform joint move by at most
@@ -118,8 +197,8 @@ def _slope(constants: Array, drives: Array, torque_max: Array, curve: Array, by_
         torques[leg] = loads[COMMANDS.start + leg]
         forces[leg] = torques[leg] + of_stops[leg]
     if by_torques:
-        torque_acceleration(constants, drives, torque_max, curve, motion, torques, of_stops,
-                            loads[WRENCH], base, work, scratch[_DRIVES], forces)
+        _torque_acceleration(constants, drives, torque_max, curve, motion, torques, of_stops,
+                             loads[WRENCH], base, work, scratch[_DRIVES], forces)
     else:
         acceleration(constants, motion, forces, loads[WRENCH], base, work)
     at = STATE_QUATERNION.start

@@ -31,7 +31,7 @@ the larger of the two torques, the breakaway torque, is what limits are checked 
     current = torque / torque_constant        copper heat = resistance current^2
     power = torque speed + copper heat        from the bus; where it is negative, back to the bus
 
-Where the screw turns with the leg, by the twist of ``leg_twist``, a right-handed thread extends
+Where the screw turns with the leg, by its twist (``leg_twist``), a right-handed thread extends
 the leg by lead / (2 pi) for each radian. The motor takes that back: gear_ratio times the twist is
 subtracted from its angle, added where the thread is left-handed. The moments of the screws about
 the legs' axes, force times lead / (2 pi), are not part of the leg forces.
@@ -48,7 +48,6 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
-from stewart_dynamics.mechanics.drives.leg_twist import leg_twist, turned
 from stewart_dynamics.mechanics.dynamics.bodies import leg_line
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
@@ -58,8 +57,49 @@ from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, consecutive, FORCES, LINEAR_ACCELERATION,
     LINEAR_VELOCITY, POSITION, ROTATION)
 from stewart_dynamics.mechanics.vectors import (
-    add, dot, read3, read9, rotate, scale, subtract)
+    add, cross, dot, read3, read9, rotate, scale, subtract, Vector3)
 from stewart_dynamics.parameters.table import Parameters, RIGHT, UNIVERSAL
+
+
+@inlined
+def leg_twist(u: Vector3, w: Vector3, w_rate: Vector3, w_acc: Vector3, s: Vector3,
+              s_rate: Vector3, s_acc: Vector3) -> tuple[float, float, float]:
+    """
+    Return the twist of a leg between its universal joints [rad], its rate and its acceleration.
+
+    Each universal joint turns about an axis u that is fixed to the base, or w = R w_P that is
+    fixed to the platform, and about an axis across the leg and across the first: the latter axes,
+    along ``u x s`` and ``w x s``, are fixed to the cylinder and to the piston. The angle from one
+    to the other about s, right-handed, is the turn of the piston against the cylinder:
+
+        twist = atan2(y, x)    y = s . (u x w)    x = u . w - (u . s)(w . s)
+
+    y and x are sine and cosine times ``|u x s| |w x s|``; where x is positive, the twist is the
+    arcsine of the product of the unit vectors along s x (u x s) and w x s. All in base axes.
+    """
+    u_s, u_s_rate, u_s_acc = dot(u, s), dot(u, s_rate), dot(u, s_acc)
+    w_s, w_s_rate = dot(w, s), dot(w_rate, s) + dot(w, s_rate)
+    w_s_acc = dot(w_acc, s) + 2.0 * dot(w_rate, s_rate) + dot(w, s_acc)
+    normal, normal_rate, normal_acc = cross(u, w), cross(u, w_rate), cross(u, w_acc)
+    y = dot(s, normal)
+    y_rate = dot(s_rate, normal) + dot(s, normal_rate)
+    y_acc = dot(s_acc, normal) + 2.0 * dot(s_rate, normal_rate) + dot(s, normal_acc)
+    x = dot(u, w) - u_s * w_s
+    x_rate = dot(u, w_rate) - u_s_rate * w_s - u_s * w_s_rate
+    x_acc = dot(u, w_acc) - u_s_acc * w_s - 2.0 * u_s_rate * w_s_rate - u_s * w_s_acc
+    square = x * x + y * y
+    inverse = 1.0 / square if square > 0.0 else math.nan
+    rate = (x * y_rate - y * x_rate) * inverse
+    return math.atan2(y, x), rate, (
+        x * y_acc - y * x_acc - 2.0 * (x * x_rate + y * y_rate) * rate) * inverse
+
+
+@inlined
+def turned(w: Vector3, omega: Vector3, alpha: Vector3) -> tuple[Vector3, Vector3]:
+    """Return first and second derivative of a vector that turns with the platform."""
+    rate = cross(omega, w)
+    return rate, add(cross(alpha, w), cross(omega, rate))
+
 
 # A row of the six motors' quantities. Commands are the torques of the forces that are published,
 # clipped to the available torques.
