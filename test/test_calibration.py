@@ -277,7 +277,7 @@ def test_outliers_are_named_and_do_not_matter() -> None:
 
 @pytest.mark.parametrize('seed', range(8))
 def test_outliers_do_not_hide_one_another(seed: int) -> None:
-    """A least-squares fit to all poses gives way to them, and misses some in three seeds."""
+    """A least-squares fit to all poses gives way to them, and misses some."""
     rng = np.random.default_rng(100 + seed)
     values = true_values(rng)
     lengths, seen = measured(rng, values, random_poses(rng, 60), Noise(2e-6, 1e-5, 1e-5))
