@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 import pinocchio as pin
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.export.hexapod_source import platform_source
+from stewart_dynamics.export.c_project import platform_source
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, lagrange
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import (

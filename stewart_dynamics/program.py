@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Container, Iterable, Sequence
 from contextlib import suppress
+from importlib import import_module
 import io
 import os
 from pathlib import Path
@@ -27,12 +28,15 @@ import signal
 import sys
 from typing import Any, TYPE_CHECKING
 
+from stewart_dynamics import __version__
 from stewart_dynamics.errors import one_line, StewartError
 
 if TYPE_CHECKING:
     from stewart_dynamics.compilation.functions import EntryPoint
 
 DONE, BAD_INPUT, PARTLY_READ, INTERRUPTED = 0, 2, 3, 130
+SOFTWARE = f'stewart_dynamics {__version__}'
+"""Name and version, as results have it."""
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -131,10 +135,9 @@ class _StoreOnce(argparse.Action):
         setattr(namespace, self.dest, values)
 
 
-def run_program(name: str, program: Callable[[Sequence[str] | None], int],
-                arguments: Sequence[str] | None) -> int:
+def run_program(name: str, module: str, arguments: Sequence[str] | None) -> int:
     """
-    Run a program that imports its libraries itself, and return its exit code.
+    Import a module, run its ``main``, and return the exit code; report a missing library.
 
     Without arguments, those of the command line, signals are ignored afterwards: the process ends.
     OpenBLAS, which numpy loads, gets one thread unless the environment says otherwise: the
@@ -149,7 +152,8 @@ def run_program(name: str, program: Callable[[Sequence[str] | None], int],
 
     before = {each: signal.signal(each, end_at_once) for each in _SIGNALS}
     try:
-        return program(arguments)
+        code: int = import_module(module).main(arguments)
+        return code
     except ModuleNotFoundError as exc:
         print(f'{name}: needs {exc.name}: pip install {exc.name}', file=sys.stderr)
         return BAD_INPUT
@@ -180,6 +184,11 @@ def unexpected(exc: BaseException) -> str:
         at = at.tb_next
     where = f' ({Path(at.tb_frame.f_code.co_filename).name}, line {at.tb_lineno})' if at else ''
     return f'unexpected error, please report it: {type(exc).__name__}: {one_line(exc)}{where}'
+
+
+def partly_read(bag: object, missing: Iterable[str]) -> str:
+    """Return which part of a bag could not be read, for PARTLY_READ."""
+    return f'{bag}: part of it could not be read: {"; ".join(missing)}'
 
 
 def node_name(text: str) -> str:

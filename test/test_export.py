@@ -36,9 +36,9 @@ from referees import (
 from stewart_dynamics import Motion, Parameters
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.export import main
-from stewart_dynamics.export.c_project import c_project, check_name, SOURCES
-from stewart_dynamics.export.hexapod_source import (
-    digest, field_values, FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
+from stewart_dynamics.export.c_project import (
+    c_project, check_name, digest, field_values, FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS,
+    SOURCES)
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS, hexapod_constants

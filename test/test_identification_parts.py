@@ -248,12 +248,13 @@ def test_a_bag_without_measured_legs_is_rejected(tmp_path: Path) -> None:
 
 
 def test_small_matrices_are_multiplied_in_one_thread() -> None:
-    code = ('import os\n'
+    code = ('import os, sys, types\n'
             'from stewart_dynamics.program import run_program\n'
             'def threads(arguments):\n'
             '    import numpy\n'
             '    return len(os.listdir("/proc/self/task"))\n'
-            'raise SystemExit(run_program("program", threads, []))\n')
+            'sys.modules["given"] = types.SimpleNamespace(main=threads)\n'
+            'raise SystemExit(run_program("program", "given", []))\n')
     environment = {name: value for name, value in os.environ.items()
                    if name != 'OPENBLAS_NUM_THREADS'}
     assert subprocess.run([sys.executable, '-c', code], env=environment, check=False,

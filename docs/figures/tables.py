@@ -32,8 +32,7 @@ from pathlib import Path
 import re
 from typing import Any
 
-from stewart_dynamics.export.hexapod_source import (
-    FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
+from stewart_dynamics.export.c_project import FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS
 from stewart_dynamics.node.node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet

@@ -24,10 +24,5 @@ __all__ = ['main']
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program stewart_calibrate; report a missing library in one line."""
-    def program(given: Sequence[str] | None) -> int:
-        from stewart_dynamics.calibration.calibrate_command_line import main as run
-
-        return run(given)
-
-    return run_program('stewart_calibrate', program, arguments)
+    """Run the program stewart_calibrate."""
+    return run_program('stewart_calibrate', f'{__name__}.calibrate_command_line', arguments)

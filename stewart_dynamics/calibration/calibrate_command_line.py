@@ -22,7 +22,8 @@ from pathlib import Path
 
 from stewart_dynamics.calibration import design_command
 from stewart_dynamics.program import (
-    add_results, between, DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
+    add_results, between, DONE, interrupt_on_signals, node_name, PARTLY_READ, partly_read,
+    Program)
 from stewart_dynamics.replay.replay_options import NODE
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 
@@ -121,7 +122,7 @@ def _run(given: argparse.Namespace) -> int:
     _PROGRAM.say(result_text(result))
     _PROGRAM.say(f'results: {given.output}')
     if missing:
-        _PROGRAM.complain(f'{given.poses}: part of it could not be read: {"; ".join(missing)}')
+        _PROGRAM.complain(partly_read(given.poses, missing))
         return PARTLY_READ
     return NOT_ALL_IDENTIFIED if given.strict and not is_complete(result) else DONE
 

@@ -28,7 +28,7 @@ from stewart_dynamics.calibration.frames import PoseErrors
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
-from stewart_dynamics.replay.fingerprint import plain_parameters, software
+from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.estimates import (
     combined, estimate, FIXED, IDENTIFIED, NOT_IDENTIFIABLE, not_identifiable_lines, table_lines)
@@ -44,7 +44,7 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
     lack = found.lack_of_fit
     units = ['m'] * len(found.names)
     return {
-        'version': VERSION, 'software': software(),
+        'version': VERSION, 'software': SOFTWARE,
         'date': datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ'),
         'poses': {'source': source, 'read': len(measured.names), 'used': found.poses},
         'options': dict(options),
@@ -76,7 +76,7 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
             'cause': lack[0].what, 'text': '; '.join(each.text for each in lack),
             'intervals': 'none', 'causes': [each._asdict() for each in lack]},
         'likely_mistakes': [each._asdict() for each in found.likely],
-        'calibrated': plain_parameters(found.parameters)}
+        'calibrated': found.parameters.plain()}
 
 
 def _pose(pose: Pose) -> dict[str, list[float]]:

@@ -290,7 +290,8 @@ class Capability:
             Base axis normal to the plane: the platform's origin has the pose's coordinate there.
 
         """
-        self._required(limits.LENGTH_MAX)
+        if limits.LENGTH_MAX not in self._limits.bounds:
+            raise self._unlimited((limits.LENGTH_MAX,))
         if normal not in ('x', 'y', 'z'):
             raise wrong_type('normal', normal, "'x', 'y' or 'z'")
         return section(self.platform, self._axes, self._single(pose), 'xyz'.index(normal))
@@ -593,7 +594,7 @@ class Capability:
             exceeded = self._limits.exceeds(name, each).reshape(-1, 6)
             if exceeded.any():
                 sample, leg = (int(n) for n in np.argwhere(exceeded)[0])
-                return Extent(0.0, _short(name), leg, sample)
+                return Extent(0.0, name.removeprefix('limits.'), leg, sample)
         side = np.ravel(solved.determinant)
         singular = ~(np.ravel(solved.condition_number) <= self.platform.parameters[
             'singularity.stop_condition']) | ~(side * side[:1] > 0.0)
@@ -606,7 +607,7 @@ class Capability:
             found.append((largest_multiple(
                 np.zeros(6), solved.rates, self._limits.bounds[limits.VELOCITY_MAX]),
                 'velocity_max'))
-        if self._motors is not None and np.isfinite(self._motors.fastest).any():
+        if self._motors is not None and self._motors.limits_speeds:
             found.append((largest_multiple(
                 np.zeros(6), self._motors.moving(motion.rows, solved.rows).speeds,
                 self._motors.fastest), 'speed_max'))
@@ -711,7 +712,7 @@ class Capability:
     def limits_rates(self) -> bool:
         """Return whether there is a limit of the legs' rates or of the motors' speeds."""
         return limits.VELOCITY_MAX in self._limits.bounds or (
-            self._motors is not None and bool(np.isfinite(self._motors.fastest).any()))
+            self._motors is not None and self._motors.limits_speeds)
 
     @property
     def forces_at_rest(self) -> Array:
@@ -735,12 +736,6 @@ class Capability:
             values = np.maximum((strongest - np.abs(forces)) / reach, 0.0).min(axis=-1)
         return float(values) if values.ndim == 0 else values
 
-    def _required(self, limit: str) -> Array:
-        if limit not in self._limits.bounds:
-            raise self._unlimited((limit,))
-        bounds: Array = self._limits.bounds[limit]
-        return bounds
-
     def _unlimited(self, names: Sequence[str]) -> ParameterError:
         return ParameterError(f'parameters: {", ".join(names)}: not set: without a limit there is '
                               'no answer')
@@ -758,10 +753,6 @@ def _directions(value: ArrayLike) -> tuple[Array, Array]:
 
 def _divided(extent: Extent, sizes: Array) -> Extent:
     return _extent(np.asarray(extent.value / sizes), extent.limit, extent.leg)
-
-
-def _short(limit: str) -> str:
-    return limit.removeprefix('limits.')
 
 
 def _tightest(found: Sequence[tuple[Array, Any]]) -> tuple[Array, Array]:

@@ -23,14 +23,12 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.force_intervals import quadratic_exit
+from stewart_dynamics.mechanics.drives.motor_limits import bound_of, largest_torques
 from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS, drive_constants, Drives, Motors, SPEEDS)
-from stewart_dynamics.mechanics.limits import TOLERANCE
+from stewart_dynamics.mechanics.limits import SPEED_MAX, TORQUE_MAX, TORQUE_SPEED
 from stewart_dynamics.mechanics.rows import MOTION, RESULT
 from stewart_dynamics.parameters.table import GUIDED, Parameters
-
-TORQUE_MAX, TORQUE_SPEED, SPEED_MAX = (
-    'drive.torque_max', 'drive.torque_speed', 'drive.speed_max')
 
 # Ratio of a torque to none that is available: finite, for searches.
 _FAR_BEYOND = 1e9
@@ -62,8 +60,8 @@ class MotorBounds:
 
     Attributes
     ----------
-    limited : bool
-        There is a limit of torques.
+    limited, limits_speeds : bool
+        There is a limit of torques, of speeds.
     inertia : (6,)
         At the motors' shafts [kg m^2].
     scales : two of (6,)
@@ -74,7 +72,7 @@ class MotorBounds:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        p = parameters
+        self._parameters = p = parameters
         self._drives = Drives(p)
         self._guided = Drives(p.replaced({'drive.screw_rotation': GUIDED}))
         constants = drive_constants(p)
@@ -82,9 +80,8 @@ class MotorBounds:
         self._factors = 1.0 + constants[:, 3], 1.0 + constants[:, 4]
         self.inertia = self._mass / self._ratio ** 2
         self.scales = tuple(each / self._ratio for each in self._factors)
-        self._strongest, self.fastest = (
-            np.full(6, math.inf) if p[name] is None else p[name] for name in (
-                TORQUE_MAX, SPEED_MAX))
+        self._strongest, self.fastest = bound_of(p, TORQUE_MAX), bound_of(p, SPEED_MAX)
+        self.limits_speeds = bool(np.isfinite(self.fastest).any())
         self._curve = p[TORQUE_SPEED]
         self.limited = p[TORQUE_MAX] is not None or self._curve is not None
         self._knees = np.empty((6, 0))  # speeds at which the largest torque has kinks
@@ -225,10 +222,4 @@ class MotorBounds:
 
     def _largest(self, speeds: Array) -> Array:
         """Return the largest torques at speeds (..., 6)."""
-        if self._curve is None:
-            return np.broadcast_to(self._strongest, speeds.shape)
-        last = self._curve[-1, 0]
-        torques = np.interp(speeds, *self._curve.T)
-        largest: Array = np.minimum(self._strongest, np.where(
-            speeds > last * (1.0 + TOLERANCE), 0.0, torques))
-        return largest
+        return largest_torques(self._parameters, speeds)

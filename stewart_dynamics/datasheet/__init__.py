@@ -22,10 +22,5 @@ from stewart_dynamics.program import run_program
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program stewart_capability; report a missing library in one line."""
-    def program(given: Sequence[str] | None) -> int:
-        from stewart_dynamics.datasheet.datasheet_command_line import main as run
-
-        return run(given)
-
-    return run_program('stewart_capability', program, arguments)
+    """Run the program stewart_capability."""
+    return run_program('stewart_capability', f'{__name__}.datasheet_command_line', arguments)

@@ -38,7 +38,7 @@ from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.fingerprint import plain_parameters, software
+from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, whole_folder
 from stewart_dynamics.whole_file import write_files, write_json
@@ -133,7 +133,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
         sheet['motion'] = {'bag': str(order.bag)} | judged(platform, recorded, used) | {
             'rejected': recorded.rejected, 'missing': recorded.missing}
     progress.stage('page')
-    sheet['parameters'] = plain_parameters(hexapod.given)
+    sheet['parameters'] = hexapod.given.plain()
     pictures = Pictures(hexapod, sheet, sections, modes, tilts, ranges,
                         None if recorded is None else recorded.seconds, used)
     with whole_folder(folder, options, DATASHEET) as partial:
@@ -145,7 +145,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
 
 def _head(hexapod: RatedHexapod, order: Order) -> dict[str, Any]:
     return {
-        'version': VERSION, 'software': software(), 'date': date.today().isoformat(),
+        'version': VERSION, 'software': SOFTWARE, 'date': date.today().isoformat(),
         'name': order.name,
         'pose': {'position': hexapod.pose.position.tolist(),
                  'angles': to_euler(hexapod.pose.rotation).tolist(),

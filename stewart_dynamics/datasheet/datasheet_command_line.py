@@ -24,7 +24,8 @@ import sys
 from typing import Any
 
 from stewart_dynamics.program import (
-    add_results, DONE, frequency, interrupt_on_signals, node_name, PARTLY_READ, Program)
+    add_results, DONE, frequency, interrupt_on_signals, node_name, PARTLY_READ, partly_read,
+    Program)
 from stewart_dynamics.replay.replay_options import NODE, Options
 from stewart_dynamics.reporting.results_folder import DATASHEETS
 
@@ -141,6 +142,6 @@ def _run(given: argparse.Namespace) -> int:
     _PROGRAM.say(f'results: {given.output}')
     missing = sheet['motion']['missing'] if sheet['motion'] else []
     if missing:
-        _PROGRAM.complain(f'{given.motion}: part of it could not be read: {"; ".join(missing)}')
+        _PROGRAM.complain(partly_read(given.motion, missing))
         return PARTLY_READ
     return NOT_POSSIBLE if given.strict and not is_possible(sheet) else DONE

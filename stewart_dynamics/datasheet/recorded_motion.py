@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_che
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics
-from stewart_dynamics.replay.differentiate import Differentiator
+from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.step import Batch
@@ -75,23 +75,19 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         The bag cannot be read, or has no setpoints.
 
     """
-    source = ('pose' if options.cutoff is not None
-              else 'combined' if 'combined' in options.topics else None)
-    if source:
-        parameters = parameters.replaced({'setpoint.source': source})
-    differentiator = None if options.cutoff is None else Differentiator(
-        options.cutoff, max(parameters['setpoint.timeout'], 1.0 / options.cutoff))
+    parameters = options.applied_to(parameters)
+    splines = differentiator(parameters, options)
     batches: list[Batch] = []
     with closing(Recording(bag)) as recording:
         topics = find_topics(recording, parameters, options)
         setpoints = Setpoints(parameters, lambda rejection, details: None, lambda text: None)
         for messages, size in recording.messages({name: key for key, name in topics.items()}):
             batch = setpoints.take_many(messages)
-            batches.append(batch if differentiator is None else differentiator.add(batch))
+            batches.append(batch if splines is None else splines.add(batch))
             progress(size)
         setpoints.end('the bag ends')
-        if differentiator is not None:
-            batches.append(differentiator.finish())
+        if splines is not None:
+            batches.append(splines.finish())
         missing = list(recording.missing)
     batches = [each for each in batches if len(each.stamps)]
     if not batches:
@@ -137,7 +133,7 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
     if p.drives:
         motors = MotorBounds(p)
         speeds, torques = motors.ratios(recorded.motion.rows, result.rows)
-        if np.isfinite(motors.fastest).any():
+        if motors.limits_speeds:
             found[SPEED] = speeds
         if motors.limited:
             found[TORQUE] = np.where(np.isfinite(torques), torques, np.inf)

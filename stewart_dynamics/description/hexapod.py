@@ -29,13 +29,12 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.mechanism import WORLD
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import homes, level_axes
 from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
-
-_WORLD = 'world'  # in SDFormat and MJCF
 
 # A body that a tool simulates needs mass and inertia about each axis. What a parameter file gives
 # as zero is replaced by these: the forces of a hexapod change by about 5e-4 of the largest.
@@ -121,7 +120,7 @@ class Hexapod:
         positions, rotations = homes(parameters)
         self.position, self.rotation = positions[0], rotations[0]
         self.base, self.platform = parameters['base_frame'], parameters['platform_frame']
-        self.base_body = f'{_WORLD}_base' if self.base == _WORLD else self.base
+        self.base_body = f'{WORLD}_base' if self.base == WORLD else self.base
         """The name of the base where a format has a world of its own, whose name is taken."""
         self.platform_body = RigidBody(
             self.platform, parameters['platform.mass'], parameters['platform.center_of_mass'],
@@ -132,7 +131,7 @@ class Hexapod:
 
     def _check_names(self) -> None:
         """Raise ParameterError where a name is taken; some formats have one list for all."""
-        names = [_WORLD, self.base_body, self.platform, *self.joints]
+        names = [WORLD, self.base_body, self.platform, *self.joints]
         for leg in self.legs:
             names += [leg.cross, leg.cylinder.name, leg.piston.name, leg.ball, leg.tip]
         twice = [name for n, name in enumerate(names) if name in names[:n]]

@@ -16,15 +16,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+import hashlib
 from importlib.resources import files
 import math
 import re
+from typing import Any
+
+import numpy as np
 
 from stewart_dynamics import __version__
-from stewart_dynamics.errors import shown, StewartError
+from stewart_dynamics.errors import ParameterError, shown, StewartError
 from stewart_dynamics.export.golden_vectors import COLUMNS, golden_vectors, PARTS
-from stewart_dynamics.export.hexapod_source import digest, hexadecimal, platform_source
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.mechanics.drives.motors import (
+    BASE_AXIS, drive_constants, PLATFORM_AXIS, TWIST)
+from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
+from stewart_dynamics.mechanics.limits import Limits
+from stewart_dynamics.parameters.table import LEG_SHAPE, OUTLINES, PARAMETERS, Parameters
 
 SOURCES = 'stewart_dynamics.h', 'stewart_dynamics.c'
 """Files that are the same for every hexapod."""
@@ -89,3 +97,111 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
     return {**{each: source(each) for each in SOURCES}, f'{name}.h': filled('hexapod.h'),
             f'{name}.c': filled('hexapod.c'), 'golden.csv': csv,
             'test_golden.c': filled('test_golden.c'), 'CMakeLists.txt': filled('CMakeLists.txt')}
+
+
+# Fields of stewart_leg and stewart_platform in their order, with the parameters that they hold.
+LEG_FIELDS = (
+    'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
+    'legs.cylinder.mass', 'legs.cylinder.center_of_mass', 'legs.cylinder.inertia',
+    'legs.piston.mass', 'legs.piston.center_of_mass', 'legs.piston.inertia',
+    'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction',
+    'actuator.coulomb_velocity', 'limits.length_min', 'limits.length_max', 'limits.velocity_max',
+    'limits.force_max', 'geometry.base_joint_axes', 'limits.base_joint_angle_max',
+    'geometry.platform_joint_axes', 'limits.platform_joint_angle_max', *LEG_SHAPE,
+    'actuator.screw_lead', 'drive.gear_ratio', 'drive.efficiency',
+    'drive.back_driving_efficiency', 'drive.screw_rotation', 'drive.base_universal_axes',
+    'drive.platform_universal_axes')
+FIELDS_BEFORE_LEGS = (
+    'gravity', 'platform.mass', 'platform.center_of_mass', 'platform.inertia')
+FIELDS_AFTER_LEGS = (
+    'limits.leg_clearance_min', 'singularity.characteristic_length',
+    'singularity.warn_condition', 'singularity.stop_condition', 'singularity.warn_time',
+    'setpoint.sync_tolerance', 'singularity.action', 'limits.action')
+_IF_NOT_SET = {'limits.length_min': 0.0, 'limits.leg_clearance_min': -math.inf}
+
+
+def field_values(parameters: Parameters) -> dict[str, Any]:
+    """
+    Return the value of each field under the name of its parameter.
+
+    An array for the fields of the legs, (6,) or (6, 3); a limit that is not set is infinite, a
+    length or radius that is not set zero. Axes are unit vectors, zero if not needed;
+    ``drive.screw_rotation`` is the turn of the motor for a turn of its leg.
+
+    Raises
+    ------
+    ParameterError
+        Axes that are needed are not given, and there is no home pose; or the clearance of the legs
+        is limited, and a plate is given, which the C source does not know.
+
+    """
+    plates = [name for name in OUTLINES if parameters[name] is not None]
+    if plates and parameters['limits.leg_clearance_min'] is not None:
+        raise ParameterError(
+            f'{", ".join(plates)}: must not be set with limits.leg_clearance_min: the exported '
+            'source has the clearance between legs, not that from plates')
+    values: dict[str, Any] = {}
+    for name in (*FIELDS_BEFORE_LEGS, *LEG_FIELDS, *FIELDS_AFTER_LEGS):
+        value = parameters[name]
+        if value is None:
+            value = _IF_NOT_SET.get(name, math.inf if name.startswith('limits.') else 0.0)
+        values[name] = int(value == 'suppress_forces') if isinstance(value, str) else value
+    angles = angles_to_check(parameters, Limits(parameters).of_joints)
+    axes = np.zeros((12, 3)) if angles is None else np.nan_to_num(angles.axes)
+    values['geometry.base_joint_axes'] = axes[:6]
+    values['geometry.platform_joint_axes'] = axes[6:]
+    drives = drive_constants(parameters)
+    values['drive.screw_rotation'] = drives[:, TWIST]
+    values['drive.base_universal_axes'] = drives[:, BASE_AXIS:BASE_AXIS + 3]
+    values['drive.platform_universal_axes'] = drives[:, PLATFORM_AXIS:PLATFORM_AXIS + 3]
+    for name in LEG_FIELDS:
+        if np.ndim(values[name]) < 1:
+            values[name] = np.full(6, values[name])
+    return values
+
+
+def digest(parameters: Parameters) -> str:
+    """Return the SHA-256 of the values of all fields, in hexadecimal digits."""
+    text = '\n'.join(f'{name} {" ".join(_numbers(value))}'
+                     for name, value in field_values(parameters).items())
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def platform_source(parameters: Parameters, name: str) -> str:
+    """Return the C definition of a hexapod, ``const stewart_platform NAME``."""
+    values = field_values(parameters)
+    lines = [f'const stewart_platform {name} = {{']
+    lines += (_field(each, values[each], '  ') for each in FIELDS_BEFORE_LEGS)
+    lines.append('  {')
+    for leg, joint in enumerate(parameters['joints']):
+        lines.append(f'    {{  /* leg {leg + 1}: {in_comment(joint)} */')
+        lines += (_field(each, values[each][leg], '      ') for each in LEG_FIELDS)
+        lines.append('    },')
+    lines.append('  },')
+    lines += (_field(each, values[each], '  ') for each in FIELDS_AFTER_LEGS)
+    return '\n'.join([*lines, '};', ''])
+
+
+def in_comment(text: str) -> str:
+    """Return a printable text as it may stand in a comment of C."""
+    plain = text.encode('ascii', 'backslashreplace').decode()
+    return plain.replace('*', ' ').replace('??', '? ?')
+
+
+def _field(name: str, value: Any, indent: str) -> str:
+    numbers = ', '.join(_numbers(value))
+    text = f'{{{numbers}}}' if np.ndim(value) else numbers
+    unit = PARAMETERS[name].unit
+    decimal = ', '.join(f'{each:.9g}' for each in np.ravel(value))
+    return f'{indent}{text},  /* {name}: {decimal}{unit and f" {unit}"} */'
+
+
+def hexadecimal(number: float) -> str:
+    """Return a number as a constant of C with all its bits."""
+    if math.isinf(number):
+        return 'HUGE_VAL' if number > 0.0 else '-HUGE_VAL'
+    return str(number) if isinstance(number, int) else number.hex()
+
+
+def _numbers(value: Any) -> Iterator[str]:
+    return map(hexadecimal, np.ravel(value).tolist())

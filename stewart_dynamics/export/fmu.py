@@ -33,8 +33,7 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.export.c_project import source, SOURCES
-from stewart_dynamics.export.hexapod_source import digest, hexadecimal, platform_source
+from stewart_dynamics.export.c_project import digest, hexadecimal, platform_source, source, SOURCES
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters

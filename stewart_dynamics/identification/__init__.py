@@ -24,10 +24,5 @@ __all__ = ['main']
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program stewart_identify; report a missing library in one line."""
-    def program(given: Sequence[str] | None) -> int:
-        from stewart_dynamics.identification.identify_command_line import main as run
-
-        return run(given)
-
-    return run_program('stewart_identify', program, arguments)
+    """Run the program stewart_identify."""
+    return run_program('stewart_identify', f'{__name__}.identify_command_line', arguments)

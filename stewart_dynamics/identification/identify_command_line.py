@@ -29,7 +29,7 @@ from stewart_dynamics.identification.identification_options import (
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
 from stewart_dynamics.program import (
     add_results, arguments_of, between, DONE, interrupt_on_signals, node_name, PARTLY_READ,
-    Program, whole)
+    partly_read, Program, whole)
 from stewart_dynamics.replay.replay_options import NODE
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 
@@ -158,10 +158,9 @@ def _run(given: argparse.Namespace) -> int:
     result = run(bags, parameters, output, options, _PROGRAM.complain)
     _PROGRAM.say(result_text(result))
     _PROGRAM.say(f'results: {output}')
-    missing = [f'{bag["bag"]}: part of it could not be read: {"; ".join(bag["missing"])}'
-               for bag in result['bags'] if bag['missing']]
-    for text in missing:
-        _PROGRAM.complain(text)
+    missing = [bag for bag in result['bags'] if bag['missing']]
+    for bag in missing:
+        _PROGRAM.complain(partly_read(bag['bag'], bag['missing']))
     if missing:
         return PARTLY_READ
     return NOT_ALL_IDENTIFIED if given.strict and not is_complete(result) else DONE

@@ -45,7 +45,7 @@ from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics, regr
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.fingerprint import plain_parameters, software
+from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.estimates import (
@@ -121,7 +121,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
             u.names, u.units, u.start, found.fit.values, states_of(what), _errors(found),
             what.shares, strict=True)]
     return {
-        'version': VERSION, 'software': software(),
+        'version': VERSION, 'software': SOFTWARE,
         'date': datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ'),
         'bags': [{
             **bag._asdict(), 'bag': str(bag.bag),
@@ -150,7 +150,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
             'causes': [_cause(each) for each in lack.causes],
             'other_causes': [_cause(each) for each in lack.others]},
         'likely_mistakes': [each._asdict() for each in found.likely],
-        'identified': plain_parameters(found.parameters),
+        'identified': found.parameters.plain(),
     }
 
 

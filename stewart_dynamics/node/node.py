@@ -456,8 +456,7 @@ class DynamicsNode(LifecycleNode):
         self._settings, self._models = parameters, models
         if self._active:
             self._measured_legs.step = models.external_wrench
-            self._diagnostics.singularity.parameters = parameters
-            self._diagnostics.limits.parameters = parameters
+            self._diagnostics.use(parameters)
             self._markers.use(parameters)
             self._travel.use(parameters)
         return SetParametersResult(successful=True)

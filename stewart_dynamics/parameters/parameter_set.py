@@ -220,6 +220,11 @@ class ParameterSet(Mapping[str, Any]):
         """Return the values that are not defaults, as they were given."""
         return MappingProxyType(self._given)
 
+    def plain(self) -> dict[str, Any]:
+        """Return all values for JSON, arrays as flat lists."""
+        return {name: list(plain) if isinstance(plain := _plain(value), tuple) else plain
+                for name, value in self._values.items()}
+
     def _key(self) -> tuple[Any, ...]:
         return tuple(tuple(value.ravel()) if isinstance(value, np.ndarray) else value
                      for value in self._values.values())

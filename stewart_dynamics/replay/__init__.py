@@ -22,10 +22,5 @@ from stewart_dynamics.program import run_program
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program stewart_replay; report a missing library in one line."""
-    def program(given: Sequence[str] | None) -> int:
-        from stewart_dynamics.replay.replay_command_line import main as run
-
-        return run(given)
-
-    return run_program('stewart_replay', program, arguments)
+    """Run the program stewart_replay."""
+    return run_program('stewart_replay', f'{__name__}.replay_command_line', arguments)

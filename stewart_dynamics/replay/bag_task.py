@@ -26,13 +26,13 @@ from typing import Any, NamedTuple
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.program import BAD_INPUT, unexpected
-from stewart_dynamics.replay.fingerprint import fingerprint, VERSION
+from stewart_dynamics.program import BAD_INPUT, partly_read, unexpected
 from stewart_dynamics.replay.index import Cell, row_of
 from stewart_dynamics.replay.legs_table import kind_of_table
-from stewart_dynamics.replay.one_bag import replay
+from stewart_dynamics.replay.one_bag import fingerprint, replay, VERSION
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.summary_text import summary_text
+from stewart_dynamics.reporting.results_folder import REPORT_PAGE, RESULT
 
 # Interval of progress reports, within one computer and on a cluster [s].
 LOCAL_INTERVAL, CLUSTER_INTERVAL = 0.1, 1.0
@@ -102,14 +102,12 @@ def finished(task: Task) -> Ended | None:
 def kept(task: Task) -> Ended | None:
     """Return the outcome of a bag whose results are there and whose inputs have not changed."""
     table = kind_of_table(task.options.parquet)
-    files = ['bag', table.FILE, *(['report.html'] if task.options.report else [])]
+    files = ['bag', table.FILE, *([REPORT_PAGE] if task.options.report else [])]
     summary = _summary_of(task)
-    try:
-        if (summary is None or not all((task.folder / name).exists() for name in files)
-                or summary['fingerprint'] != fingerprint(
-                    task.bag, task.parameters, task.options)):
-            return None
-    except OSError:  # reported when the bag is replayed
+    if summary is None or not all((task.folder / name).exists() for name in files):
+        return None
+    made_of = fingerprint(task.bag, task.parameters, task.options)
+    if not made_of or summary['fingerprint'] != made_of:
         return None
     return _outcome(task, summary)._replace(kept=True)
 
@@ -117,7 +115,7 @@ def kept(task: Task) -> Ended | None:
 def _summary_of(task: Task) -> dict[str, Any] | None:
     """Return the content of summary.json; None if this version has not written one."""
     try:
-        summary = json.loads((task.folder / 'summary.json').read_text(encoding='utf-8'))
+        summary = json.loads((task.folder / RESULT).read_text(encoding='utf-8'))
         return summary if summary['version'] == VERSION and 'fingerprint' in summary else None
     except (OSError, ValueError, TypeError, KeyError):
         return None
@@ -125,10 +123,10 @@ def _summary_of(task: Task) -> dict[str, Any] | None:
 
 def _outcome(task: Task, summary: dict[str, Any]) -> Ended:
     code = code_of(summary)
-    missing = '; '.join(' '.join(what.split()) for what in summary['missing'])
-    return Ended(task.bag, task.folder, code, row_of(code, summary, missing),
+    missing = [' '.join(what.split()) for what in summary['missing']]
+    return Ended(task.bag, task.folder, code, row_of(code, summary, '; '.join(missing)),
                  summary_text(summary, task.parameters),
-                 f'{task.bag}: part of it could not be read: {missing}' if missing else '')
+                 partly_read(task.bag, missing) if missing else '')
 
 
 def failed(task: Task, why: str) -> Ended:

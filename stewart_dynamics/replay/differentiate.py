@@ -28,6 +28,8 @@ from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION, WRENCH)
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
 from stewart_dynamics.setpoints.step import Batch
 
@@ -63,6 +65,13 @@ class Deviation(NamedTuple):
     angle_rms: float
     """[rad]"""
     angle_max: float
+
+
+def differentiator(parameters: Parameters, options: Options) -> Differentiator | None:
+    """Return what computes the motion of poses by a cut-off frequency; None without one."""
+    # A period of the cut-off frequency is the longest step that splines can bridge.
+    return None if options.cutoff is None else Differentiator(
+        options.cutoff, max(parameters['setpoint.timeout'], 1.0 / options.cutoff))
 
 
 class Differentiator:

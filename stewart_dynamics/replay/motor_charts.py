@@ -23,8 +23,10 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.mechanics.drives.motor_limits import (
+    bound_of, largest_speeds, largest_torques)
 from stewart_dynamics.mechanics.drives.motors import Motors
-from stewart_dynamics.mechanics.limits import SPEED_MAX, TORQUE_MAX, TORQUE_SPEED
+from stewart_dynamics.mechanics.limits import TORQUE_MAX, TORQUE_SPEED
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.motor_loads import CONTINUOUS
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
@@ -102,18 +104,16 @@ class Deliverable:
     """Largest torque of a motor over its speed, by ``drive.*``."""
 
     def __init__(self, parameters: Parameters, leg: int) -> None:
+        self._parameters, self._leg = parameters, leg
         self._curve = parameters[TORQUE_SPEED]
-        self.torque = _of_leg(parameters, TORQUE_MAX, leg)
-        self.speed = _of_leg(parameters, SPEED_MAX, leg)
+        self.torque = float(bound_of(parameters, TORQUE_MAX)[leg])
         if self._curve is not None:
             self.torque = min(self.torque, float(self._curve[:, 1].max()))
-            self.speed = min(self.speed, float(self._curve[-1, 0]))
+        self.speed = float(largest_speeds(parameters)[leg])
 
     def at(self, speeds: Array) -> Array:
         """Return the largest torques at speeds (N,); zero beyond the largest speed."""
-        torques = np.full(speeds.shape, self.torque)
-        if self._curve is not None:
-            torques = np.minimum(torques, np.interp(speeds, *self._curve.T))
+        torques = largest_torques(self._parameters, speeds[:, None])[:, self._leg]
         return np.where(speeds > self.speed, 0.0, torques)
 
     def outline(self, end: float) -> Array:
@@ -124,10 +124,6 @@ class Deliverable:
             speeds = np.union1d(speeds, self._curve[self._curve[:, 0] < last, 0])
         points: Array = np.column_stack([speeds, self.at(speeds)])
         return points if last < self.speed else np.vstack([points, [last, 0.0]])
-
-
-def _of_leg(parameters: Parameters, name: str, leg: int) -> float:
-    return math.inf if parameters[name] is None else float(parameters[name][leg])
 
 
 def motor_charts(points: OperatingPoints, parameters: Parameters,

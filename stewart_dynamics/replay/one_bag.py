@@ -24,6 +24,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing, ExitStack
+import hashlib
+import json
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
@@ -39,16 +41,16 @@ from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home,
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.bag_report import Report
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
-from stewart_dynamics.replay.differentiate import Differentiator
-from stewart_dynamics.replay.fingerprint import fingerprint, plain_parameters, software, VERSION
+from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
-from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
+from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, RESULT, whole_folder
 from stewart_dynamics.setpoints import base_wrench, inputs, step
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
@@ -56,6 +58,8 @@ from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
 from stewart_dynamics.setpoints.step import Batch, State, Step
 from stewart_dynamics.whole_file import write_json
 
+VERSION = 1
+"""Version of summary.json; increased when the meaning of a key changes."""
 _STAMP = re.compile(r'stamp (\d+) ns')
 
 Progress = Callable[[int, int], None]
@@ -107,11 +111,8 @@ def replay(
     """
     options = options or Options()
     check_free(folder, options)
-    made_of = _fingerprint(bag, parameters, options)
-    source = ('pose' if options.cutoff is not None
-              else 'combined' if 'combined' in options.topics else None)
-    if source:
-        parameters = parameters.replaced({'setpoint.source': source})
+    made_of = fingerprint(bag, parameters, options)
+    parameters = options.applied_to(parameters)
     with closing(Recording(bag)) as recording:
         topics = find_topics(recording, parameters, options)
         notices = notices_of(recording, topics, parameters, options)
@@ -124,17 +125,31 @@ def replay(
                     progress(size, answered)
             run.end()
             summary = run.summary() | {'fingerprint': made_of}
-            write_json(partial / 'summary.json', summary)
+            write_json(partial / RESULT, summary)
             if run.report is not None:
                 run.report.write(partial / REPORT_PAGE, summary, options.plotly)
     return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
 
 
-def _fingerprint(bag: Path, parameters: Parameters, options: Options) -> str:
+def fingerprint(bag: Path, parameters: Parameters, options: Options) -> str:
+    """
+    Return a digest that changes with whatever the results of a replay depend on.
+
+    It covers names, sizes and times of modification of the files of the bag; it is empty if these
+    cannot be read.
+    """
     try:
-        return fingerprint(bag, parameters, options)
+        files = [[file.name, found.st_size, found.st_mtime_ns]
+                 for file in (sorted(bag.iterdir()) if bag.is_dir() else [bag])
+                 if (found := file.stat())]
     except OSError:  # reported when the bag is opened
         return ''
+    about = {
+        'program': [SOFTWARE, VERSION], 'files': files, 'parameters': parameters.plain(),
+        'options': [[name, dict(value) if name == 'topics' else value]
+                    for name, value in options._asdict().items() if name not in ('force', 'run')]}
+    text = json.dumps(about, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode('utf-8', 'backslashreplace')).hexdigest()
 
 
 class _First(NamedTuple):
@@ -170,9 +185,7 @@ class _Run:
         self._stamp: int | None = None
         self._elapsed = 0, 0  # [s], [ns]
         self._summary = Summary(parameters, self._quasi_static)
-        # A period of the cut-off frequency is the longest step that splines can bridge.
-        self._differentiator = None if options.cutoff is None else Differentiator(
-            options.cutoff, max(parameters['setpoint.timeout'], 1.0 / options.cutoff))
+        self._differentiator = differentiator(parameters, options)
         self._comparison = None if options.measured is None else Comparison(parameters)
         self._efforts = Efforts(parameters['joints'])
         self.report: Report | None = None
@@ -226,7 +239,7 @@ class _Run:
             notices.append(f'and {self._more} more like these')
         return {
             'version': VERSION,
-            'software': software(),
+            'software': SOFTWARE,
             'bag': str(self._recording.path),
             'run': self._options.run,
             'complete': not missing,
@@ -243,7 +256,7 @@ class _Run:
                          for rejection, number in sorted(self._setpoints.counts.items())],
             **values,
             'measured': measured and {'headline': measured_headline(measured), **measured},
-            'parameters': plain_parameters(self._parameters),
+            'parameters': self._parameters.plain(),
         }
 
     def _rejected(self, rejection: Rejection, details: str) -> None:

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.program import (
-    add_results, DONE, frequency, interrupt_on_signals, node_name, Program)
+    add_results, DONE, frequency, interrupt_on_signals, node_name, partly_read, Program)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE, Options
 from stewart_dynamics.reporting.results_folder import REPLAYS
 
@@ -158,8 +158,7 @@ def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, stri
     _PROGRAM.say(replayed.text)
     _PROGRAM.say(f'results: {folder}')
     if replayed.summary['missing']:
-        missing = '; '.join(replayed.summary['missing'])
-        _PROGRAM.complain(f'{bag}: part of it could not be read: {missing}')
+        _PROGRAM.complain(partly_read(bag, replayed.summary['missing']))
     return DONE if replayed.code == LIMIT_MET and not strict else replayed.code
 
 

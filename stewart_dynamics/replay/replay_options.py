@@ -19,9 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from stewart_dynamics.program import DONE, PARTLY_READ
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters.table import Parameters
 
 LIMIT_MET = 1
 NODE = '/stewart_dynamics'
@@ -51,6 +54,12 @@ class Options(NamedTuple):
     """Replace existing results."""
     run: str = ''
     """Identifier of a run over many bags, written to summary.json."""
+
+    def applied_to(self, parameters: Parameters) -> Parameters:
+        """Return the parameters with the source of setpoints that these options demand."""
+        source = ('pose' if self.cutoff is not None
+                  else 'combined' if 'combined' in self.topics else None)
+        return parameters.replaced({'setpoint.source': source}) if source else parameters
 
 
 def code_of(summary: Mapping[str, Any]) -> int:

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The checks of a result before it is published: singularity warning, limits, jumps.
+The forces to publish: clipped, or suppressed by singularity warning, limits and jumps.
 
-Batches call ``check_many``. It is compiled apart from the step of single setpoints, for which a
-node waits at its first start.
+Batches call ``check_many``, compiled apart from the step of single setpoints, for which a node
+waits at its first start.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class MotorLimits:
     def __init__(self, parameters: Parameters) -> None:
         self._curve = parameters[TORQUE_SPEED] is not None
         self.bounds: dict[str, Array] = {
-            limit: np.full(6, math.inf) if parameters[limit] is None else parameters[limit]
+            limit: bound_of(parameters, limit)
             for limit in OF_MOTORS if limit != TORQUE_SPEED}
 
     def excesses(self, rows: Array, rises: Array) -> dict[str, tuple[Array, Array]]:
@@ -67,31 +67,44 @@ class MotorLimits:
             for leg in np.flatnonzero(exceeds(values, bounds)))
 
 
+def bound_of(p: Parameters, limit: str) -> Array:
+    """Return the values (6,) of one of OF_MOTORS but TORQUE_SPEED; infinite if not given."""
+    return np.full(6, math.inf) if p[limit] is None else np.asarray(p[limit])
+
+
+def largest_torques(p: Parameters, speeds: Array) -> Array:
+    """Return the largest torques [N m] at magnitudes of the motors' speeds (..., 6) [rad/s]."""
+    torques, curve = np.full(speeds.shape, math.inf), p[TORQUE_SPEED]
+    if curve is not None:
+        torques = np.where(speeds > curve[-1, 0] * (1.0 + TOLERANCE), 0.0,
+                           np.interp(speeds, *curve.T))
+    largest: Array = np.minimum(bound_of(p, TORQUE_MAX), torques)
+    return largest
+
+
+def largest_speeds(p: Parameters) -> Array:
+    """Return the largest speeds (6,) [rad/s]: there is no torque beyond the torque-speed curve."""
+    curve = p[TORQUE_SPEED]
+    speeds: Array = np.minimum(
+        bound_of(p, SPEED_MAX), math.inf if curve is None else curve[-1, 0])
+    return speeds
+
+
 def force_limits(p: Parameters, rates: Array) -> Array:
     """
     Return leg forces (..., 6) [N] that motors can drive at rates of the legs (..., 6) [m/s].
 
     For reflected masses that move uniformly; infinite without limits of torque.
     """
-    curve, most = p[TORQUE_SPEED], p[TORQUE_MAX]
-    torques = np.full(6, math.inf) if most is None else most
     ratio = motor_ratio(p)
-    if curve is not None:
-        torques = np.minimum(torques, np.interp(
-            ratio * np.abs(rates), curve[:, 0], curve[:, 1], right=0.0))
-    forces: Array = np.broadcast_to(
-        torques * ratio * p['drive.efficiency'], rates.shape)
+    forces: Array = largest_torques(p, ratio * np.abs(rates)) * ratio * p['drive.efficiency']
     return forces
 
 
 def rate_limits(p: Parameters) -> Array:
     """Return rates of the legs (6,) [m/s] below which no motor exceeds a limit of speed."""
-    curve, most = p[TORQUE_SPEED], p[SPEED_MAX]
-    speeds = np.full(6, math.inf) if most is None else most
-    if curve is not None:
-        speeds = np.minimum(speeds, curve[-1, 0])
     # The twist of a leg adds little to the speed of its motor.
-    rates: Array = speeds / motor_ratio(p) * (
+    rates: Array = largest_speeds(p) / motor_ratio(p) * (
         _WITHOUT_TWIST if p['drive.screw_rotation'] == UNIVERSAL else 1.0)
     return rates
 

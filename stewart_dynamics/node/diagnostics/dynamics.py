@@ -51,6 +51,10 @@ class DynamicsDiagnostics:
             self.setpoints, self.singularity, self.limits, self.base, self.timing,
             self.planned_trajectory, self.external_wrench, self.payload], now)
 
+    def use(self, parameters: Parameters) -> None:
+        """Use other parameters from now on."""
+        self.singularity.parameters = self.limits.parameters = parameters
+
     def answered(self, output: Output, came: float, now: float) -> bool:
         """
         Note an output and the time of arrival of its setpoint.
