@@ -128,8 +128,8 @@ def _loads(hexapod: RatedHexapod, poses: Pose) -> dict[str, Any]:
     """Return the smallest of each rating over poses (N,), or at one."""
     c, joints = hexapod.loads, hexapod.joints
     one = not poses.shape
-    many = poses[None] if one else poses
-    at = many[:, None]
+    all_poses = poses[None] if one else poses
+    at = all_poses[:, None]
     found: dict[str, Any] = {}
     if c.limits_rates:
         found['velocity'] = _smallest(c.velocity(at, DIRECTIONS), joints, KEYS)
@@ -137,13 +137,13 @@ def _loads(hexapod: RatedHexapod, poses: Pose) -> dict[str, Any]:
         found['acceleration'] = _smallest(c.acceleration(at, DIRECTIONS), joints, KEYS)
         for name, part in (('force', slice(0, 6)), ('moment', slice(6, 12))):
             found[name] = _smallest(c.wrench(at, DIRECTIONS[part]), joints, KEYS[part])
-        found['force']['every_direction'] = _least(c.force(many))
-        found['moment']['every_direction'] = _least(c.moment(many))
-        payload = c.payload(many, np.zeros(3))
+        found['force']['every_direction'] = _least(c.force(all_poses))
+        found['moment']['every_direction'] = _least(c.moment(all_poses))
+        payload = c.payload(all_poses, np.zeros(3))
         column = Extent(*(each[:, None] for each in payload[:3]))
         found['payload'] = _smallest(column, joints, ['mass'])['mass']
         found['payload']['any_orientation'] = (
-            Payloads(c, many).any_orientation()
+            Payloads(c, all_poses).any_orientation()
             if hexapod.given['gravity'].any() else None)
     return found
 

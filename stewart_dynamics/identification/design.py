@@ -205,8 +205,8 @@ def design(parameters: Parameters, options: DesignOptions,
 
 def fine_times(options: DesignOptions) -> Array:
     """Return the times of the final check [s], which cover the whole motion."""
-    many = math.ceil(options.duration * options.frequency * _FINE_SAMPLES)
-    return np.arange(many + 1, dtype=np.float64) * (options.duration / many)
+    count = math.ceil(options.duration * options.frequency * _FINE_SAMPLES)
+    return np.arange(count + 1, dtype=np.float64) * (options.duration / count)
 
 
 def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion: Motion,
@@ -243,19 +243,19 @@ class _Search:
         self.unknowns = Unknowns(parameters, options.kinds)
         self.platform = StewartPlatform(parameters)
         self.limits = DesignLimits(self.platform, options.amplitude, options.center)
-        many = options.harmonics
-        self.size = 2 * many * 6
-        self._base = options.frequency / many
-        turns = np.arange(_SAMPLES * many) / (_SAMPLES * many)
-        angle = 2.0 * np.pi * turns[:, None] * np.arange(1, many + 1)
-        omega = 2.0 * np.pi * self._base * np.arange(1, many + 1)
+        harmonics = options.harmonics
+        self.size = 2 * harmonics * 6
+        self._base = options.frequency / harmonics
+        turns = np.arange(_SAMPLES * harmonics) / (_SAMPLES * harmonics)
+        angle = 2.0 * np.pi * turns[:, None] * np.arange(1, harmonics + 1)
+        omega = 2.0 * np.pi * self._base * np.arange(1, harmonics + 1)
         c, s = np.cos(angle), np.sin(angle)
         # Position, velocity and acceleration of each sample by cosine and sine coefficients.
         self._bases = (np.hstack([c, s]), np.hstack([-omega * s, omega * c]),
                        np.hstack([-omega ** 2 * c, -omega ** 2 * s]))
         # Equal ratios give equal velocities, and equal displacements at the joints.
         self._length = size = parameters['singularity.characteristic_length']
-        self._units = (1.0 / np.tile(np.arange(1, many + 1), 2)[:, None]
+        self._units = (1.0 / np.tile(np.arange(1, harmonics + 1), 2)[:, None]
                        / np.array([1.0, 1.0, 1.0, size, size, size]))
         self._first = 0.02 * size
 
@@ -302,7 +302,7 @@ class _Search:
         return found
 
     def _parameters(self, coefficients: Array) -> ReferenceMotionParameters:
-        many, options = self._options.harmonics, self._options
+        harmonics, options = self._options.harmonics, self._options
         digits = _DIGITS - round(math.log10(self._length))
         rounded = np.hstack([
             coefficients[:, :3].round(digits), coefficients[:, 3:].round(_DIGITS)])
@@ -312,8 +312,8 @@ class _Search:
             'motion.hold_at_end': False, 'motion.initial': self.limits.center,
             'motion.fourier.frequency': self._base,
             'motion.fourier.fade': min(1.0, options.duration / 4.0),
-            'motion.fourier.cosine': rounded[:many].ravel(),
-            'motion.fourier.sine': rounded[many:].ravel()}
+            'motion.fourier.cosine': rounded[:harmonics].ravel(),
+            'motion.fourier.sine': rounded[harmonics:].ravel()}
         return ReferenceMotionParameters(given)
 
 
@@ -321,8 +321,8 @@ def _evolution(costs: Callable[[Array], Array], size: int, options: DesignOption
                progress: Callable[[int], object]) -> Array:
     """Return the best ratios found by an evolution strategy with adapted spreads."""
     random = np.random.default_rng(options.seed)
-    many = 4 + int(3.0 * math.log(size))
-    parents = many // 2
+    population = 4 + int(3.0 * math.log(size))
+    parents = population // 2
     weights = math.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
     weights /= weights.sum()
     effective = 1.0 / float(np.sum(weights ** 2))
@@ -336,14 +336,14 @@ def _evolution(costs: Callable[[Array], Array], size: int, options: DesignOption
         (size + 2.0) ** 2 + effective))
     expected = math.sqrt(size) * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size ** 2))
 
-    first = random.normal(size=(8 * many, size))
+    first = random.normal(size=(8 * population, size))
     of_first = costs(first)
     mean: Array = first[np.argmin(of_first)]
     best, lowest = mean, float(np.min(of_first))
     step, spread = 0.3, np.ones(size)
     step_path, path = np.zeros(size), np.zeros(size)
     for generation in range(options.generations):
-        moves = random.normal(size=(many, size)) * np.sqrt(spread)
+        moves = random.normal(size=(population, size)) * np.sqrt(spread)
         candidates = mean + step * moves
         found = costs(candidates)
         order = np.argsort(found, kind='stable')

@@ -181,8 +181,8 @@ class Extraction:
             for order in range(ORDERS)], axis=-1)
         columns = np.concatenate([self._decimated(rows), efforts], axis=-1)
         wrong, stops = self._wrong(window)
-        many = len(columns)
-        times = self._period * (self.margin + self.step * np.arange(many)).astype(float)
+        count = len(columns)
+        times = self._period * (self.margin + self.step * np.arange(count)).astype(float)
         if self.speeds is None:
             band = self.platform.parameters['actuator.coulomb_velocity']
             step = self._period * _rms(accelerations) + float(np.mean(band))
@@ -191,8 +191,8 @@ class Extraction:
         taps = self._narrow.taps()
         legs = np.stack([decimated(each, taps, self.step)
                          for each in (lengths, rates, accelerations)], axis=-1)
-        at = self._narrow.half + self.step * np.arange(many)
-        extract = Extract(times, columns, ~wrong[:many], legs,
+        at = self._narrow.half + self.step * np.arange(count)
+        extract = Extract(times, columns, ~wrong[:count], legs,
                           decimated(self._slip(rates), taps, self.step), found.rows[at][:, POSE])
         return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]))
 

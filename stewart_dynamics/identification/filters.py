@@ -75,11 +75,11 @@ class LowPass(NamedTuple):
         pulse = 2.0 * self.cutoff * self.period * np.sinc(2.0 * self.cutoff * self.period * lags)
         pulse *= np.blackman(2 * self.half + 3)[1:-1]
         pulse /= pulse.sum()
-        many = 8 * self.half + 8
-        circle = np.zeros(many)
+        count = 8 * self.half + 8
+        circle = np.zeros(count)
         circle[lags] = pulse
-        w = np.asarray(2.0 * np.pi * np.fft.rfftfreq(many, self.period), dtype=np.float64)
-        impulse = np.fft.irfft(np.fft.rfft(circle) * response(w), many)
+        w = np.asarray(2.0 * np.pi * np.fft.rfftfreq(count, self.period), dtype=np.float64)
+        impulse = np.fft.irfft(np.fft.rfft(circle) * response(w), count)
         # y(t) = sum h(k) x(t - k): the newest sample, k = -half, last
         taps: Array = impulse[lags[::-1]]
         # Truncation must not affect slow signals: make the response exact at 0 and at a low
@@ -97,28 +97,28 @@ class LowPass(NamedTuple):
 
 def convolved(signal: Array, taps: Array) -> Array:
     """Return the filtered signal (N, k), shorter by half a filter at each end."""
-    many = len(signal) - len(taps) + 1
+    count = len(signal) - len(taps) + 1
     size = 1 << (len(signal) - 1).bit_length()
     spectrum = np.fft.rfft(signal, size, axis=0) * np.fft.rfft(taps[::-1], size)[:, None]
-    whole: Array = np.fft.irfft(spectrum, size, axis=0)[len(taps) - 1:len(taps) - 1 + many]
+    whole: Array = np.fft.irfft(spectrum, size, axis=0)[len(taps) - 1:len(taps) - 1 + count]
     return whole
 
 
 def decimated(signal: Array, taps: Array, step: int) -> Array:
     """Return every ``step``-th sample of the filtered signal (M, ...)."""
-    many = (len(signal) - len(taps)) // step + 1
+    count = (len(signal) - len(taps)) // step + 1
     blocks = -(-len(taps) // step)
     padded = np.zeros(blocks * step)
     padded[:len(taps)] = taps
     flat: Array = signal.reshape(len(signal), -1)
-    short = (many + blocks - 1) * step - len(flat)
+    short = (count + blocks - 1) * step - len(flat)
     if short > 0:
         flat = np.concatenate([flat, np.zeros((short, flat.shape[1]))])
-    parts = flat[:(many + blocks - 1) * step].reshape(many + blocks - 1, step, -1)
-    result = np.zeros((many, 1, flat.shape[1]))
+    parts = flat[:(count + blocks - 1) * step].reshape(count + blocks - 1, step, -1)
+    result = np.zeros((count, 1, flat.shape[1]))
     for n in range(blocks):
-        result += padded[None, None, n * step:(n + 1) * step] @ parts[n:n + many]
-    return result.reshape(many, *signal.shape[1:])
+        result += padded[None, None, n * step:(n + 1) * step] @ parts[n:n + count]
+    return result.reshape(count, *signal.shape[1:])
 
 
 def white_deviation(signal: Array) -> Array:

@@ -235,9 +235,9 @@ def consistent(unknowns: Unknowns, values: Array, information: Array,
         beyond += [unknowns.names[n] for n in negative]
         free[negative] = False
         found = _held(matrix, values, free)
-    many = unknowns.many_of_platform
-    if many and smallest_eigenvalue(unknowns.inertial(found)) < _SMALLEST_BODY:
-        beyond += unknowns.names[:many]
+    count = unknowns.many_of_platform
+    if count and smallest_eigenvalue(unknowns.inertial(found)) < _SMALLEST_BODY:
+        beyond += unknowns.names[:count]
         found = _as_body(unknowns, found, matrix)
     return found, tuple(beyond)
 
@@ -259,22 +259,22 @@ def _as_body(unknowns: Unknowns, values: Array, matrix: Array) -> Array:
     def candidate(eta: Array) -> Array:
         return unknowns.with_inertial(values, units * from_log_cholesky(eta))
 
-    many = unknowns.many_of_platform
-    scales = unknowns.scales[:many]
-    metric = matrix[:many, :many]
+    count = unknowns.many_of_platform
+    scales = unknowns.scales[:count]
+    metric = matrix[:count, :count]
     eta = log_cholesky(unknowns.inertial(unknowns.start) / units)
     found = candidate(eta)
     damping = 1e-3
     for _ in range(_BODY_STEPS):
-        off = (found - values)[:many]
-        scaled = unknowns.derivative(found)[:10, :many] * scales / units[:, None]
+        off = (found - values)[:count]
+        scaled = unknowns.derivative(found)[:10, :count] * scales / units[:, None]
         derivative = scales[:, None] * np.linalg.pinv(scaled) @ log_cholesky_derivative(eta)
         normal = derivative.T @ metric @ derivative
         step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12),
                                -derivative.T @ metric @ off)
         eta_next = eta + np.clip(step, -1.0, 1.0)
         following = candidate(eta_next)
-        nearer = (following - values)[:many]
+        nearer = (following - values)[:count]
         cost, next_cost = off @ metric @ off, nearer @ metric @ nearer
         if next_cost > cost:
             damping *= 10.0
@@ -304,7 +304,7 @@ class Errors(NamedTuple):
 
 def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit) -> Errors:
     """Return the standard errors of a fit to the sums of extracts."""
-    theta, many = unknowns.theta(fit.values), len(fit.values)
+    theta, count = unknowns.theta(fit.values), len(fit.values)
     e_of_bags, alongs, alone = [], [], []
     for bag, delay in enumerate(fit.delays):
         e = directions(unknowns, fit.values, delay, bool(fit.delay_errors[bag]))
@@ -313,8 +313,8 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit) -> E
         alongs.append(without_delay(normal))
         alone.append(normal[-1, -1])
         e_of_bags.append(e)
-    by_frequency = np.zeros((many, many))
-    scores, own = [], np.zeros((len(fit.delays), many + 1))
+    by_frequency = np.zeros((count, count))
+    scores, own = [], np.zeros((len(fit.delays), count + 1))
     for extract in extracts:
         bag = extract.bag
         columns = extract.columns * extract.used[..., None]
@@ -329,7 +329,7 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit) -> E
         size = max(1, min(_BLOCK, len(residuals) // _FEWEST_BLOCKS))
         products = np.einsum('nlk,nl->nk', follow, residuals)
         scores.append(np.add.reduceat(products, np.arange(0, len(products), size), axis=0))
-    score = np.concatenate(scores) if scores else np.zeros((1, many))
+    score = np.concatenate(scores) if scores else np.zeros((1, count))
     by_blocks = score.T @ score * len(score) / max(len(score) - 1, 1)
     known = fit.identifiability.known
     inner = known.T @ (fit.matrix + unknowns.strength) @ known
@@ -349,10 +349,10 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit) -> E
 
 def _by_frequency(weighted: Array, residuals: Array) -> Array:
     """Return the inner sum of a block from columns (N, 6, k) and residuals (N, 6)."""
-    many = len(residuals)
-    size = 1 << (2 * many - 1).bit_length()
+    count = len(residuals)
+    size = 1 << (2 * count - 1).bit_length()
     r = np.fft.rfft(residuals, size, axis=0)
-    spectra = np.einsum('fi,fj->fij', r, r.conj()) / many
+    spectra = np.einsum('fi,fj->fij', r, r.conj()) / count
     smooth = smoothed(spectra, max(1, round(_SMOOTHING * size)))
     e = np.fft.rfft(weighted, size, axis=0)
     # one-sided: all frequencies except the first and the last count twice

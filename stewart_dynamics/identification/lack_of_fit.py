@@ -291,13 +291,13 @@ def _scores(causes: Causes, extracts: Extracts, noisy: Extracts, unknowns: Unkno
     of_noise: Array = np.zeros(())
     with tempfile.TemporaryFile() as file:
         for extract in _selected(extracts, len(extracts)):
-            first, many = sum(lengths), len(extract.times)
-            ends = first / causes.samples, (first + many) / causes.samples
-            spectra = spectra_of(extract, _between(*ends, many))
+            first, count = sum(lengths), len(extract.times)
+            ends = first / causes.samples, (first + count) / causes.samples
+            spectra = spectra_of(extract, _between(*ends, count))
             gram = gram + _gram(spectra)
             plain = plain + _gram(np.sqrt(fit.variances[extract.bag])[:, None] * spectra)
             np.save(file, spectra)
-            lengths.append(many)
+            lengths.append(count)
         file.seek(0)
         inverse = _inverse(gram[:-1, :-1])
         rest = inverse @ gram[:-1, -1]
@@ -319,9 +319,9 @@ def _scores(causes: Causes, extracts: Extracts, noisy: Extracts, unknowns: Unkno
             _Scores.of(plain, np.zeros_like(plain), inner))
 
 
-def _between(begin: float, end: float, many: int) -> Array:
+def _between(begin: float, end: float, count: int) -> Array:
     """Return evenly spaced numbers, without the end."""
-    numbers: Array = np.linspace(begin, end, many, endpoint=False, dtype=float)
+    numbers: Array = np.linspace(begin, end, count, endpoint=False, dtype=float)
     return numbers
 
 
@@ -333,10 +333,10 @@ def _first_of_bags(extracts: Extracts) -> Iterator[Extract]:
 
 def _spectra(columns: Array) -> Array:
     """Return real and imaginary parts (F, 2, 6, m) at frequencies below the cut-off."""
-    many = len(columns)
-    spectra = np.fft.rfft(columns, axis=0)[:int(many * _BAND / SAMPLES) + 1]
+    count = len(columns)
+    spectra = np.fft.rfft(columns, axis=0)[:int(count * _BAND / SAMPLES) + 1]
     # one-sided: all frequencies except the first count twice
-    spectra *= np.sqrt(2.0 / many)
+    spectra *= np.sqrt(2.0 / count)
     spectra[0] *= np.sqrt(0.5)
     parts: Array = np.stack([spectra.real, spectra.imag], axis=1)
     return parts

@@ -124,11 +124,11 @@ class RecordedLegs:
                 fields = ['position', *(['velocity'] if self.rates else []),
                           *(['effort'] if self._one else [])]
                 stamps, values = self._read(_LEGS, fields, messages, starts, sizes)
-                many = 12 if self.rates else 6
+                count = 12 if self.rates else 6
                 self.samples += len(stamps)
-                self._legs.add(stamps, values[:, :many], self.rejected)
+                self._legs.add(stamps, values[:, :count], self.rejected)
                 if self._one:
-                    self._efforts.add(stamps, values[:, many:], Counter())
+                    self._efforts.add(stamps, values[:, count:], Counter())
             else:
                 stamps, values = self._read(_EFFORTS, ['effort'], messages, starts, sizes)
                 self._efforts.add(stamps, values, self.rejected)

@@ -103,10 +103,10 @@ def uniform(legs: Signal, efforts: Signal, period: float) -> Window | None:
         return None
     begin = max(int(legs.stamps[0]), int(efforts.stamps[0]))
     end = min(int(legs.stamps[-1]), int(efforts.stamps[-1]))
-    many = int((end - begin) * 1e-9 / period + 1e-6) + 1
-    if many < FEWEST:
+    count = int((end - begin) * 1e-9 / period + 1e-6) + 1
+    if count < FEWEST:
         return None
-    at = period * np.arange(many, dtype=float)
+    at = period * np.arange(count, dtype=float)
     positions, replaced = _without_outliers(legs.values[:, :6], 0.0)
     pushes, replaced_too = _without_outliers(efforts.values, _OF_EFFORTS)
     of_legs, of_efforts = (1e-9 * (each.stamps - begin).astype(float)

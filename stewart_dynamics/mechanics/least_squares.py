@@ -167,9 +167,9 @@ class Combination(NamedTuple):
     coefficients: Array
 
 
-def no_information(many: int) -> Information:
+def no_information(n: int) -> Information:
     """Return the information of no samples about some parameters."""
-    return Information(np.zeros((many, many)), np.zeros(many), 0.0, 0)
+    return Information(np.zeros((n, n)), np.zeros(n), 0.0, 0)
 
 
 def normal(first: Array, second: Array) -> Array:

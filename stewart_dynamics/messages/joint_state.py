@@ -238,7 +238,7 @@ class JointStateReader:
 
     def _judge(self, data: bytes, fields: _Fields) -> _Known:
         """Return the layout of this message, for messages alike."""
-        names, many = fields.names, len(fields.names)
+        names, n_names = fields.names, len(fields.names)
         wanted = {field: fields.numbers[n] for n, field in enumerate(FIELDS)
                   if field in self._fields}
         reason = details = ''
@@ -248,16 +248,16 @@ class JointStateReader:
             details = f'{", ".join(missing)}; there are {there}'
         elif empty := [field for field, (_, count) in wanted.items() if not count]:
             reason = f'without {" and ".join(empty)}'
-            details = f'{many} names'
+            details = f'{n_names} names'
         elif uneven := [f'{count} of {field}' for field, (_, count) in wanted.items()
-                        if count != many]:
+                        if count != n_names]:
             reason = UNEVEN
-            details = f'{many} names, {", ".join(uneven)}'
+            details = f'{n_names} names, {", ".join(uneven)}'
         numbers = [] if reason else list(wanted.values())
         # Other fields may have any value.
         free = [slice(at, at + 8 * count) for at, count in fields.numbers]
         columns = [] if reason else [
-            list(wanted).index(field) * many + names.index(joint)
+            list(wanted).index(field) * n_names + names.index(joint)
             for field in self._fields for joint in self._joints]
         return _Known(Layout(data, numbers, gaps=[*fields.gaps, *free]), columns,
                       itemgetter(*columns or [0]), reason, details)

@@ -160,5 +160,5 @@ def at_any_byte(data: Bytes, size: int) -> NDArray[np.void]:
 
     They have no fields: numpy copies entries that have some field by field, far more slowly.
     """
-    many = max(data.size - size + 1, 0)
-    return np.ndarray((many,), f'V{size}', data.data, strides=(1,))
+    entries = max(data.size - size + 1, 0)
+    return np.ndarray((entries,), f'V{size}', data.data, strides=(1,))

@@ -99,8 +99,8 @@ def layout_of(reader: Callable[[bytes], Stamped], message: bytes) -> Layout:
         return Layout(message, list(numbers), gaps=gaps)
     end = 16 + COUNT[message[1]].unpack_from(message, 12)[0]
     at = aligned8(end)
-    many = 7 if reader is pose else 37 if reader is imu else 6
-    return Layout(message, [(at, many)], gaps=[slice(end, at)])
+    length = 7 if reader is pose else 37 if reader is imu else 6
+    return Layout(message, [(at, length)], gaps=[slice(end, at)])
 
 
 class StampedWriter:

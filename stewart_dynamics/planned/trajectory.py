@@ -403,12 +403,12 @@ class _Work:
             bases = bases[None] if bases.ndim == 1 else bases[first:first + len(results)]
         largest = float(np.fmax.reduce(
             np.abs(results[:, FORCES]), axis=None, initial=self._checks.force))
-        many = self._sampling.parts(durations, between, results, bases, largest)
-        if not (bounded := many <= MOST_SAMPLES).all():
+        parts = self._sampling.parts(durations, between, results, bases, largest)
+        if not (bounded := parts <= MOST_SAMPLES).all():
             n = first + int(np.argmin(bounded))
             raise self._too_far(f'{TOO_FAR}: points[{n}] and the next: more', n)
-        self._count(int(many.sum()))
-        return many
+        self._count(int(parts.sum()))
+        return parts
 
     def _count(self, samples: int) -> None:
         self._samples += samples
@@ -454,21 +454,21 @@ def _seconds(nanoseconds: Stamps) -> Array:
     return np.multiply(nanoseconds, 1e-9, dtype=float)
 
 
-def _samples(many: Array, piece: int) -> Iterator[_Places]:
+def _samples(parts: Array, piece: int) -> Iterator[_Places]:
     """
     Yield pieces of the samples that divide each interval of points (N,) into equal parts.
 
     An interval of more than one part includes both of its points; others have no samples.
     """
-    which = np.flatnonzero(many > 1.0)
-    ends = np.cumsum(many[which] + 1.0)
-    begins = ends - many[which] - 1.0
+    which = np.flatnonzero(parts > 1.0)
+    ends = np.cumsum(parts[which] + 1.0)
+    begins = ends - parts[which] - 1.0
     samples = int(ends[-1]) if len(which) else 0
     # The last of a piece is the first of the next one: something lies between two samples.
     for first in range(0, samples - 1, piece):
         index = np.arange(first, min(first + piece + 1, samples), dtype=float)
         of = np.searchsorted(ends, index, side='right')
-        yield which[of], (index - begins[of]) / many[which[of]]
+        yield which[of], (index - begins[of]) / parts[which[of]]
 
 
 _IN_PARTS: Array = np.linspace(0.0, 1.0, _PARTS + 1, dtype=np.float64)

@@ -133,8 +133,8 @@ class SingularityDiagnostics(StatusPart):
         """Return the crossing since the last report, and the change of level besides."""
         lines = []
         if self._crossings:
-            many = len(self._crossings)
-            how_many = f' (the last of {many} crossings)' if many > 1 else ''
+            count = len(self._crossings)
+            how_many = f' (the last of {count} crossings)' if count > 1 else ''
             lines = [LogLine(ERROR, f'{self.name}: {self._crossings[-1]}{how_many}')]
             self._crossings = []
             self._crossing_logged_at = now
