@@ -167,11 +167,13 @@ class Preparation:
         """Whether nothing remains to be compiled."""
         return all(map(machine_code.prepared, self._modules()))
 
-    def begin(self) -> None:
-        """Start to compile missing functions in a thread, once."""
-        if self._thread is None and not self.ready:
+    def begin(self) -> bool:
+        """Start to compile missing functions in a thread, once; return whether all are ready."""
+        ready = self.ready
+        if self._thread is None and not ready:
             self._thread = Thread(target=prepare, args=[self._functions], daemon=True)
             self._thread.start()
+        return ready
 
     def finish(self) -> None:
         """Load or compile missing functions, and return when all are ready."""

@@ -333,8 +333,7 @@ class DynamicsNode(LifecycleNode):
     def _on_measured_legs(self, data: bytes) -> None:
         if not self._active:
             return
-        if not self._external_wrench_code.ready:
-            self._external_wrench_code.begin()
+        if not self._external_wrench_code.begin():
             self._on_rejection(Rejection(MEASURED_LEGS, NOT_COMPILED), 'this takes seconds, once')
             return
         now = time.monotonic()
@@ -357,8 +356,7 @@ class DynamicsNode(LifecycleNode):
             self) -> Iterator[payload.PayloadOutcome | None] | payload.PayloadOutcome:
         if not self._active:
             return payload.PayloadOutcome('the node is not active')
-        if not self._external_wrench_code.ready:
-            self._external_wrench_code.begin()
+        if not self._external_wrench_code.begin():
             return payload.PayloadOutcome(
                 'the code for measured legs is being compiled, which takes seconds, once: move '
                 'the hexapod for payload.window after that, and ask again')
@@ -426,9 +424,7 @@ class DynamicsNode(LifecycleNode):
             if not code.ready and self._topics.writers_of(topic):
                 code.begin()  # the first message will come soon
         reads = self._topics.publishers[BASE_WRENCH].get_subscription_count() > 0
-        if reads and not self._base_wrench_code.ready:
-            self._base_wrench_code.begin()
-        self._base_wrench_read = reads and self._base_wrench_code.ready
+        self._base_wrench_read = reads and self._base_wrench_code.begin()
         self._markers.publish_due(now)  # the last answer before a silence
         self._model.publish_due(now)
         self._model.look()

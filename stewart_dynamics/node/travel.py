@@ -76,14 +76,11 @@ class TravelPublisher(PublisherAtRate):
 
     def look(self) -> str:
         """Check whether there is a subscriber; return a notice where no limit is set, once."""
-        self._read = self._publisher.get_subscription_count() > 0
-        if not self._read:
+        subscribed = self._publisher.get_subscription_count() > 0
+        self._read = subscribed and self._code.begin()
+        if not subscribed:
             return ''
-        if not self._code.ready:
-            self._code.begin()
-            self._read = False
-        unlimited = all(
-            self._parameters[name] is None for name in _ENDING)
+        unlimited = all(self._parameters[name] is None for name in _ENDING)
         said, self._said = self._said, True
         return NO_LIMIT if unlimited and not said else ''
 
