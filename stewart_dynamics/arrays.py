@@ -21,10 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-"""Indices, counts and codes."""
-Stamps = NDArray[np.int64]
-"""Times [ns]."""
+Integers = NDArray[np.int64]  # indices, counts and codes
+Stamps = NDArray[np.int64]  # times [ns]
 Flags = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
 
@@ -33,5 +31,4 @@ Six = tuple[float, float, float, float, float, float]
 
 NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-SECOND = 1_000_000_000
-"""A second in the unit of stamps [ns]."""
+SECOND = 1_000_000_000  # a second in the unit of stamps [ns]

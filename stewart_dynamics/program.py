@@ -35,8 +35,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.compilation.functions import EntryPoint
 
 DONE, BAD_INPUT, PARTLY_READ, INTERRUPTED = 0, 2, 3, 130
-SOFTWARE = f'stewart_dynamics {__version__}'
-"""Name and version, as results have it."""
+SOFTWARE = f'stewart_dynamics {__version__}'  # name and version, as results have it
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 

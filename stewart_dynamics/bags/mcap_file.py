@@ -69,13 +69,10 @@ class Scan(NamedTuple):
     """(K,): the number of the topic of a message; minus the opcode of another record."""
     values: Integers
     """(K,): the time of a message [ns]; the first two bytes of another: number of a channel."""
-    starts: Integers
-    """(K,): start of the data of a message, or of the content of another record."""
-    sizes: Integers
-    """(K,): length of the data or content [bytes]."""
+    starts: Integers  # (K,): start of the data of a message, or of the content of another record
+    sizes: Integers  # (K,): length of the data or content [bytes]
     data: Bytes
-    end: int
-    """End of the last record."""
+    end: int  # end of the last record
 
 
 @compiled
@@ -149,8 +146,7 @@ def scanned(data: bytes, numbers: Integers, valid: int, limit: int) -> Scan:
 class _Piece(NamedTuple):
     """A chunk, or records outside of chunks."""
 
-    time: int
-    """Time before which it contains no message [ns]."""
+    time: int  # time before which it contains no message [ns]
     start: int
     length: int
     is_chunk: bool

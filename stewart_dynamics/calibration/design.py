@@ -43,8 +43,7 @@ from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR, TWO_SIDED
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.approach import approach, TimedMotion
 
-NOISE = Noise(1e-5, 1e-5, 1e-5)
-"""Noise for the predicted intervals, by default [m, m, rad]."""
+NOISE = Noise(1e-5, 1e-5, 1e-5)  # noise for the predicted intervals, by default [m, m, rad]
 # Poses to choose from, poses tried for each of them, and random sets for comparison.
 _CANDIDATES, _TRIES, _RANDOM = 1500, 40, 100
 # Part of the stroke that stays free at both ends; largest angle of a pose [rad].
@@ -56,14 +55,10 @@ _LEAST_GAIN, _MOST_EXCHANGES = 1e-3, 500
 class PoseDesign(NamedTuple):
     """Designed poses in the order of their visit."""
 
-    poses: Pose
-    """(N,)"""
-    lengths: Array
-    """(N, 6) leg positions to be commanded [m]."""
-    half_widths: Array
-    """(42,) predicted 95 % intervals [m]."""
-    random_half_widths: Array
-    """(42,) the same, median of as many random poses within the limits."""
+    poses: Pose  # (N,)
+    lengths: Array  # (N, 6) leg positions to be commanded [m]
+    half_widths: Array  # (42,) predicted 95 % intervals [m]
+    random_half_widths: Array  # (42,) the same, median of as many random poses within the limits
     names: tuple[str, ...]
 
 

@@ -58,14 +58,10 @@ SAME = Frames(*2 * [Pose(np.zeros(3), np.eye(3))])
 class Linearization(NamedTuple):
     """N poses with the geometry of some values."""
 
-    residuals: Array
-    """(N, 6) [m]"""
-    derivatives: Array
-    """(N, 6, ALL)"""
-    position: Array
-    """(N, 6, 3): derivatives of the lengths by an error of the measured position."""
-    rotation: Array
-    """(N, 6, 3): the same by a small turn of the measured pose."""
+    residuals: Array  # (N, 6) [m]
+    derivatives: Array  # (N, 6, ALL)
+    position: Array  # (N, 6, 3): derivatives of the lengths by an error of the measured position
+    rotation: Array  # (N, 6, 3): the same by a small turn of the measured pose
 
 
 class Equations(NamedTuple):

@@ -48,15 +48,12 @@ _OUTLIER, _FALLS = 8.0, 0.8
 class Fit(NamedTuple):
     """Values that fit the poses best."""
 
-    values: Array
-    """(ALL,)"""
-    covariance: Array
-    """(ALL, ALL), of the known directions."""
+    values: Array  # (ALL,)
+    covariance: Array  # (ALL, ALL), of the known directions
     identifiability: Identifiability
     noise: Noise
     lin: Linearization
-    whitened: Array
-    """Residuals (N, 6) by their standard deviations."""
+    whitened: Array  # residuals (N, 6) by their standard deviations
 
 
 class Unknowns(NamedTuple):
@@ -64,10 +61,8 @@ class Unknowns(NamedTuple):
 
     start: Array
     scales: Array
-    basis: Array
-    """(ALL, m): allowed changes by the scales, orthonormal."""
-    size: float
-    """Characteristic length of the hexapod [m]."""
+    basis: Array  # (ALL, m): allowed changes by the scales, orthonormal
+    size: float  # characteristic length of the hexapod [m]
 
     @classmethod
     def of(cls, start: Array, size: float, fixed: Flags, frames: bool) -> Unknowns:
@@ -177,12 +172,9 @@ def _rms(values: Array) -> float:
 class Outliers(NamedTuple):
     """Poses with outliers, and a fit to the others with equal weights, leg by leg."""
 
-    residuals: Array
-    """(N, 6) [m], of all poses."""
-    deviations: Array
-    """(6,) robust standard deviations [m]."""
-    outlying: Flags
-    """(N, 6): which measured lengths are outliers."""
+    residuals: Array  # (N, 6) [m], of all poses
+    deviations: Array  # (6,) robust standard deviations [m]
+    outlying: Flags  # (N, 6): which measured lengths are outliers
     values: Array
 
 

@@ -44,10 +44,8 @@ _ONE_AXIS = 1.0 - 1e-6
 class PoseErrors(NamedTuple):
     """Differences of N poses: computed from leg positions, and measured."""
 
-    position: Array
-    """(N,) [m]; nan where no pose has the leg positions."""
-    rotation: Array
-    """(N,) [rad]"""
+    position: Array  # (N,) [m]; nan where no pose has the leg positions
+    rotation: Array  # (N,) [rad]
 
     @property
     def rms(self) -> tuple[float, float]:

@@ -42,11 +42,9 @@ _END = 1e30
 class MeasuredPoses(NamedTuple):
     """N measured poses."""
 
-    lengths: Array
-    """(N, 6) positions of the legs [m]."""
+    lengths: Array  # (N, 6) positions of the legs [m]
     poses: Pose
-    names: tuple[str, ...]
-    """Of each pose, such as ``row 2``."""
+    names: tuple[str, ...]  # of each pose, such as ``row 2``
     angles: Array | None = None
     """(N, 3) angles as they were read, if the poses were given by angles."""
 

@@ -42,12 +42,9 @@ _DEPENDENT = 1e-13
 class Noise(NamedTuple):
     """Standard deviations."""
 
-    length: float
-    """Of a measured leg position [m]."""
-    position: float
-    """Of a measured position, each coordinate [m]."""
-    rotation: float
-    """Of a measured rotation, about each axis [rad]."""
+    length: float  # of a measured leg position [m]
+    position: float  # of a measured position, each coordinate [m]
+    rotation: float  # of a measured rotation, about each axis [rad]
 
 
 def covariances(noise: Noise, size: float, lin: Linearization) -> Array:
@@ -70,10 +67,8 @@ class VarianceComponents(NamedTuple):
     The weights W have W V W^T = 1, V being the covariance of the residuals.
     """
 
-    units: Array
-    """A (3, N, 6, 6): W V_i W^T for a unit of variance i."""
-    rows: Array
-    """Z (N, 6, n): orthonormal combinations of the weighted derivatives."""
+    units: Array  # A (3, N, 6, 6): W V_i W^T for a unit of variance i
+    rows: Array  # Z (N, 6, n): orthonormal combinations of the weighted derivatives
     known: Array
     """(ALL, n): the same combinations of the unknowns; their covariance is known known^T."""
 

@@ -42,8 +42,7 @@ from stewart_dynamics.mechanics.vectors import (
 
 SHIFT, TURN, HALF, BOUND, CELL = 0, 3, 6, 12, 13
 """Columns of a cell: d and r of its middle, six half widths, and a bound that holds in it."""
-DEPTH = 1024
-"""Largest number of cells that wait at a time."""
+DEPTH = 1024  # largest number of cells that wait at a time
 CENTER, ARM, BASE_AXIS, PLATFORM_AXIS, LEVER, LEG = 0, 3, 6, 9, 12, 15
 """Columns of a leg: c, a, the axes of its joints, and the platform joint from the origin."""
 EXCESS, UPPER, POINT, FOUND = 0, 1, slice(2, 8), 8
@@ -53,16 +52,11 @@ EXCESS, UPPER, POINT, FOUND = 0, 1, slice(2, 8), 8
 class Place(NamedTuple):
     """The pose in the middle of a cell, and how far the cell reaches."""
 
-    shift: Vector3
-    """d"""
-    turn: Vector3
-    """r"""
-    exponential: Vector3
-    """sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3 of t = |r|."""
-    half_shift: float
-    """Norm of the half widths of d."""
-    half_turn: float
-    """Norm of the half widths of r."""
+    shift: Vector3  # d
+    turn: Vector3  # r
+    exponential: Vector3  # sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3 of t = |r|
+    half_shift: float  # norm of the half widths of d
+    half_turn: float  # norm of the half widths of r
 
 
 @compiled

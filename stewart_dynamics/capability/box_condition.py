@@ -39,8 +39,7 @@ from stewart_dynamics.mechanics.vectors import (
 # Columns of the scratch memory behind those of ``singular_values``: the derivatives of a row by
 # the six coordinates, and a row of sum_k h_k |M_k|.
 _ROW_RATES, _CHANGE = COLUMNS, COLUMNS + 36
-WORK = COLUMNS + 42
-"""Columns of the scratch memory."""
+WORK = COLUMNS + 42  # columns of the scratch memory
 
 
 @compiled

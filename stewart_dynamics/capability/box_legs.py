@@ -47,16 +47,12 @@ _EXACT = 1e-7
 class _Bounded(NamedTuple):
     """By how much a limit is exceeded in a cell."""
 
-    excess: float
-    """In its middle."""
-    bound: float
-    """Everywhere in it."""
+    excess: float  # in its middle
+    bound: float  # everywhere in it
     by_shift: Vector3
-    by_turn: Vector3
-    """The gradient."""
+    by_turn: Vector3  # the gradient
     shift_change: float
-    turn_change: float
-    """Bounds of the change of each number of the gradient over the cell."""
+    turn_change: float  # bounds of the change of each number of the gradient over the cell
 
 
 _NOWHERE = (0.0, 0.0, 0.0)

@@ -52,31 +52,24 @@ PLACE, RATES, STILL, TURNING, ARM, CORNER = 0, 3, 21, 22, 23, 26
 BASE_JOINT, CYLINDER, CYLINDER_END, PLATFORM_JOINT, OF_LEG = 0, 1, 2, 3, 4
 PLATES = 6 * OF_LEG
 
-FOLLOWING, STAYING, ROTATING = 0, 1, 2
-"""How n changes."""
+FOLLOWING, STAYING, ROTATING = 0, 1, 2  # how n changes
 
 # Corners whose direction from the nearest one is this near to a right angle with n count as near.
 _NEAR = 0.05
 # Part of the least squares that keeps n_k small where legs are almost parallel.
 _RIDGE = 1e-3
 
-Body = tuple[int, int, int]
-"""First corner, step to the next one, and end."""
+Body = tuple[int, int, int]  # first corner, step to the next one, and end
 
 
 class Bodies(NamedTuple):
     """Cylinders, pistons and plates, by their corners."""
 
-    shapes: Array
-    """(6, 3), as in ``leg_clearance``."""
-    corners: Array
-    """(M, CORNER)"""
-    base_corners: int
-    """Number of corners of the base's plate."""
-    spins: Array
-    """(C, 3...): angular velocity of the platform by each coordinate."""
-    n_rates: Array
-    """(C, 3...): derivative of n by each coordinate."""
+    shapes: Array  # (6, 3), as in ``leg_clearance``
+    corners: Array  # (M, CORNER)
+    base_corners: int  # number of corners of the base's plate
+    spins: Array  # (C, 3...): angular velocity of the platform by each coordinate
+    n_rates: Array  # (C, 3...): derivative of n by each coordinate
 
 
 def rows_of(plates: Sequence[Array], coordinates: int) -> int:

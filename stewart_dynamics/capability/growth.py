@@ -52,12 +52,9 @@ _BLOCK = 1024
 class _State(NamedTuple):
     """Samples at factors (N, ...)."""
 
-    rows: Array
-    """Rows of motion."""
-    results: Array
-    """Rows of ``inverse_dynamics``."""
-    ratios: Array
-    """To the limits (N, 6 M)."""
+    rows: Array  # rows of motion
+    results: Array  # rows of ``inverse_dynamics``
+    ratios: Array  # to the limits (N, 6 M)
     smooth: Array
     """
     Quantities without Coulomb friction (N, Q, 6).

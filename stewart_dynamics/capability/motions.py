@@ -39,8 +39,7 @@ from stewart_dynamics.planned.interpolation import (
 from stewart_dynamics.planned.sampling import Sampling
 from stewart_dynamics.planned.trajectory import MOST_SAMPLES
 
-LARGEST = 2.0 ** 20
-"""A factor that nothing limits grows by doubling up to this one."""
+LARGEST = 2.0 ** 20  # a factor that nothing limits grows by doubling up to this one
 # Rounds in which the sample that limits is found between two, and samples of a round.
 _ZOOMS, _NEAR = 6, 33
 

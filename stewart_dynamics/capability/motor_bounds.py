@@ -37,12 +37,9 @@ _FAR_BEYOND = 1e9
 class MovingMotors(NamedTuple):
     """Quantities of the motors that follow from a motion alone (..., 6)."""
 
-    speeds: Array
-    """[rad/s]"""
-    own: Array
-    """Torques that turn rotors and screws [N m]."""
-    inertial: Array
-    """Parts of the leg forces that do not pass the screws [N]."""
+    speeds: Array  # [rad/s]
+    own: Array  # torques that turn rotors and screws [N m]
+    inertial: Array  # parts of the leg forces that do not pass the screws [N]
 
 
 class MotorBounds:

@@ -27,8 +27,7 @@ from stewart_dynamics.mechanics.vectors import put3, Vector3, Vector6
 # Columns of the scratch memory of a leg: its row [s, arm x s] of the scaled J_inv, and a row of
 # the inverse.
 ROW, INVERSE, COLUMNS = 0, 6, 12
-BEND = 1.2
-"""Bound of |s''| / (|l'| / |l|)^2 of the unit vector s of l, l'' = 0: above 2 / sqrt(3)."""
+BEND = 1.2  # bound of |s''| / (|l'| / |l|)^2 of the unit vector s of l, l'' = 0: above 2 / sqrt(3)
 
 
 @inlined

@@ -56,20 +56,13 @@ _LARGEST_STOP = 1e20
 class _At(NamedTuple):
     """The scaled J_inv at a point of a travel."""
 
-    largest: float
-    """Norm of J."""
-    rate: float
-    """Bound of the norm of J'."""
-    inverse: float
-    """Norm of K."""
-    relative: float
-    """Bound of the norm of K J'."""
-    bend: float
-    """Bound of the norm of J'' while the legs keep their lengths."""
-    quickest: float
-    """Largest speed of a leg over its length."""
-    room: float
-    """Limit over condition number, negative where det(J) has changed its sign, less 1."""
+    largest: float  # norm of J
+    rate: float  # bound of the norm of J'
+    inverse: float  # norm of K
+    relative: float  # bound of the norm of K J'
+    bend: float  # bound of the norm of J'' while the legs keep their lengths
+    quickest: float  # largest speed of a leg over its length
+    room: float  # limit over condition number, negative where det(J) has changed its sign, less 1
     determinant: float
 
 

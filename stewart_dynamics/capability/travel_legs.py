@@ -52,8 +52,7 @@ _LINE, _PLATFORM_AXIS, ARM = 0, 9, 18
 CENTER, _BASE_AXIS = 27, 30
 # Bounds of speed V and reach |B| of the platform joint.
 SPEED, REACH, LEG = 33, 34, 35
-ROUNDING = 1e-12
-"""A value within this of its limit, relative to the limit's own size, is on it."""
+ROUNDING = 1e-12  # a value within this of its limit, relative to the limit's own size, is on it
 NARROW = 1e-7
 """Condition number and clearance are proven in intervals down to this part of the size."""
 # Steps end below this part of the way so far, or of the hexapod's size.
@@ -66,14 +65,10 @@ _MOST_STEPS = 1_000_000
 class Way(NamedTuple):
     """The direction of a travel."""
 
-    velocity: Vector3
-    """v"""
-    turn: Vector3
-    """w"""
-    rate: float
-    """|w|"""
-    axis: Vector3
-    """w / |w|, zeros where it does not turn."""
+    velocity: Vector3  # v
+    turn: Vector3  # w
+    rate: float  # |w|
+    axis: Vector3  # w / |w|, zeros where it does not turn
 
 
 class _Margin(NamedTuple):
@@ -81,10 +76,8 @@ class _Margin(NamedTuple):
 
     value: float
     slope: float
-    curvature: float
-    """Bound of the second derivative, from below, with the other sign."""
-    holds: float
-    """Step for which the curvature holds."""
+    curvature: float  # bound of the second derivative, from below, with the other sign
+    holds: float  # step for which the curvature holds
 
 
 @inlined

@@ -60,10 +60,8 @@ _Curve = Callable[[Array], Array]
 class Boundary(NamedTuple):
     """A part of the boundary of a section, which one limit of one leg forms."""
 
-    limit: str
-    """Name of the limit without ``limits.``, or ``singularity``."""
-    leg: int
-    """Index of the leg; -1 at a singularity."""
+    limit: str  # name of the limit without ``limits.``, or ``singularity``
+    leg: int  # index of the leg; -1 at a singularity
     points: Array
     """Positions of the platform's origin (M, 3) in order, base frame [m]; of a closed curve the
     first one again at the end."""

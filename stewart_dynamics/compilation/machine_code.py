@@ -65,8 +65,7 @@ def _hint() -> str:
     return ''
 
 
-HINT = _hint()
-"""Why nothing is compiled, and the consequence; empty where functions are compiled."""
+HINT = _hint()  # why nothing is compiled, and the consequence; empty where functions are compiled
 COMPILED = not HINT
 
 announce: Callable[[str], object] = partial(

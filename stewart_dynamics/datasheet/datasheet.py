@@ -43,8 +43,7 @@ from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, whole_folder
 from stewart_dynamics.whole_file import write_files, write_json
 
-VERSION = 1
-"""Version of datasheet.json; increased when the meaning of a key changes."""
+VERSION = 1  # version of datasheet.json; increased when the meaning of a key changes
 TABLE = 'workspace.csv'
 
 # Heights of the tilt chart, as parts of the travel along z both ways.
@@ -69,10 +68,8 @@ class Order(NamedTuple):
 class Progress(NamedTuple):
     """Receivers of the progress."""
 
-    stage: Callable[[str], object]
-    """Called with each stage as it begins."""
-    read: Callable[[int], object]
-    """Called with the numbers of bytes of the bag that were read."""
+    stage: Callable[[str], object]  # called with each stage as it begins
+    read: Callable[[int], object]  # called with the numbers of bytes of the bag that were read
 
 
 # Natural frequency below that of any platform on its legs [Hz].

@@ -51,12 +51,9 @@ class Pictures(NamedTuple):
     sections: Mapping[str, Section]
     modes: Mapping[str, Frequencies]
     tilts: Mapping[str, Boundary]
-    ranges: Array | None
-    """Ranges (6, 2) that are reachable at once."""
-    seconds: Array | None
-    """Times of the motion's samples [s]."""
-    used: Mapping[str, Array] | None
-    """Use of the limits at these times."""
+    ranges: Array | None  # ranges (6, 2) that are reachable at once
+    seconds: Array | None  # times of the motion's samples [s]
+    used: Mapping[str, Array] | None  # use of the limits at these times
 
     def drawing(self) -> Drawing:
         """Return the drawing of the hexapod, with the ends of its travel along z."""

@@ -64,8 +64,7 @@ class Margins(NamedTuple):
 
     top: float = 32.0
     bottom: float = 46.0
-    sides: float = 96.0
-    """Left and right together."""
+    sides: float = 96.0  # left and right together
     left: float = 16.0
 
 

@@ -42,10 +42,8 @@ _ROUNDING = 1e-12
 class Payload(NamedTuple):
     """A point mass on the platform."""
 
-    mass: float
-    """[kg]"""
-    center_of_mass: Array
-    """(3,) platform frame [m]"""
+    mass: float  # [kg]
+    center_of_mass: Array  # (3,) platform frame [m]
 
 
 class RatedHexapod:

@@ -52,16 +52,12 @@ _MOST, _MOST_BETWEEN = 100_000, 10_000
 class RecordedMotion(NamedTuple):
     """Setpoints of a bag."""
 
-    seconds: Array
-    """Since the first setpoint (N,) [s]."""
+    seconds: Array  # since the first setpoint (N,) [s]
     motion: Motion
-    wrench: Array
-    """External wrench (N, 6) [N, N m]."""
+    wrench: Array  # external wrench (N, 6) [N, N m]
     base: BaseMotion | None
-    missing: list[str]
-    """Parts of the bag that could not be read."""
-    rejected: int = 0
-    """Number of rejected messages."""
+    missing: list[str]  # parts of the bag that could not be read
+    rejected: int = 0  # number of rejected messages
 
 
 def read_motion(bag: Path, parameters: Parameters, options: Options,

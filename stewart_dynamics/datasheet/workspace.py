@@ -30,19 +30,15 @@ from stewart_dynamics.mechanics.frames.motion import Pose
 _AZIMUTHS = 360
 # Cells of a section, in both directions, for which a natural frequency is given.
 _CELLS = 32
-PLANES = {'xz': (0, 2), 'yz': (1, 2), 'xy': (0, 1)}
-"""Sections, and the axes in them."""
+PLANES = {'xz': (0, 2), 'yz': (1, 2), 'xy': (0, 1)}  # sections, and the axes in them
 
 
 class Boundary(NamedTuple):
     """Tilt toward all azimuths, and the limits that end it."""
 
-    directions: Array
-    """(N, 6), base axes."""
-    begin: Array
-    """(6,) translation from the pose, at which the platform tilts."""
-    values: Array
-    """Travel along each direction (N,) [rad]; infinite if nothing limits."""
+    directions: Array  # (N, 6), base axes
+    begin: Array  # (6,) translation from the pose, at which the platform tilts
+    values: Array  # travel along each direction (N,) [rad]; infinite if nothing limits
     limits: list[str]
     legs: list[int]
 
@@ -89,12 +85,9 @@ def rotations_over_height(hexapod: RatedHexapod, low: float, high: float, count:
 class Frequencies(NamedTuple):
     """Lowest natural frequencies over a section, at the middles of equal cells."""
 
-    first: Array
-    """Displacements from the pose along the first axis of the section (N,) [m]."""
-    second: Array
-    """The same along the second axis (M,) [m]."""
-    values: Array
-    """(N, M) [Hz]; nan outside the section, 0 where the pose is not stable."""
+    first: Array  # displacements from the pose along the first axis of the section (N,) [m]
+    second: Array  # the same along the second axis (M,) [m]
+    values: Array  # (N, M) [Hz]; nan outside the section, 0 where the pose is not stable
 
     def listed(self) -> dict[str, Any]:
         """Return the numbers for ``datasheet.json``; None outside the section."""

@@ -46,45 +46,32 @@ requires one: in the model it is zero."""
 
 PASSIVE_RATE = 1000.0
 """Limit of passive joints in formats that require a limit of every joint [m/s, rad/s]."""
-_UNLIMITED_LENGTH = 10.0
-"""Longest leg without a limit, in terms of its length at home."""
-UNLIMITED = 1e9
-"""Force or rate of a leg without a limit, where a format requires one [N, m/s]."""
+_UNLIMITED_LENGTH = 10.0  # longest leg without a limit, in terms of its length at home
+UNLIMITED = 1e9  # force or rate of a leg without a limit, where a format requires one [N, m/s]
 
 
 class RigidBody(NamedTuple):
     """A rigid body."""
 
     name: str
-    mass: float
-    """[kg]"""
-    center: Array
-    """Center of mass, axes of the body (3,) [m]."""
-    inertia: Array
-    """About the center of mass, axes of the body (3, 3) [kg m^2]."""
+    mass: float  # [kg]
+    center: Array  # center of mass, axes of the body (3,) [m]
+    inertia: Array  # about the center of mass, axes of the body (3, 3) [kg m^2]
 
 
 class LegDescription(NamedTuple):
     """A leg: its names, its joints, its two bodies, and the properties of its actuator."""
 
     name: str
-    cross: str
-    """Name of the massless body between the joints of the universal joint."""
-    universal: tuple[str, str]
-    """Names of these joints."""
-    ball: str
-    """Name of the joint at the platform, and of the frame on the platform where it is."""
-    tip: str
-    """Name of the end of the leg there."""
-    base_joint: Array
-    """Base frame (3,) [m]."""
-    platform_joint: Array
-    """Platform frame (3,) [m]."""
-    mount: Array
-    """Axes of the mount to base axes (3, 3)."""
+    cross: str  # name of the massless body between the joints of the universal joint
+    universal: tuple[str, str]  # names of these joints
+    ball: str  # name of the joint at the platform, and of the frame on the platform where it is
+    tip: str  # name of the end of the leg there
+    base_joint: Array  # base frame (3,) [m]
+    platform_joint: Array  # platform frame (3,) [m]
+    mount: Array  # axes of the mount to base axes (3, 3)
     zero_length: float
-    home_length: float
-    """[m]"""
+    home_length: float  # [m]
     cylinder: RigidBody
     piston: RigidBody
     reflected_mass: float
@@ -187,14 +174,10 @@ _BARREL_LENGTH, _ROD_LENGTH, _OF_HOME = 0.9, 0.95, 0.7
 class VisualShape(NamedTuple):
     """A cylinder along z, a ball, or a mesh; placed in the axes of its body."""
 
-    kind: str
-    """cylinder, sphere or mesh."""
-    color: str
-    """A key of COLORS."""
-    position: Array
-    """Of its center, or of the mesh's origin (3,) [m]."""
-    rotation: Array
-    """Its axes to those of the body (3, 3)."""
+    kind: str  # cylinder, sphere or mesh
+    color: str  # a key of COLORS
+    position: Array  # of its center, or of the mesh's origin (3,) [m]
+    rotation: Array  # its axes to those of the body (3, 3)
     radius: float = 0.0
     length: float = 0.0
     file: str = ''

@@ -70,12 +70,10 @@ class MechanismBody:
     name: str
     placement: Placement
     mass: float | None = None
-    center: Array = field(default_factory=lambda: np.zeros(3))
-    """In the frame of the body [m]."""
+    center: Array = field(default_factory=lambda: np.zeros(3))  # in the frame of the body [m]
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     """About the center of mass, axes of the body [kg m^2]."""
-    note: str = ''
-    """Assumption of the reader about it."""
+    note: str = ''  # assumption of the reader about it
 
 
 @dataclass
@@ -86,14 +84,11 @@ class Joint:
     kind: str
     parent: str
     child: str
-    anchor: Array
-    """In the world; on the parent's side [m]."""
-    axes: list[Array] = field(default_factory=list)
-    """Unit vectors, in world axes."""
+    anchor: Array  # in the world; on the parent's side [m]
+    axes: list[Array] = field(default_factory=list)  # unit vectors, in world axes
     child_anchor: Array | None = None
     """The same point on the child's side, where it is given on its own [m]."""
-    position: float = 0.0
-    """Position of a slide at the placements of the file [m]."""
+    position: float = 0.0  # position of a slide at the placements of the file [m]
     lower: float | None = None
     upper: float | None = None
     velocity_max: float | None = None
@@ -111,11 +106,8 @@ class Mechanism:
     name: str
     parts: dict[str, MechanismBody]
     joints: list[Joint]
-    gravity: Array | None = None
-    """World axes [m/s^2]."""
+    gravity: Array | None = None  # world axes [m/s^2]
     carried: dict[str, str] = field(default_factory=dict)
     """Parameters that stewart_describe has added to the format, as text."""
-    order: tuple[str, ...] = ()
-    """Names of slides in the order of their actuators."""
-    remarks: list[str] = field(default_factory=list)
-    """Assumptions of the reader, one line each."""
+    order: tuple[str, ...] = ()  # names of slides in the order of their actuators
+    remarks: list[str] = field(default_factory=list)  # assumptions of the reader, one line each

@@ -39,8 +39,7 @@ from stewart_dynamics.messages.joint_state import joint_state_layout
 from stewart_dynamics.messages.standard import transforms
 from stewart_dynamics.parameters.table import Parameters
 
-JOINT_STATES = 'joint_states'
-"""Under the node's name."""
+JOINT_STATES = 'joint_states'  # under the node's name
 TF = '/tf'
 
 

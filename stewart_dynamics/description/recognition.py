@@ -59,8 +59,7 @@ class Recognized(NamedTuple):
     """The hexapod of a file."""
 
     parameters: Parameters
-    remarks: tuple[str, ...]
-    """Assumptions and missing values, one line each."""
+    remarks: tuple[str, ...]  # assumptions and missing values, one line each
 
 
 class _Body(NamedTuple):

@@ -39,8 +39,7 @@ class LegJoint(NamedTuple):
     """A joint of a leg, on the way from the base to the platform."""
 
     joint: Joint
-    from_parent: bool
-    """Whether its parent is the body on the side of the base."""
+    from_parent: bool  # whether its parent is the body on the side of the base
 
     @property
     def near(self) -> Array:
@@ -61,8 +60,7 @@ class Chain(NamedTuple):
     """A leg as found."""
 
     steps: list[LegJoint]
-    lower: list[MechanismBody]
-    """The bodies on the side of the base of its slide."""
+    lower: list[MechanismBody]  # the bodies on the side of the base of its slide
     upper: list[MechanismBody]
 
     @property
@@ -74,8 +72,7 @@ class Chain(NamedTuple):
 class Topology(NamedTuple):
     """The hexapod within a mechanism."""
 
-    base: MechanismBody
-    """Whose frame is the base frame."""
+    base: MechanismBody  # whose frame is the base frame
     platform: MechanismBody
     platform_parts: list[MechanismBody]
     """All bodies that are fixed to the platform, itself included."""
@@ -91,8 +88,7 @@ class _Groups:
         for joint in mechanism.joints:
             if joint.kind == FIXED:
                 self._of[self.of(joint.parent)] = self.of(joint.child)
-        self.members: dict[str, list[str]] = {}
-        """Names of the bodies of each group."""
+        self.members: dict[str, list[str]] = {}  # names of the bodies of each group
         for name in self._of:
             self.members.setdefault(self.of(name), []).append(name)
         self.joints: dict[str, list[Joint]] = {group: [] for group in self.members}

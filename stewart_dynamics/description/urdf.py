@@ -57,10 +57,8 @@ HARDWARE = {
 class Ros2Control(NamedTuple):
     """The block ros2_control."""
 
-    interfaces: Sequence[str]
-    """Command interfaces of each leg: effort, velocity, position."""
-    hardware: str
-    """A key of HARDWARE, or the name of a plugin."""
+    interfaces: Sequence[str]  # command interfaces of each leg: effort, velocity, position
+    hardware: str  # a key of HARDWARE, or the name of a plugin
 
 
 def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str:

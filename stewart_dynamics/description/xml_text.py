@@ -39,10 +39,8 @@ _IN_ELEMENTS = frozenset((
     *LIMITS, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
     'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
     'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'))
-INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
-"""Names of the inertia in URDF and SDFormat."""
-NOT_CHECKED = 'none'
-"""Value there of a limit that is not checked."""
+INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')  # names of the inertia in URDF and SDFormat
+NOT_CHECKED = 'none'  # value there of a limit that is not checked
 
 
 def numbers(*values: Any) -> str:

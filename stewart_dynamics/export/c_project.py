@@ -34,8 +34,7 @@ from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.parameters.table import LEG_SHAPE, OUTLINES, PARAMETERS, Parameters
 
-SOURCES = 'stewart_dynamics.h', 'stewart_dynamics.c'
-"""Files that are the same for every hexapod."""
+SOURCES = 'stewart_dynamics.h', 'stewart_dynamics.c'  # files that are the same for every hexapod
 
 _KEYWORDS = frozenset("""
 alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t class

@@ -59,10 +59,8 @@ class Variable(NamedTuple):
     causality: str
     description: str
     unit: str = ''
-    kind: str = 'Float64'
-    """Type in FMI 3.0."""
-    start: float | None = None
-    """None for outputs."""
+    kind: str = 'Float64'  # type in FMI 3.0
+    start: float | None = None  # none for outputs
 
     @property
     def variability(self) -> str:

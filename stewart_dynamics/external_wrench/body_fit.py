@@ -47,8 +47,7 @@ from stewart_dynamics.mechanics.dynamics.pseudo_inertia import is_consistent
 from stewart_dynamics.mechanics.least_squares import Information, Solution, solve, TWO_SIDED
 
 TEN = 10
-FRICTION = 3
-"""Columns of each leg: Coulomb, viscous, static."""
+FRICTION = 3  # columns of each leg: Coulomb, viscous, static
 
 # A change that matters, of the mass, of the center by the size of the platform, of the inertia by
 # the mean of the given one. A direction is known if its standard error is at most a quarter of it.
@@ -70,44 +69,32 @@ _LEAST_NOISE = 1e-5
 class Body(NamedTuple):
     """Mass, center of mass and inertia, as a parameter file has them."""
 
-    mass: float
-    """[kg]"""
-    center: Array
-    """Platform axes (3,) [m]."""
-    inertia: Array
-    """ixx ixy ixz iyy iyz izz about the center of mass, platform axes (6,) [kg m^2]."""
+    mass: float  # [kg]
+    center: Array  # platform axes (3,) [m]
+    inertia: Array  # ixx ixy ixz iyy iyz izz about the center of mass, platform axes (6,) [kg m^2]
 
 
 class FittedBody(NamedTuple):
     """The body that fits best."""
 
-    body: Body
-    """Numbers that are not known have the given values."""
-    half_widths: Array
-    """(10,) halves of the 95 % intervals of mass, center and inertia"""
-    known: Flags
-    """(10,) whether each of them is identifiable"""
-    consistent: bool
-    """False: no real body has the inertia that fits best; it has the given one."""
-    residual: float
-    """RMS of the efforts that remain [N]."""
+    body: Body  # numbers that are not known have the given values
+    half_widths: Array  # (10,) halves of the 95 % intervals of mass, center and inertia
+    known: Flags  # (10,) whether each of them is identifiable
+    consistent: bool  # false: no real body has the inertia that fits best; it has the given one
+    residual: float  # RMS of the efforts that remain [N]
 
 
 class LegSamples(NamedTuple):
     """N consecutive measurements, and how a wrong acceleration changes them."""
 
-    columns: Array
-    """(N, 6, 10) of the regressor, of ``about(center)``"""
+    columns: Array  # (N, 6, 10) of the regressor, of ``about(center)``
     friction: Array
     """(N, 6, FRICTION) effort for one standard deviation of each kind of friction [N]"""
-    differences: Array
-    """(N, 6) efforts less those of the model [N]"""
-    acceleration_noise: Array
-    """(6, 6) covariance of the noise in the accelerations of one sample"""
+    differences: Array  # (N, 6) efforts less those of the model [N]
+    acceleration_noise: Array  # (6, 6) covariance of the noise in the accelerations of one sample
     columns_by_acceleration: Array
     """(6, 6, 10) derivative of the columns by each of the six accelerations"""
-    model_by_acceleration: Array
-    """(6, 6) derivative of the model's efforts, likewise"""
+    model_by_acceleration: Array  # (6, 6) derivative of the model's efforts, likewise
 
 
 def about(center: Array) -> Array:

@@ -84,14 +84,10 @@ _GIVES = Struct(f'{_CODE.stop}d')
 class Measurement(NamedTuple):
     """Measurement of the six legs at one time."""
 
-    stamp: int
-    """[ns]"""
-    lengths: Six
-    """[m]"""
-    rates: Six
-    """[m/s]"""
-    forces: Six
-    """Of the actuators since the last measurement [N], + pushes."""
+    stamp: int  # [ns]
+    lengths: Six  # [m]
+    rates: Six  # [m/s]
+    forces: Six  # of the actuators since the last measurement [N], + pushes
 
 
 class Overload(NamedTuple):
@@ -108,12 +104,10 @@ class Estimate(NamedTuple):
     stamp: int
     motion: tuple[float, ...]
     """A row of motion: pose, twist, and the acceleration since the last measurement."""
-    wrench: Six | None
-    """The external wrench, filtered; none of the first measurement [N, N m]."""
+    wrench: Six | None  # the external wrench, filtered; none of the first measurement [N, N m]
     differences: Six | None
     """Measured - model, not filtered (6) [N]; none of the first measurement."""
-    base: tuple[float, ...] = NO_BASE
-    """A row of the base's motion; of nan: it is still."""
+    base: tuple[float, ...] = NO_BASE  # a row of the base's motion; of nan: it is still
     overloads: tuple[Overload, ...] = ()
 
     @property

@@ -52,8 +52,7 @@ class LegHistory:
 
     def __init__(self, seconds: float) -> None:
         self.capacity = round(seconds * HIGHEST_RATE)
-        self.count = 0
-        """How many have been added; measurement n is in row n modulo the capacity."""
+        self.count = 0  # how many have been added; measurement n is in row n modulo the capacity
         self._rows = np.zeros((self.capacity, OF_BASE.stop))
         self._memory = self._rows.data.cast('B')
 

@@ -86,15 +86,11 @@ UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
 class Payload(NamedTuple):
     """Platform and payload as one body, as ``platform.*`` means it."""
 
-    stamp: int
-    """Of the last measurement [ns]."""
-    seconds: float
-    """Time of the measurements."""
-    excluded: int
-    """Measurements that were not used: with saturated efforts, or legs at their ends."""
+    stamp: int  # of the last measurement [ns]
+    seconds: float  # time of the measurements
+    excluded: int  # measurements that were not used: with saturated efforts, or legs at their ends
     fitted: FittedBody
-    given: Body
-    """The parameters, of which what is not known has the values."""
+    given: Body  # the parameters, of which what is not known has the values
 
 
 class PayloadOutcome(NamedTuple):
@@ -170,8 +166,7 @@ def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
 class _Windows:
     """Means of the inputs of the fit over windows."""
 
-    scale: float
-    """Of the forces, by those of the model."""
+    scale: float  # of the forces, by those of the model
 
     def __init__(self, platform: StewartPlatform, stamps: Stamps) -> None:
         p = platform.parameters

@@ -57,14 +57,10 @@ _Part = tuple[Array, list['Cause'], Factors]
 class Cause(NamedTuple):
     """A possible cause of a lack of fit."""
 
-    what: str
-    """Keyword for programs."""
-    places: Integers
-    """Indices of its columns."""
-    text: str
-    """Description; ``{}`` stands for the amounts."""
-    factor: float = 1.0
-    """Factor from the amounts to the unit of the text."""
+    what: str  # keyword for programs
+    places: Integers  # indices of its columns
+    text: str  # description; ``{}`` stands for the amounts
+    factor: float = 1.0  # factor from the amounts to the unit of the text
     measure: Callable[[Array], Any] = np.asarray
     """Function from the amounts (k,) to the values in the text."""
 

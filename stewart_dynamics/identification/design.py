@@ -84,8 +84,7 @@ class DesignLimits:
         if center is None:
             digits = 6 - round(math.log10(self._size))
             center = [*platform.home_pose().position.round(digits).tolist(), 0.0, 0.0, 0.0]
-        self.center: Array = np.array(center, dtype=float)
-        """X Y Z alpha beta gamma."""
+        self.center: Array = np.array(center, dtype=float)  # X Y Z alpha beta gamma
         self._rotation = from_euler(self.center[3:]).ravel()
         self._bounds = _bounds(p)
         self._of_joints = tuple(name for name in OF_JOINTS if name in self._bounds)
@@ -175,8 +174,7 @@ class Design(NamedTuple):
     unknowns: Unknowns
     half_widths: Array
     """(k,) predicted 95 % intervals of the unknowns, for white noise in the efforts"""
-    use: dict[str, float]
-    """Fraction of each limit that the motion uses."""
+    use: dict[str, float]  # fraction of each limit that the motion uses
 
 
 def design(parameters: Parameters, options: DesignOptions,

@@ -47,8 +47,7 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 WIDE, SAMPLES = 2.5, 4.0
 # Transition width of both filters, relative to the narrow cut-off.
 _TRANSITION = 1.0
-ORDERS = 4
-"""Number of columns of an effort: its value and its first ORDERS - 1 derivatives."""
+ORDERS = 4  # number of columns of an effort: its value and its first ORDERS - 1 derivatives
 # Distance from a length limit within which an end stop may be touched, relative to the platform's
 # size; fraction of force_max above which an effort may be saturated.
 _STOP, _SATURATED = 1e-4, 0.999
@@ -74,14 +73,10 @@ class Extract(NamedTuple):
     columns: Array
     """(N, 6, n + 1 + ORDERS): the regressor of ``Unknowns.theta``, the force of all other
     parameters [N], and the effort with its time derivatives [N, N/s, ...]"""
-    used: Flags
-    """(N, 6) whether an effort is fitted: all samples that contribute to it are valid"""
-    legs: Array
-    """(N, 6, 3) length, rate and acceleration [m, m/s, m/s^2]"""
-    slip: Array
-    """(N, 6, SLIP) shapes of friction over the rate"""
-    poses: Array
-    """(N, POSE) platform poses at the output times, guesses for forward kinematics"""
+    used: Flags  # (N, 6) whether an effort is fitted: all samples that contribute to it are valid
+    legs: Array  # (N, 6, 3) length, rate and acceleration [m, m/s, m/s^2]
+    slip: Array  # (N, 6, SLIP) shapes of friction over the rate
+    poses: Array  # (N, POSE) platform poses at the output times, guesses for forward kinematics
     bag: int = 0
 
     @property
@@ -103,10 +98,8 @@ class WindowRead(NamedTuple):
     extract: Extract
     deviations: tuple[float, float]
     """Standard deviations of the white noise of lengths [m] and rates [m/s]; nan: no rates."""
-    stops: int
-    """Number of recorded samples at an end stop or a force limit."""
-    end: Pose
-    """Last pose."""
+    stops: int  # number of recorded samples at an end stop or a force limit
+    end: Pose  # last pose
 
 
 class Extracts:
@@ -116,8 +109,7 @@ class Extracts:
         self._file = tempfile.TemporaryFile()
         self._bags: list[int] = []
         self.samples = 0
-        self.used: list[Flags] = []
-        """(N, 6) of each extract; may be changed."""
+        self.used: list[Flags] = []  # (N, 6) of each extract; may be changed
 
     def add(self, bag: int, begin: float, extract: Extract) -> None:
         """Add the extract of a window of a bag that begins at a time [s]."""

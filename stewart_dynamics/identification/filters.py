@@ -41,12 +41,9 @@ _TRANSITION = 5.5
 class LowPass(NamedTuple):
     """A low-pass filter for a sampling period."""
 
-    period: float
-    """[s]"""
-    cutoff: float
-    """Frequency at which the amplitude is one half [Hz]."""
-    half: int
-    """Number of samples before and after an output on which it depends."""
+    period: float  # [s]
+    cutoff: float  # frequency at which the amplitude is one half [Hz]
+    half: int  # number of samples before and after an output on which it depends
 
     @classmethod
     def of(cls, period: float, cutoff: float, transition: float) -> LowPass:

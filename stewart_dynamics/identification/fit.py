@@ -73,17 +73,13 @@ class Fit(NamedTuple):
     """Unknowns (k,) that fit the samples of B bags."""
 
     values: Array
-    covariance: Array
-    """(k, k) for white noise"""
-    delays: Array
-    """(B,) of the efforts [s], + later than the positions"""
+    covariance: Array  # (k, k) for white noise
+    delays: Array  # (B,) of the efforts [s], + later than the positions
     delay_errors: Array
     """(B,) standard errors for white noise [s]; 0: the delay is not identifiable"""
-    variances: Array
-    """(B, 6) of the residuals [N^2]"""
+    variances: Array  # (B, 6) of the residuals [N^2]
     identifiability: Identifiability
-    matrix: Array
-    """(k, k) information of the unknowns, delays eliminated"""
+    matrix: Array  # (k, k) information of the unknowns, delays eliminated
     at_bound: tuple[str, ...]
     """Names of parameters that would be inconsistent or negative without the bounds."""
 

@@ -28,52 +28,35 @@ CUTOFF = 10.0
 class IdentificationOptions(NamedTuple):
     """Options of an identification."""
 
-    node: str = NODE
-    """Node name: the prefix of the usual topic."""
-    measured: str | None = None
-    """Topic of the measured legs; None: the usual one."""
-    efforts: str | None = None
-    """Topic of the efforts; None: the topic of the measured legs."""
-    kinds: tuple[str, ...] = DEFAULT
-    """Parameters to be identified, from ``unknowns.KINDS``."""
-    motor_torque: bool = False
-    """Efforts are motor torques [N m]."""
-    motor_current: bool = False
-    """Efforts are motor currents [A]."""
-    cutoff: float = CUTOFF
-    """Cut-off frequency of the filter on regressor and efforts [Hz]."""
+    node: str = NODE  # node name: the prefix of the usual topic
+    measured: str | None = None  # topic of the measured legs; None: the usual one
+    efforts: str | None = None  # topic of the efforts; None: the topic of the measured legs
+    kinds: tuple[str, ...] = DEFAULT  # parameters to be identified, from ``unknowns.KINDS``
+    motor_torque: bool = False  # efforts are motor torques [N m]
+    motor_current: bool = False  # efforts are motor currents [A]
+    cutoff: float = CUTOFF  # cut-off frequency of the filter on regressor and efforts [Hz]
     prior: float | None = None
     """Standard error of the file's values, relative to the scales; None: they do not count."""
-    hold_out: float = HOLD_OUT
-    """Fraction at the end of each bag that validates a fit to the rest."""
-    delay: bool = True
-    """Estimate the delay of the efforts."""
-    accept_mistakes: bool = False
-    """Write results although a mistake is likely."""
-    report: bool = True
-    """Write report.html."""
-    force: bool = False
-    """Replace existing results."""
+    hold_out: float = HOLD_OUT  # fraction at the end of each bag that validates a fit to the rest
+    delay: bool = True  # estimate the delay of the efforts
+    accept_mistakes: bool = False  # write results although a mistake is likely
+    report: bool = True  # write report.html
+    force: bool = False  # replace existing results
     run: str = ''
 
 
 class DesignOptions(NamedTuple):
     """Options of a design."""
 
-    kinds: tuple[str, ...] = DEFAULT
-    """Parameters to be identified, from ``unknowns.KINDS``."""
-    duration: float = 60.0
-    """Duration of the motion [s]."""
-    frequency: float = 2.0
-    """Frequency of the highest harmonic [Hz]."""
+    kinds: tuple[str, ...] = DEFAULT  # parameters to be identified, from ``unknowns.KINDS``
+    duration: float = 60.0  # duration of the motion [s]
+    frequency: float = 2.0  # frequency of the highest harmonic [Hz]
     harmonics: int = 10
     amplitude: float | None = None
     """Largest displacement [m]; rotations: divided by the characteristic length."""
     center: tuple[float, ...] | None = None
     """Center of the motion, X Y Z alpha beta gamma [m, rad]; None: home."""
-    noise: float = 5.0
-    """Standard deviation of the efforts [N], for the predicted intervals."""
-    rate: float = 500.0
-    """Rate of setpoints and measured efforts [Hz]."""
+    noise: float = 5.0  # standard deviation of the efforts [N], for the predicted intervals
+    rate: float = 500.0  # rate of setpoints and measured efforts [Hz]
     generations: int = 400
     seed: int = 0

@@ -78,8 +78,7 @@ class BagRead(NamedTuple):
     period_s: float
     cutoff_hz: float
     rates: bool
-    pieces_left_out: int
-    """Number of windows between gaps that are too short for the filters."""
+    pieces_left_out: int  # number of windows between gaps that are too short for the filters
     samples_at_stops: int
     samples_outliers: int
     noise_of_lengths_m: float
@@ -114,24 +113,18 @@ class Residuals(NamedTuple):
 class Identified(NamedTuple):
     """Result of an identification."""
 
-    parameters: Parameters
-    """The file's parameters with the identified values."""
+    parameters: Parameters  # the file's parameters with the identified values
     unknowns: Unknowns
     fit: Fit
     errors: Errors
     bags: tuple[BagRead, ...]
-    samples: int
-    """Number of filtered samples of all bags."""
-    outliers: int
-    """Number of filtered efforts left out after the first fit."""
-    unsound: int
-    """Number left out before it: outliers in samples, end stops, force limits."""
+    samples: int  # number of filtered samples of all bags
+    outliers: int  # number of filtered efforts left out after the first fit
+    unsound: int  # number left out before it: outliers in samples, end stops, force limits
     residuals: Residuals
-    validation: Residuals | None
-    """Residuals on held-out time, by a fit to the rest."""
+    validation: Residuals | None  # residuals on held-out time, by a fit to the rest
     likely: tuple[LikelyMistake, ...]
-    lack_of_fit: LackOfFit | None
-    """None if the residuals are noise."""
+    lack_of_fit: LackOfFit | None  # none if the residuals are noise
 
 
 class Identification:

@@ -80,11 +80,9 @@ class Found(NamedTuple):
 
     what: str
     text: str
-    statistic: float
-    """Chi-squared statistic of the scores of its columns."""
+    statistic: float  # chi-squared statistic of the scores of its columns
     columns: int
-    deviations: float
-    """Standard deviations of a normal distribution with the same probability."""
+    deviations: float  # standard deviations of a normal distribution with the same probability
     places: Integers
 
     @property
@@ -96,16 +94,11 @@ class Found(NamedTuple):
 class LackOfFit(NamedTuple):
     """A lack of fit and its likeliest causes."""
 
-    causes: tuple[Found, ...]
-    """Causes in the order in which they were found, the likeliest first."""
-    others: tuple[Found, ...]
-    """Causes that explain the residuals nearly as well as the first."""
-    shifts: Array
-    """(k,) amount by which the interval of each unknown is widened on both sides"""
-    left: float
-    """Fraction of the residual RMS that remains with the first cause."""
-    unexplained: bool
-    """Whether something significant remains, or the cause is unknown."""
+    causes: tuple[Found, ...]  # causes in the order in which they were found, the likeliest first
+    others: tuple[Found, ...]  # causes that explain the residuals nearly as well as the first
+    shifts: Array  # (k,) amount by which the interval of each unknown is widened on both sides
+    left: float  # fraction of the residual RMS that remains with the first cause
+    unexplained: bool  # whether something significant remains, or the cause is unknown
 
     @property
     def text(self) -> str:
@@ -133,11 +126,9 @@ IDENTIFY = {'offset': 'offset', 'tilt': 'tilt', 'reflected_mass': 'reflected_mas
 class _Explained(NamedTuple):
     """The part of the residuals that k columns explain."""
 
-    amounts: Array
-    """(k,) least-squares amounts"""
+    amounts: Array  # (k,) least-squares amounts
     statistic: float
-    freedom: int
-    """Number of their directions that are not in the fit."""
+    freedom: int  # number of their directions that are not in the fit
 
 
 class _Scores(NamedTuple):
@@ -145,14 +136,10 @@ class _Scores(NamedTuple):
 
     normal: Array
     """(m, m), the covariance of the scores; the projection leaves this of 1 on the diagonal"""
-    of_noise: Array
-    """(m, m), the part of it that is noise of lengths and rates"""
-    scores: Array
-    """(m,), without what this noise adds to them"""
-    sizes: Array
-    """(m,)"""
-    squares: float
-    """Sum of squared residuals."""
+    of_noise: Array  # (m, m), the part of it that is noise of lengths and rates
+    scores: Array  # (m,), without what this noise adds to them
+    sizes: Array  # (m,)
+    squares: float  # sum of squared residuals
 
     @classmethod
     def of(cls, sums: Array, of_noise: Array, inner: int) -> _Scores:

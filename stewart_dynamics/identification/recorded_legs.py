@@ -81,14 +81,10 @@ class RecordedLegs:
                  overlap: float) -> None:
         self._recording, self._topics, self._overlap = recording, topics, overlap
         self._joints = joints
-        self.rejected: Counter[str] = Counter()
-        """Number of rejected messages by reason."""
-        self.samples = 0
-        """Number of positions used."""
-        self.rates: bool | None = None
-        """Whether rates are recorded."""
-        self.period = 0.0
-        """Sampling period [s], known after the first window."""
+        self.rejected: Counter[str] = Counter()  # number of rejected messages by reason
+        self.samples = 0  # number of positions used
+        self.rates: bool | None = None  # whether rates are recorded
+        self.period = 0.0  # sampling period [s], known after the first window
         self._one = topics.legs == topics.efforts
         self._legs, self._efforts = _Buffer(), _Buffer()
         self._readers: dict[str, JointStateReader] = {}

@@ -56,8 +56,7 @@ _OF_LEGS = {'cylinder': (CYLINDER_FIRST, CYLINDER_SECOND),
             'coulomb_friction': (COULOMB_FRICTION,),
             'friction': (VISCOUS_FRICTION, COULOMB_FRICTION), 'offset': (OFFSET,)}
 TILT = 'tilt'
-KINDS = (*_OF_PLATFORM, *_OF_LEGS, TILT)
-"""Values that --identify accepts."""
+KINDS = (*_OF_PLATFORM, *_OF_LEGS, TILT)  # values that --identify accepts
 DEFAULT = ('platform', 'viscous_friction', 'coulomb_friction')
 
 # Indices of the linear parameters whose forces depend on gravity.

@@ -56,18 +56,12 @@ class Signal(NamedTuple):
 class Window(NamedTuple):
     """Uniform samples of all legs."""
 
-    begin: int
-    """Stamp of the first sample [ns]."""
-    period: float
-    """Sampling period [s]."""
-    positions: Array
-    """(N, 6) [m]"""
-    rates: Array | None
-    """(N, 6) [m/s]"""
-    efforts: Array
-    """(N, 6) as recorded"""
-    outliers: Flags
-    """(N, 6): an effort or a position of the leg was replaced."""
+    begin: int  # stamp of the first sample [ns]
+    period: float  # sampling period [s]
+    positions: Array  # (N, 6) [m]
+    rates: Array | None  # (N, 6) [m/s]
+    efforts: Array  # (N, 6) as recorded
+    outliers: Flags  # (N, 6): an effort or a position of the leg was replaced
 
     def with_lag(self, lag: int) -> Window:
         """Return the window with efforts taken ``lag`` samples later."""

@@ -70,8 +70,7 @@ ANGLES = {BASE_ANGLE_MAX: BASE_JOINT_ANGLES, PLATFORM_ANGLE_MAX: PLATFORM_JOINT_
 class Exceedance(NamedTuple):
     """A limit that a leg exceeds."""
 
-    limit: str
-    """One of LIMITS or OF_MOTORS, or JUMP."""
+    limit: str  # one of LIMITS or OF_MOTORS, or JUMP
     leg: int
     value: float
     bound: float

@@ -131,13 +131,10 @@ class Singularity(NamedTuple):
     """The state of the warning after a sample; the first sample follows Singularity()."""
 
     cause: Cause = Cause.NONE
-    stopped: bool = False
-    """Inside stop_condition."""
-    determinant: float = 0.0
-    """The last that was not zero."""
+    stopped: bool = False  # inside stop_condition
+    determinant: float = 0.0  # the last that was not zero
     time_to_crossing: float = math.inf
-    crossings: int = 0
-    """Changes of sign of det(J) so far."""
+    crossings: int = 0  # changes of sign of det(J) so far
 
     @property
     def warning(self) -> bool:

@@ -63,8 +63,7 @@ class MalformedError(ValueError):
 class Stamped(NamedTuple):
     """A message with a header: its stamp, its frame and its numbers."""
 
-    stamp: int
-    """[ns]"""
+    stamp: int  # [ns]
     frame: bytes
     values: tuple[float, ...]
 

@@ -61,22 +61,17 @@ class JointStateError(ValueError):
 class JointStates(NamedTuple):
     """The contents of many messages, K of which can be used."""
 
-    stamps: Stamps
-    """(K,) [ns]"""
-    values: Array
-    """(K, 6 * fields): the six joints of one field, then of the next."""
-    rejected: dict[str, int]
-    """How many of the others were rejected, by reason."""
+    stamps: Stamps  # (K,) [ns]
+    values: Array  # (K, 6 * fields): the six joints of one field, then of the next
+    rejected: dict[str, int]  # how many of the others were rejected, by reason
 
 
 class _Fields(NamedTuple):
     """Stamp and names of a sensor_msgs/JointState, and where its numbers stand in its bytes."""
 
-    stamp: int
-    """[ns]"""
+    stamp: int  # [ns]
     names: list[str]
-    numbers: tuple[tuple[int, int], ...]
-    """Of position, velocity and effort: offset and count."""
+    numbers: tuple[tuple[int, int], ...]  # of position, velocity and effort: offset and count
     gaps: tuple[slice, ...]
     """Bytes that only align what follows, and those behind the message: they may be anything."""
 
@@ -138,10 +133,8 @@ class JointStateReader:
     """
 
     def __init__(self, joints: Sequence[str], fields: Sequence[str] = FIELDS) -> None:
-        self.found = False
-        """Whether a message had all joints."""
-        self.other_names: list[str] = []
-        """The names in the first message that lacked one."""
+        self.found = False  # whether a message had all joints
+        self.other_names: list[str] = []  # the names in the first message that lacked one
         self._joints = list(joints)
         self._fields = list(fields)
         self._known: list[_Known] = []

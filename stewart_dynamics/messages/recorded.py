@@ -27,17 +27,12 @@ from stewart_dynamics.arrays import Bytes, Integers, Stamps
 class Messages(NamedTuple):
     """M recorded messages in the order of time, and the bytes that contain them."""
 
-    topics: tuple[str, ...]
-    """Names under which the topics were asked for."""
-    of_topic: Integers
-    """(M,): index of the topic."""
-    times: Stamps
-    """(M,): when each was recorded [ns]."""
+    topics: tuple[str, ...]  # names under which the topics were asked for
+    of_topic: Integers  # (M,): index of the topic
+    times: Stamps  # (M,): when each was recorded [ns]
     data: Bytes
-    starts: Integers
-    """(M,): start of each in the data."""
-    sizes: Integers
-    """(M,): length of each [bytes]."""
+    starts: Integers  # (M,): start of each in the data
+    sizes: Integers  # (M,): length of each [bytes]
 
     @classmethod
     def of(cls, topics: tuple[str, ...], of_topic: Sequence[int], times: Sequence[int],

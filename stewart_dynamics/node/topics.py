@@ -54,19 +54,13 @@ DIAGNOSTICS, MARKERS, PAYLOAD, TRAVEL = '/diagnostics', 'markers', 'payload', 't
 class Topic(NamedTuple):
     """One topic."""
 
-    name: str
-    """Under the node's name, or whole."""
+    name: str  # under the node's name, or whole
     kind: str
-    meaning: str
-    """For the README."""
-    details: str = ''
-    """Follow the meaning in docs/node.md."""
-    parameter: str = ''
-    """Parameter and value with which the topic is there; empty: always."""
-    depth: int = 10
-    """Messages that may wait in the middleware."""
-    latched: bool = False
-    """A later subscriber gets the last message."""
+    meaning: str  # for the README
+    details: str = ''  # follow the meaning in docs/node.md
+    parameter: str = ''  # parameter and value with which the topic is there; empty: always
+    depth: int = 10  # messages that may wait in the middleware
+    latched: bool = False  # a later subscriber gets the last message
 
     @property
     def ros_name(self) -> str:

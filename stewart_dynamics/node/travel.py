@@ -34,8 +34,7 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.visualization import PublisherAtRate
 from stewart_dynamics.parameters.table import Parameters
 
-_RATE = 10.0
-"""[Hz]"""
+_RATE = 10.0  # [Hz]
 # Directions in the order of the message: each of x y z rx ry rz to minus, then to plus.
 _DIRECTIONS = np.stack([-np.eye(6), np.eye(6)], axis=1).reshape(12, 6)
 # Values where nothing limits, since no output is infinite: the largest number [m]; one turn [rad].

@@ -41,15 +41,11 @@ _PYTHON_TYPES: Mapping[str, Any] = {'string': str, 'double': float, 'bool': bool
 class Parameter(NamedTuple):
     """The declaration of one parameter."""
 
-    name: str
-    """Dotted, as in a file."""
-    kind: str
-    """Type in ROS, for an array the type of an entry: string, double or bool."""
-    text: str
-    """Meaning, for the documents, ``--help`` and ROS's description."""
+    name: str  # dotted, as in a file
+    kind: str  # type in ROS, for an array the type of an entry: string, double or bool
+    text: str  # meaning, for the documents, ``--help`` and ROS's description
     unit: str = ''
-    default: Any = None
-    """The value if it is not given; an empty tuple: no value, unlimited."""
+    default: Any = None  # the value if it is not given; an empty tuple: no value, unlimited
     required: bool = False
     sizes: tuple[int, ...] = ()
     """The lengths that an array may have, empty for a single value; an array of length 1 or 6
@@ -58,12 +54,9 @@ class Parameter(NamedTuple):
     """Whether an array has any number of rows, one after the other, of its one length each."""
     minimum: float = -math.inf
     maximum: float = math.inf
-    above: bool = False
-    """Whether ``minimum`` itself is out of range."""
-    choices: tuple[str, ...] = ()
-    """The accepted texts."""
-    while_active: bool = False
-    """Whether it may be changed while the node is active."""
+    above: bool = False  # whether ``minimum`` itself is out of range
+    choices: tuple[str, ...] = ()  # the accepted texts
+    while_active: bool = False  # whether it may be changed while the node is active
 
     @property
     def ros_type(self) -> str:

@@ -36,8 +36,7 @@ from stewart_dynamics.parameters.tolerances import (
 
 # Corners of a plate are in a plane to this part of its size.
 _FLAT = 1e-6
-STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
-"""[m/s^2]"""
+STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s^2]
 
 
 def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:
@@ -105,16 +104,12 @@ def _drives() -> Iterator[Parameter]:
                         'pose, in the plane of the base joints', '', (), sizes=(18,))
 
 
-GUIDED, UNIVERSAL = 'guided', 'universal'
-"""Values of drive.screw_rotation."""
-RIGHT, LEFT = 'right', 'left'
-"""Values of drive.screw_hand."""
+GUIDED, UNIVERSAL = 'guided', 'universal'  # values of drive.screw_rotation
+RIGHT, LEFT = 'right', 'left'  # values of drive.screw_hand
 MOTOR_INERTIA, SCREW_INERTIA = DRIVE_INERTIAS = 'drive.motor_inertia', 'drive.screw_inertia'
 """Parameters from which actuator.reflected_mass follows, where one of them is given."""
-AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'
-"""Values of geometry.platform_side."""
-IGNORE, CHECK, PREPEND = 'ignore', 'check', 'prepend'
-"""Values of trajectory.approach."""
+AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'  # values of geometry.platform_side
+IGNORE, CHECK, PREPEND = 'ignore', 'check', 'prepend'  # values of trajectory.approach
 LEG_SHAPE = 'legs.cylinder.radius', 'legs.cylinder.length', 'legs.piston.radius'
 """Parameters that the clearance of the legs needs."""
 BASE_OUTLINE, PLATFORM_OUTLINE = OUTLINES = 'geometry.base_outline', 'geometry.platform_outline'
@@ -305,8 +300,7 @@ class Parameters(ParameterSet):
     table = PARAMETERS
     node = 'stewart_dynamics'
     described = 'drive.', 'actuator.reflected_mass'  # which may follow from drive.*
-    drives: tuple[str, ...]
-    """Names of drive.* that are given; without them no motors are computed."""
+    drives: tuple[str, ...]  # names of drive.* that are given; without them no motors are computed
 
     def _check_together(self, source: str) -> None:
         """Check the rules between parameters."""

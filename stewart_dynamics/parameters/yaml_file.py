@@ -33,8 +33,7 @@ from stewart_dynamics.errors import one_line, ParameterError, shown, shown_name
 from stewart_dynamics.whole_file import read_text, write_files
 import yaml  # type: ignore[import-untyped]
 
-LARGEST = 100_000
-"""Size of the largest file that is read [bytes]."""
+LARGEST = 100_000  # size of the largest file that is read [bytes]
 _DEEPEST = 20
 
 
@@ -42,8 +41,7 @@ class _Blank(str):
     """A text of length 0."""
 
 
-BLANK = _Blank()
-"""The value of a name without a value, which rcl rejects."""
+BLANK = _Blank()  # the value of a name without a value, which rcl rejects
 
 _TRUE = frozenset('Y y yes Yes YES true True TRUE on On ON'.split())
 _FALSE = frozenset('N n no No NO false False FALSE off Off OFF'.split())

@@ -60,8 +60,7 @@ SINGULAR = 'a singularity is met'
 class Violation(NamedTuple):
     """Reason and time of a rejection."""
 
-    time: float
-    """[s]"""
+    time: float  # [s]
     reason: str
     words: str
     leg: int | None = None
@@ -76,20 +75,14 @@ class Violation(NamedTuple):
 class Samples(NamedTuple):
     """M samples of a trajectory in the order of time."""
 
-    times: Array
-    """(M,) [s]"""
-    durations: Array
-    """Time from each sample to the next (M - 1,) [s]."""
-    motions: Array
-    """Rows of motion (M, MOTION)."""
-    results: Array
-    """Rows of results (M, RESULT)."""
-    joined: Flags
-    """Whether the next sample follows this one in the trajectory (M - 1,)."""
+    times: Array  # (M,) [s]
+    durations: Array  # time from each sample to the next (M - 1,) [s]
+    motions: Array  # rows of motion (M, MOTION)
+    results: Array  # rows of results (M, RESULT)
+    joined: Flags  # whether the next sample follows this one in the trajectory (M - 1,)
     near: Flags
     """Whether it is near enough for motion and forces between both to follow from theirs."""
-    ways: Array
-    """Bound of how far a platform joint, or corner of its plate, moves to the next [m]."""
+    ways: Array  # bound of how far a platform joint, or corner of its plate, moves to the next [m]
 
     def until(self, n: int) -> Samples:
         """Return the samples before the n-th, n more than 0."""

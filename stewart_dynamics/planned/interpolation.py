@@ -59,20 +59,13 @@ class Bounds(NamedTuple):
     enter by the derivatives of the rotation vector.
     """
 
-    path: Array
-    """Length of the path [m]."""
-    speed: Array
-    """[m/s]"""
-    acceleration: Array
-    """[m/s^2]"""
-    jerk: Array
-    """[m/s^3]"""
-    position_deviation: Array
-    """[m]"""
-    velocity_deviation: Array
-    """[m/s]"""
-    acceleration_deviation: Array
-    """[m/s^2]"""
+    path: Array  # length of the path [m]
+    speed: Array  # [m/s]
+    acceleration: Array  # [m/s^2]
+    jerk: Array  # [m/s^3]
+    position_deviation: Array  # [m]
+    velocity_deviation: Array  # [m/s]
+    acceleration_deviation: Array  # [m/s^2]
 
 
 class Interpolation:

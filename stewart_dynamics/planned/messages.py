@@ -70,16 +70,11 @@ _POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
 class PlannedOutcome(NamedTuple):
     """The outcome of the check of a trajectory."""
 
-    message: str
-    """In words: accepted or rejected, and why."""
-    reason: str = ''
-    """Why it is rejected, a constant; empty where it is accepted."""
-    answer: bytes = b''
-    """A trajectory_msgs/JointTrajectory; empty where rejected."""
-    warning: bool = False
-    """Accepted, but the condition number reaches singularity.warn_condition."""
-    values: tuple[tuple[str, str], ...] = ()
-    """Keys with their units, and values."""
+    message: str  # in words: accepted or rejected, and why
+    reason: str = ''  # why it is rejected, a constant; empty where it is accepted
+    answer: bytes = b''  # a trajectory_msgs/JointTrajectory; empty where rejected
+    warning: bool = False  # accepted, but the condition number reaches singularity.warn_condition
+    values: tuple[tuple[str, str], ...] = ()  # keys with their units, and values
 
 
 class _NotCheckableError(Exception):

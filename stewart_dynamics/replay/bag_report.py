@@ -251,8 +251,7 @@ class MarginColumn(NamedTuple):
 
     name: str
     unit: str
-    key: str
-    """Key of a leg in summary.json."""
+    key: str  # key of a leg in summary.json
     limits: tuple[str, ...]
 
 

@@ -44,14 +44,10 @@ class Ended(NamedTuple):
     bag: Path
     folder: Path
     code: int
-    row: dict[str, Cell]
-    """Of fleet.csv."""
-    text: str = ''
-    """The summary in the terminal; empty if the bag failed."""
-    error: str = ''
-    """Why it failed or was read in part, with its path."""
-    kept: bool = False
-    """The results are those of an earlier run."""
+    row: dict[str, Cell]  # of fleet.csv
+    text: str = ''  # the summary in the terminal; empty if the bag failed
+    error: str = ''  # why it failed or was read in part, with its path
+    kept: bool = False  # the results are those of an earlier run
 
 
 class Task(NamedTuple):

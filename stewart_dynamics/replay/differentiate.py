@@ -59,11 +59,9 @@ class Deviation(NamedTuple):
     Poses within 1 / cutoff of the ends of their segment are left out.
     """
 
-    position_rms: float
-    """[m]"""
+    position_rms: float  # [m]
     position_max: float
-    angle_rms: float
-    """[rad]"""
+    angle_rms: float  # [rad]
     angle_max: float
 
 
@@ -106,8 +104,7 @@ class Differentiator:
         self.cutoff = cutoff
         self.left_out: Counter[str] = Counter()
         """Number of setpoints left out, without twist and acceleration, by reason."""
-        self.near_ends = 0
-        """Setpoints within 1 / cutoff of an end of their segment."""
+        self.near_ends = 0  # setpoints within 1 / cutoff of an end of their segment
         self._gap = round(gap * 1e9)
         self._reach = round(_REACH / cutoff * 1e9)
         self._window = window

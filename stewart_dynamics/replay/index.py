@@ -39,16 +39,13 @@ from stewart_dynamics.whole_file import write_files
 FOLDER = Path(__file__).with_name('templates')
 
 Cell = str | int | float | bool | None
-Row = Mapping[str, Cell]
-"""The cells of one bag, by column."""
+Row = Mapping[str, Cell]  # the cells of one bag, by column
 
-RESULTS = ('done', 'limit or warning', 'failed', 'incomplete')
-"""The results by exit code."""
+RESULTS = ('done', 'limit or warning', 'failed', 'incomplete')  # the results by exit code
 REJECTED = 'messages rejected'
 """The result of code 0 if messages were rejected, more than a hundredth of the setpoints."""
 _REJECTED_SHARE = 0.01
-NOTHING_ANSWERED = 'nothing answered'
-"""The result of code 3 if no setpoint could be answered."""
+NOTHING_ANSWERED = 'nothing answered'  # the result of code 3 if no setpoint could be answered
 SEVERITY = (RESULTS[DONE], REJECTED, RESULTS[LIMIT_MET], RESULTS[PARTLY_READ], NOTHING_ANSWERED,
             RESULTS[BAD_INPUT])
 """The results, the most severe last."""

@@ -35,8 +35,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.block_statistics import Exceeded, Extreme, finite, Integral
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
 
-MARGIN = 1.2
-"""Factor on torques and speed of the motor that is needed."""
+MARGIN = 1.2  # factor on torques and speed of the motor that is needed
 CONTINUOUS = 'drive.torque_continuous'
 _OF_VELOCITY = TORQUE_SPEED, SPEED_MAX
 # Loads that a motor must bear, by the key of the motor that is needed.

@@ -58,8 +58,7 @@ from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
 from stewart_dynamics.setpoints.step import Batch, State, Step
 from stewart_dynamics.whole_file import write_json
 
-VERSION = 1
-"""Version of summary.json; increased when the meaning of a key changes."""
+VERSION = 1  # version of summary.json; increased when the meaning of a key changes
 _STAMP = re.compile(r'stamp (\d+) ns')
 
 Progress = Callable[[int, int], None]
@@ -77,12 +76,9 @@ class Replayed(NamedTuple):
 
     bag: Path
     folder: Path
-    summary: dict[str, Any]
-    """The content of summary.json; see docs/summary.md."""
-    text: str
-    """The summary for the terminal."""
-    code: int
-    """DONE, LIMIT_MET or PARTLY_READ, the most severe."""
+    summary: dict[str, Any]  # the content of summary.json; see docs/summary.md
+    text: str  # the summary for the terminal
+    code: int  # DONE, LIMIT_MET or PARTLY_READ, the most severe
 
 
 def replay(
@@ -156,10 +152,8 @@ class _First(NamedTuple):
     """The first message that was rejected for a reason."""
 
     details: str
-    stamp: int | None
-    """[ns], if the details begin with it."""
-    recorded: int | None
-    """When it was recorded [ns]."""
+    stamp: int | None  # [ns], if the details begin with it
+    recorded: int | None  # when it was recorded [ns]
 
 
 class _Run:

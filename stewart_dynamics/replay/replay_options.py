@@ -42,18 +42,13 @@ class Options(NamedTuple):
     """
     cutoff: float | None = None
     """Cut-off frequency [Hz]: read only poses, and differentiate them by smoothing splines."""
-    measured: str | None = None
-    """Topic of a sensor_msgs/JointState with the measured efforts."""
-    parquet: bool = False
-    """Write legs.parquet in place of legs.csv."""
-    report: bool = True
-    """Write report.html."""
+    measured: str | None = None  # topic of a sensor_msgs/JointState with the measured efforts
+    parquet: bool = False  # write legs.parquet in place of legs.csv
+    report: bool = True  # write report.html
     plotly: Path | None = None
     """The file of plotly.js that the reports share; None: it is in each report."""
-    force: bool = False
-    """Replace existing results."""
-    run: str = ''
-    """Identifier of a run over many bags, written to summary.json."""
+    force: bool = False  # replace existing results
+    run: str = ''  # identifier of a run over many bags, written to summary.json
 
     def applied_to(self, parameters: Parameters) -> Parameters:
         """Return the parameters with the source of setpoints that these options demand."""

@@ -105,14 +105,10 @@ _SECONDS, _POSE, _FORCES = 0, slice(1, 13), slice(13, 19)
 class Compared(NamedTuple):
     """K setpoints that were compared."""
 
-    seconds: Array
-    """(K,)"""
-    measured: Array
-    """(K, 6) [N]"""
-    computed: Array
-    """(K, 6) [N]"""
-    wrench: Array
-    """External wrench (K, 6) [N, N m]."""
+    seconds: Array  # (K,)
+    measured: Array  # (K, 6) [N]
+    computed: Array  # (K, 6) [N]
+    wrench: Array  # external wrench (K, 6) [N, N m]
 
 
 class Comparison:
@@ -294,8 +290,7 @@ class Contact(NamedTuple):
     begin: float
     end: float
     axis: int
-    excess: float
-    """Largest distance from the median, as a multiple of the threshold."""
+    excess: float  # largest distance from the median, as a multiple of the threshold
     load: tuple[float, ...]
 
 

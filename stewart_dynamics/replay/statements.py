@@ -30,14 +30,12 @@ from stewart_dynamics.mechanics.limits import CLIPPED, Exceedance, QUANTITIES, T
 from stewart_dynamics.reporting.plots import PLOT_OF
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
 
-Summary = Mapping[str, Any]
-"""The content of summary.json."""
+Summary = Mapping[str, Any]  # the content of summary.json
 
 READING, MISSING, REJECTED, LIMITS, JOINTS, LOADS, MOTORS, SINGULARITY, MEASURED = (
     'reading', 'missing', 'rejected', 'limits', 'joints', 'loads', 'motors', 'singularity',
     'measured')
-LEVELS = ('none', 'good', 'warn', 'bad')
-"""The levels, the worst last; none: information."""
+LEVELS = ('none', 'good', 'warn', 'bad')  # the levels, the worst last; none: information
 _CARDS = {
     (READING, MISSING, REJECTED): {
         'good': 'The whole bag was read', 'warn': 'Not all messages could be used',
@@ -61,12 +59,9 @@ class Statement(NamedTuple):
     topic: str
     level: str
     text: str
-    at: float | None = None
-    """Follows the text [s]."""
-    plot: str = ''
-    """Plot of the report that shows this time."""
-    end: str = ''
-    """Follows the time."""
+    at: float | None = None  # follows the text [s]
+    plot: str = ''  # plot of the report that shows this time
+    end: str = ''  # follows the time
 
     @property
     def line(self) -> str:

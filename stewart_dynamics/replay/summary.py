@@ -57,8 +57,7 @@ class Answered(NamedTuple):
     """(N,) since the first setpoint of the bag [s]; it does not advance where stamps jump back."""
     setpoints: Batch
     outputs: Outputs
-    base_wrenches: Array
-    """Wrench of the hexapod on its base (N, 6) [N, N m]; nan: not known."""
+    base_wrenches: Array  # wrench of the hexapod on its base (N, 6) [N, N m]; nan: not known
     breakdown: Array | None = None
     """The demanded forces by source (N, 7, 6): sample, source, leg [N]."""
 

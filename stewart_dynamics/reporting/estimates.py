@@ -31,11 +31,9 @@ from stewart_dynamics.mechanics.least_squares import (
     combinations, Identifiability, LEAST_SHARE, TWO_SIDED)
 
 IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE = 'identified', 'in_combination', 'not_identifiable'
-FIXED = 'fixed'
-"""Held at the file's value by an option."""
+FIXED = 'fixed'  # held at the file's value by an option
 
-HOLD_OUT = 0.2
-"""Share of the data that validates a fit to the rest, by default."""
+HOLD_OUT = 0.2  # share of the data that validates a fit to the rest, by default
 _WITHOUT_VALUE = {IN_COMBINATION: 'only in a combination', FIXED: 'fixed',
                   NOT_IDENTIFIABLE: 'kept: not identifiable'}
 # Numbers below _SMALL with more decimals have an exponent.
@@ -45,10 +43,8 @@ _MOST_DECIMALS, _SMALL = 9, 1e-4
 class LikelyMistake(NamedTuple):
     """A likely mistake in the data, or a likely cause of a lack of fit."""
 
-    what: str
-    """Keyword for programs, as sign, unit, swapped."""
-    text: str
-    """Description in one line."""
+    what: str  # keyword for programs, as sign, unit, swapped
+    text: str  # description in one line
 
 
 def states_of(what: Identifiability) -> list[str]:

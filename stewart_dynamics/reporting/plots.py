@@ -77,14 +77,11 @@ class Plot(NamedTuple):
     note: str = ''
     bounds: Sequence[Bound] = ()
     log: bool = False
-    contacts: bool = False
-    """Shade the intervals with an external load."""
+    contacts: bool = False  # shade the intervals with an external load
     spikes: bool = False
     """A few samples may be far larger than the others: they do not set the scale."""
-    section: str = 'plots'
-    """Where it is in the report."""
-    spectrum: bool = False
-    """Over frequency, both axes logarithmic."""
+    section: str = 'plots'  # where it is in the report
+    spectrum: bool = False  # over frequency, both axes logarithmic
 
     def plain(self) -> dict[str, Any]:
         """Return the plot for JSON."""

@@ -35,19 +35,14 @@ from typing import Protocol
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.whole_file import named
 
-RESULT = 'summary.json'
-"""The file by which a folder is known as results of a replay."""
-IDENTIFICATION = 'identification.json'
-"""The same of an identification."""
-DATASHEET = 'datasheet.json'
-"""The same of a datasheet."""
-CALIBRATION = 'calibration.json'
-"""The same of a calibration."""
+RESULT = 'summary.json'  # the file by which a folder is known as results of a replay
+IDENTIFICATION = 'identification.json'  # the same of an identification
+DATASHEET = 'datasheet.json'  # the same of a datasheet
+CALIBRATION = 'calibration.json'  # the same of a calibration
 
 DATASHEET_PAGE, REPORT_PAGE = 'datasheet.html', 'report.html'
 """Pages of a datasheet and of a replay, which link to each other."""
-DATASHEETS, REPLAYS = 'datasheet', 'replayed'
-"""Folders of their results if no other is given."""
+DATASHEETS, REPLAYS = 'datasheet', 'replayed'  # folders of their results if no other is given
 
 # For the file by which a folder is known: the kind of folder, and all that a program writes there.
 _KINDS = {

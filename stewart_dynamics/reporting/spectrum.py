@@ -56,14 +56,10 @@ INTERVALS = 600
 class Density(NamedTuple):
     """Amplitude spectral densities of C channels."""
 
-    frequencies: Array
-    """Above zero, up to the Nyquist rate (F,) [Hz]."""
-    amplitudes: Array
-    """(C, F), in the unit of the channel per sqrt(Hz)."""
-    segments: int
-    """How many there are the mean of."""
-    seconds: float
-    """Length of a segment [s]."""
+    frequencies: Array  # above zero, up to the Nyquist rate (F,) [Hz]
+    amplitudes: Array  # (C, F), in the unit of the channel per sqrt(Hz)
+    segments: int  # how many there are the mean of
+    seconds: float  # length of a segment [s]
     uneven: float
     """Part of the steps in time that were not even: values were interpolated linearly."""
 

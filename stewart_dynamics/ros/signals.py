@@ -85,5 +85,4 @@ class Signals:
             os._exit(0)
 
 
-SIGNALS = Signals()
-"""Those of this process."""
+SIGNALS = Signals()  # those of this process

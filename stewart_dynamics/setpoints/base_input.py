@@ -56,8 +56,7 @@ class BaseInput:
     def __init__(self, parameters: Parameters, rejections: Rejections,
                  noticed: Callable[[str], object]) -> None:
         source = parameters['base.source']
-        self.topics = BASE_SOURCES[source]
-        """Topics of the base; empty if the base is fixed."""
+        self.topics = BASE_SOURCES[source]  # topics of the base; empty if the base is fixed
         self.joining = SampleJoining(
             self.topics, None if source == 'imu' else parameters['world_frame'],
             parameters['setpoint.sync_tolerance'], parameters['base.timeout'], rejections,

@@ -83,12 +83,9 @@ LARGEST = 1e9
 class TopicSamples(NamedTuple):
     """New samples of a topic, N of them."""
 
-    stamps: Stamps
-    """(N,) [ns]"""
-    values: Array
-    """(N, ...)"""
-    places: Integers
-    """(N,): index of each message in the order of all messages."""
+    stamps: Stamps  # (N,) [ns]
+    values: Array  # (N, ...)
+    places: Integers  # (N,): index of each message in the order of all messages
 
 
 class SampleReader:

@@ -63,8 +63,7 @@ class Setpoints:
         self.topics = SOURCES[parameters['setpoint.source']]
         self._rejections = Rejections(rejected)
         self._wrench_input = WrenchInput(parameters, self._rejections)
-        self.base = BaseInput(parameters, self._rejections, noticed)
-        """The motion of the base."""
+        self.base = BaseInput(parameters, self._rejections, noticed)  # the motion of the base
         self._joining = SampleJoining(
             self.topics, parameters['base_frame'], parameters['setpoint.sync_tolerance'],
             parameters['setpoint.timeout'], self._rejections, noticed)

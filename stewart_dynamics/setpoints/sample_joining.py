@@ -43,15 +43,11 @@ Waiting = dict[int, tuple[float, ...]]
 class Joined(NamedTuple):
     """K joined setpoints, and the remaining samples of each topic."""
 
-    stamps: Stamps
-    """(K,) [ns]"""
-    motions: Array
-    """Rows of motion (K, MOTION)."""
-    places: Integers
-    """(K,): index of the message that completed each."""
+    stamps: Stamps  # (K,) [ns]
+    motions: Array  # rows of motion (K, MOTION)
+    places: Integers  # (K,): index of the message that completed each
     waiting: dict[str, Waiting]
-    dropped: dict[str, list[int]]
-    """Stamps of samples that can no longer be joined."""
+    dropped: dict[str, list[int]]  # stamps of samples that can no longer be joined
 
 
 def join_many(samples: Mapping[str, TopicSamples], waiting: Mapping[str, Waiting],
@@ -131,12 +127,9 @@ NO_SAMPLES = TopicSamples(_NOWHERE, np.empty((0, 0)), _NOWHERE)
 class JoinedSample(NamedTuple):
     """Samples of the same time, one of each topic."""
 
-    stamp: int
-    """Stamp of the first topic's sample [ns]."""
-    values: tuple[float, ...]
-    """Concatenated values, in the order of topics."""
-    restart: bool
-    """Time has jumped back before it."""
+    stamp: int  # stamp of the first topic's sample [ns]
+    values: tuple[float, ...]  # concatenated values, in the order of topics
+    restart: bool  # time has jumped back before it
     stamped: bool = True
     """Whether the stamp comes from the samples; otherwise it is the time of arrival."""
 

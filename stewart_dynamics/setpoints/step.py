@@ -54,14 +54,10 @@ from stewart_dynamics.setpoints.published_forces import (
 class Setpoint(NamedTuple):
     """Pose, twist and acceleration at one time."""
 
-    stamp: int
-    """[ns]"""
-    motion: tuple[float, ...]
-    """A row of motion, laid out as for ``inverse_dynamics``."""
-    wrench: Six = NO_WRENCH
-    """Load on the platform at its origin, base axes [N, N m]."""
-    restart: bool = False
-    """Time has jumped back: earlier setpoints no longer apply."""
+    stamp: int  # [ns]
+    motion: tuple[float, ...]  # a row of motion, laid out as for ``inverse_dynamics``
+    wrench: Six = NO_WRENCH  # load on the platform at its origin, base axes [N, N m]
+    restart: bool = False  # time has jumped back: earlier setpoints no longer apply
     base: tuple[float, ...] | None = None
     """Row of the base's motion, nan if unknown; None if the base is fixed."""
     stamped: bool = True
@@ -77,10 +73,8 @@ class State(NamedTuple):
     """State after earlier setpoints; before the first setpoint it is State()."""
 
     singularity: Singularity | None = None
-    stamp: int = 0
-    """Stamp of the last setpoint that was not a jump [ns]."""
-    lengths: Six | None = None
-    """Leg lengths of that setpoint [m]; None before the first one."""
+    stamp: int = 0  # stamp of the last setpoint that was not a jump [ns]
+    lengths: Six | None = None  # leg lengths of that setpoint [m]; None before the first one
     windings: tuple[float, ...] | None = None
     """Of the motors after that setpoint, see ``motor_step``; None without thermal data."""
 
@@ -108,8 +102,7 @@ class Output(NamedTuple):
     """Distance of the surface of each leg to the nearest other leg [m]; empty without limit."""
     motors: tuple[float, ...] = ()
     """Begin of a row of motors, see ``motor_step``; empty without ``drive.*``."""
-    state: State = State()
-    """For the next setpoint."""
+    state: State = State()  # for the next setpoint
 
     @property
     def solvable(self) -> bool:
@@ -120,16 +113,11 @@ class Output(NamedTuple):
 class Batch(NamedTuple):
     """Sequence of N setpoints."""
 
-    stamps: Stamps
-    """(N,) [ns]"""
-    motions: Array
-    """Rows of motion (N, 24), laid out as for ``inverse_dynamics``."""
-    wrenches: Array
-    """(N, 6) [N, N m], or one row for all."""
-    restarts: Flags
-    """(N,): time has jumped back before the setpoint."""
-    times: Stamps
-    """Time of arrival of the message that completed each (N,) [ns]."""
+    stamps: Stamps  # (N,) [ns]
+    motions: Array  # rows of motion (N, 24), laid out as for ``inverse_dynamics``
+    wrenches: Array  # (N, 6) [N, N m], or one row for all
+    restarts: Flags  # (N,): time has jumped back before the setpoint
+    times: Stamps  # time of arrival of the message that completed each (N,) [ns]
     bases: Array | None = None
     """Rows of the base's motion (N, 12), nan where unknown; None if the base is fixed."""
     stamped: Flags | None = None
@@ -150,30 +138,20 @@ class Batch(NamedTuple):
 class Outputs(NamedTuple):
     """Results of the step for the N setpoints of a batch that could be answered."""
 
-    answered: Flags
-    """Mask of the batch: setpoints that could be answered; the others overflow."""
-    stamps: Stamps
-    """(N,) [ns]"""
+    answered: Flags  # mask of the batch: setpoints that could be answered; the others overflow
+    stamps: Stamps  # (N,) [ns]
     results: Array
     """Rows of results (N, 27), laid out as for ``inverse_dynamics``; missing forces are nan."""
     forces: Array
     """As published (N, 6): clipped to limits.force_max; nan where suppressed or not solved."""
-    states: Array
-    """Rows of Singularity (N, STATE)."""
-    changed: Flags
-    """(N,): the singularity warning has changed."""
-    exceeding: Flags
-    """(N,): a limit is exceeded."""
-    jumped: Flags
-    """(N,): the legs cannot follow from the last setpoint that was not a jump."""
-    joint_angles: Array
-    """Rows of joint angles (N, 12) [rad], or (N, 0), as in Output."""
-    clearances: Array
-    """(N, 6) [m], or (N, 0), as in Output."""
-    motors: Array
-    """Rows of motors (N, MOTOR_ROW), or (N, 0); see ``motor_step``."""
-    state: State = State()
-    """For the next setpoint."""
+    states: Array  # rows of Singularity (N, STATE)
+    changed: Flags  # (N,): the singularity warning has changed
+    exceeding: Flags  # (N,): a limit is exceeded
+    jumped: Flags  # (N,): the legs cannot follow from the last setpoint that was not a jump
+    joint_angles: Array  # rows of joint angles (N, 12) [rad], or (N, 0), as in Output
+    clearances: Array  # (N, 6) [m], or (N, 0), as in Output
+    motors: Array  # rows of motors (N, MOTOR_ROW), or (N, 0); see ``motor_step``
+    state: State = State()  # for the next setpoint
 
     @property
     def lengths(self) -> Array:

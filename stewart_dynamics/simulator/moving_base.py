@@ -53,12 +53,9 @@ _SHORTEST_RAMP = 1e-9  # shorter than any time step: none [s]
 class Harmonics(NamedTuple):
     """``x_i(t) = sum_k amplitudes_ki sin(frequencies_ki t + phases_ki)``, of six axes."""
 
-    amplitudes: Array
-    """(K, 6) [m, rad]"""
-    frequencies: Array
-    """(K, 6) [rad/s]"""
-    phases: Array
-    """(K, 6) [rad]"""
+    amplitudes: Array  # (K, 6) [m, rad]
+    frequencies: Array  # (K, 6) [rad/s]
+    phases: Array  # (K, 6) [rad]
 
     def at(self, times: Array) -> tuple[Array, Array, Array]:
         """Return x, its first and its second derivative (..., 6) at times (...) [s]."""
@@ -133,14 +130,11 @@ _AT_ONCE = 16
 class BasePeriod(NamedTuple):
     """How the base moves in a period."""
 
-    rows: Array
-    """At its begin, middle and end, (3, BASE), see ``mechanics.rows``."""
+    rows: Array  # at its begin, middle and end, (3, BASE), see ``mechanics.rows``
     pose: tuple[float, ...] = ()
     """Of the base frame in the world at its end, position and quaternion x y z w; if known."""
-    twist: tuple[float, ...] = ()
-    """World axes [m/s, rad/s]."""
-    acceleration: tuple[float, ...] = ()
-    """World axes [m/s^2, rad/s^2]."""
+    twist: tuple[float, ...] = ()  # world axes [m/s, rad/s]
+    acceleration: tuple[float, ...] = ()  # world axes [m/s^2, rad/s^2]
 
 
 class GeneratedBase:

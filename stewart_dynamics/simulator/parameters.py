@@ -30,8 +30,7 @@ from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
 _POSE = 'X Y Z alpha beta gamma'
 
-FORCE, TORQUE = 'force', 'torque'
-"""Values of commands."""
+FORCE, TORQUE = 'force', 'torque'  # values of commands
 
 _OWN = (
     Parameter('initial_pose', 'double', 'X Y Z alpha beta gamma, where the brakes hold the '

@@ -133,19 +133,15 @@ _NUMBERS = Struct(f'{STATE + _OF_MOTORS.stop}d')
 class PlantState(NamedTuple):
     """The hexapod at the end of a period."""
 
-    lengths: Six
-    """[m]"""
-    rates: Six
-    """[m/s]"""
+    lengths: Six  # [m]
+    rates: Six  # [m/s]
     forces: Six
     """Of the actuators, without end stops [N]: the commands as they saturated; under torques the
     forces at the end of the period."""
     pose: tuple[float, ...]
     """Position and quaternion x y z w of the platform frame in the base frame."""
-    twist: Six
-    """Base axes [m/s, rad/s]."""
-    acceleration: Six
-    """Base axes [m/s^2, rad/s^2]."""
+    twist: Six  # base axes [m/s, rad/s]
+    acceleration: Six  # base axes [m/s^2, rad/s^2]
     motors: tuple[float, ...] = ()
     """Angles [rad], speeds [rad/s] and torques [N m] (18,); empty without ``drive.*``."""
 
@@ -166,11 +162,9 @@ class Plant:
         self.parameters = parameters
         self.substeps = substeps(parameters)
         """Steps that are taken within one of the parameter's length."""
-        self.fault = ''
-        """Why it is held at rest permanently; empty while it is not."""
+        self.fault = ''  # why it is held at rest permanently; empty while it is not
         period = 1.0 / parameters['rate']
-        self.steps = round(period / parameters['step']) * self.substeps
-        """Steps in a period."""
+        self.steps = round(period / parameters['step']) * self.substeps  # steps in a period
         self._step = period / self.steps
         self._limits = Limits(parameters)
         self._loads = np.array(NO_WRENCH + NO_WRENCH + 3 * NO_BASE)
@@ -188,8 +182,7 @@ class Plant:
             *drives, parameters['commands'] == TORQUE, stops_of(parameters),
             self._limits.force_max, self._loads, self._state, self._result, steps, self._step,
             np.empty(SCRATCH), np.empty(WORK)) for steps in (0, self.steps))
-        self.state = self._run(0)._replace(acceleration=NO_WRENCH)
-        """The present one."""
+        self.state = self._run(0)._replace(acceleration=NO_WRENCH)  # the present one
         self._check_lengths()
         self._deviations = np.repeat([
             parameters['noise.length'], parameters['noise.rate'], parameters['noise.force']], 6)

@@ -36,24 +36,16 @@ from stewart_dynamics.mechanics.vectors import (
 class LegDynamics(NamedTuple):
     """A leg in a motion: its length and rate, and the forces that move it."""
 
-    length: float
-    """[m]"""
-    rate: float
-    """[m/s]"""
-    force: Vector3
-    """On the leg at its platform joint, to move the leg [N], base axes."""
-    moment: Vector3
-    """Of that force about the platform's origin [N m]."""
+    length: float  # [m]
+    rate: float  # [m/s]
+    force: Vector3  # on the leg at its platform joint, to move the leg [N], base axes
+    moment: Vector3  # of that force about the platform's origin [N m]
     actuator: float
     """Force [N] that moves the actuator itself: its reflected mass and its friction."""
-    row: Vector6
-    """The leg's row of J_inv, its right half divided by the characteristic length."""
-    row_rate: Vector6
-    """Time derivative of that row."""
-    arm: Vector3
-    """a = R p: the platform joint from the platform's origin, base axes [m]."""
-    inertia: float
-    """Effective mass across the leg, I_e / L^2 + m_ce [kg]."""
+    row: Vector6  # the leg's row of J_inv, its right half divided by the characteristic length
+    row_rate: Vector6  # time derivative of that row
+    arm: Vector3  # a = R p: the platform joint from the platform's origin, base axes [m]
+    inertia: float  # effective mass across the leg, I_e / L^2 + m_ce [kg]
 
 
 @inlined

@@ -46,24 +46,16 @@ CONSTANTS = _FIRST_LEG + 6 * _LEG
 class Leg(NamedTuple):
     """The constants of one leg but for its joints."""
 
-    piston_mass: float
-    """[kg]"""
-    piston_center: float
-    """Distance of its center of mass from the platform joint [m]."""
-    cylinder_moment: float
-    """Mass times distance of the center of mass from the base joint [kg m]."""
+    piston_mass: float  # [kg]
+    piston_center: float  # distance of its center of mass from the platform joint [m]
+    cylinder_moment: float  # mass times distance of the center of mass from the base joint [kg m]
     joint_inertia: float
     """About the base joint: cylinder mass * CoM^2 + the inertias of both parts [kg m^2]."""
-    reflected_mass: float
-    """Of the actuator [kg]."""
-    viscous_friction: float
-    """[N s/m]"""
-    coulomb_friction: float
-    """[N]"""
-    coulomb_velocity: float
-    """Rate below which Coulomb friction is linear [m/s]."""
-    cylinder_mass: float
-    """[kg]"""
+    reflected_mass: float  # of the actuator [kg]
+    viscous_friction: float  # [N s/m]
+    coulomb_friction: float  # [N]
+    coulomb_velocity: float  # rate below which Coulomb friction is linear [m/s]
+    cylinder_mass: float  # [kg]
 
 
 def hexapod_constants(p: Parameters) -> Array:

@@ -40,8 +40,7 @@ from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 (PLATFORM, CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND, PISTON_MASS, PISTON_FIRST,
  PISTON_SECOND, REFLECTED_MASS, VISCOUS_FRICTION, COULOMB_FRICTION, OFFSET) = consecutive(
      10, *10 * [6])
-LINEAR = OFFSET.stop
-"""The number of parameters."""
+LINEAR = OFFSET.stop  # the number of parameters
 
 # Indices of the ten parameters of the platform.
 MASS, FIRST_MOMENT, INERTIA = 0, slice(1, 4), slice(4, 10)
@@ -57,8 +56,7 @@ _LEG_KINDS = (
 _PLATFORM_UNITS = ('kg', *3 * ['kg m'], *6 * ['kg m^2'])
 _LEG_UNITS = ('kg', 'kg m', 'kg m^2', 'kg', 'kg m', 'kg m^2', 'kg', 'N s/m', 'N', 'N')
 
-UNITS = (*_PLATFORM_UNITS, *(unit for unit in _LEG_UNITS for _ in range(6)))
-"""Of each parameter."""
+UNITS = (*_PLATFORM_UNITS, *(unit for unit in _LEG_UNITS for _ in range(6)))  # of each parameter
 
 # A moment of inertia that rounding made negative is taken as zero, by the second moment.
 _ROUNDING = 1e-9

@@ -52,12 +52,9 @@ _YAWS = np.deg2rad(np.arange(0.0, 360.0, 10.0))
 class Shape(NamedTuple):
     """A hexapod's joints in axes of which the third is the normal of the base joints' plane."""
 
-    base: Array
-    """From their center (6, 3) [m]."""
-    platform: Array
-    """From their center (6, 3) [m], while the axes of both frames are parallel."""
-    axes: Array
-    """Those axes in the base frame (3, 3), row by row."""
+    base: Array  # from their center (6, 3) [m]
+    platform: Array  # from their center (6, 3) [m], while the axes of both frames are parallel
+    axes: Array  # those axes in the base frame (3, 3), row by row
     base_radius: float
     platform_radius: float
 
@@ -72,23 +69,17 @@ class Reach(NamedTuple):
 
     yaw: float | None
     """The angle nearest to 0 at which all legs are within them at some height; else None."""
-    longest: float
-    """The longest leg to be expected [m]."""
-    side: float
-    """1 where the platform is where the normal points, else -1."""
-    certain: bool
-    """The parameters give the side; otherwise it is assumed."""
+    longest: float  # the longest leg to be expected [m]
+    side: float  # 1 where the platform is where the normal points, else -1
+    certain: bool  # the parameters give the side; otherwise it is assumed
 
 
 class Home(NamedTuple):
     """The height of the platform at home."""
 
-    heights: Array
-    """Along the normal from the base joints' center, the most likely first (N,) [m]."""
-    yaw: float
-    """Turn about the normal [rad]."""
-    length: float | None
-    """Of the mean leg [m]; None if the parameters do not give it."""
+    heights: Array  # along the normal from the base joints' center, the most likely first (N,) [m]
+    yaw: float  # turn about the normal [rad]
+    length: float | None  # of the mean leg [m]; None if the parameters do not give it
 
     @property
     def text(self) -> str:

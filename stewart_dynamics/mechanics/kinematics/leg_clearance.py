@@ -51,8 +51,7 @@ from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, norm, put3, read3, read9, rotate_back, scale, subtract, Vector3)
 from stewart_dynamics.parameters.table import BASE_OUTLINE, LEG_SHAPE, Parameters, PLATFORM_OUTLINE
 
-BASE, PLATFORM = 6, 7
-"""Numbers of the plates, where 0 to 5 are legs."""
+BASE, PLATFORM = 6, 7  # numbers of the plates, where 0 to 5 are legs
 
 # The axis of a leg in scratch memory: base joint, direction, length, length of the cylinder.
 _BASE, _DIRECTION, _LENGTH, _CYLINDER, _AXIS = 0, 3, 6, 7, 8

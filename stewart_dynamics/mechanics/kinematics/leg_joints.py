@@ -63,10 +63,8 @@ _UPRIGHT = 1e-3
 class HomeDirections(NamedTuple):
     """The directions of the legs at home, from base joint to platform joint."""
 
-    base: Array
-    """Base axes (6, 3)."""
-    platform: Array
-    """Platform axes (6, 3)."""
+    base: Array  # base axes (6, 3)
+    platform: Array  # platform axes (6, 3)
 
 
 class TreeJoints:

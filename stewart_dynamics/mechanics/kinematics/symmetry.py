@@ -46,8 +46,7 @@ class OddJoint(NamedTuple):
     """A joint that breaks a symmetry of the other five."""
 
     joint: int
-    expected: Array
-    """Where it would be symmetric (3,) [m]."""
+    expected: Array  # where it would be symmetric (3,) [m]
     symmetry: str
 
 

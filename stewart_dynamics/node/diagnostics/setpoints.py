@@ -51,8 +51,7 @@ class SetpointDiagnostics(StatusPart):
         self._timeout: float = parameters['setpoint.timeout']
         self._tolerance: float = parameters['setpoint.sync_tolerance']
         self._answers = answers
-        self.heard = dict.fromkeys(topics, NEVER)
-        """When the last message came on each topic."""
+        self.heard = dict.fromkeys(topics, NEVER)  # when the last message came on each topic
         self._writers: dict[str, int] = {}
         self._readers: dict[str, int] = {}
         self._namesakes = '', 1
