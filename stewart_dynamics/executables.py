@@ -32,11 +32,7 @@ def executable(name: str) -> Path:
     A virtual environment is searched before the workspaces that are sourced, any other Python
     after them.
 
-    Raises
-    ------
-    StewartError
-        Not found; the message lists the folders that were searched.
-
+    Raises StewartError: not found; the message lists the folders that were searched.
     """
     beside = Path(sys.executable).parent
     prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)

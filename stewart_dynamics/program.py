@@ -40,15 +40,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Program:
-    """
-    A program: its output and its end.
-
-    Parameters
-    ----------
-    name : str
-        Name of the executable, in front of each message on stderr.
-
-    """
+    """A program: its output and its end."""
 
     def __init__(self, name: str) -> None:
         self.name = name

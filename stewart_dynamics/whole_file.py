@@ -33,20 +33,9 @@ def read_text(path: str | Path, largest: int, error: type[StewartError]) -> str:
     """
     Return the text of a regular file of UTF-8.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file; a pipe or a device is rejected without waiting for it.
-    largest : int
-        Largest size [bytes].
-    error : type
-        Class of the error that is raised.
-
-    Raises
-    ------
-    StewartError
-        In one line: the file cannot be read, is too large or is not UTF-8.
-
+    path: the file; a pipe or a device is rejected without waiting for it.
+    largest: largest size [bytes].
+    Raises StewartError: in one line: the file cannot be read, is too large or is not UTF-8.
     """
     try:
         with open(os.fspath(path), 'rb', opener=_without_waiting) as file:
@@ -98,11 +87,7 @@ def write_files(files: Mapping[Path, str | bytes]) -> None:
     their names. Existing files are replaced, and kept where writing fails. Text is UTF-8; names in
     it that are not UTF-8 are written with escapes.
 
-    Raises
-    ------
-    OSError
-        With the name of the file that cannot be written.
-
+    Raises OSError: with the name of the file that cannot be written.
     """
     partial: dict[Path, Path] = {}
     try:

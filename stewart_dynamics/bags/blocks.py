@@ -48,15 +48,9 @@ class Source(Protocol):
     """
     A file of a recording.
 
-    Attributes
-    ----------
-    missing : list of str
-        Descriptions of the parts that could not be read so far.
-    unchecked : bool
-        Messages without a checksum were read.
-    topics : dict
-        The type of each topic, and its encoding if that is not CDR.
-
+    missing: descriptions of the parts that could not be read so far.
+    unchecked: messages without a checksum were read.
+    topics: the type of each topic, and its encoding if that is not CDR.
     """
 
     missing: list[str]
@@ -70,11 +64,7 @@ class Source(Protocol):
         """
         Yield messages in the order of time, and the number of bytes read for them.
 
-        Parameters
-        ----------
-        keys : mapping
-            From topics in the file to the names under which their messages are given.
-
+        keys: from topics in the file to the names under which their messages are given.
         """
 
     def close(self) -> None:

@@ -45,15 +45,10 @@ def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
     bags below it; otherwise each of its files is a bag. Symbolic links, hidden names and
     results of replays are skipped.
 
-    Parameters
-    ----------
-    path : Path
-        A path that is not a folder is returned as it is, even if it does not exist.
-    leave_out : Path, optional
-        A folder that is not searched: the folder of the results.
+    path: a path that is not a folder is returned as it is, even if it does not exist.
+    leave_out: a folder that is not searched: the folder of the results.
 
     Raises BagError if there is no bag.
-
     """
     if not path.is_dir():
         return [path]
@@ -102,15 +97,10 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
     """
     Return the files of a bag in their order.
 
-    Parameters
-    ----------
-    bag : Path
-        A file, or a folder with the metadata of rosbag2 or without.
-    missing, notices : list of str
-        Listed files that do not exist, and notices to the user, are appended.
+    bag: a file, or a folder with the metadata of rosbag2 or without.
+    missing, notices: listed files that do not exist, and notices to the user, are appended.
 
     Raises BagError if there is no file, or if a listed file is outside of the folder.
-
     """
     if not bag.is_dir():
         if not bag.is_file():

@@ -90,20 +90,13 @@ def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> N
     """
     List the messages of some channels, and all records that are not messages.
 
-    Parameters
-    ----------
-    data : (M,)
-        The bytes of the records. The scan ends where the fields that it reads are not in them,
-        where the lengths in a message or a message index are inconsistent, or at an opcode that
-        is not valid.
-    numbers : (65536,)
-        Number of the topic of each channel, or IGNORED.
-    found : (4, K)
-        Output: see Scan. Records beyond K are only counted.
-    totals : (2,)
-        In: bits of the valid opcodes, and the end that no record may exceed. Output: K and end,
-        see Scan.
-
+    data (M,): the bytes of the records. The scan ends where the fields that it reads are not in
+        them, where the lengths in a message or a message index are inconsistent, or at an opcode
+        that is not valid.
+    numbers (65536,): number of the topic of each channel, or IGNORED.
+    found (4, K): output: see Scan. Records beyond K are only counted.
+    totals (2,): in: bits of the valid opcodes, and the end that no record may exceed. Output: K
+        and end, see Scan.
     """
     count = at = 0
     while at + 9 <= len(data):

@@ -51,15 +51,9 @@ class Recording:
 
     Raises BagError if nothing of it can be read, with the reason in one line.
 
-    Attributes
-    ----------
-    topics : dict
-        The type of each topic in it.
-    missing : list of str
-        Descriptions of the parts that could not be read so far.
-    notices : list of str
-        Notices to the user about the reading of the bag.
-
+    topics: the type of each topic in it.
+    missing: descriptions of the parts that could not be read so far.
+    notices: notices to the user about the reading of the bag.
     """
 
     def __init__(self, path: Path) -> None:
@@ -98,11 +92,7 @@ class Recording:
         """
         Yield the messages of some topics, and the number of bytes read for them.
 
-        Parameters
-        ----------
-        keys : mapping
-            From topics in the bag to the names under which their messages are given.
-
+        keys: from topics in the bag to the names under which their messages are given.
         """
         for file, source in self._sources:
             most, count = _MESSAGES + file.stat().st_size, 0

@@ -67,13 +67,8 @@ def design_poses(platform: StewartPlatform, count: int, noise: Noise = NOISE, se
     """
     Return poses from which the geometry is identifiable, and its predicted intervals.
 
-    Raises
-    ------
-    ParameterError
-        A limit of length is missing, or home is not within the limits.
-    StewartError
-        Too few poses are within the limits.
-
+    Raises ParameterError: a limit of length is missing, or home is not within the limits.
+    Raises StewartError: too few poses are within the limits.
     """
     random = np.random.default_rng(seed)
     p = platform.parameters

@@ -68,15 +68,9 @@ class Equations(NamedTuple):
     """
     N measured poses.
 
-    Attributes
-    ----------
-    lengths : (N, 6)
-        Positions of the legs, which are zero at their zero length [m].
-    pose : Pose
-        Poses (N,) of the target in the device's frame.
-    frames : Frames
-        Frames that the unknown frames are relative to.
-
+    lengths (N, 6): positions of the legs, which are zero at their zero length [m].
+    pose: poses (N,) of the target in the device's frame.
+    frames: frames that the unknown frames are relative to.
     """
 
     lengths: Array

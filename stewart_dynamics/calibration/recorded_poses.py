@@ -54,11 +54,7 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
 
     ``measured`` and ``pose`` are topics; by default the usual one, or the only one of its type.
 
-    Raises
-    ------
-    BagError
-        The bag cannot be read, a topic is not found, or nothing was measured at rest.
-
+    Raises BagError: the bag cannot be read, a topic is not found, or nothing was measured at rest.
     """
     with closing(Recording(path)) as recording:
         topics = {

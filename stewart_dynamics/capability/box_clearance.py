@@ -237,26 +237,16 @@ def clearance_in_box(constants: Array, axes: Array, shapes: Array, base: Array, 
     """
     Prove that no leg is nearer than a limit to another one, or to a plate, over a box.
 
-    Parameters
-    ----------
-    constants, axes, row, pivot, box, legs, cells
-        As in ``box_legs.legs_in_box``.
-    shapes, base, platform : (6, 3), (M, 3), (M, 3)
-        As in ``leg_clearance``.
-    limit : float
-        Smallest clearance [m].
-    most : int
-        Largest number of cells for each pair.
-    coarse : float
-        The largest excess of a pair that does not keep the limit is found to this part; infinite:
-        the search ends with the first pair that does not.
-    memory : (clearance_bounds.rows_of(plates, 6), CORNER)
-        Scratch memory.
-    found : (PAIRS, FOUND)
-        Written: for each pair the largest excess found, a bound of the excess [m], and the point
-        [d; r]; minus infinity where there is no plate. A pair that keeps the limit everywhere is
-        not searched further.
-
+    constants, axes, row, pivot, box, legs, cells: as in ``box_legs.legs_in_box``.
+    shapes, base, platform (6, 3), (M, 3), (M, 3): as in ``leg_clearance``.
+    limit: smallest clearance [m].
+    most: largest number of cells for each pair.
+    coarse: the largest excess of a pair that does not keep the limit is found to this part;
+        infinite: the search ends with the first pair that does not.
+    memory (clearance_bounds.rows_of(plates, 6), CORNER): scratch memory.
+    found (PAIRS, FOUND): written: for each pair the largest excess found, a bound of the excess
+        [m], and the point [d; r]; minus infinity where there is no plate. A pair that keeps the
+        limit everywhere is not searched further.
     """
     bodies = bodies_in(memory, 6, shapes, len(base))
     prepare_legs(constants, axes, row, pivot, legs)

@@ -123,21 +123,14 @@ def condition_in_box(constants: Array, axes: Array, row: Array, pivot: Array, bo
     """
     Prove that the condition number stays below ``stop`` over a box, and det(J) its sign.
 
-    Parameters
-    ----------
-    constants, axes, row, pivot, box, most, legs, cells
-        As in ``box_legs.legs_in_box``; det(J) must have the sign that it has at the pose.
-    stop : float
-        Condition number that must not be reached.
-    work : (7, WORK)
-        Scratch memory.
-    found : (FOUND,)
-        Written: largest condition number that was met less ``stop``, 0 where it is proven that it
-        stays below, else infinity, and the point [d; r]; the excess is infinite where det(J) has
-        changed its sign.
-    count : (1,)
-        Written: the number of cells.
-
+    constants, axes, row, pivot, box, most, legs, cells: as in ``box_legs.legs_in_box``; det(J)
+        must have the sign that it has at the pose.
+    stop: condition number that must not be reached.
+    work (7, WORK): scratch memory.
+    found (FOUND,): written: largest condition number that was met less ``stop``, 0 where it is
+        proven that it stays below, else infinity, and the point [d; r]; the excess is infinite
+        where det(J) has changed its sign.
+    count (1,): written: the number of cells.
     """
     prepare_legs(constants, axes, row, pivot, legs)
     weights = work[6]

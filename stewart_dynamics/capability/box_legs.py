@@ -203,24 +203,15 @@ def legs_in_box(constants: Array, axes: Array, bounds: Array, row: Array, pivot:
     """
     Write the largest excess of each limit of lengths and joint angles over a box.
 
-    Parameters
-    ----------
-    constants, axes, bounds : (CONSTANTS,), (12, 3), (5, 6)
-        As in ``travel.travels``; the clearance is that of ``clearance_in_box``.
-    row : (MOTION,)
-        Pose from which the box is measured.
-    pivot : (3,)
-        Center of rotation, platform frame [m].
-    box : (12,)
-        Middle and half widths of translation [m] and rotation vector [rad].
-    most : int
-        Largest number of cells for each limit of each leg.
-    legs, cells : (6, LEG), (DEPTH + 2, CELL)
-        Scratch memory.
-    found : (24, FOUND)
-        Written: for each code and leg the largest excess found [m, rad], a bound of the excess,
-        and the point [d; r]; minus infinity where there is no limit.
-
+    constants, axes, bounds (CONSTANTS,), (12, 3), (5, 6): as in ``travel.travels``; the clearance
+        is that of ``clearance_in_box``.
+    row (MOTION,): pose from which the box is measured.
+    pivot (3,): center of rotation, platform frame [m].
+    box (12,): middle and half widths of translation [m] and rotation vector [rad].
+    most: largest number of cells for each limit of each leg.
+    legs, cells (6, LEG), (DEPTH + 2, CELL): scratch memory.
+    found (24, FOUND): written: for each code and leg the largest excess found [m, rad], a bound of
+        the excess, and the point [d; r]; minus infinity where there is no limit.
     """
     prepare_legs(constants, axes, row, pivot, legs)
     for code in range(4):

@@ -114,17 +114,7 @@ def pairs_with(other: int) -> int:
 
 @inlined
 def pair_of(bodies: Bodies, leg: int, other: int, pair: int) -> tuple[Body, Body, float]:
-    """
-    Return a body of a leg, one of a leg or plate, and the sum of their radii.
-
-    Parameters
-    ----------
-    bodies : Bodies
-        All bodies.
-    leg, other, pair : int
-        Leg, other leg or plate, and which pair of theirs.
-
-    """
+    """Return a body of a leg, one of a leg or plate, and the sum of their radii."""
     first, shapes = OF_LEG * leg, bodies.shapes
     cylinder = (first, CYLINDER, first + CYLINDER + 1)
     piston = (first, PLATFORM_JOINT, first + OF_LEG)

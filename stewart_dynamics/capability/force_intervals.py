@@ -26,18 +26,9 @@ def largest_multiple(values: Array, changes: Array, bounds: Array) -> Array:
     """
     Return the largest t >= 0 with ``|values + t changes| <= bounds``.
 
-    Parameters
-    ----------
-    values, changes : (..., 6)
-        Leg forces or rates, and their change for t = 1.
-    bounds : (6,)
-        Largest magnitudes.
-
-    Returns
-    -------
-    (..., 6)
-        0 where the bound is exceeded at t = 0, infinity where it is never reached.
-
+    values, changes (..., 6): leg forces or rates, and their change for t = 1.
+    bounds (6,): largest magnitudes.
+    Returns (..., 6): 0 where the bound is exceeded at t = 0, infinity where it is never reached.
     """
     room = np.where(changes > 0.0, bounds - values, bounds + values)
     with np.errstate(divide='ignore', invalid='ignore'):
@@ -50,23 +41,12 @@ def quadratic_exit(values: tuple[Array, ...], bounds: Array, begin: Array, end: 
     """
     Return the first k in [begin, end] with ``|c + k b + k^2 a| > bound + k slope``.
 
-    Parameters
-    ----------
-    values : three of (..., 6)
-        Coefficients c, b and a of leg forces, or torques.
-    bounds : (..., 6)
-        Largest magnitudes at k = 0.
-    begin, end : (..., 6) or ()
-        Ends of the interval of each leg.
-    slopes : (..., 6)
-        Changes of the bounds for k = 1.
-
-    Returns
-    -------
-    (..., 6)
-        ``begin`` where the bound is exceeded there, infinity where it is not exceeded up to
-        ``end``.
-
+    values (three of (..., 6)): coefficients c, b and a of leg forces, or torques.
+    bounds (..., 6): largest magnitudes at k = 0.
+    begin, end (..., 6) or (): ends of the interval of each leg.
+    slopes (..., 6): changes of the bounds for k = 1.
+    Returns (..., 6): ``begin`` where the bound is exceeded there, infinity where it is not
+        exceeded up to ``end``.
     """
     constant, linear, square = values
     first = np.full(np.broadcast_shapes(constant.shape, begin.shape, end.shape), np.inf)

@@ -67,21 +67,9 @@ class Growth:
     """
     Ratios of a motion's samples to limits, (N, 6 M): six legs for each of ``names``.
 
-    Parameters
-    ----------
-    platform : StewartPlatform
-        The hexapod.
-    limits : mapping
-        Limits that are set, by name.
-    motors : MotorBounds or None
-        Limits of the motors.
-    deviations : Deviations
-        The motion.
-    wrench : (6,) or (N, 6), optional
-        External wrench.
-    base : BaseMotion of shape () or (N,), optional
-        Motion of the base.
-
+    limits: limits that are set, by name.
+    wrench (6,) or (N, 6): external wrench.
+    base () or (N,): motion of the base.
     """
 
     def __init__(self, platform: StewartPlatform, limits: Mapping[str, Array],
@@ -105,11 +93,7 @@ class Growth:
 
         With its sample and column, or None.
 
-        Raises
-        ------
-        MotionError
-            The intervals in which that is proven are too many or too narrow.
-
+        Raises MotionError: the intervals in which that is proven are too many or too narrow.
         """
         found, last = None, min(most, LARGEST)
         for first in range(0, self._count, _BLOCK):
@@ -214,17 +198,9 @@ class Growth:
         """
         Return bounds of the ratios' magnitudes (N, 6 M) between two factors.
 
-        Parameters
-        ----------
-        middle : _State
-            Samples in the middle of the intervals.
-        begin, end : (N, Q, 6)
-            Smooth quantities at both ends.
-        widths, which : (N,)
-            Widths of the intervals, and samples.
-        chord : bool
-            Bounds follow from the chord between the ends instead of from the middle.
-
+        begin, end (N, Q, 6): smooth quantities at both ends.
+        widths, which (N,): widths of the intervals, and samples.
+        chord: bounds follow from the chord between the ends instead of from the middle.
         """
         p = self._platform.parameters
         off = self._bounds(

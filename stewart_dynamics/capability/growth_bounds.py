@@ -73,13 +73,8 @@ class Disc:
     numbers are multiplied as ``sum a_k b_k``, without conjugation, so that the results are
     analytic; ``|a . b|`` and ``|a x b|`` are at most ``|a| |b|`` all the same.
 
-    Parameters
-    ----------
-    center : (N, M) or (3, N, M)
-        Numbers, or vectors.
-    radius : (N, M)
-        Distance; 0 by default.
-
+    center (N, M) or (3, N, M): numbers, or vectors.
+    radius (N, M): distance; 0 by default.
     """
 
     def __init__(self, center: Array, radius: Array | float = 0.0) -> None:
@@ -152,14 +147,6 @@ class GrowthBounds:
 
     Rates and forces of the legs; speeds of the motors, loads of the screws, and torques with both
     factors of ``MotorBounds``.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        The hexapod.
-    motors : MotorBounds or None
-        Limits of its motors.
-
     """
 
     def __init__(self, parameters: Parameters, motors: MotorBounds | None) -> None:
@@ -174,21 +161,13 @@ class GrowthBounds:
 
         Infinite where unknown.
 
-        Parameters
-        ----------
-        rows : (N, MOTION)
-            Rows of motion in the middle of the intervals.
-        forces, per_load : (N, 6)
-            Leg forces there, without Coulomb friction, and those under a unit load.
-        changes : (N, 3, 6)
-            Displacement, rate and acceleration for k = 1.
-        base : (N, BASE)
-            Motion of the base.
-        widths : (N,)
-            Widths of the intervals.
-        chord : bool
-            Bounds are those of the distance from the chord instead.
-
+        rows (N, MOTION): rows of motion in the middle of the intervals.
+        forces, per_load (N, 6): leg forces there, without Coulomb friction, and those under a unit
+            load.
+        changes (N, 3, 6): displacement, rate and acceleration for k = 1.
+        base (N, BASE): motion of the base.
+        widths (N,): widths of the intervals.
+        chord: bounds are those of the distance from the chord instead.
         """
         at = lagrange.unchecked_legs(
             self._p, rows[:, POSITION], rows[:, ROTATION].reshape(-1, 3, 3))

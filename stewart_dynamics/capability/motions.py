@@ -50,18 +50,9 @@ class Deviations:
     """
     The deviations of a motion's samples from a pose.
 
-    Parameters
-    ----------
-    center : Motion of one sample
-        At rest.
-    rows : (N, MOTION)
-        Rows of motion.
-
-    Attributes
-    ----------
-    changes : (N, 3, 6)
-        Displacement and rotation vector, their rates and accelerations.
-
+    center: at rest.
+    rows (N, MOTION): rows of motion.
+    changes (N, 3, 6): displacement and rotation vector, their rates and accelerations.
     """
 
     def __init__(self, center: Motion, rows: Array) -> None:
@@ -110,19 +101,10 @@ def timed(platform: StewartPlatform, times: ArrayLike, motion: Any,
     """
     Return the answer to a question about a motion, between its samples, too.
 
-    Parameters
-    ----------
-    platform : StewartPlatform
-        Its limits say which intervals need samples.
-    times : (N,)
-        Times of the samples [s], strictly increasing.
-    motion : Motion of shape (N,)
-        The samples.
-    ask : callable
-        Takes samples and a factor that need not be exceeded; returns an Extent.
-    grown : callable
-        Takes rows of motion and a factor; returns those of the motion at its limit.
-
+    platform: its limits say which intervals need samples.
+    times (N,): times of the samples [s], strictly increasing.
+    ask: takes samples and a factor that need not be exceeded; returns an Extent.
+    grown: takes rows of motion and a factor; returns those of the motion at its limit.
     """
     check_kind(motion, Motion)
     seconds = as_array('times', times, motion.shape or (1,))

@@ -50,22 +50,11 @@ class MotorBounds:
     where the leg moves, that of the motor that drives or is driven; near standstill both count, as
     in ``drives.motors``.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        With ``drive.*``.
-
-    Attributes
-    ----------
-    limited, limits_speeds : bool
-        There is a limit of torques, of speeds.
-    inertia : (6,)
-        At the motors' shafts [kg m^2].
-    scales : two of (6,)
-        Torques per load [m]: of the motor that drives, and of the one that is driven.
-    fastest : (6,)
-        ``drive.speed_max``, or infinity [rad/s].
-
+    limited, limits_speeds: there is a limit of torques, of speeds.
+    inertia (6,): at the motors' shafts [kg m^2].
+    scales (two of (6,)): torques per load [m]: of the motor that drives, and of the one that is
+        driven.
+    fastest (6,): ``drive.speed_max``, or infinity [rad/s].
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -120,15 +109,9 @@ class MotorBounds:
         """
         Return bounds of ``ratios`` in an interval.
 
-        Parameters
-        ----------
-        low, high : (6, N, 6)
-            Bounds of the quantities of ``GrowthBounds``.
-        friction : two of (N, 6)
-            Bounds of the Coulomb friction, low and high [N].
-        band : (6,)
-            Rates below which a leg is near standstill.
-
+        low, high (6, N, 6): bounds of the quantities of ``GrowthBounds``.
+        friction (two of (N, 6)): bounds of the Coulomb friction, low and high [N].
+        band (6,): rates below which a leg is near standstill.
         """
         rates, speeds, load = ((low[n], high[n]) for n in (0, 2, 3))
         with np.errstate(invalid='ignore'):  # both factors count where loads are not bounded
@@ -164,25 +147,14 @@ class MotorBounds:
         """
         Return the first t in [begin, end] from which a torque exceeds the largest at its speed.
 
-        Parameters
-        ----------
-        load, own : three of (..., 6)
-            Coefficients of 1, t and t^2: loads of the screws [N], torques of the rotors [N m].
-        speeds : (..., 6)
-            [rad/s], where they grow at t = 1.
-        direction : (..., 6)
-            Signs of the rates of the legs; 0 near standstill.
-        begin, end : (..., 6) or ()
-            Ends of the interval of each leg.
-        growing : bool
-            Speeds grow with t.
-
-        Returns
-        -------
-        exits, limits : (..., 6)
-            ``begin`` where a torque is exceeded there, infinity where it is not exceeded up to
-            ``end``; names of the limits without ``drive.``.
-
+        load, own (three of (..., 6)): coefficients of 1, t and t^2: loads of the screws [N],
+            torques of the rotors [N m].
+        speeds (..., 6): [rad/s], where they grow at t = 1.
+        direction (..., 6): signs of the rates of the legs; 0 near standstill.
+        begin, end (..., 6) or (): ends of the interval of each leg.
+        growing: speeds grow with t.
+        Returns exits, limits (..., 6): ``begin`` where a torque is exceeded there, infinity where
+            it is not exceeded up to ``end``; names of the limits without ``drive.``.
         """
         constant, linear, square = load
         speeds = np.abs(speeds)

@@ -70,11 +70,8 @@ def smallest_and_largest(rows: Array) -> tuple[float, float, float]:
     """
     Return smallest and largest singular value and the determinant; writes the rows of the inverse.
 
-    Parameters
-    ----------
-    rows : (6, COLUMNS)
-        Rows of the scaled J_inv, of about length one; written: those of its inverse.
-
+    rows (6, COLUMNS): rows of the scaled J_inv, of about length one; written: those of its
+        inverse.
     """
     a, b, c = _read6(rows[0], ROW), _read6(rows[1], ROW), _read6(rows[2], ROW)
     d, e, f = _read6(rows[3], ROW), _read6(rows[4], ROW), _read6(rows[5], ROW)

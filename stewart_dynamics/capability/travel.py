@@ -85,36 +85,22 @@ def travels(constants: Array, axes: Array, bounds: Array, shapes: Array, base: A
     """
     Write the largest travel from each pose in its direction.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-    axes : (12, 3)
-        Axes of the joints, see ``joint_angles``; not read where an angle has no bound.
-    bounds : (5, 6)
-        Bounds of each leg by code: shortest and longest length [m], largest angles of base and
-        platform joint [rad], smallest clearance [m], the same for all; 0, infinity and minus
-        infinity where there is no bound.
-    shapes : (6, 3)
-        As in ``leg_clearance``; not read where the clearance has no bound.
-    base, platform : (M, 3)
-        Corners of the plates, likewise.
-    stop : float
-        Condition number that ends a travel.
-    poses : (N, MOTION)
-        Rows of motion, of which the pose is read.
-    directions : (N, 6)
-        Directions [v; w], base axes, not zero.
-    pivots : (N, 3)
-        Centers of rotation, platform frame [m].
-    values, limits, legs : (N,)
-        Written: multiple of the direction until the first limit, its code, and the leg, of two
-        legs that are too near the first; infinity, NOTHING and -1 if nothing limits, leg -1 at a
-        singularity. nan where the bounded number of steps does not decide whether a limit is
-        exceeded, with that limit.
-    memory : of shape ``memory_of``
-        Scratch memory.
-
+    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    axes (12, 3): axes of the joints, see ``joint_angles``; not read where an angle has no bound.
+    bounds (5, 6): bounds of each leg by code: shortest and longest length [m], largest angles of
+        base and platform joint [rad], smallest clearance [m], the same for all; 0, infinity and
+        minus infinity where there is no bound.
+    shapes (6, 3): as in ``leg_clearance``; not read where the clearance has no bound.
+    base, platform (M, 3): corners of the plates, likewise.
+    stop: condition number that ends a travel.
+    poses (N, MOTION): rows of motion, of which the pose is read.
+    directions (N, 6): directions [v; w], base axes, not zero.
+    pivots (N, 3): centers of rotation, platform frame [m].
+    values, limits, legs (N,): written: multiple of the direction until the first limit, its code,
+        and the leg, of two legs that are too near the first; infinity, NOTHING and -1 if nothing
+        limits, leg -1 at a singularity. nan where the bounded number of steps does not decide
+        whether a limit is exceeded, with that limit.
+    memory: scratch memory.
     """
     of_legs, work = memory[:6], memory[6:12]
     bodies = bodies_in(memory[12:], 1, shapes, len(base))

@@ -84,17 +84,10 @@ def section(platform: StewartPlatform, axes: Array, start: Motion, normal: int) 
     """
     Return the section through a pose, at its rotation, in a plane.
 
-    Parameters
-    ----------
-    platform : StewartPlatform
-        With ``limits.length_max``.
-    axes : (12, 3)
-        As in ``travel.travels``.
-    start : Motion of one sample
-        det(J) has the same sign in all of the section.
-    normal : int
-        Index of the base axis that is normal to the plane.
-
+    platform: with ``limits.length_max``.
+    axes (12, 3): as in ``travel.travels``.
+    start: det(J) has the same sign in all of the section.
+    normal: index of the base axis that is normal to the plane.
     """
     plane = _Plane(platform, start, normal)
     curves = list(_curves(platform, axes, start, normal))

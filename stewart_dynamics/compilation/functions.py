@@ -68,14 +68,9 @@ class EntryPoint:
 
     Its machine code is loaded, or compiled, at the first call.
 
-    Parameters
-    ----------
-    function : callable
-        The same in plain Python.
-    types : sequence of str
-        Types of the arguments: ``f8``, ``i8`` or ``b1``; arrays in C order with ``[::1]`` or
+    function: the same in plain Python.
+    types: types of the arguments: ``f8``, ``i8`` or ``b1``; arrays in C order with ``[::1]`` or
         ``[:,::1]``, those of bytes begin with ``u1``.
-
     """
 
     def __init__(self, function: Callable[..., None], types: Sequence[str]) -> None:

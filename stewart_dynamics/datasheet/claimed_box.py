@@ -38,12 +38,9 @@ def read_box(path: Path, parameters: Parameters) -> Array:
     Each of ``x``, ``y``, ``z``, ``rx``, ``ry``, ``rz`` has a lower and an upper bound, or one
     number for both signs; axes that are not named do not move.
 
-    Raises
-    ------
-    ParameterError
-        In one line: the file cannot be read, names another axis, all ranges are zero, or one is
-        beyond a turn or 100 times the size of the hexapod: then its unit is another one.
-
+    Raises ParameterError: in one line: the file cannot be read, names another axis, all ranges are
+        zero, or one is beyond a turn or 100 times the size of the hexapod: then its unit is
+        another one.
     """
     document = read_value(read_text(path, LARGEST, ParameterError), str(path))
     if not isinstance(document, dict) or not document:

@@ -88,11 +88,8 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     """
     Write a datasheet into a folder; return the content of datasheet.json.
 
-    Raises
-    ------
-    StewartError
-        No limit is given, the pose is outside the limits or singular, or the bag cannot be read.
-
+    Raises StewartError: no limit is given, the pose is outside the limits or singular, or the bag
+        cannot be read.
     """
     hexapod = RatedHexapod(parameters, order.pose, order.pivot, order.payload)
     progress.stage('motion')

@@ -80,15 +80,8 @@ class Drawing:
     """
     Drawings of a hexapod at a pose.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-    pose : Pose
-        Pose that is drawn.
-    ends : sequence of Pose
-        Poses whose platforms are drawn as outlines.
-
+    pose: pose that is drawn.
+    ends: poses whose platforms are drawn as outlines.
     """
 
     def __init__(self, parameters: Parameters, pose: Pose, ends: tuple[Pose, ...] = ()) -> None:

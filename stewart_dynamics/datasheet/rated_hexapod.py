@@ -53,35 +53,15 @@ class RatedHexapod:
     Poses are those of the pivot: travels are of it, rotations about it, and forces act on it. The
     singularity of a pose is judged at the origin of the platform frame, as in the node.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-    pose : Pose, optional
-        Pose of the platform frame; by default home.
-    pivot : (3,), optional
-        Pivot, platform frame [m]; by default its origin.
-    payload : Payload, optional
-        Mass that is added to the platform.
-
-    Attributes
-    ----------
-    given : Parameters
-        Parameters with the payload.
-    platform : StewartPlatform
-        With the payload, and the origin of the platform frame at the pivot.
-    loads : Capability
-        Capability of that platform, for rates and loads.
-    origin, pose : Pose
-        Pose of the platform frame as given, and of the pivot.
-    pivot : (3,)
-        As given.
-
-    Raises
-    ------
-    StewartError
-        No limit is given, or the pose is outside the limits or singular.
-
+    pose: pose of the platform frame; by default home.
+    pivot (3,): pivot, platform frame [m]; by default its origin.
+    payload: mass that is added to the platform.
+    given: parameters with the payload.
+    platform: with the payload, and the origin of the platform frame at the pivot.
+    loads: capability of that platform, for rates and loads.
+    origin, pose: pose of the platform frame as given, and of the pivot.
+    pivot (3,): as given.
+    Raises StewartError: no limit is given, or the pose is outside the limits or singular.
     """
 
     def __init__(self, parameters: Parameters, pose: Pose | None = None,

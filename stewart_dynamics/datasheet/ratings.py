@@ -38,15 +38,9 @@ class Payloads:
     """
     Largest point masses that can be added to a platform at rest, by forces and torques.
 
-    Forces of the legs are linear in gravity, in the mass, and in its first moment.
+    capability, poses (N,): with limits of forces.
 
-    Parameters
-    ----------
-    capability : Capability
-        With limits of forces.
-    poses : Pose
-        (N,)
-
+    poses: (N,)
     """
 
     def __init__(self, capability: Capability, poses: Pose) -> None:
@@ -65,11 +59,8 @@ class Payloads:
         """
         Return the smallest payload [kg] over poses and azimuths, in the given gravity.
 
-        Parameters
-        ----------
-        offset, height : float
-            Position of its center of mass beside the platform's origin and above it [m].
-
+        offset, height: position of its center of mass beside the platform's origin and above it
+            [m].
         """
         masses = self._masses(offset, height)
         return float(largest_multiple(

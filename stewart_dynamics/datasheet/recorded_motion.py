@@ -65,11 +65,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
     """
     Return the setpoints of a bag, joined as in the replay.
 
-    Raises
-    ------
-    BagError
-        The bag cannot be read, or has no setpoints.
-
+    Raises BagError: the bag cannot be read, or has no setpoints.
     """
     parameters = options.applied_to(parameters)
     splines = differentiator(parameters, options)

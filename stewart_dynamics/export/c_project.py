@@ -70,12 +70,8 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
     """
     Return the texts of all files by their names.
 
-    Raises
-    ------
-    StewartError
-        The name cannot be used in C; a limit of joint angles is set, its axes are not, and there
-        is no home pose; or plates limit the clearance of the legs.
-
+    Raises StewartError: the name cannot be used in C; a limit of joint angles is set, its axes are
+        not, and there is no home pose; or plates limit the clearance of the legs.
     """
     check_name(name)
     head = (f'A hexapod, written by stewart_export {__version__}.\n'
@@ -127,12 +123,8 @@ def field_values(parameters: Parameters) -> dict[str, Any]:
     length or radius that is not set zero. Axes are unit vectors, zero if not needed;
     ``drive.screw_rotation`` is the turn of the motor for a turn of its leg.
 
-    Raises
-    ------
-    ParameterError
-        Axes that are needed are not given, and there is no home pose; or the clearance of the legs
-        is limited, and a plate is given, which the C source does not know.
-
+    Raises ParameterError: axes that are needed are not given, and there is no home pose; or the
+        clearance of the legs is limited, and a plate is given, which the C source does not know.
     """
     plates = [name for name in OUTLINES if parameters[name] is not None]
     if plates and parameters['limits.leg_clearance_min'] is not None:

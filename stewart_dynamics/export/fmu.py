@@ -79,11 +79,7 @@ def variables(parameters: Parameters) -> list[Variable]:
     """
     Return the variables in the order of ``fmu.h``; they start at rest at the home pose.
 
-    Raises
-    ------
-    ParameterError
-        The parameters do not give the height of the platform at the home pose.
-
+    Raises ParameterError: the parameters do not give the height of the platform at the home pose.
     """
     home = StewartPlatform(parameters).home_pose()
     start = [*home.position, *to_quaternion(home.rotation), *np.zeros(18), *parameters['gravity'],
@@ -158,22 +154,11 @@ def fmu(parameters: Parameters, name: str, version: str = '3',
     """
     Return the FMU as the bytes of its file, the same for the same parameters and compiler.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        The hexapod.
-    name : str
-        Its model identifier, a name in C.
-    version : str
-        Version of FMI, 3 or 2.
-    compiler : list of str, optional
-        Words of the command of a C compiler, for the binary of this computer; None: no binary.
-
-    Raises
-    ------
-    StewartError
-        The compiler fails, or the parameters give no home pose.
-
+    name: its model identifier, a name in C.
+    version: version of FMI, 3 or 2.
+    compiler: words of the command of a C compiler, for the binary of this computer; None: no
+        binary.
+    Raises StewartError: the compiler fails, or the parameters give no home pose.
     """
     listed = variables(parameters)
     token = f'{{{uuid.UUID(bytes=bytes.fromhex(digest(parameters))[:16])}}}'

@@ -230,14 +230,10 @@ class ExternalWrench:
         motion. If the stamp of the last estimate is later, or older by more than
         ``setpoint.timeout``, only its pose is used, and the filter restarts.
 
-        Raises
-        ------
-        PoseError, SingularityError
-            The forward kinematics did not converge from the last pose. If there is no pose yet,
-            or no pose within ``setpoint.timeout``, the target and home were tried as well.
-        MotionError
-            Numbers overflow.
-
+        Raises PoseError, SingularityError: the forward kinematics did not converge from the last
+            pose. If there is no pose yet, or no pose within ``setpoint.timeout``, the target and
+            home were tried as well.
+        Raises MotionError: numbers overflow.
         """
         given = (*measurement.lengths, *measurement.rates, *measurement.forces, *known)
         interval = 0 if before is None else measurement.stamp - before.stamp

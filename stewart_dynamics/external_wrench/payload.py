@@ -90,7 +90,7 @@ class Payload(NamedTuple):
     seconds: float  # time of the measurements
     excluded: int  # measurements that were not used: with saturated efforts, or legs at their ends
     fitted: FittedBody
-    given: Body  # the parameters, of which what is not known has the values
+    given: Body  # unknown ones as in the file
 
 
 class PayloadOutcome(NamedTuple):

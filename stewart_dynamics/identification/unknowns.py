@@ -116,27 +116,17 @@ class Unknowns:
     The file's parameters give the scales, and the values of all other parameters. ``prior`` is
     the standard error of the file's values by the scales; without it they do not count.
 
-    Attributes
-    ----------
-    names, units : tuple of str
-        Name and unit of each parameter.
-    start : (k,)
-        Values from the file.
-    scales : (k,)
-        Relevant change of each parameter.
-    linear : (m,)
-        Indices of the LINEAR parameters that depend on them; the platform's ten come first.
-    inertial_scales, linear_scales : (10,), (m,)
-        Mass of the platform with powers of its size; scales of ``linear``.
-    weighing : (w,)
-        Elements of ``linear`` whose forces depend on gravity.
-    legs : range
-        Indices of the leg parameters: after the platform's, before the tilt.
-    tilt : Tilt or None
-        Rotation of gravity; None: not to be identified.
-    strength : (k, k)
-        Information of the file's values; zero without a prior.
-
+    names, units: name and unit of each parameter.
+    start (k,): values from the file.
+    scales (k,): relevant change of each parameter.
+    linear (m,): indices of the LINEAR parameters that depend on them; the platform's ten come
+        first.
+    inertial_scales, linear_scales (10,), (m,): mass of the platform with powers of its size;
+        scales of ``linear``.
+    weighing (w,): elements of ``linear`` whose forces depend on gravity.
+    legs: indices of the leg parameters: after the platform's, before the tilt.
+    tilt: rotation of gravity; None: not to be identified.
+    strength (k, k): information of the file's values; zero without a prior.
     """
 
     def __init__(self, parameters: Parameters, kinds: Sequence[str] = DEFAULT,

@@ -49,19 +49,13 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None,
     """
     Return the rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-    motions : (N, MOTION)
-        Rows of motion, see ``rows`` for the layout.
-    wrenches : (N, WRENCH) or (1, WRENCH), optional
-        External wrenches at the platform's origin, base axes [N, N m]; one row for all.
-    bases : (N, BASE) or (1, BASE), optional
-        Rows of the base's motion, one row for all; without them it is still.
-    condition : bool
-        Whether the condition number is computed.
-
+    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    motions (N, MOTION): rows of motion, see ``rows`` for the layout.
+    wrenches (N, WRENCH) or (1, WRENCH): external wrenches at the platform's origin, base axes [N,
+        N m]; one row for all.
+    bases (N, BASE) or (1, BASE): rows of the base's motion, one row for all; without them it is
+        still.
+    condition: whether the condition number is computed.
     """
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)

@@ -59,17 +59,10 @@ class Information(NamedTuple):
     """
     Normal-equation sums of samples for n parameters.
 
-    Attributes
-    ----------
-    matrix : (n, n)
-        Y^T W Y.
-    vector : (n,)
-        Y^T W f.
-    squares : float
-        f^T W f.
-    rows : int
-        Number of efforts, six for each sample.
-
+    matrix (n, n): Y^T W Y.
+    vector (n,): Y^T W f.
+    squares: f^T W f.
+    rows: number of efforts, six for each sample.
     """
 
     matrix: Array
@@ -91,20 +84,13 @@ class Identifiability(NamedTuple):
     """
     Identifiability of n parameters from data.
 
-    Attributes
-    ----------
-    scales : (n,)
-        Scales of the parameters, as given.
-    singular_values : (n,)
-        Singular values of the scaled regressor, largest first: 1 / standard error of each
-        direction.
-    directions : (n, n)
-        One direction in each column, by the scales, in the order of the singular values.
-    rank : int
-        Number of directions that are known; they come first.
-    shares : (n,)
-        Share of the unknown directions in each parameter, 0 to 1.
-
+    scales (n,): scales of the parameters, as given.
+    singular_values (n,): singular values of the scaled regressor, largest first: 1 / standard
+        error of each direction.
+    directions (n, n): one direction in each column, by the scales, in the order of the singular
+        values.
+    rank: number of directions that are known; they come first.
+    shares (n,): share of the unknown directions in each parameter, 0 to 1.
     """
 
     scales: Array
@@ -134,15 +120,7 @@ class Solution(NamedTuple):
     """
     Parameters that fit the samples, unknown directions left as they were.
 
-    Attributes
-    ----------
-    values : (n,)
-        The parameters.
-    covariance : (n, n)
-        For white noise of the weights' variance; of the known directions.
-    identifiability : Identifiability
-        Identifiability of the parameters.
-
+    covariance (n, n): for white noise of the weights' variance; of the known directions.
     """
 
     values: Array
@@ -154,13 +132,8 @@ class Combination(NamedTuple):
     """
     An identifiable sum of parameters that are not identifiable individually.
 
-    Attributes
-    ----------
-    parameters : tuple of int
-        Indices of the parameters.
-    coefficients : (k,)
-        Factors of the parameters, relative to the first, which is 1.
-
+    parameters: indices of the parameters.
+    coefficients (k,): factors of the parameters, relative to the first, which is 1.
     """
 
     parameters: tuple[int, ...]
@@ -190,15 +163,9 @@ def information(regressor: Array, efforts: Array, weights: Array) -> Information
     """
     Return the information of samples.
 
-    Parameters
-    ----------
-    regressor : (N, 6, n)
-        Y of each sample.
-    efforts : (N, 6)
-        Efforts less the efforts of parameters that are not to be identified [N].
-    weights : (6,) or (N, 6)
-        1 / variance of each effort [1/N^2]; 0 leaves it out.
-
+    regressor (N, 6, n): Y of each sample.
+    efforts (N, 6): efforts less the efforts of parameters that are not to be identified [N].
+    weights (6,) or (N, 6): 1 / variance of each effort [1/N^2]; 0 leaves it out.
     """
     weights = np.broadcast_to(weights, efforts.shape)
     rows = regressor.reshape(-1, regressor.shape[-1])
@@ -213,17 +180,10 @@ def identifiability(matrix: Array, scales: Array, noise: Array | None = None,
     """
     Return the identifiability of parameters from an information matrix.
 
-    Parameters
-    ----------
-    matrix : (n, n)
-        Y^T W Y.
-    scales : (n,)
-        Change of each parameter that would matter.
-    noise : (n, n), optional
-        The same sum for the noise in Y alone.
-    largest_error : float
-        Largest standard error of a known direction, by the scales.
-
+    matrix (n, n): Y^T W Y.
+    scales (n,): change of each parameter that would matter.
+    noise (n, n): the same sum for the noise in Y alone.
+    largest_error: largest standard error of a known direction, by the scales.
     """
     signal = matrix if noise is None else matrix - TIMES_NOISE * noise
     values, directions = np.linalg.eigh(scales[:, None] * signal * scales)
@@ -240,15 +200,8 @@ def solve(samples: Information, start: Array, scales: Array, noise: Array | None
     """
     Return the parameters that fit the samples best.
 
-    Parameters
-    ----------
-    samples : Information
-        Information about n parameters.
-    start : (n,)
-        Unknown directions keep these values.
-    scales, noise, largest_error
-        As ``identifiability`` takes them.
-
+    start (n,): unknown directions keep these values.
+    scales, noise, largest_error: as ``identifiability`` takes them.
     """
     what = identifiability(samples.matrix, scales, noise, largest_error)
     known = what.known

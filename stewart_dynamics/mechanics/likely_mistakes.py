@@ -110,13 +110,7 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
     """
     Return likely mistakes, each in one line: parameter, value, suspected mistake.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-    geometry : bool
-        Check legs and poses as well, which takes ten times as long as the rest.
-
+    geometry: check legs and poses as well, which takes ten times as long as the rest.
     """
     # An overflow of numbers near the largest double is not reported by itself.
     with np.errstate(all='ignore'):

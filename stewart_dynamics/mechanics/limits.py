@@ -98,22 +98,12 @@ class Limits:
     """
     The limits of the legs of a hexapod.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod; limits that are not given are never exceeded.
-
-    Attributes
-    ----------
-    bounds : dict of str to (6,)
-        Values of each limit that is given [m, m/s, N, rad].
-    thresholds : (7, 6)
-        Values above (or below) which each of LIMITS is exceeded; infinite if not given.
-    of_joints : tuple of str
-        Names in OF_JOINTS that are given.
-    force_max : (6,)
-        Forces to which leg forces are clipped [N]; infinite if not given.
-
+    parameters: parameters of the hexapod; limits that are not given are never exceeded.
+    bounds (6,): values of each limit that is given [m, m/s, N, rad].
+    thresholds (7, 6): values above (or below) which each of LIMITS is exceeded; infinite if not
+        given.
+    of_joints: names in OF_JOINTS that are given.
+    force_max (6,): forces to which leg forces are clipped [N]; infinite if not given.
     """
 
     def __init__(self, parameters: Parameters) -> None:

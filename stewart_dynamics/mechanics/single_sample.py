@@ -160,15 +160,7 @@ class _Memories:
     """
     The memory of calls of a function: as much as there are calls at the same time.
 
-    Parameters
-    ----------
-    function : EntryPoint
-        Called with the constants and with arrays.
-    constants : (CONSTANTS,)
-        Constants of the hexapod.
-    arrays
-        Like those of each call.
-
+    constants (CONSTANTS,): constants of the hexapod.
     """
 
     def __init__(self, function: EntryPoint, constants: Array, *arrays: NDArray[Any]) -> None:

@@ -99,15 +99,9 @@ def advance(state: Array, limits: Array, determinant: float, determinant_rate: f
     """
     Update a state by one more sample.
 
-    Parameters
-    ----------
-    state : (STATE,)
-        Written.
-    limits : (THRESHOLDS,)
-        The thresholds; later elements of the array are not read.
-    determinant, determinant_rate, condition : float
-        Values of the sample.
-
+    state (STATE,): written.
+    limits (THRESHOLDS,): the thresholds; later elements of the array are not read.
+    determinant, determinant_rate, condition: values of the sample.
     """
     hysteresis = HYSTERESIS if state[CAUSE] > 0.0 else 1.0
     time = -determinant / determinant_rate if determinant_rate != 0.0 else math.inf

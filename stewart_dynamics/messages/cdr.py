@@ -100,17 +100,9 @@ def sequence(data: bytes, at: int, count: Struct, gaps: list[slice]) -> tuple[in
     """
     Return a sequence's length, and where its first entry begins.
 
-    Parameters
-    ----------
-    data : bytes
-        The message.
-    at : int
-        Where the field before it ends.
-    count : Struct
-        One of COUNT.
-    gaps : list of slice
-        Added to: the bytes before it that only align it.
-
+    at: where the field before it ends.
+    count: one of COUNT.
+    gaps: added to: the bytes before it that only align it.
     """
     begin = at + 3 & ~3
     gaps.append(slice(at, begin))

@@ -123,13 +123,8 @@ class JointStateReader:
     field by field, and those whose bytes are the same but for stamp and numbers are read by it,
     one after the other or many at once.
 
-    Parameters
-    ----------
-    joints : sequence of str
-        Names of the joints in the order wanted.
-    fields : sequence of str
-        Which of FIELDS are wanted; the others may be empty.
-
+    joints: names of the joints in the order wanted.
+    fields: which of FIELDS are wanted; the others may be empty.
     """
 
     def __init__(self, joints: Sequence[str], fields: Sequence[str] = FIELDS) -> None:
@@ -143,13 +138,8 @@ class JointStateReader:
         """
         Return stamp [ns] and values, laid out as in JointStates.
 
-        Raises
-        ------
-        MalformedError
-            The bytes are no JointState.
-        JointStateError
-            It lacks joints or fields, or a number is not finite.
-
+        Raises MalformedError: the bytes are no JointState.
+        Raises JointStateError: it lacks joints or fields, or a number is not finite.
         """
         for known in self._known:
             read = known.layout.read_one(data)
@@ -170,13 +160,8 @@ class JointStateReader:
         """
         Return the results of ``read_one`` for many messages, and the number of rejections.
 
-        Parameters
-        ----------
-        data : bytes or array of them
-            It holds all messages.
-        starts, sizes : (M,)
-            Where each begins, and its length in bytes.
-
+        data: it holds all messages.
+        starts, sizes (M,): where each begins, and its length in bytes.
         """
         whole = np.frombuffer(data, dtype=np.uint8)
         begins, lengths = np.asarray(starts, dtype=np.int64), np.asarray(sizes, dtype=np.int64)

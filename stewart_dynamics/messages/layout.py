@@ -37,17 +37,10 @@ class Layout:
     """
     Messages that differ in nothing but their stamp and numbers.
 
-    Parameters
-    ----------
-    message : bytes
-        One of them.
-    numbers : sequence of (offset, count)
-        Where doubles stand in it, in the order of their offsets.
-    stamps : sequence of int
-        Offsets of its stamps; by default that of a header, which reading requires.
-    gaps : sequence of slice
-        Bytes that may be anything: those that only align what follows.
-
+    message: one of them.
+    numbers (offset, count): where doubles stand in it, in the order of their offsets.
+    stamps: offsets of its stamps; by default that of a header, which reading requires.
+    gaps: bytes that may be anything: those that only align what follows.
     """
 
     def __init__(
@@ -113,13 +106,8 @@ class Layout:
 
         Stamps and numbers of the others mean nothing.
 
-        Parameters
-        ----------
-        data : (M,)
-            Bytes that have all the messages in them.
-        starts : (N,)
-            Where each begins; each is of ``size``.
-
+        data (M,): bytes that have all the messages in them.
+        starts (N,): where each begins; each is of ``size``.
         """
         rows = at_any_byte(data, self.size)[starts].view(self._dtype)
         stamp, = (rows[name] for name in self._stamps)

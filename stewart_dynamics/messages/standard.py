@@ -89,11 +89,7 @@ def transforms(frames: Sequence[tuple[str, str]]) -> Layout:
 
     Its parts are the transforms: x y z [m] and the quaternion's x y z w.
 
-    Parameters
-    ----------
-    frames : sequence of (frame, child)
-        The frames of each transform.
-
+    frames (frame, child): the frames of each transform.
     """
     body = bytearray(LITTLE_ENDIAN)
     put_count(body, len(frames))

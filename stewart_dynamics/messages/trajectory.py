@@ -81,13 +81,7 @@ class PlatformTrajectory:
     """
     Reads a trajectory_msgs/MultiDOFJointTrajectory of one or two joints and any number of points.
 
-    Parameters
-    ----------
-    data : bytes
-        The message.
-
     Raises MalformedError where it has no header, or more than two joints.
-
     """
 
     def __init__(self, data: bytes) -> None:
@@ -141,17 +135,10 @@ class LegTrajectory:
     """
     Writes a trajectory_msgs/JointTrajectory of six joints without accelerations.
 
-    Parameters
-    ----------
-    stamp : int
-        [ns]
-    names : sequence of str
-        Names of the joints; frame_id is empty.
-    size : int
-        Number of points.
-    effort : bool
-        Points have effort.
-
+    stamp: [ns]
+    names: names of the joints; frame_id is empty.
+    size: number of points.
+    effort: points have effort.
     """
 
     def __init__(self, stamp: int, names: Sequence[str], size: int, effort: bool) -> None:

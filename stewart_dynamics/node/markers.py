@@ -84,12 +84,8 @@ class Markers:
     warning is on, and vermillion inside ``singularity.stop_condition`` and at a crossing. A purple
     ball is the platform's centre of mass.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Geometry, centre of mass, limits, thresholds, names and ``visualization_rate``. Some of
-        them may change while the node is active: other parameters need other ``Markers``.
-
+    parameters: geometry, centre of mass, limits, thresholds, names and ``visualization_rate``.
+        Some of them may change while the node is active: other parameters need other ``Markers``.
     """
 
     # Sizes near the maximum of a double overflow: then nothing is answered or drawn.
@@ -148,13 +144,7 @@ class Markers:
         """
         Return the message.
 
-        Parameters
-        ----------
-        motion : sequence of float
-            Motion of the setpoint, laid out as for ``inverse_dynamics``.
-        output : Output
-            The result for the setpoint.
-
+        motion: motion of the setpoint, laid out as for ``inverse_dynamics``.
         """
         body = self._body
         stamp = divmod(output.stamp, SECOND)

@@ -49,15 +49,9 @@ class TaskQueue(Generic[Outcome]):
     """
     Works on tasks in order and in pieces, one at each tick of a timer.
 
-    Parameters
-    ----------
-    start : callable
-        Starts the timer; it ticks once after each start.
-    code : Preparation
-        Compilation of the functions that a task calls; tasks wait until it is ready.
-    done : callable
-        Called with an outcome and the time of arrival of its task [s].
-
+    start: starts the timer; it ticks once after each start.
+    code: compilation of the functions that a task calls; tasks wait until it is ready.
+    done: called with an outcome and the time of arrival of its task [s].
     """
 
     def __init__(self, start: Callable[[], None], code: Preparation,
@@ -117,15 +111,8 @@ class PayloadService:
 
     The service exists in all states of the node's lifecycle.
 
-    Parameters
-    ----------
-    node : Node
-        The node that offers the service.
-    work : callable
-        Called at a request while no task is in progress: returns the task, or its outcome.
-    done : callable
-        Called with an outcome and the duration of the task [s].
-
+    work: called at a request while no task is in progress: returns the task, or its outcome.
+    done: called with an outcome and the duration of the task [s].
     """
 
     def __init__(

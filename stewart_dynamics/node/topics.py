@@ -155,13 +155,8 @@ class NodeTopics:
     """
     Publishers and subscriptions of the node; created by ``make``.
 
-    Attributes
-    ----------
-    publishers : dict of str to Publisher
-        Publishers by topic, without the node's name.
-    setpoints, base : dict of str to Subscription
-        Raw subscriptions to the setpoint topics and to the topics of the base.
-
+    publishers: publishers by topic, without the node's name.
+    setpoints, base: raw subscriptions to the setpoint topics and to the topics of the base.
     """
 
     def __init__(self, node: LifecycleNode) -> None:
@@ -178,21 +173,12 @@ class NodeTopics:
         """
         Create all publishers and subscriptions.
 
-        Parameters
-        ----------
-        parameters : Parameters
-            Select the setpoint topics, the topics of the base, and whether markers, joint states,
-            transforms and motors are published.
-        on_setpoint, on_base : callable
-            Called with topic and bytes of a message on a setpoint topic, or on one of the base.
-        others : mapping of topic to callable
-            Called with the bytes of a message on each of the other topics.
-
-        Raises
-        ------
-        ParameterError
-            ``publish_tf`` needs a package that is not installed.
-
+        parameters: select the setpoint topics, the topics of the base, and whether markers, joint
+            states, transforms and motors are published.
+        on_setpoint, on_base: called with topic and bytes of a message on a setpoint topic, or on
+            one of the base.
+        others: called with the bytes of a message on each of the other topics.
+        Raises ParameterError: ``publish_tf`` needs a package that is not installed.
         """
         there = {MARKERS: parameters['visualization_rate'] > 0.0, TF: parameters['publish_tf']}
         there[JOINT_STATES] = there[MARKERS]

@@ -51,15 +51,8 @@ class TravelPublisher(PublisherAtRate):
     """
     Publishes the travel from the last pose.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Geometry and limits; ``use`` replaces them.
-    publisher : Publisher
-        Publishes the messages.
-    code : Preparation
-        Machine code that is compiled once somebody subscribes.
-
+    parameters: geometry and limits; ``use`` replaces them.
+    code: machine code that is compiled once somebody subscribes.
     """
 
     def __init__(self, parameters: Parameters, publisher: Any, code: Preparation) -> None:

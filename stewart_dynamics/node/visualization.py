@@ -34,13 +34,8 @@ class PublisherAtRate:
     """
     Publishes the last data noted, at most at a given rate, while there are subscribers.
 
-    Parameters
-    ----------
-    publisher : Publisher, optional
-        Publishes the message from ``_write``; None if nothing is to be published.
-    rate : float
-        Maximum rate [Hz].
-
+    publisher: publishes the message from ``_write``; None if nothing is to be published.
+    rate: maximum rate [Hz].
     """
 
     def __init__(self, publisher: Any, rate: float) -> None:
@@ -88,15 +83,8 @@ class ModelPublisher(PublisherAtRate):
     """
     Publishes the last pose as joint states, and each pose as a transform.
 
-    Parameters
-    ----------
-    messages : ModelMessages
-        Writes their messages.
-    rate : float
-        Maximum rate of ``~/joint_states`` [Hz].
-    joint_states, transforms : Publisher, optional
-        None if the rate is zero, or if ``publish_tf`` is false.
-
+    rate: maximum rate of ``~/joint_states`` [Hz].
+    joint_states, transforms: None if the rate is zero, or if ``publish_tf`` is false.
     """
 
     def __init__(self, messages: ModelMessages, rate: float, joint_states: Any, transforms: Any,

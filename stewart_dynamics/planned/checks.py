@@ -95,17 +95,10 @@ class Checks:
     """
     Finds violations in samples of a trajectory that come in the order of time.
 
-    Attributes
-    ----------
-    violations : list of Violation
-        Violations found so far, in no order.
-    condition_number, condition_time : float
-        Largest condition number so far, and its time [s].
-    force, force_leg : float, int
-        Largest absolute force so far [N], and its leg.
-    load : float
-        The largest absolute force so far as a part of limits.force_max.
-
+    violations: violations found so far, in no order.
+    condition_number, condition_time: largest condition number so far, and its time [s].
+    force, force_leg: largest absolute force so far [N], and its leg.
+    load: the largest absolute force so far as a part of limits.force_max.
     """
 
     def __init__(self, parameters: Parameters) -> None:

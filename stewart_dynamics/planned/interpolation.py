@@ -72,13 +72,9 @@ class Interpolation:
     """
     The motion between N + 1 points in order.
 
-    Parameters
-    ----------
-    durations : (N,)
-        From each point to the next [s], more than 0.
-    motions : (N + 1, MOTION)
-        The points. Between two of them the platform takes the shorter rotation.
-
+    durations (N,): from each point to the next [s], more than 0.
+    motions (N + 1, MOTION): the points. Between two of them the platform takes the shorter
+        rotation.
     """
 
     def __init__(self, durations: Array, motions: Array) -> None:
@@ -107,11 +103,7 @@ class Interpolation:
         """
         Return bounds of the motion of a point of the platform in each interval.
 
-        Parameters
-        ----------
-        arm : float
-            Distance of the point from the platform's origin [m].
-
+        arm: distance of the point from the platform's origin [m].
         """
         h = self._durations
         differences, steps = self._control, []
@@ -129,13 +121,9 @@ class Interpolation:
         """
         Return rows of motion (M, MOTION).
 
-        Parameters
-        ----------
-        which : (M,)
-            Index of the point before each row, one of the first N.
-        fraction : (M,)
-            Fraction of the time to the next point, 0 to 1; 0 and 1 are the points themselves.
-
+        which (M,): index of the point before each row, one of the first N.
+        fraction (M,): fraction of the time to the next point, 0 to 1; 0 and 1 are the points
+            themselves.
         """
         h = self._durations[which][:, None]
         control = self._control[which]

@@ -94,21 +94,13 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
     """
     Yield None after each piece of the work, and the outcome at the end.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        They hold for all of the work.
-    wrench : (6,)
-        External wrench at the platform's origin, base axes [N, N m].
-    data : bytes
-        A trajectory_msgs/MultiDOFJointTrajectory as received. Its second joint, if it has one,
+    parameters: they hold for all of the work.
+    wrench (6,): external wrench at the platform's origin, base axes [N, N m].
+    data: a trajectory_msgs/MultiDOFJointTrajectory as received. Its second joint, if it has one,
         is the base, which moves in the world as its points say.
-    base : (BASE,), optional
-        A row of the base's motion for a trajectory without the base. A row of nan: not known; at
-        rest by default.
-    measured : (MOTION,), optional
-        A row of motion of the platform as measured, for ``trajectory.approach``.
-
+    base (BASE,): a row of the base's motion for a trajectory without the base. A row of nan: not
+        known; at rest by default.
+    measured (MOTION,): a row of motion of the platform as measured, for ``trajectory.approach``.
     """
     platform = StewartPlatform(parameters)
     try:

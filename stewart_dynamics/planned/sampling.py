@@ -86,15 +86,11 @@ class Sampling:
         """
         Return the number of parts in which each of N intervals is sampled (N,).
 
-        Parameters
-        ----------
-        durations, between, results : (N,), Interpolation, (N + 1, RESULT)
-            Durations of the intervals [s], motion in them, and results at the points.
-        bases : (N + 1, BASE) or (1, BASE), optional
-            Rows of the base's motion at the points; the base is at rest by default.
-        largest : float
-            Absolute force that is known to occur in the trajectory [N].
-
+        durations, between, results (N,), Interpolation, (N + 1, RESULT): durations of the
+            intervals [s], motion in them, and results at the points.
+        bases (N + 1, BASE) or (1, BASE): rows of the base's motion at the points; the base is at
+            rest by default.
+        largest: absolute force that is known to occur in the trajectory [N].
         """
         bounds = between.bounds(self._arm)
         # Accelerations of the joints and along the legs due to speed.

@@ -51,13 +51,9 @@ class TrajectoryNode(Node):
     With ``use_sim_time`` they are due by /clock and published as soon as it comes: a simulation
     may run as fast or as slowly as it can, or wait for the answers to it.
 
-    Parameters
-    ----------
-    done : Future
-        Gets the exit code after the last sample.
+    done: gets the exit code after the last sample.
 
     Raises ParameterError where the parameters break a rule.
-
     """
 
     def __init__(self, done: Future) -> None:

@@ -84,17 +84,11 @@ class Differentiator:
     A jump back in time or a gap ends a segment; no spline continues across it. The results do
     not depend, bit for bit, on how the poses are split into batches.
 
-    Parameters
-    ----------
-    cutoff : float
-        Frequency whose amplitude is reduced to 1/sqrt(2) [Hz].
-    gap : float
-        Longest time between two poses of a segment [s].
-    window : int
-        Poses in a window.
+    cutoff: frequency whose amplitude is reduced to 1/sqrt(2) [Hz].
+    gap: longest time between two poses of a segment [s].
+    window: poses in a window.
 
     Raises StewartError if the cut-off is not a positive number, or scipy is not installed.
-
     """
 
     def __init__(self, cutoff: float, gap: float, window: int = WINDOW) -> None:
@@ -130,11 +124,7 @@ class Differentiator:
         """
         Add setpoints that have only poses; return those that are done, with their motion.
 
-        Parameters
-        ----------
-        batch : Batch
-            Stamps increase, except at jumps back in time.
-
+        batch: stamps increase, except at jumps back in time.
         """
         wrenches = np.broadcast_to(batch.wrenches, (len(batch.stamps), WRENCH))
         self._pending.append(Batch(

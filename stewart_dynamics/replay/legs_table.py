@@ -56,17 +56,10 @@ class Table(ABC):
     """
     A file with one row per setpoint.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the file.
-    legs : sequence of str
-        Names of the six legs.
-    quasi_static : bool
-        Velocities are not known: columns that depend on them are empty.
-    joint_angles, clearance : bool
-        There are columns of the joints' angles, and of the clearance between the legs.
-
+    folder: folder of the file.
+    quasi_static: velocities are not known: columns that depend on them are empty.
+    joint_angles, clearance: there are columns of the joints' angles, and of the clearance between
+        the legs.
     """
 
     FILE = ''

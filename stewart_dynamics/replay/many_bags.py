@@ -77,23 +77,13 @@ def replay_fleet(
     """
     Replay bags and write fleet.csv and index.html, a row for each bag.
 
-    Parameters
-    ----------
-    bags : sequence of (Path, Path)
-        Each with the folder of its results, from bags.folders_of_results.
-    parameters : Parameters
-        Parameters of the hexapod.
-    output : Path
-        Folder of fleet.csv and index.html.
-    options : Options
-        Options of every bag. ``run`` is set if it is empty.
-    jobs : int
-        Number of processes; 1: this one.
-    scheduler : str, optional
-        Address of a Dask scheduler whose workers replay the bags. They must have this package
-        and see the bags and ``output`` at the same paths as this process.
-    show_progress : bool, optional
-        Show the progress on stderr; by default if stderr is a terminal.
+    bags (Path, Path): each with the folder of its results, from bags.folders_of_results.
+    output: folder of fleet.csv and index.html.
+    options: options of every bag. ``run`` is set if it is empty.
+    jobs: number of processes; 1: this one.
+    scheduler: address of a Dask scheduler whose workers replay the bags. They must have this
+        package and see the bags and ``output`` at the same paths as this process.
+    show_progress: show the progress on stderr; by default if stderr is a terminal.
 
     Results of an earlier run are kept if bag, parameters, options and program have not changed,
     unless ``options.force``.
@@ -101,7 +91,6 @@ def replay_fleet(
     Raises StewartError if files of another run would be replaced, or if the cluster cannot be
     reached. Errors in a bag are written to its row. KeyboardInterrupt stops the run; finished
     bags keep their results.
-
     """
     output.mkdir(parents=True, exist_ok=True)
     options = options._replace(run=options.run or uuid.uuid4().hex)

@@ -149,11 +149,8 @@ def needed(loads: Iterable[Mapping[str, Any]]) -> dict[str, float | None]:
     """
     Return the smallest motor that bears loads with MARGIN.
 
-    Parameters
-    ----------
-    loads : iterable of mapping
-        ``torque_rms_n_m``, ``torque_peak_n_m`` and ``speed_peak_rad_s`` of each; None: not known.
-
+    loads: ``torque_rms_n_m``, ``torque_peak_n_m`` and ``speed_peak_rad_s`` of each; None: not
+        known.
     """
     every = list(loads)
     return {'margin': MARGIN, **{

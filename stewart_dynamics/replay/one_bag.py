@@ -87,23 +87,14 @@ def replay(
     """
     Replay a bag into a folder: a bag, a table, a summary and a report.
 
-    Parameters
-    ----------
-    bag : Path
-        A bag: a folder or a file.
-    parameters : Parameters
-        Parameters of the hexapod.
-    folder : Path
-        Folder of the results; it gets this name when complete, and must not exist, unless
+    bag: a bag: a folder or a file.
+    folder: folder of the results; it gets this name when complete, and must not exist, unless
         ``options.force``.
-    options : Options, optional
-        Topics to read, and files to write.
-    progress : callable, optional
-        Called with the bytes read and the setpoints answered since the last call.
+    options: topics to read, and files to write.
+    progress: called with the bytes read and the setpoints answered since the last call.
 
     Raises BagError if the bag cannot be read or lacks a topic, or if the folder exists.
     Raises StewartError if a library needed for an option is missing.
-
     """
     options = options or Options()
     check_free(folder, options)

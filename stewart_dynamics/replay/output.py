@@ -113,19 +113,10 @@ class OutputBag:
 
     Messages are assembled in blocks; each block is a chunk with a checksum.
 
-    Parameters
-    ----------
-    folder : Path
-        It is created; the file in it has its name.
-    node : str
-        Node name, the prefix of the topics.
-    messages : OutputMessages
-        Serializes the messages.
-    model : RecordedModel
-        Serializes those that show the hexapod as a model.
-    rate : float
-        Highest rate of these [Hz]; 0: they are not written and have no topics.
-
+    folder: it is created; the file in it has its name.
+    node: node name, the prefix of the topics.
+    model: serializes those that show the hexapod as a model.
+    rate: highest rate of these [Hz]; 0: they are not written and have no topics.
     """
 
     def __init__(self, folder: Path, node: str, messages: OutputMessages, model: RecordedModel,

@@ -52,17 +52,7 @@ class OutputFiles:
     """
     The output bag and the table of a replay.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the files.
-    parameters : Parameters
-        Parameters of the hexapod.
-    options : Options
-        Name of the node, and kind of the table.
-    quasi_static : bool
-        Velocities are not known: columns that depend on them are empty.
-
+    quasi_static: velocities are not known: columns that depend on them are empty.
     """
 
     def __init__(self, folder: Path, parameters: Parameters, options: Options,

@@ -71,15 +71,9 @@ def smoothing_spline(times: Array, samples: Array, cutoff: float) -> Spline:
     """
     Return the smoothing spline of K signals sampled at the same times.
 
-    Parameters
-    ----------
-    times : (N,)
-        [s], increasing, N at least FEWEST.
-    samples : (N, K)
-        In any unit.
-    cutoff : float
-        Frequency whose amplitude is reduced to 1/sqrt(2) [Hz].
-
+    times (N,): [s], increasing, N at least FEWEST.
+    samples (N, K): in any unit.
+    cutoff: frequency whose amplitude is reduced to 1/sqrt(2) [Hz].
     """
     banded = banded_solver()
     steps = np.diff(times)

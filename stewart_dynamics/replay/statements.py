@@ -35,7 +35,7 @@ Summary = Mapping[str, Any]  # the content of summary.json
 READING, MISSING, REJECTED, LIMITS, JOINTS, LOADS, MOTORS, SINGULARITY, MEASURED = (
     'reading', 'missing', 'rejected', 'limits', 'joints', 'loads', 'motors', 'singularity',
     'measured')
-LEVELS = ('none', 'good', 'warn', 'bad')  # the levels, the worst last; none: information
+LEVELS = ('none', 'good', 'warn', 'bad')  # the worst last; the first: information
 _CARDS = {
     (READING, MISSING, REJECTED): {
         'good': 'The whole bag was read', 'warn': 'Not all messages could be used',

@@ -66,13 +66,8 @@ class Summary:
     """
     The summary of a motion of a hexapod with given parameters.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Names of the legs, limits, and ``setpoint.timeout``.
-    quasi_static : bool
-        Only poses are known: values that depend on velocities are None, not zero.
-
+    parameters: names of the legs, limits, and ``setpoint.timeout``.
+    quasi_static: only poses are known: values that depend on velocities are None, not zero.
     """
 
     def __init__(self, parameters: Parameters, quasi_static: bool = False) -> None:

@@ -46,13 +46,8 @@ class Curves:
 
     The result does not depend on how the samples are split into blocks.
 
-    Parameters
-    ----------
-    timeout : float
-        A step in time up to this long never breaks a line [s].
-    buckets : int
-        The largest number of buckets, even.
-
+    timeout: a step in time up to this long never breaks a line [s].
+    buckets: the largest number of buckets, even.
     """
 
     def __init__(self, timeout: float, buckets: int = BUCKETS) -> None:
@@ -70,13 +65,8 @@ class Curves:
         """
         Add samples.
 
-        Parameters
-        ----------
-        seconds : (N,)
-            Times, never decreasing [s].
-        values : (C, N)
-            Values of every channel; values that are not finite break the line.
-
+        seconds (N,): times, never decreasing [s].
+        values (C, N): values of every channel; values that are not finite break the line.
         """
         if not len(seconds):
             return
@@ -206,13 +196,8 @@ class Frames:
     When there are too many, the intervals are doubled. The result does not depend on how the
     samples are split into blocks, and contains every sample while there are few.
 
-    Parameters
-    ----------
-    numbers : int
-        Number of values of a sample.
-    most : int
-        The largest number of frames, in addition to the last sample.
-
+    numbers: number of values of a sample.
+    most: the largest number of frames, in addition to the last sample.
     """
 
     def __init__(self, numbers: int, most: int = 1024) -> None:

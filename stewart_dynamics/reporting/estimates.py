@@ -58,17 +58,11 @@ def estimate(name: str, unit: str, start: float, value: float, state: str, error
     """
     Return an estimated parameter for JSON.
 
-    Parameters
-    ----------
-    name, unit, state : str
-        Name, unit and state of the parameter.
-    start, value : float
-        The file's value and the estimate.
-    error, share : float
-        Standard error; share of the unknown directions.
-    at_bound, sure : bool
-        Whether the value is at a bound; whether it has an interval, if it is identified.
-
+    name, unit, state: name, unit and state of the parameter.
+    start, value: the file's value and the estimate.
+    error, share: standard error; share of the unknown directions.
+    at_bound, sure: whether the value is at a bound; whether it has an interval, if it is
+        identified.
     """
     return {
         'name': name, 'unit': unit, 'file': float(start), 'value': float(value),

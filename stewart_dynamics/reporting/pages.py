@@ -88,21 +88,11 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
     """
     Return a page.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder of the template.
-    template : str
-        Name of the template (.html), its style (.css) and its script (.js), if it has one.
-    scripts : sequence of str
-        Other scripts that the page is allowed to run.
-    shared : bool
-        The page is allowed to run scripts in files.
-    document : bool
-        The page has the common style of documents (document.css) before its own.
-    values : mapping
-        Variables of the template.
-
+    template: name of the template (.html), its style (.css) and its script (.js), if it has one.
+    scripts: other scripts that the page is allowed to run.
+    shared: the page is allowed to run scripts in files.
+    document: the page has the common style of documents (document.css) before its own.
+    values: variables of the template.
     """
     style, script = folder.joinpath(f'{template}.css').read_text(encoding='utf-8'), ''
     own = folder / f'{template}.js'

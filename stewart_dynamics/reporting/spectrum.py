@@ -73,15 +73,8 @@ class Spectrum:
     missing, values are interpolated linearly. A gap, a jump back in time or a value that is not
     finite ends a segment early, and it is left out.
 
-    Parameters
-    ----------
-    channels : int
-        Number of channels.
-    timeout : float
-        A step in time up to this long is never a gap [s].
-    folder : Path, optional
-        Contains the file of the samples, which has no name there.
-
+    timeout: a step in time up to this long is never a gap [s].
+    folder: contains the file of the samples, which has no name there.
     """
 
     def __init__(self, channels: int, timeout: float, folder: Path | None = None) -> None:
@@ -93,13 +86,7 @@ class Spectrum:
         """
         Add samples.
 
-        Parameters
-        ----------
-        seconds : (N,)
-            Times, never decreasing; the same time again where time has jumped back [s].
-        values : (C, N)
-            Values of every channel.
-
+        seconds (N,): times, never decreasing; the same time again where time has jumped back [s].
         """
         self._file.seek(0, os.SEEK_END)
         self._file.write(np.column_stack((seconds, values.T)).tobytes())
@@ -210,11 +197,8 @@ def drawn(frequencies: Array, amplitudes: Array) -> tuple[Array, Array]:
     """
     Return points of a line: of each interval of a logarithmic axis the lowest and the highest.
 
-    Parameters
-    ----------
-    frequencies, amplitudes : (F,)
-        Spectrum of one channel; the frequencies increase and are above zero.
-
+    frequencies, amplitudes (F,): spectrum of one channel; the frequencies increase and are above
+        zero.
     """
     if not len(frequencies):
         return frequencies, amplitudes

@@ -33,13 +33,8 @@ class Picture:
 
     Attributes of elements are keyword arguments with ``_`` for ``-``; ``css`` is the class.
 
-    Parameters
-    ----------
-    width, height : float
-        [px]
-    title : str
-        Description for those who cannot see it.
-
+    width, height: [px]
+    title: description for those who cannot see it.
     """
 
     def __init__(self, width: float, height: float, title: str) -> None:
@@ -87,15 +82,8 @@ class Chart:
     """
     Axes on a picture: a frame, its scales, grid and numbers.
 
-    Parameters
-    ----------
-    picture : Picture
-        Where the chart is drawn.
-    frame : tuple of float
-        Left, top, width and height [px].
-    x, y : tuple of float
-        Ranges of the data.
-
+    frame: left, top, width and height [px].
+    x, y: ranges of the data.
     """
 
     def __init__(self, picture: Picture, frame: tuple[float, float, float, float],

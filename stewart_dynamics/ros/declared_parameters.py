@@ -229,20 +229,9 @@ def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool
     """
     Return the parameters with changes applied.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        The present parameters.
-    changes : mapping of name to value
-        New values, as given by ROS.
-    configured : bool
-        Whether the node is configured: then only some parameters may change.
-
-    Raises
-    ------
-    ParameterError
-        A change breaks a rule.
-
+    changes: new values, as given by ROS.
+    configured: whether the node is configured: then only some parameters may change.
+    Raises ParameterError.
     """
     for name, value in changes.items():
         if value is None:

@@ -54,14 +54,6 @@ def answer_impossible_transitions(node: LifecycleNode, log: Callable[[str], None
     rclpy raises the error out of spin, which ends the program, and the client waits forever
     (https://github.com/ros2/rclpy/issues/1209; its pull request 1319 is not in 7.1). rclpy 9.1
     answers so itself, and logs the error.
-
-    Parameters
-    ----------
-    node : LifecycleNode
-        The node whose service ``change_state`` answers so.
-    log : callable
-        Called with the text.
-
     """
     service = node._service_change_state
     change_state = service.callback
@@ -86,15 +78,7 @@ def create_later_service(node: Node, kind: Any, name: str,
     not await it (https://github.com/ros2/rclpy/issues/1473, mended in later releases), and the
     single-threaded one may not resume it (https://github.com/ros2/rclpy/issues/1462).
 
-    Parameters
-    ----------
-    node : Node
-        Whose service it is.
-    kind, name
-        Its type and name.
-    begin : callable
-        Called at each request with a function that sends the answer, once.
-
+    begin: called at each request with a function that sends the answer, once.
     """
     def callback(request: Any, response: Any) -> _Later:
         later = _Later(send)
@@ -145,15 +129,8 @@ class OneShotTimer:
     no upstream issue). So each one has a clock of its own, and a call before its time is ignored.
     Until test_a_timer_that_starts_itself_again_is_late_and_never_early passes without this.
 
-    Parameters
-    ----------
-    node : Node
-        Whose timer it is.
-    seconds : float
-        From the start to the call.
-    callback : callable
-        It may start the timer again.
-
+    seconds: from the start to the call.
+    callback: it may start the timer again.
     """
 
     def __init__(self, node: Node, seconds: float, callback: Callable[[], None]) -> None:

@@ -48,15 +48,10 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
     """
     Make a node, spin it until a signal or ``done`` stops it, and return the exit code.
 
-    Parameters
-    ----------
-    make_node : callable
-        Called after rclpy.init; a StewartError that it raises is printed in one line, exit code 1.
-    kind : type of ParameterSet
-        Its parameters; their files have been checked by ``console_scripts``.
-    done : Future, optional
-        When it is done, its result is the exit code.
-
+    make_node: called after rclpy.init; a StewartError that it raises is printed in one line, exit
+        code 1.
+    kind: its parameters; their files have been checked by ``console_scripts``.
+    done: when it is done, its result is the exit code.
     """
     SIGNALS.watch()
     executor = node = None

@@ -138,20 +138,10 @@ class BaseInput:
         """
         Continue after the samples that ``join_many`` has joined.
 
-        Parameters
-        ----------
-        joined : Joined
-            The samples.
-        places : mapping of topic to (K,)
-            As for ``join_many``.
-        stamps, completed : (N,)
-            Stamps of setpoints [ns], and the index of the message that completed each.
-
-        Returns
-        -------
-        (N, BASE) or None
-            The rows at the setpoints, see ``at``.
-
+        places (K,): as for ``join_many``.
+        stamps, completed (N,): stamps of setpoints [ns], and the index of the message that
+            completed each.
+        Returns (N, BASE): the rows at the setpoints, see ``at``.
         """
         if not self.topics:
             return None

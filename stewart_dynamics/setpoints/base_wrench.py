@@ -55,12 +55,8 @@ class BaseWrench:
     Force [N] and moment [N m] on the base at its origin, base axes; see
     ``mechanics.dynamics.base_wrench``.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Constant for all calls; create another object for other parameters. Not thread-safe: calls
-        for one setpoint share a buffer.
-
+    parameters: constant for all calls; create another object for other parameters. Not
+        thread-safe: calls for one setpoint share a buffer.
     """
 
     def __init__(self, parameters: Parameters) -> None:

@@ -94,15 +94,8 @@ class SampleReader:
 
     Messages with the layout of the first valid one are read by that layout, which is faster.
 
-    Parameters
-    ----------
-    topic : str
-        One of ``input_topics``.
-    frame : str or None
-        Required frame_id; an empty one is accepted. None: the first non-empty one is required.
-    rejections : Rejections
-        Counts rejected messages.
-
+    topic: one of ``input_topics``.
+    frame: required frame_id; an empty one is accepted. None: the first non-empty one is required.
     """
 
     def __init__(self, topic: str, frame: str | None, rejections: Rejections) -> None:
@@ -165,13 +158,8 @@ class SampleReader:
 
         None if one is invalid or has another layout: then read them one by one.
 
-        Parameters
-        ----------
-        data : (M,)
-            Bytes that contain all messages.
-        starts, sizes : (N,)
-            Offset and length of each message in bytes; N >= 1.
-
+        data (M,): bytes that contain all messages.
+        starts, sizes (N,): offset and length of each message in bytes; N >= 1.
         """
         if self._layout is None:
             self._learn(data[starts[0]:starts[0] + sizes[0]].tobytes())
@@ -221,20 +209,10 @@ def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
     """
     Normalize quaternions; return lengths and which quaternions are valid as well.
 
-    Parameters
-    ----------
-    quaternions : (N, 4)
-        Finite numbers x y z w.
-
-    Returns
-    -------
-    quaternions : (4, N)
-        Normalized quaternions, one row for each of x y z w.
-    lengths : (N,)
-        Lengths before normalization.
-    unit : (N,)
-        Which lengths are 1 within the tolerance.
-
+    quaternions (N, 4): finite numbers x y z w.
+    Returns quaternions (4, N): normalized quaternions, one row for each of x y z w.
+    Returns lengths (N,): lengths before normalization.
+    Returns unit (N,): which lengths are 1 within the tolerance.
     """
     # Element by element, as for one sample, so that results are bit-identical.
     x, y, z, w = quaternions.T
@@ -263,17 +241,9 @@ class WrenchInput:
         """
         Use new wrenches in order, and return the one that is valid at each of the given indices.
 
-        Parameters
-        ----------
-        samples : Samples
-            Read by ``reader``.
-        places : (K,)
-            Indices in the order of all messages.
-
-        Returns
-        -------
-        (K, 6) [N, N m]
-
+        samples: read by ``reader``.
+        places (K,): indices in the order of all messages.
+        Returns (K, 6).
         """
         wrenches = np.empty((len(places), 6))
         wrenches[:] = self.wrench

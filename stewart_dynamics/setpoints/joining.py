@@ -46,15 +46,9 @@ class Setpoints:
     """
     Joins the samples of the setpoint topics by stamp.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Source of setpoints, frame, tolerance and timeout.
-    rejected : callable
-        Called with each rejection and its details; they are counted as well.
-    noticed : callable
-        Called with texts for the log: a restart, stamps that are all zero.
-
+    parameters: source of setpoints, frame, tolerance and timeout.
+    rejected: called with each rejection and its details; they are counted as well.
+    noticed: called with texts for the log: a restart, stamps that are all zero.
     """
 
     def __init__(
@@ -88,15 +82,7 @@ class Setpoints:
         """
         Return the setpoint that this message completes, if any; without the base's motion.
 
-        Parameters
-        ----------
-        topic : str
-            One of ``topics``.
-        data : bytes
-            The message as received, CDR.
-        now : callable
-            The clock [ns]; read if the stamps of a setpoint are zero.
-
+        now: the clock [ns]; read if the stamps of a setpoint are zero.
         """
         sample = self._joining.take(topic, data, now)
         if sample is None:

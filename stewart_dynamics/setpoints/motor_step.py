@@ -62,21 +62,15 @@ def check_motors(constants: Array, drives: Array, torque_max: Array, curve: Arra
     """
     Write the motors of setpoints in order, and update the windings.
 
-    Parameters
-    ----------
-    constants, drives, torque_max, curve, motions, results, forces
-        As in ``motor_rows``; forces as published.
-    thresholds : (24,)
-        Limits of speeds and temperature rises, thermal resistances and time constants.
-    elapsed : (N,)
-        Time from the last setpoint that was not a jump [s].
-    jumped : (N,)
-        The motors cannot follow, and the windings keep their state.
-    windings : (12,)
-        Temperature rises [K], and copper heat [W] that is held until the next setpoint.
-    rows : (N, MOTOR_ROW)
-        Written.
-
+    constants, drives, torque_max, curve, motions, results, forces: as in ``motor_rows``; forces as
+        published.
+    thresholds (24,): limits of speeds and temperature rises, thermal resistances and time
+        constants.
+    elapsed (N,): time from the last setpoint that was not a jump [s].
+    jumped (N,): the motors cannot follow, and the windings keep their state.
+    windings (12,): temperature rises [K], and copper heat [W] that is held until the next
+        setpoint.
+    rows (N, MOTOR_ROW): written.
     """
     for n in range(len(motions)):
         row = rows[n]
@@ -115,17 +109,7 @@ _GIVES = Struct(f'{_WINDINGS + DEMANDED_TORQUES.stop}d')
 
 
 class MotorStep:
-    """
-    The motors of setpoints; see ``Step``.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        With ``drive.*``.
-    motion, result, forces : (MOTION,), (RESULT,), (6,)
-        Memory of the single setpoint that ``Step`` has computed.
-
-    """
+    """The motors of setpoints; see ``Step``."""
 
     def __init__(self, parameters: Parameters, motion: Array, result: Array, forces: Array,
                  ) -> None:

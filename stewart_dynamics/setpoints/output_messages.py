@@ -56,11 +56,7 @@ class OutputMessages:
     """
     Writes the output messages.
 
-    Attributes
-    ----------
-    types : dict of str to str
-        Topics that the hexapod has, and their types.
-
+    types: topics that the hexapod has, and their types.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -99,13 +95,9 @@ class OutputMessages:
         """
         Return the same messages as ``of_output`` for a batch of outputs.
 
-        Returns
-        -------
-        list of (topic, which, messages)
-            In the order in which they are published for one output: indices (K,) of the outputs
-            that have this message, and the messages (K,), all of one length. A topic may occur
-            twice, for messages with and without forces.
-
+        Returns (topic, which, messages): in the order in which they are published for one output:
+            indices (K,) of the outputs that have this message, and the messages (K,), all of one
+            length. A topic may occur twice, for messages with and without forces.
         """
         positions = outputs.lengths - self._zero_lengths
         solved = np.isfinite(outputs.forces[:, 0])

@@ -55,15 +55,9 @@ def join_many(samples: Mapping[str, TopicSamples], waiting: Mapping[str, Waiting
     """
     Join samples; None if stamps are not strictly increasing or more than WAITING samples wait.
 
-    Parameters
-    ----------
-    samples : mapping of str to Samples
-        New samples of each topic, in the order of topics in a row of motion.
-    waiting : mapping of str to Waiting
-        Earlier samples of each topic that still wait.
-    last : mapping of str to int
-        Last used stamp of each topic [ns]; empty before the first.
-
+    samples: new samples of each topic, in the order of topics in a row of motion.
+    waiting: earlier samples of each topic that still wait.
+    last: last used stamp of each topic [ns]; empty before the first.
     """
     stamps: dict[str, Stamps] = {}
     places: dict[str, Integers] = {}  # -1 for samples already waiting
@@ -138,20 +132,11 @@ class SampleJoining:
     """
     Joins the topics' samples by stamp.
 
-    Parameters
-    ----------
-    topics : sequence of str
-        Topics, in the order in which their values are joined.
-    frame : str or None
-        Required frame_id; an empty one is accepted. None: the first non-empty one is required.
-    tolerance, timeout : float
-        Maximum difference between the stamps of joined samples, and the jump back in time above
-        which a restart is assumed [s].
-    rejections : Rejections
-        Counts rejected messages.
-    noticed : callable
-        Called with texts for the log: a restart, stamps that are all zero.
-
+    topics: topics, in the order in which their values are joined.
+    frame: required frame_id; an empty one is accepted. None: the first non-empty one is required.
+    tolerance, timeout: maximum difference between the stamps of joined samples, and the jump back
+        in time above which a restart is assumed [s].
+    noticed: called with texts for the log: a restart, stamps that are all zero.
     """
 
     def __init__(self, topics: Sequence[str], frame: str | None, tolerance: float, timeout: float,
@@ -173,15 +158,7 @@ class SampleJoining:
         """
         Return the joined sample that this message completes, if any.
 
-        Parameters
-        ----------
-        topic : str
-            One of ``topics``.
-        data : bytes
-            The message as received, CDR.
-        now : callable
-            The clock [ns]; read if the stamps of samples are zero.
-
+        now: the clock [ns]; read if the stamps of samples are zero.
         """
         sample = self._readers[topic].read(data)
         if sample is None:
@@ -230,13 +207,8 @@ class SampleJoining:
 
         Regular messages are valid, have one layout for each topic and strictly increasing stamps.
 
-        Parameters
-        ----------
-        messages : Messages
-            Messages of these and other topics.
-        places : mapping of topic to (K,)
-            Indices of the messages of each topic; topics without a message are absent.
-
+        messages: messages of these and other topics.
+        places (K,): indices of the messages of each topic; topics without a message are absent.
         """
         if self._tolerance or self._unstamped_logged:
             return None

@@ -241,12 +241,8 @@ class Step:
     """
     The step for a hexapod with given parameters.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Constant for all calls; create another step for other parameters. Not thread-safe: calls
-        for one setpoint share a buffer.
-
+    parameters: constant for all calls; create another step for other parameters. Not thread-safe:
+        calls for one setpoint share a buffer.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -289,13 +285,8 @@ class Step:
         """
         Return the output, or None if the stamp or other numbers overflow.
 
-        Parameters
-        ----------
-        setpoint : Setpoint
-            Finite, with a valid rotation matrix.
-        before : State, optional
-            State of the previous output; None for the first setpoint.
-
+        setpoint: finite, with a valid rotation matrix.
+        before: state of the previous output; None for the first setpoint.
         """
         before = before or State()
         stamp, since, elapsed = setpoint.stamp, 0.0, math.inf

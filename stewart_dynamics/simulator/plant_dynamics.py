@@ -70,21 +70,13 @@ def _torque_acceleration(
     """
     Write the acceleration of a motion under motor torques, and the forces of the legs.
 
-    Parameters
-    ----------
-    constants, motion, wrench, base, work
-        As in ``forward_dynamics.acceleration``.
-    drives, torque_max, curve
-        As in ``motor_rows``; torques are clipped in place to those available.
-    torques : (6,)
-        [N m], + extends.
-    others : (6,)
-        Forces along the legs that do not pass through their screws [N].
-    scratch : (_OF_TWIST.stop,)
-        Scratch memory.
-    forces : (6,)
-        Written: forces of the legs as ``inverse_dynamics`` has them [N].
-
+    constants, motion, wrench, base, work: as in ``forward_dynamics.acceleration``.
+    drives, torque_max, curve: as in ``motor_rows``; torques are clipped in place to those
+        available.
+    torques (6,): [N m], + extends.
+    others (6,): forces along the legs that do not pass through their screws [N].
+    scratch (_OF_TWIST.stop,): scratch memory.
+    forces (6,): written: forces of the legs as ``inverse_dynamics`` has them [N].
     """
     changed, pushes = scratch[_CHANGED], scratch[_PUSHES]
     power, factor, of_twist = scratch[_POWER], scratch[_FACTOR], scratch[_OF_TWIST]
@@ -282,32 +274,19 @@ def advance(constants: Array, drives: Array, torque_max: Array, curve: Array, by
     """
     Take steps of h [s] and write the state and the result.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-    drives, torque_max, curve
-        As in ``motor_rows``; without motors ``drives`` is (0, n).
-    by_torques : bool
-        Whether commands are torques of the motors [N m]; else they are forces.
-    stops : (STOPS,)
-        The end stops, see ``end_stops``.
-    largest_forces : (6,)
-        To which commanded forces are clipped [N].
-    loads : (LOADS,)
-        Commands, force and moment on the platform [N, N m], rows of the base's motion at
-        begin, middle and end of the call, of nan where it is still; forces are clipped in
+    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    drives, torque_max, curve: as in ``motor_rows``; without motors ``drives`` is (0, n).
+    by_torques: whether commands are torques of the motors [N m]; else they are forces.
+    stops (STOPS,): the end stops, see ``end_stops``.
+    largest_forces (6,): to which commanded forces are clipped [N].
+    loads (LOADS,): commands, force and moment on the platform [N, N m], rows of the base's motion
+        at begin, middle and end of the call, of nan where it is still; forces are clipped in
         place.
-    state : (STATE,)
-        The initial state, overwritten with the final one. Where a step cannot be computed: the
-        last state that could be, at rest.
-    result : (RESULT,)
-        Written.
-    steps, h
-        Number of steps, and their length.
-    scratch, work : (SCRATCH,), forward_dynamics.WORK
-        Scratch memory.
-
+    state (STATE,): the initial state, overwritten with the final one. Where a step cannot be
+        computed: the last state that could be, at rest.
+    result (RESULT,): written.
+    steps, h: number of steps, and their length.
+    scratch, work (SCRATCH,): scratch memory.
     """
     after, slope, base = scratch[_AFTER], scratch[_SLOPE], scratch[_BASE]
     forces = result[RESULT_FORCES]

@@ -42,17 +42,10 @@ def warm(times: Array, heat: Array, resistance: Array, time_constant: Array, ris
     The heat of each time is held until the next one: for that the rises are exact. The first of
     them is given.
 
-    Parameters
-    ----------
-    times : (N,)
-        [s]
-    heat : (N, 6)
-        Copper heat [W].
-    resistance, time_constant : (6,)
-        From winding to ambient [K/W], and of the winding [s].
-    rises : (N, 6)
-        Above ambient; the first row is read, the others are written.
-
+    times (N,): [s]
+    heat (N, 6): copper heat [W].
+    resistance, time_constant (6,): from winding to ambient [K/W], and of the winding [s].
+    rises (N, 6): above ambient; the first row is read, the others are written.
     """
     for n in range(1, len(times)):
         for leg in range(6):

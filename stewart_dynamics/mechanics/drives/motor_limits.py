@@ -34,12 +34,8 @@ class MotorLimits:
     """
     The limits of the motors of a hexapod; those that are not given are never exceeded.
 
-    Attributes
-    ----------
-    bounds : dict of str to (6,)
-        Values of each of OF_MOTORS that is given [N m, rad/s, K]; torques at any speed are at
-        most drive.torque_max.
-
+    bounds (6,): values of each of OF_MOTORS that is given [N m, rad/s, K]; torques at any speed
+        are at most drive.torque_max.
     """
 
     def __init__(self, parameters: Parameters) -> None:

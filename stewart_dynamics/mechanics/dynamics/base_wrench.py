@@ -118,19 +118,14 @@ def base_wrenches(constants: Array, motions: Array, wrenches: Array, bases: Arra
     """
     Write the base wrench of each motion.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``; its gravity is not used.
-    motions : (N, MOTION)
-        Rows of motion, SI units, base axes.
-    wrenches : (N, WRENCH) or (1, WRENCH)
-        External wrenches on the platform at its origin, base axes; one row for all.
-    bases : (N, BASE) or (1, BASE)
-        Rows of the base's motion; one row for all. A row of nan gives nan.
-    results : (N, WRENCH)
-        Written: force [N] and moment [N m] on the base at its origin, base axes.
-
+    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``; its gravity is not
+        used.
+    motions (N, MOTION): rows of motion, SI units, base axes.
+    wrenches (N, WRENCH) or (1, WRENCH): external wrenches on the platform at its origin, base
+        axes; one row for all.
+    bases (N, BASE) or (1, BASE): rows of the base's motion; one row for all. A row of nan gives
+        nan.
+    results (N, WRENCH): written: force [N] and moment [N m] on the base at its origin, base axes.
     """
     one_wrench, one_base = len(wrenches) == 1, len(bases) == 1
     for row in range(len(motions)):

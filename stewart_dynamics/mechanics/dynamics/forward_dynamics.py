@@ -121,21 +121,12 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
     """
     Write the acceleration of a motion under leg forces.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-    motion : (MOTION,)
-        A row of motion, SI units, base axes; its acceleration is written.
-    forces : (6,)
-        Forces of the actuators [N], + pushes; their friction is subtracted here.
-    wrench : (6,)
-        Force [N] and moment [N m] on the platform at its origin, base axes.
-    base : (BASE,)
-        A row of the base's motion; one of nan adds no load.
-    work : WORK
-        Scratch memory.
-
+    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    motion (MOTION,): a row of motion, SI units, base axes; its acceleration is written.
+    forces (6,): forces of the actuators [N], + pushes; their friction is subtracted here.
+    wrench (6,): force [N] and moment [N m] on the platform at its origin, base axes.
+    base (BASE,): a row of the base's motion; one of nan adds no load.
+    work: scratch memory.
     """
     inverse_size = 1.0 / characteristic_length_of(constants)
     position = read3(motion, POSITION.start)

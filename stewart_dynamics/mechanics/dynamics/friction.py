@@ -40,15 +40,10 @@ def friction(rates: Array, viscous: Array, coulomb: Array, coulomb_velocity: Arr
     """
     Write the forces that overcome the friction.
 
-    Parameters
-    ----------
-    rates : (N, 6)
-        [m/s]
-    viscous, coulomb, coulomb_velocity : (6,)
-        Coefficients [N s/m], forces [N] and rates below which the latter are linear [m/s].
-    forces : (N, 6)
-        Written [N].
-
+    rates (N, 6): [m/s]
+    viscous, coulomb, coulomb_velocity (6,): coefficients [N s/m], forces [N] and rates below which
+        the latter are linear [m/s].
+    forces (N, 6): written [N].
     """
     for n in range(len(rates)):
         for leg in range(6):

@@ -282,25 +282,18 @@ def solve(constants: Array, motions: Array, wrenches: Array, bases: Array, resul
     """
     Compute the result of every motion.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-    motions : (N, MOTION)
-        Rows of position, rotation, twist and acceleration, SI units, base axes.
-    wrenches : (N, WRENCH) or (1, WRENCH)
-        Force [N] and moment [N m] on the platform at its origin, base axes; one row for all.
-    bases : (N, BASE) or (1, BASE)
-        Rows of the base's motion; one row for all. A row of nan adds no load.
-    results : (N, RESULT)
-        Written: lengths [m], rates [m/s], forces [N], forces under a unit load, det(J) [m^3],
-        d(det)/dt [m^3/s] and the condition number.
-    sound : (N,) or (0,)
-        Written: whether all numbers are finite and J_inv can be solved. If it has no entries, the
-        condition number, which takes half of the time, is not computed: its column is arbitrary.
-    tile : (TILE,)
-        Scratch memory.
-
+    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    motions (N, MOTION): rows of position, rotation, twist and acceleration, SI units, base axes.
+    wrenches (N, WRENCH) or (1, WRENCH): force [N] and moment [N m] on the platform at its origin,
+        base axes; one row for all.
+    bases (N, BASE) or (1, BASE): rows of the base's motion; one row for all. A row of nan adds no
+        load.
+    results (N, RESULT): written: lengths [m], rates [m/s], forces [N], forces under a unit load,
+        det(J) [m^3], d(det)/dt [m^3/s] and the condition number.
+    sound (N,) or (0,): written: whether all numbers are finite and J_inv can be solved. If it has
+        no entries, the condition number, which takes half of the time, is not computed: its column
+        is arbitrary.
+    tile (TILE,): scratch memory.
     """
     many = len(motions)
     one_wrench, one_base, checked = len(wrenches) == 1, len(bases) == 1, len(sound) > 0

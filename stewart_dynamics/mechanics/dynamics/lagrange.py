@@ -55,11 +55,7 @@ def legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
     """
     Return lengths, directions and arms at a pose: (1), (2).
 
-    Raises
-    ------
-    MotionError
-        A length is 0 or overflows.
-
+    Raises MotionError: a length is 0 or overflows.
     """
     with np.errstate(all='ignore'):
         at = unchecked_legs(parameters, position, rotation)

@@ -89,19 +89,10 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
     """
     Return the values of theta under the names of a parameter file, offsets left out.
 
-    Parameters
-    ----------
-    theta : (LINEAR,)
-        Parameters of a hexapod, SI units.
-    p : Parameters
-        Source of the center of mass of each part of a leg without mass.
-
-    Raises
-    ------
-    ParameterError
-        No body has these parameters: a mass is not positive, or a part of a leg has moments
-        without mass or a negative inertia about its center of mass.
-
+    theta (LINEAR,): parameters of a hexapod, SI units.
+    p: source of the center of mass of each part of a leg without mass.
+    Raises ParameterError: no body has these parameters: a mass is not positive, or a part of a leg
+        has moments without mass or a negative inertia about its center of mass.
     """
     mass = float(theta[MASS])
     if not mass > 0.0:

@@ -46,11 +46,7 @@ def pseudo_inertia(ten: Array) -> Array:
     """
     Return the pseudo-inertia (4, 4) of a body.
 
-    Parameters
-    ----------
-    ten : (10,)
-        Mass [kg], first moment [kg m], ixx ixy ixz iyy iyz izz about the origin [kg m^2].
-
+    ten (10,): mass [kg], first moment [kg m], ixx ixy ixz iyy iyz izz about the origin [kg m^2].
     """
     mass, hx, hy, hz, xx, xy, xz, yy, yz, zz = ten
     half = 0.5 * (xx + yy + zz)
@@ -86,11 +82,7 @@ def log_cholesky(ten: Array) -> Array:
     """
     Return the log-Cholesky parameters (10,) of a body's inertial parameters (10,).
 
-    Raises
-    ------
-    ParameterError
-        No body can have these inertial parameters.
-
+    Raises ParameterError: no body can have these inertial parameters.
     """
     pseudo = pseudo_inertia(ten)
     try:

@@ -207,20 +207,11 @@ def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, flo
     """
     Find the pose of six lengths.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-    lengths : (6,)
-        [m]
-    motion : (MOTION,)
-        A row of motion; its first twelve numbers are the guess, and the pose when it is found.
-
-    Returns
-    -------
-    code, steps, residual
-        FOUND, NO_POSE or SINGULAR; the steps taken; the largest difference in length [m].
-
+    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    lengths (6,): [m]
+    motion (MOTION,): a row of motion; its first twelve numbers are the guess, and the pose when it
+        is found.
+    Returns FOUND, NO_POSE or SINGULAR; the steps taken; the largest difference in length [m].
     """
     guess = read3(motion, POSITION.start)
     # Twice, as a guess may be 1e-6 off; rounding errors do not add up from pose to pose.

@@ -94,11 +94,8 @@ def home_pose(parameters: Parameters) -> Pose:
     """
     Return the home pose.
 
-    Raises
-    ------
-    ParameterError
-        Neither both limits of length nor a zero length that level legs can have give its height.
-
+    Raises ParameterError: neither both limits of length nor a zero length that level legs can have
+        give its height.
     """
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)

@@ -62,17 +62,11 @@ def joint_angles(constants: Array, axes: Array, motions: Array, angles: Array) -
     """
     Write the angles of the joints in each motion.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-    axes : (12, 3)
-        Unit vectors: of the base joints in base axes, of the platform joints in platform axes.
-    motions : (N, MOTION)
-        Rows of motion.
-    angles : (N, JOINT_ANGLES)
-        Written [rad]; nan where an axis is.
-
+    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    axes (12, 3): unit vectors: of the base joints in base axes, of the platform joints in platform
+        axes.
+    motions (N, MOTION): rows of motion.
+    angles (N, JOINT_ANGLES): written [rad]; nan where an axis is.
     """
     for row in range(len(motions)):
         position = read3(motions[row], POSITION.start)
@@ -125,24 +119,10 @@ class JointAngles:
     """
     The angles of a hexapod's joints.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-    needed : sequence of str
-        Names in AXES; the other angles are nan.
-
-    Attributes
-    ----------
-    axes : (12, 3)
-        Unit vectors from which the angles are measured: of the base joints in base axes, of the
-        platform joints in platform axes; nan for axes that are not needed.
-
-    Raises
-    ------
-    ParameterError
-        Axes that are needed are not given, and there is no home pose.
-
+    needed: names in AXES; the other angles are nan.
+    axes (12, 3): unit vectors from which the angles are measured: of the base joints in base axes,
+        of the platform joints in platform axes; nan for axes that are not needed.
+    Raises ParameterError: axes that are needed are not given, and there is no home pose.
     """
 
     def __init__(self, parameters: Parameters, needed: Sequence[str] = AXES) -> None:

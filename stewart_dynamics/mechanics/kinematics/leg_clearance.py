@@ -123,18 +123,11 @@ def from_plate(plate: Array, first: int, end: int, p: Vector3, p_end: Vector3, e
     """
     Return the shortest vector from a plate to a segment; zero where the segment crosses it.
 
-    Parameters
-    ----------
-    plate : (M, 3 or more)
-        Rows that begin with the corners of the plate, in order [m].
-    first, end : int
-        Its rows.
-    p, p_end : (3,)
-        Ends of the segment.
-    enough : float
-        Where the segment is this far from the plane of the plate, the distance from the plane
+    plate (M, 3 or more): rows that begin with the corners of the plate, in order [m].
+    first, end: its rows.
+    p, p_end (3,): ends of the segment.
+    enough: where the segment is this far from the plane of the plate, the distance from the plane
         will do [m].
-
     """
     origin = read3(plate[first], 0)
     area = (0.0, 0.0, 0.0)
@@ -184,21 +177,14 @@ def leg_clearances(constants: Array, shapes: Array, base: Array, platform: Array
     """
     Write the clearance of each leg from the nearest other leg or plate.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-    shapes : (6, 3)
-        Radius and length of the cylinder and radius of the piston of each leg [m].
-    base, platform : (M, 3)
-        Corners of the plates, base frame and platform frame [m]; none without a plate.
-    motions : (N, MOTION)
-        Rows of motion.
-    clearances, nearest : (N, 6)
-        Written: clearance [m], negative where legs overlap; and number of the leg or plate.
-    axes : (6, _AXIS)
-        Scratch memory.
-
+    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    shapes (6, 3): radius and length of the cylinder and radius of the piston of each leg [m].
+    base, platform (M, 3): corners of the plates, base frame and platform frame [m]; none without a
+        plate.
+    motions (N, MOTION): rows of motion.
+    clearances, nearest (N, 6): written: clearance [m], negative where legs overlap; and number of
+        the leg or plate.
+    axes (6, _AXIS): scratch memory.
     """
     for row in range(len(motions)):
         position = read3(motions[row], POSITION.start)
@@ -239,25 +225,11 @@ class LegClearance:
     """
     The clearance of a hexapod's legs.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-
-    Attributes
-    ----------
-    shapes : (6, 3)
-        Radius and length of the cylinder and radius of the piston of each leg [m].
-    base, platform : (M, 3)
-        Corners of the plates, base frame and platform frame [m]; none without a plate.
-    reach : float
-        Distance of the farthest platform joint or corner from the platform's origin [m].
-
-    Raises
-    ------
-    ParameterError
-        Radii or length are not given.
-
+    shapes (6, 3): radius and length of the cylinder and radius of the piston of each leg [m].
+    base, platform (M, 3): corners of the plates, base frame and platform frame [m]; none without a
+        plate.
+    reach: distance of the farthest platform joint or corner from the platform's origin [m].
+    Raises ParameterError: radii or length are not given.
     """
 
     def __init__(self, parameters: Parameters) -> None:

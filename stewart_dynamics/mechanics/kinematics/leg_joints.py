@@ -71,19 +71,10 @@ class TreeJoints:
     """
     The joints of a hexapod as a tree: their names, and their positions at a pose.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Names of all joints (24,): first the platform's joints, from base to platform, then for
+    names: names of all joints (24,): first the platform's joints, from base to platform, then for
         each leg two of the universal joint and one of the prismatic joint.
-    mounts : (6, 3, 3)
-        Rotation from the axes of each leg's mount to base axes.
-
-    Raises
-    ------
-    ParameterError
-        Two joints would have the same name.
-
+    mounts (6, 3, 3): rotation from the axes of each leg's mount to base axes.
+    Raises ParameterError: two joints would have the same name.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -101,13 +92,8 @@ class TreeJoints:
         """
         Return the position of each joint, in the order of ``names``, (..., 24) [m, rad].
 
-        Parameters
-        ----------
-        position : (..., 3)
-            Origin of the platform frame in the base frame [m].
-        rotation : (..., 3, 3)
-            Platform axes to base axes.
-
+        position (..., 3): origin of the platform frame in the base frame [m].
+        rotation (..., 3, 3): platform axes to base axes.
         """
         at, r = np.asarray(position, dtype=float), np.asarray(rotation, dtype=float)
         legs = at[..., None, :] + self._platform @ r.swapaxes(-1, -2) - self._base
@@ -124,11 +110,8 @@ class TreeJoints:
         """
         Return the same at one pose (24,) [m, rad], much faster.
 
-        Parameters
-        ----------
-        pose : sequence of float
-            Position and rotation, row by row (12,); further numbers, as of a motion, are ignored.
-
+        pose: position and rotation, row by row (12,); further numbers, as of a motion, are
+            ignored.
         """
         x, y, z, r00, r01, r02, r10, r11, r12, r20, r21, r22 = pose[:12]
         gamma = atan2(r10, r00)

@@ -59,11 +59,7 @@ class DynamicsDiagnostics:
         """
         Note an output and the time of arrival of its setpoint.
 
-        Returns
-        -------
-        bool
-            Whether a report is due.
-
+        Returns whether a report is due.
         """
         self._answers.add(now)
         self.timing.answered(now - came)

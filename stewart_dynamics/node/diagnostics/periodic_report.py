@@ -84,11 +84,7 @@ class Held:
     """
     Levels by their causes, each held for a second after it was last noted.
 
-    Parameters
-    ----------
-    causes : str
-        In the order of their messages; a single one by default.
-
+    causes: in the order of their messages; a single one by default.
     """
 
     def __init__(self, *causes: str) -> None:
@@ -194,13 +190,8 @@ class Answers:
     """
     Number of answered setpoints, and time of the last one.
 
-    Parameters
-    ----------
-    timeout : float
-        Age from which the last answer counts as old [s].
-    now : float
-        Start time of the count.
-
+    timeout: age from which the last answer counts as old [s].
+    now: start time of the count.
     """
 
     def __init__(self, timeout: float, now: float) -> None:

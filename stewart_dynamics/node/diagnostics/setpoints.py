@@ -68,17 +68,8 @@ class SetpointDiagnostics(StatusPart):
         """
         Note publishers, subscribers and nodes of the same name.
 
-        Parameters
-        ----------
-        writers : mapping of topic to int
-            Number of publishers on setpoint topics; other topics keep their number.
-        readers : mapping of topic to int
-            Number of subscribers to the topics for controllers.
-        name : str
-            The node's name.
-        namesakes : int
-            Number of nodes with this name.
-
+        writers: number of publishers on setpoint topics; other topics keep their number.
+        readers: number of subscribers to the topics for controllers.
         """
         self._writers.update(writers)
         self._readers.update(readers)
