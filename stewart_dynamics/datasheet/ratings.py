@@ -39,8 +39,6 @@ class Payloads:
     Largest point masses that can be added to a platform at rest, by forces and torques.
 
     capability, poses (N,): with limits of forces.
-
-    poses: (N,)
     """
 
     def __init__(self, capability: Capability, poses: Pose) -> None:
