@@ -32,3 +32,4 @@ Six = tuple[float, float, float, float, float, float]
 NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 SECOND = 1_000_000_000  # a second in the unit of stamps [ns]
+NANOSECOND = 1e-9  # the unit of stamps [s]

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, NANOSECOND
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.capability.motor_bounds import MotorBounds
@@ -96,7 +96,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
             raise BagError(f"{bag}: the base's motion is not known at any setpoint")
         stamps, rows, wrenches, bases = (each[known] for each in (stamps, rows, wrenches, bases))
     steps = np.maximum(np.diff(stamps, prepend=stamps[0]), 0)  # a bag that loops
-    return RecordedMotion(np.cumsum(steps) * 1e-9, Motion.of_rows(rows), wrenches,
+    return RecordedMotion(np.cumsum(steps) * NANOSECOND, Motion.of_rows(rows), wrenches,
                           None if bases is None else BaseMotion.of_rows(bases), missing,
                           sum(setpoints.counts.values()))
 

@@ -26,7 +26,7 @@ import math
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, NANOSECOND
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.frames.motion import Motion
@@ -119,7 +119,7 @@ def _motions(parameters: Parameters) -> Array:
     """Return rows of motion (_COUNT, MOTION)."""
     positions, rotations = homes(parameters)
     size = parameters['singularity.characteristic_length']
-    times = 1e-9 * _PERIOD * np.arange(_COUNT)[:, None]
+    times = NANOSECOND * _PERIOD * np.arange(_COUNT)[:, None]
     omega = 2.0 * math.pi * np.array([0.9, 1.1, 1.3, 1.5, 1.7, 1.9])
     growth = times / times[-1]
     sine, cosine = np.sin(omega * times), np.cos(omega * times)

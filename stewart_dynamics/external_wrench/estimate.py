@@ -49,7 +49,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, NO_WRENCH, Six
+from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
 from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
@@ -216,7 +216,7 @@ class ExternalWrench:
         self._numbers = np.zeros(_TILE.stop)
         self._memory = self._numbers.data  # the same as bytes
         self._numbers[_PLATFORM] = StewartPlatform(parameters).constants
-        self._longest_gap = round(parameters['setpoint.timeout'] * 1e9)
+        self._longest_gap = round(parameters['setpoint.timeout'] * SECOND)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
         self._most_force, self._most_moment = (
             parameters[f'{EXTERNAL_WRENCH}.{limit}'] for limit in ('force_max', 'moment_max'))
@@ -238,7 +238,7 @@ class ExternalWrench:
         given = (*measurement.lengths, *measurement.rates, *measurement.forces, *known)
         interval = 0 if before is None else measurement.stamp - before.stamp
         if before is not None and 0 < interval <= self._longest_gap:
-            seconds = interval * 1e-9
+            seconds = interval * NANOSECOND
             result = self._solve(
                 given, before.wrench or NO_WRENCH, seconds, before.motion, before.base, base)
         else:

@@ -26,7 +26,7 @@ from struct import Struct
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Six, Stamps
+from stewart_dynamics.arrays import Array, SECOND, Six, Stamps
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError, StewartError
 from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench, Measurement
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, NO_BASE, TWIST, WRENCH
@@ -121,7 +121,7 @@ class MeasuredLegs:
         self.step = step
         self._reader = JointStateReader(parameters['joints'])
         self._zero_lengths = tuple(parameters['geometry.zero_length'].tolist())
-        self._timeout = round(parameters['setpoint.timeout'] * 1e9)
+        self._timeout = round(parameters['setpoint.timeout'] * SECOND)
         self._rejected = rejected
         self._noticed = noticed
         self._history = history
@@ -180,10 +180,11 @@ class MeasuredLegs:
         """Return whether a measurement may still be used, or reject it."""
         back = self._last.stamp - stamp if self._last else -1
         if back > self._timeout:
-            self._noticed(f'{MEASURED_LEGS}: stamps jumped back by {back / 1e9:g} s: followed as '
-                          'a restart')
+            self._noticed(f'{MEASURED_LEGS}: stamps jumped back by {back / SECOND:g} s: followed '
+                          'as a restart')
         elif back == 0:
             self._reject(TWICE, f'stamp {stamp} ns')
         elif back > 0:
-            self._reject(TOO_OLD, f'stamp {stamp} ns is {back / 1e9:g} s older than the last used')
+            self._reject(
+                TOO_OLD, f'stamp {stamp} ns is {back / SECOND:g} s older than the last used')
         return back < 0 or back > self._timeout

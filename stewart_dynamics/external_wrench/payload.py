@@ -33,7 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Integers, Stamps
+from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.external_wrench.body_fit import (
     about, Body, BodyFit, FittedBody, FRICTION, LAGS, LegSamples, ROUNDS, TEN)
@@ -117,7 +117,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     for first in range(begin, end, PIECE):
         work.add(history, begin, first, min(first + PIECE, end))
         yield None
-    seconds = float(stamps[-1] - stamps[0]) * 1e-9
+    seconds = float(stamps[-1] - stamps[0]) * NANOSECOND
     samples = work.samples()
     if samples is None:
         needed = LEAST_WINDOWS * work.half_width
@@ -159,7 +159,7 @@ def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
         return end, end
     stopped = np.flatnonzero(np.diff(stamps) <= 0)
     restart = int(stopped[-1]) + 1 if len(stopped) else 0
-    late = np.searchsorted(stamps[restart:], stamps[-1] - round(seconds * 1e9))
+    late = np.searchsorted(stamps[restart:], stamps[-1] - round(seconds * SECOND))
     return history.first + restart + int(late), end
 
 
@@ -176,10 +176,10 @@ class _Windows:
                 ('force_max', math.inf), ('length_min', 0.0), ('length_max', math.inf)))
         self.excluded = 0
         self._longest_gap = p['setpoint.timeout']
-        intervals = np.diff(stamps) * 1e-9
+        intervals = np.diff(stamps) * NANOSECOND
         interval = float(np.median(intervals)) if len(intervals) else 0.0
         self.half_width = max(_HALF_WIDTH, _MEASUREMENTS * interval)
-        many = int((stamps[-1] - stamps[0]) * 1e-9 / self.half_width) + 2
+        many = int((stamps[-1] - stamps[0]) * NANOSECOND / self.half_width) + 2
         self._sums = np.zeros((many, 6, _COLUMNS + 2))
         self._covered = np.zeros(many)
         self._about = about(p['platform.center_of_mass'])
@@ -199,7 +199,7 @@ class _Windows:
         if low < history.first:  # overwritten meanwhile
             return
         rows = history.rows(low, high)
-        seconds = (self._stamps[low - begin:high - begin] - self._stamps[0]) * 1e-9
+        seconds = (self._stamps[low - begin:high - begin] - self._stamps[0]) * NANOSECOND
         steps = np.diff(seconds)
         sound = steps <= self._longest_gap
         twists = rows[:, TURNED]

@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, ParameterError, PoseError, SingularityError
 from stewart_dynamics.identification.extraction import Extraction, Extracts, WindowRead
@@ -202,7 +202,7 @@ class Identification:
                     lag = 0
             window = window.with_lag(lag)
             is_first, last = last is None, self._read_window(path, extraction, window, last)
-            self.extracts.add(len(self.bags), (window.begin - begin) * 1e-9, last.extract)
+            self.extracts.add(len(self.bags), (window.begin - begin) * NANOSECOND, last.extract)
             if is_first:
                 self._add_noise(extraction, window, last)
             speeds = np.abs(last.extract.legs[..., 1])
@@ -211,7 +211,7 @@ class Identification:
                 'outliers': int(np.count_nonzero(window.outliers)), 'speeds': speeds.size,
                 'slow': int(np.count_nonzero(
                     speeds < self.parameters['actuator.coulomb_velocity']))})
-            end = window.begin + round(len(window.positions) * window.period * 1e9)
+            end = window.begin + round(len(window.positions) * window.period * SECOND)
         if extraction is None or last is None:
             return None
         period, rates = window.period, window.rates is not None
@@ -219,7 +219,7 @@ class Identification:
             extraction, period, (self.extracts.samples - before) * extraction.step * period,
             counts['slow'] / counts['speeds'])
         self.bags.append(BagRead(
-            path, counts['samples'], (end - begin) * 1e-9, period, extraction.cutoff,
+            path, counts['samples'], (end - begin) * NANOSECOND, period, extraction.cutoff,
             rates, counts['left out'], counts['stops'], counts['outliers'], last.deviations[0],
             last.deviations[1] if rates else None, lag * period, {}, [], notices))
         return self.bags[-1]

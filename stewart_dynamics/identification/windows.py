@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, Stamps
 
 # Minimum number of samples of a window.
 FEWEST = 8
@@ -75,12 +75,12 @@ class Window(NamedTuple):
 
 def period_of(stamps: Stamps) -> float:
     """Return the median time between samples [s]."""
-    return float(np.median(np.diff(stamps))) * 1e-9
+    return float(np.median(np.diff(stamps))) * NANOSECOND
 
 
 def segments(stamps: Stamps, period: float) -> list[slice]:
     """Return the parts between gaps."""
-    steps = np.diff(stamps) * 1e-9
+    steps = np.diff(stamps) * NANOSECOND
     breaks = np.flatnonzero((steps > GAP * period) | (steps <= 0.0)) + 1
     edges = [0, *breaks.tolist(), len(stamps)]
     return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
@@ -97,13 +97,13 @@ def uniform(legs: Signal, efforts: Signal, period: float) -> Window | None:
         return None
     begin = max(int(legs.stamps[0]), int(efforts.stamps[0]))
     end = min(int(legs.stamps[-1]), int(efforts.stamps[-1]))
-    count = int((end - begin) * 1e-9 / period + 1e-6) + 1
+    count = int((end - begin) * NANOSECOND / period + 1e-6) + 1
     if count < FEWEST:
         return None
     at = period * np.arange(count, dtype=float)
     positions, replaced = _without_outliers(legs.values[:, :6], 0.0)
     pushes, replaced_too = _without_outliers(efforts.values, _OF_EFFORTS)
-    of_legs, of_efforts = (1e-9 * (each.stamps - begin).astype(float)
+    of_legs, of_efforts = (NANOSECOND * (each.stamps - begin).astype(float)
                            for each in (legs, efforts))
     outliers = _near(of_legs, replaced, at, period) | _near(of_efforts, replaced_too, at, period)
     # Samples within a gap of the efforts are not fitted.

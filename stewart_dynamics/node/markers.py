@@ -243,7 +243,7 @@ class Markers:
         at = self._put(8, '10d', *position, 0.0, 0.0, 0.0, 1.0, *scale)
         self._put(4, '4f', *color)
         seconds = int(self._stays)
-        self._put(4, 'iI?', seconds, int((self._stays - seconds) * 1e9), False)
+        self._put(4, 'iI?', seconds, int((self._stays - seconds) * SECOND), False)
         self._put(4, 'I', len(points))
         for point in points:
             self._put(8, '3d', *point)

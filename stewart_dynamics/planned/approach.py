@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import optional_array, wrong_type
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
@@ -140,7 +140,7 @@ def approach_in_pieces(platform: StewartPlatform, start: Array, end: Array, wren
         duration = math.ceil(duration * rate - 1e-9) / rate
         found = _quintic(start, end, duration, rate)
         result = None
-        for result in check_in_pieces(platform, np.rint(found.times * 1e9).astype(np.int64),
+        for result in check_in_pieces(platform, np.rint(found.times * SECOND).astype(np.int64),
                                       found.motion.rows, wrench, base):
             if result is None:
                 yield None

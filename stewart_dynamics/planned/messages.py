@@ -28,7 +28,7 @@ import numpy as np
 
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array, SECOND, Six, Stamps
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Six, Stamps
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.base_motion import row_of_motion
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
@@ -168,8 +168,9 @@ def _read(message: PlatformTrajectory, parameters: Parameters,
         stuck = first_not_increasing(times[first:end], times[first - 1] if first else -1)
         if stuck is not None:
             n = first + stuck
-            raise _NotCheckableError(NOT_INCREASING, f'points[{n}]: {times[n] * 1e-9:.9g} s, ' + (
-                f'after {times[n - 1] * 1e-9:.9g} s' if n else 'must be at least 0'))
+            rule = f'after {times[n - 1] * NANOSECOND:.9g} s' if n else 'must be at least 0'
+            raise _NotCheckableError(
+                NOT_INCREASING, f'points[{n}]: {times[n] * NANOSECOND:.9g} s, {rule}')
         rows[first:end] = _rows(first, _numbers(points, 0))
         if bases is not None:
             r: Any = _rows(first, _numbers(points, 1)).T
@@ -212,8 +213,8 @@ def _from_measured(platform: StewartPlatform, times: Stamps, rows: Array, wrench
     except MotionError as exc:
         raise _NotCheckableError(NO_APPROACH, str(exc)) from exc
     assert found is not None  # the last one
-    before = np.rint(found.times[:-1] * 1e9).astype(np.int64)
-    times = np.concatenate([before, times - times[0] + round(found.times[-1] * 1e9)])
+    before = np.rint(found.times[:-1] * SECOND).astype(np.int64)
+    times = np.concatenate([before, times - times[0] + round(found.times[-1] * SECOND)])
     if bases is not None and bases.ndim == 2:
         bases = np.concatenate([np.repeat(bases[:1], len(before), axis=0), bases])
     return times, np.concatenate([found.motion.rows[:-1], rows]), bases

@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Integers, Stamps
+from stewart_dynamics.arrays import Array, Integers, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
@@ -174,7 +174,7 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
     if outside.any():
         n = int(np.argmax(outside))
         raise MotionError(f'times[{n}]: {seconds[n]} s: must be 0 to {_TIMES_END} s')
-    stamps = np.rint(seconds * 1e9).astype(np.int64)
+    stamps = np.rint(seconds * SECOND).astype(np.int64)
     if (stuck := first_not_increasing(stamps)) is not None:
         raise MotionError(f'times[{stuck}]: {seconds[stuck]} s after {seconds[stuck - 1]} s: must '
                           'be strictly increasing, by at least a nanosecond')
@@ -416,7 +416,7 @@ class _Work:
             raise self._too_far(f'{TOO_FAR}: more', None)
 
     def _too_far(self, words: str, point: int | None) -> _ViolationError:
-        time = math.nan if point is None else float(self._times[point]) * 1e-9
+        time = math.nan if point is None else float(self._times[point]) * NANOSECOND
         return _ViolationError(Violation(
             time, TOO_FAR, f'{words} than {MOST_SAMPLES} samples are needed to check what lies '
             'between'))
@@ -447,7 +447,7 @@ class _Work:
     @property
     def _duration(self) -> float:
         """From the first point to the last [s]."""
-        return float(self._times[-1] - self._times[0]) * 1e-9
+        return float(self._times[-1] - self._times[0]) * NANOSECOND
 
 
 def _seconds(nanoseconds: Stamps) -> Array:

@@ -21,7 +21,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.arrays import Array, Integers, SECOND
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
@@ -48,7 +48,7 @@ def sample_count(parameters: ReferenceMotionParameters) -> int:
 def sample_time(parameters: ReferenceMotionParameters, index: ArrayLike) -> Integers:
     """Return the times of samples by their index (...) [ns]; rounding errors do not add up."""
     times: Integers = np.rint(
-        np.asarray(index) * 1e9 / parameters['rate']).astype(np.int64)
+        np.asarray(index) * SECOND / parameters['rate']).astype(np.int64)
     return times
 
 

@@ -29,6 +29,7 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from rclpy.time import Time
 from std_msgs.msg import Header
+from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.reference_motion.motion import motion_at, sample_count, sample_time
@@ -83,7 +84,7 @@ class TrajectoryNode(Node):
             self._outputs = [self._pose, self._twist, self._accel]
             self._publish = self._publish_separate
         self._begun = self._subscribed = False
-        self._start = time.monotonic_ns() + round(self._settings['start_timeout'] * 1e9)
+        self._start = time.monotonic_ns() + round(self._settings['start_timeout'] * SECOND)
         self._timer = self.create_timer(
             1.0 / self._settings['rate'], self._on_timer,
             clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -125,7 +126,7 @@ class TrajectoryNode(Node):
     def _publish_due(self, now: int) -> None:
         """Publish the samples that are due, each with its own stamp, however late it is [ns]."""
         if self._held:  # of these the last one is enough
-            self._index = max(self._index, int(now * 1e-9 * self._settings['rate']))
+            self._index = max(self._index, int(now * NANOSECOND * self._settings['rate']))
         while not self._done.done():
             due = int(sample_time(self._settings, self._index))
             if due > now:
@@ -172,7 +173,8 @@ class TrajectoryNode(Node):
             return self._held
         at = self._index % _BLOCK
         if at == 0:
-            times = sample_time(self._settings, range(self._index, self._index + _BLOCK)) * 1e-9
+            times = NANOSECOND * sample_time(
+                self._settings, range(self._index, self._index + _BLOCK))
             motion = motion_at(self._settings, times)
             quaternions = to_quaternion(motion.rotation)
             self._block = [

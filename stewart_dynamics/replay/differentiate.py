@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
@@ -99,8 +99,8 @@ class Differentiator:
         self.left_out: Counter[str] = Counter()
         """Number of setpoints left out, without twist and acceleration, by reason."""
         self.near_ends = 0  # setpoints within 1 / cutoff of an end of their segment
-        self._gap = round(gap * 1e9)
-        self._reach = round(_REACH / cutoff * 1e9)
+        self._gap = round(gap * SECOND)
+        self._reach = round(_REACH / cutoff * SECOND)
         self._window = window
         self._pending: list[Batch] = []
         self._held = 0
@@ -183,7 +183,7 @@ class Differentiator:
             return []
         if not self._given:
             self._begun = int(stamps[0])
-        self._check_rate((stamps[:self._window] - stamps[0]) * 1e-9)
+        self._check_rate((stamps[:self._window] - stamps[0]) * NANOSECOND)
         done = []
         while self._given < len(stamps):
             end = min(self._given + self._window, len(stamps))
@@ -218,7 +218,7 @@ class Differentiator:
     def _differentiate(self, segment: Batch, part: slice, core: slice) -> Batch:
         """Return the setpoints of a core with the motion of the spline through a larger part."""
         stamps, motions = segment.stamps[part], segment.motions[part]
-        times = (stamps - stamps[0]) * 1e-9
+        times = (stamps - stamps[0]) * NANOSECOND
         self._check_rate(times)
         quaternions = rotations.to_quaternion(motions[:, ROTATION].reshape(-1, 3, 3))
         flips = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0
@@ -243,7 +243,7 @@ class Differentiator:
         out[:, LINEAR_VELOCITY], out[:, LINEAR_ACCELERATION] = rates[:, :3], accelerations[:, :3]
         out[:, ANGULAR_VELOCITY], out[:, ANGULAR_ACCELERATION] = omega, alpha
 
-        time = 1e9 / self.cutoff
+        time = SECOND / self.cutoff
         near = (given.stamps - self._begun < time) | (segment.stamps[-1] - given.stamps < time)
         self.near_ends += int(np.count_nonzero(followed & near))
         known = followed & ~near & np.isfinite(out).all(axis=1)

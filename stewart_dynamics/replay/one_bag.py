@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, SECOND, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.bags import recording as bag_recording
 from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.bags.recording import Recording
@@ -255,9 +255,9 @@ class _Run:
         """Return when a message was rejected, since the first setpoint [s]; None: not known."""
         begin, restarts = setpoints['first_stamp_ns'], setpoints['restarts']
         if begin is not None and first.stamp is not None and not restarts:
-            return (first.stamp - int(begin)) * 1e-9
+            return (first.stamp - int(begin)) * NANOSECOND
         if self._first_time is not None and first.recorded is not None:
-            return (first.recorded - self._first_time) * 1e-9
+            return (first.recorded - self._first_time) * NANOSECOND
         return None
 
     def _notice(self, text: str) -> None:
@@ -310,7 +310,7 @@ class _Run:
         whole, rest = self._elapsed[0] + np.cumsum(whole), self._elapsed[1] + np.cumsum(rest)
         self._stamp = int(stamps[-1])
         self._elapsed = int(whole[-1] + rest[-1] // SECOND), int(rest[-1] % SECOND)
-        seconds: Array = (whole + rest // SECOND) + (rest % SECOND) * 1e-9
+        seconds: Array = (whole + rest // SECOND) + (rest % SECOND) * NANOSECOND
         return seconds
 
     def _take_measured(self, messages: Messages, which: Flags) -> None:

@@ -38,7 +38,7 @@ from mcap.records import (
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import get_typestore, Stores
-from stewart_dynamics.arrays import Array, Bytes, Stamps
+from stewart_dynamics.arrays import Array, Bytes, SECOND, Stamps
 from stewart_dynamics.bags.mcap_file import MAGIC
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.model import JOINT_STATES, LinkTransforms, TF
@@ -123,7 +123,7 @@ class OutputBag:
                  rate: float) -> None:
         self._folder = folder
         self._messages, self._model = messages, model
-        self._period = round(1e9 / rate) if rate else 0
+        self._period = round(SECOND / rate) if rate else 0
         self._due: int | None = None  # when the model is written next
         self._types = messages.types | (MODEL_TYPES if rate else {})
         folder.mkdir()

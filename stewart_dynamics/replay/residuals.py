@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Bytes, Stamps
+from stewart_dynamics.arrays import Array, Bytes, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.external_wrench.estimate import external_wrenches
 from stewart_dynamics.mechanics.rows import POSE
@@ -126,7 +126,7 @@ class Comparison:
         self._parameters = parameters
         self._platform = StewartPlatform(parameters)
         gap = parameters['setpoint.timeout']
-        self._gap = round(gap * 1e9)
+        self._gap = round(gap * SECOND)
         self._setpoints = Waiting(self._gap, _SETPOINTS_WAITING)
         self._samples = Waiting(self._gap, _SAMPLES_WAITING)
         self._without_force = 0
@@ -203,7 +203,7 @@ class Comparison:
             'samples': self._samples.taken,
             'samples_out_of_order': self._samples.out_of_order,
             'samples_jumped_back': max(self._samples.pass_number, 0),
-            'gap_limit_s': self._gap * 1e-9,
+            'gap_limit_s': self._gap * NANOSECOND,
             **self._of_all_legs(),
             'legs': {joint: self._leg(leg) for leg, joint in enumerate(joints)},
             'external_wrench': {axis: self._wrench.named(number, '', unit)
@@ -242,7 +242,7 @@ class Comparison:
         smallest = 1e-3 * force * np.array([1.0, 1.0, 1.0, length, length, length])
         middle, deviation = self._bins.middle()
         threshold = np.maximum(6.0 * deviation, smallest)
-        found = self._bins.contacts(middle, threshold, self._gap * 1e-9)
+        found = self._bins.contacts(middle, threshold, self._gap * NANOSECOND)
         strongest = sorted(sorted(found, key=lambda each: -each.excess)[:100])
         return {
             'count': len(found),

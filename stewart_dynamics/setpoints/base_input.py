@@ -31,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Integers, Stamps
+from stewart_dynamics.arrays import Array, Integers, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.mechanics.frames.base_motion import row_of_imu, row_of_motion, row_of_pose
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import BASE, GRAVITY, NO_BASE
@@ -62,8 +62,8 @@ class BaseInput:
             parameters['setpoint.sync_tolerance'], parameters['base.timeout'], rejections,
             lambda text: noticed(f'base: {text}'))
         """Joins the samples of the topics."""
-        self._timeout = round(parameters['base.timeout'] * 1e9)
-        self._restart = round(parameters['setpoint.timeout'] * 1e9)
+        self._timeout = round(parameters['base.timeout'] * SECOND)
+        self._restart = round(parameters['setpoint.timeout'] * SECOND)
         gravity: Any = tuple(parameters['gravity'].tolist())
 
         def of_pose(stamp: int, values: Any) -> _Row:
@@ -191,7 +191,7 @@ class _OfImu:
         length = math.sqrt(x * x + y * y + z * z + w * w)
         self._rotation = from_quaternion(x / length, y / length, z / length, w / length)
         self._rate = 2.0 * math.pi * parameters['base.imu.cutoff']
-        self._timeout = round(parameters['base.timeout'] * 1e9)
+        self._timeout = round(parameters['base.timeout'] * SECOND)
         self._last: tuple[int, Any] | None = None
         self._filtered = 0.0, 0.0, 0.0
 
@@ -201,7 +201,7 @@ class _OfImu:
         if self._last is None or not 0 < interval <= self._timeout:
             self._filtered = 0.0, 0.0, 0.0
         else:
-            dt = interval * 1e-9
+            dt = interval * NANOSECOND
             gain = -math.expm1(-self._rate * dt)
             x, y, z = (old + gain * ((now - then) / dt - old) for old, now, then in zip(
                 self._filtered, spin, self._last[1], strict=True))

@@ -28,7 +28,7 @@ from struct import Struct
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, Stamps
 from stewart_dynamics.compilation.functions import entry_point
 from stewart_dynamics.mechanics.drives import motors
 from stewart_dynamics.mechanics.drives.heat import warmed
@@ -164,5 +164,5 @@ def times_followed(stamps: Stamps, restarts: Flags, jumped: Flags, before: int) 
     """
     last = np.maximum.accumulate(np.where(jumped, -1, np.arange(len(stamps))))
     last = np.concatenate([[-1], last[:-1]])[:len(stamps)]
-    elapsed = (stamps - np.where(last < 0, before, stamps[last])) * 1e-9
+    elapsed = (stamps - np.where(last < 0, before, stamps[last])) * NANOSECOND
     return np.where(restarts | (elapsed < 0.0), 0.0, elapsed)

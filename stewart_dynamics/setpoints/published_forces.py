@@ -25,7 +25,7 @@ import math
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, Stamps
 from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.mechanics.limits import any_exceeded, jumps
 from stewart_dynamics.mechanics.rows import (
@@ -88,7 +88,7 @@ def check_many(settings: Array, stamps: Stamps, bases_known: Flags, restarts: Fl
         is_stamp = -STAMPS_END <= stamps[n] < STAMPS_END
         elapsed = math.inf
         if is_stamp and not restart and stamps[n] > followed_at[0]:
-            elapsed = (stamps[n] - followed_at[0]) * 1e-9 + slack[n]
+            elapsed = (stamps[n] - followed_at[0]) * NANOSECOND + slack[n]
         answered[n], exceeding[n], jumped[n] = check(
             settings, limits, is_stamp, bases_known[n], state, restart, followed, elapsed,
             results[n], forces[n])

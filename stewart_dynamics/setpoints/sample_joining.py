@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Integers, Stamps
+from stewart_dynamics.arrays import Array, Integers, SECOND, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.setpoints.inputs import SampleReader, TopicSamples
@@ -144,8 +144,8 @@ class SampleJoining:
         self.topics = tuple(topics)
         self._reject = rejections.reject
         self._readers = {topic: SampleReader(topic, frame, rejections) for topic in self.topics}
-        self._tolerance = round(tolerance * 1e9)
-        self._timeout = round(timeout * 1e9)
+        self._tolerance = round(tolerance * SECOND)
+        self._timeout = round(timeout * SECOND)
         self._noticed = noticed
         self._last: dict[str, int] = {}
         self._waiting: dict[str, Waiting] = {topic: {} for topic in self.topics}
@@ -244,7 +244,7 @@ class SampleJoining:
         if stamp == last:
             self._reject(topic, TWICE, f'stamp {stamp} ns')
         else:
-            self._reject(topic, TOO_OLD, f'stamp {stamp} ns is {(last - stamp) / 1e9:g} s '
+            self._reject(topic, TOO_OLD, f'stamp {stamp} ns is {(last - stamp) / SECOND:g} s '
                          f'older than the last used')
         return False
 
@@ -285,7 +285,7 @@ class SampleJoining:
         first = self.topics[0]
         jump: int = self._last[first] - stamps[first] if self._last else 0
         if jump > self._timeout:
-            self._noticed(f'stamps jumped back by {jump / 1e9:g} s: followed as a restart')
+            self._noticed(f'stamps jumped back by {jump / SECOND:g} s: followed as a restart')
         for topic, stamp in stamps.items():
             waiting = self._waiting[topic]
             if len(waiting) > 1:

@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, NO_WRENCH, Six, Stamps
 from stewart_dynamics.compilation.functions import entry_point
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
@@ -291,7 +291,7 @@ class Step:
         before = before or State()
         stamp, since, elapsed = setpoint.stamp, 0.0, math.inf
         if stamp > before.stamp and not setpoint.restart:
-            since = (stamp - before.stamp) * 1e-9
+            since = (stamp - before.stamp) * NANOSECOND
             elapsed = since + (self._slack if setpoint.stamped else self._slack_of_arrival)
         _GIVEN.pack_into(
             self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,

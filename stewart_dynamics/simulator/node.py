@@ -197,13 +197,13 @@ class SimulatorNode(Node):
             # Stamps go on with the clock, the motion where it was.
             self._start += late
             self._stamp += late
-            self._say('late', f'fell behind by {late / 1e9:.3f} s: that time is skipped')
+            self._say('late', f'fell behind by {late / SECOND:.3f} s: that time is skipped')
         while self._time_of(self._index + 1) <= now - self._start:
             self._advance()
 
     def _time_of(self, index: int) -> int:
         """Return the time of a period's end since the start [ns]; rounding does not add up."""
-        return round(index * 1e9 / self._rate)
+        return round(index * SECOND / self._rate)
 
     def _advance(self) -> None:
         """Take one period, with the brakes on until there is a command, and when they stop."""

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from stewart_dynamics.arrays import SECOND
+from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.periodic_report import (
@@ -150,4 +150,4 @@ def _crossing(before: Output | None, output: Output) -> str:
     if before is None or passed <= 0:
         return f'det(J) crossed zero before {stamp}'
     now, then = abs(output.determinant), abs(before.determinant)
-    return f'det(J) crossed zero {passed * 1e-9 * now / (now + then):.3g} s before {stamp}'
+    return f'det(J) crossed zero {passed * NANOSECOND * now / (now + then):.3g} s before {stamp}'
