@@ -39,14 +39,14 @@ from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.node.diagnostics.diagnostic_array import DiagnosticsPublisher
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, TICK, WARN
-from stewart_dynamics.node.diagnostics.publisher import DiagnosticsPublisher
+from stewart_dynamics.node.publishers_at_rate import MarkersPublisher, ModelPublisher
 from stewart_dynamics.node.tasks import (
     inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)
 from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD, TRAVEL
 from stewart_dynamics.node.travel import TravelPublisher
-from stewart_dynamics.node.visualization import MarkersPublisher, ModelPublisher
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory

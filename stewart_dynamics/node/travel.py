@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.limits import (
     CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, OF_JOINTS)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.node.visualization import PublisherAtRate
+from stewart_dynamics.node.publishers_at_rate import PublisherAtRate
 from stewart_dynamics.parameters.table import Parameters
 
 _RATE = 10.0  # [Hz]

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Visualization of the hexapod, while there are subscribers.
+Topics that are published at a limited rate, while there are subscribers.
 
-``~/markers`` and ``~/joint_states`` at most at ``visualization_rate``, and the platform's
-transform on ``/tf`` with every pose.
+``~/markers`` and ``~/joint_states`` at most at ``visualization_rate``; with every pose the
+platform's transform on ``/tf``.
 """
 
 from __future__ import annotations
