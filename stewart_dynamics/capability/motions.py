@@ -50,8 +50,9 @@ class Deviations:
     """
     The deviations of a motion's samples from a pose.
 
-    center: at rest.
+    center: one sample, at rest.
     rows (N, MOTION): rows of motion.
+
     changes (N, 3, 6): displacement and rotation vector, their rates and accelerations.
     """
 

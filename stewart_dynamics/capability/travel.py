@@ -100,7 +100,7 @@ def travels(constants: Array, axes: Array, bounds: Array, shapes: Array, base: A
         and the leg, of two legs that are too near the first; infinity, NOTHING and -1 if nothing
         limits, leg -1 at a singularity. nan where the bounded number of steps does not decide
         whether a limit is exceeded, with that limit.
-    memory: scratch memory.
+    memory: scratch memory, of shape ``memory_of``.
     """
     of_legs, work = memory[:6], memory[6:12]
     bodies = bodies_in(memory[12:], 1, shapes, len(base))

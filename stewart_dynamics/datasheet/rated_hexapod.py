@@ -56,11 +56,12 @@ class RatedHexapod:
     pose: pose of the platform frame; by default home.
     pivot (3,): pivot, platform frame [m]; by default its origin.
     payload: mass that is added to the platform.
+
     given: parameters with the payload.
     platform: with the payload, and the origin of the platform frame at the pivot.
     loads: capability of that platform, for rates and loads.
     origin, pose: pose of the platform frame as given, and of the pivot.
-    pivot (3,): as given.
+
     Raises StewartError: no limit is given, or the pose is outside the limits or singular.
     """
 

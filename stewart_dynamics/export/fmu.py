@@ -60,7 +60,7 @@ class Variable(NamedTuple):
     description: str
     unit: str = ''
     kind: str = 'Float64'  # type in FMI 3.0
-    start: float | None = None  # none for outputs
+    start: float | None = None  # None for outputs
 
     @property
     def variability(self) -> str:

@@ -104,7 +104,7 @@ class Estimate(NamedTuple):
     stamp: int
     motion: tuple[float, ...]
     """A row of motion: pose, twist, and the acceleration since the last measurement."""
-    wrench: Six | None  # the external wrench, filtered; none of the first measurement [N, N m]
+    wrench: Six | None  # the external wrench, filtered; None for the first measurement [N, N m]
     differences: Six | None
     """Measured - model, not filtered (6) [N]; none of the first measurement."""
     base: tuple[float, ...] = NO_BASE  # a row of the base's motion; of nan: it is still

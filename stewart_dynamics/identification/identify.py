@@ -124,7 +124,7 @@ class Identified(NamedTuple):
     residuals: Residuals
     validation: Residuals | None  # residuals on held-out time, by a fit to the rest
     likely: tuple[LikelyMistake, ...]
-    lack_of_fit: LackOfFit | None  # none if the residuals are noise
+    lack_of_fit: LackOfFit | None  # None if the residuals are noise
 
 
 class Identification:

@@ -96,10 +96,9 @@ class Exceedance(NamedTuple):
 
 class Limits:
     """
-    The limits of the legs of a hexapod.
+    The limits of the legs of a hexapod; those that are not given are never exceeded.
 
-    parameters: parameters of the hexapod; limits that are not given are never exceeded.
-    bounds (6,): values of each limit that is given [m, m/s, N, rad].
+    bounds: values (6,) of each limit that is given [m, m/s, N, rad].
     thresholds (7, 6): values above (or below) which each of LIMITS is exceeded; infinite if not
         given.
     of_joints: names in OF_JOINTS that are given.

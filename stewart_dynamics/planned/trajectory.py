@@ -451,7 +451,7 @@ class _Work:
 
 
 def _seconds(nanoseconds: Stamps) -> Array:
-    return np.multiply(nanoseconds, 1e-9, dtype=float)
+    return np.multiply(nanoseconds, NANOSECOND, dtype=float)
 
 
 def _samples(parts: Array, piece: int) -> Iterator[_Places]:

@@ -77,7 +77,7 @@ def replay_fleet(
     """
     Replay bags and write fleet.csv and index.html, a row for each bag.
 
-    bags (Path, Path): each with the folder of its results, from bags.folders_of_results.
+    bags: each with the folder of its results, from bags.folders_of_results.
     output: folder of fleet.csv and index.html.
     options: options of every bag. ``run`` is set if it is empty.
     jobs: number of processes; 1: this one.

@@ -231,7 +231,7 @@ def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool
 
     changes: new values, as given by ROS.
     configured: whether the node is configured: then only some parameters may change.
-    Raises ParameterError.
+    Raises ParameterError if a change breaks a rule.
     """
     for name, value in changes.items():
         if value is None:

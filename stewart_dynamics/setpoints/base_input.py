@@ -141,7 +141,7 @@ class BaseInput:
         places (K,): as for ``join_many``.
         stamps, completed (N,): stamps of setpoints [ns], and the index of the message that
             completed each.
-        Returns (N, BASE): the rows at the setpoints, see ``at``.
+        Returns the rows at the setpoints (N, BASE), see ``at``; None where that is not possible.
         """
         if not self.topics:
             return None

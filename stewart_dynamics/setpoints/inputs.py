@@ -243,7 +243,7 @@ class WrenchInput:
 
         samples: read by ``reader``.
         places (K,): indices in the order of all messages.
-        Returns (K, 6).
+        Returns (K, 6) [N, N m].
         """
         wrenches = np.empty((len(places), 6))
         wrenches[:] = self.wrench

@@ -286,7 +286,7 @@ def advance(constants: Array, drives: Array, torque_max: Array, curve: Array, by
         computed: the last state that could be, at rest.
     result (RESULT,): written.
     steps, h: number of steps, and their length.
-    scratch, work (SCRATCH,): scratch memory.
+    scratch (SCRATCH,), work: scratch memory.
     """
     after, slope, base = scratch[_AFTER], scratch[_SLOPE], scratch[_BASE]
     forces = result[RESULT_FORCES]

@@ -34,7 +34,7 @@ class MotorLimits:
     """
     The limits of the motors of a hexapod; those that are not given are never exceeded.
 
-    bounds (6,): values of each of OF_MOTORS that is given [N m, rad/s, K]; torques at any speed
+    bounds: values (6,) of each of OF_MOTORS that is given [N m, rad/s, K]; torques at any speed
         are at most drive.torque_max.
     """
 

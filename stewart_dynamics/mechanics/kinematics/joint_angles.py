@@ -120,6 +120,7 @@ class JointAngles:
     The angles of a hexapod's joints.
 
     needed: names in AXES; the other angles are nan.
+
     axes (12, 3): unit vectors from which the angles are measured: of the base joints in base axes,
         of the platform joints in platform axes; nan for axes that are not needed.
     Raises ParameterError: axes that are needed are not given, and there is no home pose.
