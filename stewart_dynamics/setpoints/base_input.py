@@ -141,7 +141,7 @@ class BaseInput:
         places (K,): as for ``join_many``.
         stamps, completed (N,): stamps of setpoints [ns], and the index of the message that
             completed each.
-        Returns the rows at the setpoints (N, BASE), see ``at``; None where that is not possible.
+        Returns the rows at the setpoints (N, BASE), see ``at``; None if the base is fixed.
         """
         if not self.topics:
             return None
