@@ -47,7 +47,6 @@ from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
-from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.estimates import (
     combined, estimate, IDENTIFIED, justified, NOT_IDENTIFIABLE, not_identifiable_lines,
     page_values, states_of, table_lines)
@@ -257,8 +256,7 @@ def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapp
     """Write the page of a result, with the content of identification.json."""
     legs = list(found.parameters['joints'])
     curves, spectra = _curves(extracts, found)
-    data = {'legs': legs, 'colors': LEG_COLORS,
-            'curves': [base64_of(column, '<f4') for column in curves.T], 'spectra': spectra}
+    data = {'legs': legs, 'curves': [base64_of(column, '<f4') for column in curves.T], 'spectra': spectra}
     script = plotly_script()
     bag = result['bags'][0]['bag']
     text = page(

@@ -28,27 +28,28 @@ import hashlib
 import itertools
 from pathlib import Path
 import re
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, LIMITS, OF_JOINTS, QUANTITIES
+from stewart_dynamics.mechanics.limits import (
+    CLEARANCE_MIN, LIMITS, OF_JOINTS, QUANTITIES, Quantity)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE, POSITION,
     ROTATION)
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
-from stewart_dynamics.replay.summary import Answered
-from stewart_dynamics.reporting.colors import LEG_COLORS
+from stewart_dynamics.replay.summary import Answered, margin_key
+from stewart_dynamics.reporting.colors import FORCE_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
     base64_of, link, link_to_other, page, plotly_script)
 from stewart_dynamics.reporting.plots import (
-    base_wrench_plots, measured_plots, motion_plots, PLOT_OF, spectrum_plots)
+    base_wrench_plots, measured_plots, motion_plots, spectrum_plots)
 from stewart_dynamics.reporting.results_folder import DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
@@ -150,7 +151,7 @@ class Report:
             data=self._data(summary), sources=sources_of(self._parameters),
             cards=cards(summary), margins=smallest_margins(summary),
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
-            date=date(summary['setpoints']['first_stamp_ns']), plot_of=PLOT_OF,
+            date=date(summary['setpoints']['first_stamp_ns']), quantities=QUANTITIES,
             units={name: (each.unit or '').replace('^2', '²')
                    for name, each in PARAMETERS.items()},
             most_times=_MOST_TIMES,
@@ -189,7 +190,7 @@ class Report:
             'begin': float(times[0]) if len(times) else 0.0,
             'end': float(times[-1]) if len(times) else 0.0,
             'legs': self._legs,
-            'colors': LEG_COLORS,
+            'forceColors': FORCE_COLORS,
             'baseJoints': p['geometry.base_joints'].tolist(),
             'platformJoints': p['geometry.platform_joints'].tolist(),
             'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8')},
@@ -246,36 +247,28 @@ def rejections(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
             for each in summary['rejected']]
 
 
-class MarginColumn(NamedTuple):
-    """The margins of a quantity from its limits."""
+def margin_columns(parameters: Parameters) -> list[tuple[Quantity, str, list[str]]]:
+    """
+    Return the quantities with limits, each with the key of its margin and its limits.
 
-    name: str
-    unit: str
-    key: str  # key of a leg in summary.json
-    limits: tuple[str, ...]
-
-
-def margin_columns(parameters: Parameters) -> list[MarginColumn]:
-    """Return the quantities with limits; joint angles and clearance only if theirs are given."""
+    Joint angles and clearance are left out if none of their limits is given.
+    """
     left_out: set[str] = set()
     for names in (OF_JOINTS, (CLEARANCE_MIN,)):
         if all(parameters[name] is None for name in names):
             left_out.update(names)
-    return [column for column in _MARGINS if column.limits[0] not in left_out]
-
-
-_MARGINS = [
-    MarginColumn(
-        name, unit, f'{name.replace(" ", "_")}_margin_{unit.lower().replace("/", "_")}',
-        tuple(limit for limit in LIMITS if QUANTITIES[limit] == (name, unit)))
-    for name, unit in dict.fromkeys(QUANTITIES[limit] for limit in LIMITS)]
+    limits: dict[Quantity, list[str]] = {}
+    for limit in LIMITS:
+        if limit not in left_out:
+            limits.setdefault(QUANTITIES[limit], []).append(limit)
+    return [(quantity, margin_key(quantity), names) for quantity, names in limits.items()]
 
 
 def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the smallest margins of all quantities with a limit, each with its leg."""
     found = []
-    for name, unit, key, _ in _MARGINS:
-        if margins := values_of(summary['legs'], key):
+    for name, unit in dict.fromkeys(QUANTITIES[limit] for limit in LIMITS):
+        if margins := values_of(summary['legs'], margin_key(Quantity(name, unit))):
             value, joint = min(margins, key=FIRST)
             found.append({'name': name, 'value': value, 'unit': unit, 'leg': joint})
     return found

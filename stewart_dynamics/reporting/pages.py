@@ -91,7 +91,8 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
     template: name of the template (.html), its style (.css) and its script (.js), if it has one.
     scripts: other scripts that the page is allowed to run.
     shared: the page is allowed to run scripts in files.
-    document: the page has the common style of documents (document.css) before its own.
+    document: the page has the common style of documents (document.css) before its own, and a
+        white ground; another page may follow the reader's dark screen.
     values: variables of the template.
     """
     style, script = folder.joinpath(f'{template}.css').read_text(encoding='utf-8'), ''
@@ -99,7 +100,7 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
     if own.is_file():
         script = f"\n{own.read_text(encoding='utf-8')}"
     common = _SHARED.joinpath('document.css').read_text(encoding='utf-8') if document else ''
-    style = custom_properties() + common + style
+    style = custom_properties(dark=not document) + common + style
     hashes = ' '.join([*(f"'sha256-{_digest(each)}'" for each in (*scripts, script) if each),
                        *(["'self'"] if shared else [])]) or "'none'"
     return _environment(folder).get_template(f'{template}.html').render(
