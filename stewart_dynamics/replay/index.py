@@ -37,6 +37,7 @@ from stewart_dynamics.replay.replay_options import LIMIT_MET
 from stewart_dynamics.replay.statements import MEASURED, MISSING, needed_words, statements
 from stewart_dynamics.replay.summary import margin_key
 from stewart_dynamics.reporting.pages import page
+from stewart_dynamics.reporting.results_folder import REPORT_PAGE
 from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')
@@ -263,6 +264,6 @@ def _link(output: Path, row: Row) -> str | None:
     """Return the link to the report of a bag, or to its folder if there is no report."""
     if row['results'] is None:
         return None
-    report = Path(str(row['results'])) / 'report.html'
+    report = Path(str(row['results'])) / REPORT_PAGE
     target = report if (output / report).is_file() else report.parent
     return quote(os.fsencode(target))

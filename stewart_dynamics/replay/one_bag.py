@@ -34,7 +34,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.bags import recording as bag_recording
-from stewart_dynamics.bags.find import bytes_of
+from stewart_dynamics.bags.find import bytes_of, RESULT
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
@@ -50,7 +50,7 @@ from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
-from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, RESULT, whole_folder
+from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
 from stewart_dynamics.setpoints import base_wrench, inputs, step
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
