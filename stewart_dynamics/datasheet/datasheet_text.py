@@ -25,7 +25,7 @@ import math
 from typing import Any, NamedTuple
 
 from stewart_dynamics.datasheet.ratings import AXES
-
+from stewart_dynamics.mechanics.limits import QUANTITIES, short_name, SINGULARITY
 
 _DIGITS = 4
 _THIN_SPACE = '\u202f'
@@ -39,6 +39,8 @@ class Unit(NamedTuple):
 
 
 MM, DEGREE = Unit('mm', 1e3), Unit('°', math.degrees(1.0))
+# Units in which those of limits are written.
+_UNITS = {'m': MM, 'rad': DEGREE}
 LINEAR = {'travel': MM, 'velocity': Unit('mm/s', 1e3), 'acceleration': Unit('m/s²', 1.0),
           'force': Unit('N', 1.0), 'stiffness': Unit('N/µm', 1e-6)}
 ANGULAR = {'travel': DEGREE, 'velocity': Unit('°/s', DEGREE.factor),
@@ -197,7 +199,8 @@ def _exceeded(found: dict[str, Any]) -> str:
         return f'{limit} between the rated pose and a pose'
     if excess <= 0.0:
         return f'not proven: no pose exceeds a limit as far as searched, {limit} is nearest'
-    if found['limit'] == 'singularity':
+    if found['limit'] == SINGULARITY:
         return f'{limit}: condition number exceeded by {down(excess)}'
-    unit = MM if found['limit'].startswith('length') else DEGREE
+    unit = next(_UNITS[quantity.unit] for name, quantity in QUANTITIES.items()
+                if short_name(name) == found['limit'])
     return f'{limit} exceeded by {down(excess * unit.factor)} {unit.name}'

@@ -73,11 +73,17 @@ QUANTITIES = {
     SPEED_MAX: Quantity('motor speed', 'rad/s'),
     TEMPERATURE_RISE_MAX: Quantity('temperature rise', 'K'),
     JUMP: Quantity('mean rate from the last setpoint', 'm/s')}
+SINGULARITY = 'singularity'  # among short names: inside stop_condition, or beyond det(J) = 0
 CLIPPED = FORCE_MAX, TORQUE_MAX, TORQUE_SPEED
 """Limits to which published values are clipped; the others follow limits.action."""
 
 ANGLES = {BASE_ANGLE_MAX: BASE_JOINT_ANGLES, PLATFORM_ANGLE_MAX: PLATFORM_JOINT_ANGLES}
 """Where in a row of joint angles the values of a limit are."""
+
+
+def short_name(limit: str) -> str:
+    """Return the name of a limit without its section: length_max."""
+    return limit.rpartition('.')[2]
 
 
 class Exceedance(NamedTuple):

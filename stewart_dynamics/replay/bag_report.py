@@ -35,6 +35,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
+from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.limits import (
     CLEARANCE_MIN, LIMITS, OF_JOINTS, QUANTITIES, Quantity)
 from stewart_dynamics.mechanics.rows import (
@@ -94,7 +95,8 @@ class Report:
             powers = forces * outputs.rates
         quantities = {
             'position': motions[:, POSITION],
-            'angles': self._continued(_euler(motions[:, ROTATION])),
+            'angles': self._continued(np.degrees(to_euler(
+                motions[:, ROTATION].reshape(-1, 3, 3)))),
             'velocity': motions[:, LINEAR_VELOCITY],
             'angular_velocity': np.degrees(motions[:, ANGULAR_VELOCITY]),
             'acceleration': motions[:, LINEAR_ACCELERATION],
@@ -201,15 +203,6 @@ class Report:
             'curves': [_packed(*each) for each in curves],
             'plots': [plot.plain() for plot in plots],
         }
-
-
-def _euler(rotations: Array) -> Array:
-    """Return alpha, beta, gamma (N, 3) [deg] of rows of R = Rz(gamma) Ry(beta) Rx(alpha)."""
-    r = rotations.T
-    level = np.hypot(r[0], r[3])
-    angles: Array = np.degrees(np.stack([
-        np.arctan2(r[7], r[8]), np.arctan2(-r[6], level), np.arctan2(r[3], r[0])], axis=1))
-    return angles
 
 
 def _add(curves: Curves, seconds: Array, quantities: Mapping[str, Array]) -> dict[str, slice]:

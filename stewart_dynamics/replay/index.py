@@ -29,7 +29,8 @@ from urllib.parse import quote
 
 from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, OF_JOINTS, OF_RESULTS, QUANTITIES, VELOCITY_MAX)
+    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, OF_JOINTS, OF_RESULTS, QUANTITIES, short_name,
+    VELOCITY_MAX)
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.legs_table import harmless
 from stewart_dynamics.replay.motor_loads import needed
@@ -113,7 +114,7 @@ _largest = partial(max, key=abs)
 def _exceeded(summary: dict[str, Any]) -> str:
     legs: dict[str, list[str]] = {}
     for each in summary['limits']:
-        legs.setdefault(each['limit'].removeprefix('limits.'), []).append(each['leg'])
+        legs.setdefault(short_name(each['limit']), []).append(each['leg'])
     return '; '.join(f'{limit}: {", ".join(of)}' for limit, of in legs.items())
 
 

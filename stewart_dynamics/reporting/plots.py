@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
 from stewart_dynamics.mechanics.limits import (
     ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS,
-    QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
+    QUANTITIES, short_name, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.colors import AXIS_COLORS, LEG_COLORS, ROLES
 from stewart_dynamics.reporting.spectrum import Density
@@ -235,7 +235,7 @@ def _bounds(limit: str, values: ArrayLike | None, both: bool = False) -> list[Bo
     if values is None:
         return []
     of_legs = np.broadcast_to(values, 6)
-    alike, name = bool(np.all(of_legs == of_legs[0])), limit.partition('.')[2]
+    alike, name = bool(np.all(of_legs == of_legs[0])), short_name(limit)
     return [Bound(sign * float(value), name if alike else '', _BLACK if alike else color)
             for sign in ((1.0, -1.0) if both else (1.0,))
             for value, color in list(zip(of_legs, LEG_COLORS, strict=True))[:1 if alike else 6]]
