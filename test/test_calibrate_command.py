@@ -137,7 +137,7 @@ def edited(change: Callable[[list[str]], list[str]], table: Path, tmp_path: Path
     (lambda rows: [*rows[:3], 'long' + rows[3][rows[3].index(','):], *rows[4:]],
      "row 4: leg_1: 'long': must be a finite number"),
     (lambda rows: [*rows[:3], rows[3].rpartition(',')[0] + ',3.0', *rows[4:]],
-     'row 4: quaternion of length 3'),
+     'row 4: quaternion: length 3'),
     (lambda rows: [rows[0], *[rows[1]] * 20], 'itself, with residuals of')])
 def test_bad_files_are_rejected_in_one_line(
         change: Callable[[list[str]], list[str]], words: str, table: Path, tmp_path: Path,
@@ -226,7 +226,7 @@ def test_poses_of_a_bag_at_rest(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert np.abs(found - values[:42]).max() < 1e-4
     capsys.readouterr()
     assert main([str(folder), '--params', str(PLATFORM), '--pose', '/other']) == 2
-    assert '--pose /other: not a topic of type' in capsys.readouterr().err
+    assert 'has no topic /other' in capsys.readouterr().err
 
 
 def test_a_design_identifies_better_than_random_poses(

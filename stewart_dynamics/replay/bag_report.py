@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, SECOND
+from stewart_dynamics.arrays import Array, RPM, SECOND
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.frames.rotation import to_euler
@@ -43,6 +43,7 @@ from stewart_dynamics.mechanics.rows import (
     ROTATION)
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
+from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
 from stewart_dynamics.replay.summary import Answered, margin_key
 from stewart_dynamics.reporting.colors import FORCE_COLORS
@@ -154,9 +155,8 @@ class Report:
             cards=cards(summary), margins=smallest_margins(summary),
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
             date=date(summary['setpoints']['first_stamp_ns']), quantities=QUANTITIES,
-            units={name: (each.unit or '').replace('^2', '²')
-                   for name, each in PARAMETERS.items()},
-            most_times=_MOST_TIMES,
+            units={name: each.unit or '' for name, each in PARAMETERS.items()},
+            most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM,
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})
         write_files({path: text})

@@ -35,7 +35,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.bags import recording as bag_recording
 from stewart_dynamics.bags.find import bytes_of, RESULT
-from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
@@ -43,7 +43,7 @@ from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.bag_report import Report
-from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
+from stewart_dynamics.replay.bag_topics import find_topics, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.replay_options import code_of, Options

@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, CLIPPED, Exceedance, LENGTH_MAX, PLATFORM_ANGLE_MAX, QUANTITIES, SPEED_MAX,
     TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
+from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.summary import margin_key
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
 
@@ -243,9 +244,8 @@ def _motors(summary: Summary) -> Iterator[Statement]:
 
 def needed_words(needed: Summary) -> str:
     """Return the motor that is needed in words; empty if it is not known."""
-    words = [f'{needed[key]:.4g} {unit}' for key, unit in (
-        ('torque_continuous_n_m', 'N m continuous'), ('torque_peak_n_m', 'N m peak'),
-        ('speed_rad_s', 'rad/s')) if needed[key] is not None]
+    words = [f'{name} {needed[key]:.4g} {unit}' for key, (_, name, unit) in NEEDS.items()
+             if needed[key] is not None]
     return f'{", ".join(words)}, with a margin of {100.0 * (needed["margin"] - 1.0):.3g} %' * bool(
         words)
 

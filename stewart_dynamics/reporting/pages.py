@@ -76,7 +76,8 @@ def _typeset(text: str) -> str:
 def _environment(folder: Path) -> Environment:
     made = Environment(loader=FileSystemLoader([folder, _SHARED]), autoescape=True,
                        undefined=StrictUndefined, keep_trailing_newline=True)
-    made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr)
+    made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr,
+                        unit=lambda text: text.replace('^2', '²'))
     made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
     # Data cannot end the element that contains them: the filter escapes < > & and '.
     made.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
