@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 from stewart_dynamics.datasheet.ratings import AXES
 from stewart_dynamics.mechanics.limits import QUANTITIES, short_name, SINGULARITY
+from stewart_dynamics.parameters.table import FIXED
 
 _DIGITS = 4
 _THIN_SPACE = '\u202f'
@@ -125,7 +126,7 @@ def sheet_text(sheet: dict[str, Any]) -> str:
 def rated_payload(sheet: Mapping[str, Any]) -> tuple[str, float | None]:
     """Return the payload at rest; of any orientation of the base, and so named, if that moves."""
     found = sheet['payload']
-    if sheet['parameters']['base.source'] != 'fixed' and found['any_orientation'] is not None:
+    if sheet['parameters']['base.source'] != FIXED and found['any_orientation'] is not None:
         return ', base in any orientation', found['any_orientation']
     return '', found['value']
 

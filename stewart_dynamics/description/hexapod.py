@@ -34,7 +34,7 @@ from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import homes, level_axes
 from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
-from stewart_dynamics.parameters.table import inertia_matrix, Parameters
+from stewart_dynamics.parameters.table import inertia_matrix, mean_radius, Parameters
 
 # A body that a tool simulates needs mass and inertia about each axis. What a parameter file gives
 # as zero is replaced by these: the forces of a hexapod change by about 5e-4 of the largest.
@@ -188,7 +188,7 @@ def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[VisualShape, 
     """Return the shapes of each body, by its name; without ``uris`` only meshes that are paths."""
     p = hexapod.parameters
     base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
-    size = float(np.mean(np.linalg.norm(platform - platform.mean(axis=0), axis=1)))
+    size = mean_radius(platform)
     found = {}
     for name, kind, joints in ((hexapod.base, 'base', base),
                                (hexapod.platform, 'platform', platform)):

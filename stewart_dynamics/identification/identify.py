@@ -48,7 +48,7 @@ from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import NEGATIVE, Parameters
+from stewart_dynamics.parameters.table import FIXED, NEGATIVE, Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
@@ -131,7 +131,7 @@ class Identification:
     """Reads bags and identifies parameters, beginning with those of the file."""
 
     def __init__(self, parameters: Parameters, options: IdentificationOptions) -> None:
-        if parameters['base.source'] != 'fixed':
+        if parameters['base.source'] != FIXED:
             raise ParameterError(
                 f'base.source: {parameters["base.source"]}: hexapods are identified on a base at '
                 'rest: must be fixed')

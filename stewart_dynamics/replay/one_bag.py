@@ -40,7 +40,7 @@ from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRo
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.bag_report import Report
 from stewart_dynamics.replay.bag_topics import find_topics, MEASURED, notices_of
@@ -157,7 +157,7 @@ class _Run:
         self.notices: list[str] = []
         self._more = 0
         self._quasi_static = (
-            parameters['setpoint.source'] == 'pose' and options.cutoff is None)
+            parameters['setpoint.source'] == POSES_ALONE and options.cutoff is None)
         if self._quasi_static:
             self.notices.append('setpoint.source is pose: the forces are those at rest')
         self._firsts: dict[Rejection, _First] = {}
