@@ -24,11 +24,8 @@ import pytest
 from referees import ROOT, symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
-from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.node.diagnostics.outcomes import (
-    PayloadDiagnostics, PlannedTrajectoryDiagnostics)
-from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, LogLine, OK, STALE, Status, StatusPart, WARN)
+from stewart_dynamics.node.diagnostics.levels import ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.ros.repeated_log import SECONDS, Series
 from stewart_dynamics.setpoints.inputs import ACCEL, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
@@ -72,12 +69,12 @@ def status(diagnostics: DynamicsDiagnostics, name: str, now: float) -> Status:
 
 
 def report(diagnostics: DynamicsDiagnostics, now: float) -> list[Status]:
-    return diagnostics.report.make(now)[0]
+    return diagnostics.report(now)[0]
 
 
 def logged(diagnostics: DynamicsDiagnostics, now: float) -> list[tuple[int, str]]:
     """Return levels and texts that a report gives to the log."""
-    return [(level, text) for level, text, _ in diagnostics.report.make(now)[1]]
+    return [(level, text) for level, text, _ in diagnostics.report(now)[1]]
 
 
 # Silence
@@ -217,18 +214,18 @@ def test_rejections_are_counted_with_their_reason_and_are_a_warning() -> None:
 
 def test_another_node_of_the_same_name_is_logged_once() -> None:
     diagnostics = begun()
-    logged = []
-    for namesakes in (1, 2, 2, 3, 1, 2):
+    lines = []
+    for namesakes in ('', '2 nodes', '2 nodes', '3 nodes', '', '2 nodes'):
         answered(diagnostics, BEGIN)
-        diagnostics.setpoints.found({}, {}, '/node', namesakes)
-        logged += diagnostics.setpoints.log_lines(BEGIN)
-    assert logged == 2 * [LogLine(WARN, 'setpoints: 2 nodes are named /node')]
+        diagnostics.setpoints.found({}, {}, namesakes)
+        lines += logged(diagnostics, BEGIN)
+    assert lines == 2 * [(WARN, 'setpoints: 2 nodes')]
 
 
 def test_an_error_is_not_hidden_by_silence_and_both_are_stated() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
-    diagnostics.setpoints.found(dict.fromkeys(TOPICS, 2), {}, '/node', 1)
+    diagnostics.setpoints.found(dict.fromkeys(TOPICS, 2), {}, '')
     of = status(diagnostics, 'setpoints', BEGIN + 3.0)
     assert of.level == ERROR
     assert of.message == (
@@ -250,13 +247,13 @@ def test_the_status_names_the_rejection_if_all_messages_are_rejected() -> None:
 def test_processing_times_are_those_of_the_last_seconds() -> None:
     diagnostics = begun()
     assert status(diagnostics, 'timing', BEGIN)[1:] == (
-        OK, 'no setpoint yet', (('dropped', '0'), ('incomplete', '0')))
+        OK, 'no setpoint yet', [('dropped', '0'), ('incomplete', '0')])
     for took in (100e-6, 900e-6, 200e-6):
         answered(diagnostics, BEGIN, took=took)
     of = status(diagnostics, 'timing', BEGIN)
     assert (of.level, of.message) == (OK, 'on time')
-    assert of.values[:2] == (
-        ('processing time, median (us)', '200'), ('processing time, largest (us)', '900'))
+    assert of.values[:2] == [
+        ('processing time, median (us)', '200'), ('processing time, largest (us)', '900')]
     for second in (1.0, 2.0, 3.0):
         answered(diagnostics, BEGIN + second, took=50e-6)
         of = status(diagnostics, 'timing', BEGIN + second)
@@ -278,7 +275,7 @@ def test_a_backlog_is_a_warning_for_a_second_and_its_losses_stay_counted() -> No
     answered(diagnostics, BEGIN + 1.5)
     of = status(diagnostics, 'timing', BEGIN + 1.5)
     assert (of.level, of.message) == (OK, 'on time')
-    assert of.values[-2:] == (('dropped', '3'), ('incomplete', '1'))
+    assert of.values[-2:] == [('dropped', '3'), ('incomplete', '1')]
 
 
 def test_the_age_of_the_last_setpoint_is_stated() -> None:
@@ -467,7 +464,7 @@ def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
     assert output is not None
     diagnostics = begun(limits__action=action, **limits)
     answered(diagnostics, BEGIN, output)
-    lines = [line.text for line in diagnostics.report.make(BEGIN)[1]]
+    lines = [line.text for line in diagnostics.report(BEGIN)[1]]
     of = status(diagnostics, 'limits', BEGIN)
     assert of.level == ERROR
     suppressed = '; forces suppressed' if action == 'suppress_forces' else ''
@@ -546,20 +543,20 @@ def test_a_level_holds_for_a_second_after_its_cause() -> None:
 
 def test_a_change_of_level_is_pending_until_it_is_reported() -> None:
     diagnostics = begun()
-    diagnostics.report.make(BEGIN)
-    assert not diagnostics.report.level_changed(BEGIN)
+    diagnostics.report(BEGIN)
+    assert not diagnostics.level_changed(BEGIN)
     assert answered(diagnostics, BEGIN)  # from stale to ok
-    assert diagnostics.report.level_changed(BEGIN)
-    diagnostics.report.make(BEGIN)
+    assert diagnostics.level_changed(BEGIN)
+    diagnostics.report(BEGIN)
     assert not answered(diagnostics, BEGIN + 0.01)
     diagnostics.rejected(Rejection(POSE, TWICE), '', BEGIN + 0.01)
-    assert diagnostics.report.level_changed(BEGIN + 0.01)
-    diagnostics.report.make(BEGIN + 0.01)
+    assert diagnostics.level_changed(BEGIN + 0.01)
+    diagnostics.report(BEGIN + 0.01)
     assert not answered(diagnostics, BEGIN + 0.02)
     assert answered(diagnostics, BEGIN + 0.03, output_of(QUARTER))
-    diagnostics.report.make(BEGIN + 0.03)
-    assert not diagnostics.report.level_changed(BEGIN + 0.04)
-    assert diagnostics.report.level_changed(BEGIN + 0.14)  # stale
+    diagnostics.report(BEGIN + 0.03)
+    assert not diagnostics.level_changed(BEGIN + 0.04)
+    assert diagnostics.level_changed(BEGIN + 0.14)  # stale
 
 
 # Every value
@@ -605,7 +602,7 @@ def test_every_value_is_finite_and_every_key_has_its_unit(
         else:
             answered(diagnostics, now, output)
             state = output.state
-        diagnostics.setpoints.found({POSE: 2}, {'leg_states': 1}, '/node', 1)
+        diagnostics.setpoints.found({POSE: 2}, {'leg_states': 1}, '')
         _check_values(diagnostics, now)
 
 
@@ -675,6 +672,5 @@ def test_first_and_last_are_logged_and_none_is_lost(events: list[tuple[str, floa
 def test_the_page_of_the_node_names_each_status() -> None:
     page = (ROOT / 'docs/node.md').read_text(encoding='utf-8')
     table = page.partition('| status | contents |')[2].partition('\n\n')[0]
-    parts = [*StatusPart.__subclasses__(), PayloadDiagnostics, PlannedTrajectoryDiagnostics]
     assert set(re.findall(r'^\| ([a-z ]+) \|', table, re.MULTILINE)) == {
-        part.name for part in parts if part.name}
+        part.name for part in begun().parts}

@@ -17,12 +17,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
+import math
 
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, JUMP, LENGTH_MAX, LIMITS, OF_MOTORS, QUANTITIES)
-from stewart_dynamics.node.diagnostics.periodic_report import (
-    Answers, ERROR, Level, LogLine, OK_LEVEL, StatusPart)
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.node.diagnostics.inputs import Answers
+from stewart_dynamics.node.diagnostics.levels import (
+    ERROR, Level, LogLine, OK_LEVEL, Status, StatusPart)
 from stewart_dynamics.setpoints.motor_step import DEMANDED_TORQUES, RISES, SPEEDS
 from stewart_dynamics.setpoints.step import Output
 
@@ -38,12 +40,10 @@ class LimitsDiagnostics(StatusPart):
 
     name = 'limits'
 
-    def __init__(self, parameters: Parameters, answers: Answers) -> None:
+    def __init__(self, answers: Answers) -> None:
         super().__init__(*_LIMITS)
-        self._joints: tuple[str, ...] = parameters['joints']
-        self.parameters = parameters  # may be replaced at any time
         self._answers = answers
-        self._output: Output | None = None
+        self._joints: tuple[str, ...] = answers.parameters['joints']
         self._setpoints = Counter[str]()  # that exceed each limit
         self._worst: dict[str, Exceedance] = {}
         self._suppressed = 0
@@ -52,7 +52,6 @@ class LimitsDiagnostics(StatusPart):
 
     def answered(self, output: Output, now: float) -> None:
         """Note an output."""
-        self._output = output
         forces = output.demanded_forces
         if forces is not None:
             largest = abs(self._largest_force)
@@ -62,54 +61,36 @@ class LimitsDiagnostics(StatusPart):
                 self._its_leg = forces.index(self._largest_force)
         if output.exceedances or self._exceeding:
             self._exceeding = bool(output.exceedances)
-            suppressed = output.forces is None and output.demanded_forces is not None and (
-                self.parameters['limits.action'] == 'suppress_forces')
-            self._suppressed += suppressed
-            mistake = self._mistake(output)
-            for name in _LIMITS:
-                exceeded = [each for each in output.exceedances if each.limit == name]
-                if not exceeded:
-                    self.held.see(OK_LEVEL, now, name)
-                    continue
-                words = ', '.join(map(self._words, exceeded))
-                if suppressed and name not in CLIPPED:
-                    words += '; forces suppressed'
-                if name in (LENGTH_MAX, JUMP):
-                    words += mistake
-                self.held.see(Level(ERROR, words), now, name)
-                self._setpoints[name] += 1
-                known = [self._worst[name]] if name in self._worst else []
-                self._worst[name] = max(exceeded + known, key=lambda each: each.excess)
+            self._note_exceedances(output, now)
 
-    def state(self, now: float) -> Level:
-        """Return the present level and all causes."""
-        return self._answers.state(self.held.at(now), 'all held', now)
+    def _note_exceedances(self, output: Output, now: float) -> None:
+        suppressed = output.forces is None and output.demanded_forces is not None and (
+            self._answers.parameters['limits.action'] == 'suppress_forces')
+        self._suppressed += suppressed
+        mistake = self._mistake(output)
+        for name in _LIMITS:
+            exceeded = [each for each in output.exceedances if each.limit == name]
+            if not exceeded:
+                self.held.see(OK_LEVEL, now, name)
+                continue
+            words = ', '.join(map(self._words, exceeded))
+            if suppressed and name not in CLIPPED:
+                words += '; forces suppressed'
+            if name in (LENGTH_MAX, JUMP):
+                words += mistake
+            self.held.see(Level(ERROR, words), now, name)
+            self._setpoints[name] += 1
+            self._worst[name] = max(*exceeded, self._worst.get(name, exceeded[0]),
+                                    key=lambda each: each.excess)
 
-    def values(self, now: float) -> list[tuple[str, str]]:
-        """Return keys and values."""
-        output = self._output
-        if output is None:
-            return []
-        values = [(f'{leg}: length (m)', f'{length:.6g}') for leg, length in
-                  zip(self._joints, output.lengths, strict=True)]
-        values += [(f'{leg}: rate (m/s)', f'{rate:.6g}') for leg, rate in
-                   zip(self._joints, output.rates, strict=True)]
-        if output.demanded_forces is not None:
-            values += [(f'{leg}: force demanded (N)', f'{force:.6g}') for leg, force in
-                       zip(self._joints, output.demanded_forces, strict=True)]
-        if output.joint_angles:
-            values += [(f'{leg}: {quantity} ({unit})', f'{angle:.6g}')
-                       for limit, where in ANGLES.items() if self.parameters[limit] is not None
-                       for quantity, unit in [QUANTITIES[limit]]
-                       for leg, angle in zip(
-                           self._joints, output.joint_angles[where], strict=True)]
-        values += [(f'{leg}: {quantity} ({unit})', f'{clearance:.6g}')
-                   for quantity, unit in [QUANTITIES[CLEARANCE_MIN]]
-                   for leg, clearance in zip(self._joints, output.clearances, strict=False)]
-        if output.motors:
-            for quantity, unit, part in _OF_MOTORS:
-                values += [(f'{leg}: {quantity} ({unit})', f'{value:.6g}') for leg, value in zip(
-                    self._joints, output.motors[part], strict=True) if value == value]
+    def status(self, now: float) -> Status:
+        """Return the status, with all causes of its level."""
+        values = []
+        if self._answers.output is not None:
+            values = [(f'{leg}: {quantity} ({unit})', f'{number:.6g}')
+                      for quantity, unit, numbers in self._of_legs(self._answers.output)
+                      for leg, number in zip(self._joints, numbers, strict=False)
+                      if not math.isnan(number)]
         if self._largest_force:
             values += [
                 ('largest force demanded since activation (N)', f'{self._largest_force:.6g}'),
@@ -120,23 +101,31 @@ class LimitsDiagnostics(StatusPart):
                        (f'worst since activation, {name}', self._words(self._worst[name]))]
         if self._suppressed:
             values.append(('setpoints without forces, by limits.action', str(self._suppressed)))
-        return values
+        return Status(self.name, *self._answers.state(self.held.at(now), 'all held', now), values)
 
-    def log_lines(self, now: float) -> list[LogLine]:
+    def _of_legs(self, output: Output) -> list[tuple[str, str, Sequence[float]]]:
+        """Return quantity, unit and six numbers; empty or nan where they are not computed."""
+        return [
+            ('length', 'm', output.lengths),
+            ('rate', 'm/s', output.rates),
+            ('force demanded', 'N', output.demanded_forces or ()),
+            *((*QUANTITIES[limit], output.joint_angles[where]) for limit, where in ANGLES.items()),
+            (*QUANTITIES[CLEARANCE_MIN], output.clearances),
+            *((quantity, unit, output.motors[where]) for quantity, unit, where in _OF_MOTORS)]
+
+    def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """Return the changes of each kind of limit."""
         lines = []
         for name, worst in self._worst.items():
-            state = self.held.of(name, now)
-            if not state.message:
-                state = Level(state.level, f'{name}: no longer exceeded; '
-                              f'{self._setpoints[name]} setpoints since activation, worst: '
-                              + self._words(worst))
-            lines += self._changed(state, name)
+            level, message = self.held.of(name, now)
+            lines += self._changed(level, message or (
+                f'{name}: no longer exceeded; {self._setpoints[name]} setpoints since activation, '
+                f'worst: {self._words(worst)}'), name)
         return lines
 
     def _mistake(self, output: Output) -> str:
         """Return the likely mistake where legs are too long, as words to append."""
-        longest = self.parameters['limits.length_max']
+        longest = self._answers.parameters['limits.length_max']
         reference = output.state.lengths if longest is None else longest.tolist()
         if reference and all(0.3 < length / (_MILLIMETRES * most) < 1.5 for length, most in zip(
                 output.lengths, reference, strict=True)):

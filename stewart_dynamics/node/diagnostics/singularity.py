@@ -19,8 +19,9 @@ from __future__ import annotations
 from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.singularity_warning import Cause
-from stewart_dynamics.node.diagnostics.periodic_report import (
-    Answers, ERROR, Level, LogLine, OK_LEVEL, PERIOD, StatusPart, WARN)
+from stewart_dynamics.node.diagnostics.inputs import Answers
+from stewart_dynamics.node.diagnostics.levels import (
+    ERROR, Level, LogLine, OK_LEVEL, PERIOD, Status, StatusPart, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import HYSTERESIS
 from stewart_dynamics.setpoints.step import Output
@@ -64,27 +65,23 @@ class SingularityDiagnostics(StatusPart):
 
     name = 'singularity'
 
-    def __init__(self, parameters: Parameters, answers: Answers, now: float) -> None:
+    def __init__(self, answers: Answers) -> None:
         super().__init__(_CROSSING, _NEARNESS)
-        self.parameters = parameters  # may be replaced at any time
         self._answers = answers
-        self._output: Output | None = None
-        self._at_home, self._other_side = determinant_at_home(parameters), ''
+        self._at_home, self._other_side = determinant_at_home(answers.parameters), ''
         self._crossed = False  # with the last setpoint
         self._crossings: list[str] = []  # since the last report
         self._crossing_logged_at = -PERIOD
-        self._largest = self._second_largest = self._second_before_largest = 1.0
-        self._second_begin = now
+        self._largest = 1.0
 
     def answered(self, output: Output, now: float) -> bool:
         """Note an output; return whether it must be reported at once, at any level."""
-        before, self._output = self._output, output
+        before = self._answers.before
         if before is None:
             self._other_side = other_side(output.determinant, self._at_home)
-        if output.condition > self._second_largest:
-            self._second_largest = output.condition
-            self._largest = max(self._largest, output.condition)
-        state = singularity_state(output, self.parameters)
+        if output.condition > self._largest:
+            self._largest = output.condition
+        state = singularity_state(output, self._answers.parameters)
         if state.level == OK_LEVEL.level and self._other_side:
             state = Level(WARN, self._other_side)
         if output.singularity.cause is not Cause.CROSSED:
@@ -101,35 +98,28 @@ class SingularityDiagnostics(StatusPart):
         self.held.see(state if stopped else OK_LEVEL, now, _NEARNESS)
         return now - self._crossing_logged_at >= PERIOD
 
-    def state(self, now: float) -> Level:
-        """Return the present level and its causes."""
-        return self._answers.state(self.held.at(now), 'clear', now)
+    def status(self, now: float) -> Status:
+        """Return the status."""
+        answers, output, values = self._answers, self._answers.output, []
+        if output is not None:
+            forces = output.unit_load_forces
+            worst = max(range(6), key=forces.__getitem__)
+            crossing = output.singularity.time_to_crossing
+            of_the_last_second = max(
+                output.condition, answers.present.condition, answers.previous.condition)
+            values = [
+                ('det(J) (m^3)', f'{output.determinant:.9g}'),
+                ('d(det(J))/dt (m^3/s)', f'{output.determinant_rate:.9g}'),
+                ('time to crossing (s)', f'{crossing:.3f}' if crossing < 1e6 else 'none'),
+                ('crossings', str(output.singularity.crossings)),
+                ('condition number', f'{output.condition:.6g}'),
+                ('worst condition number of the last second', f'{of_the_last_second:.6g}'),
+                ('worst condition number since activation', f'{self._largest:.6g}'),
+                ('largest leg force under a unit load', f'{forces[worst]:.6g}'),
+                ('its leg', answers.parameters['joints'][worst])]
+        return Status(self.name, *answers.state(self.held.at(now), 'clear', now), values)
 
-    def values(self, now: float) -> list[tuple[str, str]]:
-        """Return keys and values."""
-        output = self._output
-        if output is None:
-            return []
-        forces = output.unit_load_forces
-        worst = max(range(6), key=forces.__getitem__)
-        crossing = output.singularity.time_to_crossing
-        of_the_last_second = max(
-            output.condition, self._second_largest, self._second_before_largest)
-        if now - self._second_begin >= 1.0:
-            self._second_begin = now
-            self._second_before_largest, self._second_largest = self._second_largest, 1.0
-        return [
-            ('det(J) (m^3)', f'{output.determinant:.9g}'),
-            ('d(det(J))/dt (m^3/s)', f'{output.determinant_rate:.9g}'),
-            ('time to crossing (s)', f'{crossing:.3f}' if crossing < 1e6 else 'none'),
-            ('crossings', str(output.singularity.crossings)),
-            ('condition number', f'{output.condition:.6g}'),
-            ('worst condition number of the last second', f'{of_the_last_second:.6g}'),
-            ('worst condition number since activation', f'{self._largest:.6g}'),
-            ('largest leg force under a unit load', f'{forces[worst]:.6g}'),
-            ('its leg', self.parameters['joints'][worst])]
-
-    def log_lines(self, now: float) -> list[LogLine]:
+    def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """Return the crossing since the last report, and the change of level besides."""
         lines = []
         if self._crossings:
@@ -138,8 +128,8 @@ class SingularityDiagnostics(StatusPart):
             lines = [LogLine(ERROR, f'{self.name}: {self._crossings[-1]}{how_many}')]
             self._crossings = []
             self._crossing_logged_at = now
-        state = self.held.of(_NEARNESS, now)
-        return lines + self._changed(Level(state.level, state.message or 'clear'))
+        level, message = self.held.of(_NEARNESS, now)
+        return lines + self._changed(level, message or 'clear')
 
 
 def _crossing(before: Output | None, output: Output) -> str:
