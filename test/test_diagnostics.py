@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.node.diagnostics.levels import ERROR, OK, STALE, Status, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
-from stewart_dynamics.ros.repeated_log import SECONDS, Series
+from stewart_dynamics.ros.repeated_log import RepeatedLog, SECONDS
 from stewart_dynamics.setpoints.inputs import ACCEL, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
@@ -625,46 +625,65 @@ def test_a_level_lasts_as_long_as_the_output_that_caused_it() -> None:
 
 # The log lines of repeated events
 
+class Log:
+    """A log at chosen times, and what it has written."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.lines: list[str] = []
+        self.log = RepeatedLog(self, lambda: self.now)
+
+    def warning(self, text: str) -> None:
+        """Take a line, as the logger of a node does."""
+        self.lines.append(text)
+
+    def add(self, text: str, now: float, kind: str = 'a') -> None:
+        """Let one more event happen."""
+        self.now = now
+        self.log.write([(WARN, text, kind)])
+
+
 def test_the_first_is_logged_at_once_and_the_last_when_the_series_ends() -> None:
-    series = Series()
-    assert series.add('a', 'one', 0.0) == 'one'
-    assert series.add('a', 'two', 1.0) is None
-    assert series.add('a', 'three', 2.0) is None
-    assert series.over(2.0 + 0.99 * SECONDS) == []
-    assert series.over(2.0 + SECONDS) == ['three (the last of 3)']
-    assert series.over(100.0) == []
-    assert series.add('a', 'anew', 101.0) == 'anew'
+    of = Log()
+    of.add('one', 0.0)
+    assert of.lines == ['one']
+    of.add('two', 1.0)
+    of.add('three', 2.0)
+    of.log.write_last(2.0 + 0.99 * SECONDS)
+    assert of.lines == ['one']
+    of.log.write_last(2.0 + SECONDS)
+    of.log.write_last()
+    of.add('anew', 101.0)
+    assert of.lines == ['one', 'three (the last of 3)', 'anew']
 
 
 def test_frequent_events_are_logged_every_five_seconds_with_their_number() -> None:
-    series = Series()
-    lines = [(n, line) for n in range(101)
-             if (line := series.add('a', f'number {n}', 0.1 * n)) is not None]
-    assert lines == [(0, 'number 0'), (50, 'number 50 (and 49 before it)'),
-                     (100, 'number 100 (and 49 before it)')]
-    # the last one has been logged
-    assert series.over(100.0) == []
+    of = Log()
+    for n in range(101):
+        of.add(f'number {n}', 0.1 * n)
+    of.log.write_last()  # the last one has been logged
+    assert of.lines == ['number 0', 'number 50 (and 49 before it)',
+                        'number 100 (and 49 before it)']
 
 
 def test_two_in_a_series_that_are_far_apart_are_both_logged() -> None:
-    series = Series()
-    assert series.add('a', 'one', 0.0) == 'one'
-    assert series.add('a', 'two', SECONDS) == 'two'
+    of = Log()
+    of.add('one', 0.0)
+    of.add('two', SECONDS)
+    assert of.lines == ['one', 'two']
 
 
 @given(st.lists(st.tuples(st.sampled_from('ab'), st.floats(0.0, 4.0)), min_size=1))
 def test_first_and_last_are_logged_and_none_is_lost(events: list[tuple[str, float]]) -> None:
-    series, now = Series(), 0.0
-    said: list[str] = []
+    of, now = Log(), 0.0
     for n, (kind, pause) in enumerate(events):
         now += pause
-        said += series.over(now)
-        line = series.add(kind, f'{kind} {n}.', now)
-        said += [line] if line is not None else []
-    said += series.over(now + 2.0 * SECONDS)
+        of.log.write_last(now)
+        of.add(f'{kind} {n}.', now, kind)
+    of.log.write_last()
     for kind in {kind for kind, _ in events}:
-        own = [n for n, (of, _) in enumerate(events) if of == kind]
-        lines = [line for line in said if line.startswith(kind)]
+        own = [n for n, (each, _) in enumerate(events) if each == kind]
+        lines = [line for line in of.lines if line.startswith(kind)]
         assert lines[0] == f'{kind} {own[0]}.'
         assert lines[-1].startswith(f'{kind} {own[-1]}.')
 
