@@ -441,14 +441,6 @@ def test_held_limits_are_ok() -> None:
         assert values[f'{name}: force demanded (N)'] == f'{CLEAR.demanded_forces[leg]:.6g}'
 
 
-def test_an_exceeded_limit_is_an_error_with_the_excess() -> None:
-    diagnostics = begun()
-    excess = Exceedance('limits.length_max', 1, 1.75, 1.5)
-    answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(excess,)))
-    of = status(diagnostics, 'limits', BEGIN)
-    assert (of.level, of.message) == (ERROR, excess.words(PARAMETERS['joints']))
-
-
 @pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
 @pytest.mark.parametrize('limited', [False, True])
 def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
@@ -664,13 +656,6 @@ def test_frequent_events_are_logged_every_five_seconds_with_their_number() -> No
     of.log.write_last()  # the last one has been logged
     assert of.lines == ['number 0', 'number 50 (and 49 before it)',
                         'number 100 (and 49 before it)']
-
-
-def test_two_in_a_series_that_are_far_apart_are_both_logged() -> None:
-    of = Log()
-    of.add('one', 0.0)
-    of.add('two', SECONDS)
-    assert of.lines == ['one', 'two']
 
 
 @given(st.lists(st.tuples(st.sampled_from('ab'), st.floats(0.0, 4.0)), min_size=1))

@@ -21,7 +21,7 @@ from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home,
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.inputs import Answers
 from stewart_dynamics.node.diagnostics.levels import (
-    ERROR, Level, LogLine, OK_LEVEL, PERIOD, Status, StatusPart, WARN)
+    ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, Status, StatusPart, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import HYSTERESIS
 from stewart_dynamics.setpoints.step import Output
@@ -82,7 +82,7 @@ class SingularityDiagnostics(StatusPart):
         if output.condition > self._largest:
             self._largest = output.condition
         state = singularity_state(output, self._answers.parameters)
-        if state.level == OK_LEVEL.level and self._other_side:
+        if state.level == OK and self._other_side:
             state = Level(WARN, self._other_side)
         if output.singularity.cause is not Cause.CROSSED:
             self.held.see(state, now, _NEARNESS)
