@@ -62,23 +62,23 @@ class Answers:
         self.number = 0
         self.at = now  # time of the last one
         self.output: Output | None = None
-        self.before: Output | None = None
-        self.present, self.previous = Second(now), Second(now)
+        self.output_before: Output | None = None
+        self.second, self.second_before = Second(now), Second(now)
         self._timeout: float = parameters['setpoint.timeout']
 
     def add(self, output: Output, seconds: float, now: float) -> None:
         """Note an answer, and its processing time."""
         self.number += 1
         self.at = now
-        self.before, self.output = self.output, output
-        self.present.times.append(seconds)
-        if output.condition > self.present.condition:
-            self.present.condition = output.condition
+        self.output_before, self.output = self.output, output
+        self.second.times.append(seconds)
+        if output.condition > self.second.condition:
+            self.second.condition = output.condition
 
     def end_second(self, now: float) -> None:
         """End the present second after a report: reports may be much less than one apart."""
-        if now - self.present.begin >= 1.0:
-            self.previous, self.present = self.present, Second(now)
+        if now - self.second.begin >= 1.0:
+            self.second_before, self.second = self.second, Second(now)
 
     def stale(self, now: float) -> bool:
         """Return whether there is no recent answer."""
@@ -148,8 +148,8 @@ class SetpointDiagnostics(StatusPart):
         if not found:
             found = [self.held.of(REJECTED, now).message
                      or self.held.of(INCOMPLETE, now).message or 'answered']
-        number = len(answers.previous.times) + len(answers.present.times)
-        seconds = now - answers.previous.begin
+        number = len(answers.second_before.times) + len(answers.second.times)
+        seconds = now - answers.second_before.begin
         rate = number / seconds if seconds > 0.0 else 0.0
         values = [('setpoints answered', str(answers.number)), ('rate (Hz)', f'{rate:.1f}')]
         if answers.number:
@@ -157,7 +157,8 @@ class SetpointDiagnostics(StatusPart):
         values += _last_heard(self.heard, now)
         values += [(f'{topic}: writers', str(n)) for topic, n in self._writers.items()]
         values += [(f'{topic}: readers', str(n)) for topic, n in self._readers.items()]
-        return Status(self.name, self.level(now), ', '.join(found), values + self._rejections())
+        values += self._rejection_values()
+        return Status(self.name, self.level(now), ', '.join(found), values)
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """
@@ -202,7 +203,7 @@ class TimingDiagnostics(StatusPart):
     def status(self, now: float) -> Status:
         """Return the status."""
         values = []
-        if times := self._answers.previous.times + self._answers.present.times:
+        if times := self._answers.second_before.times + self._answers.second.times:
             values = [('processing time, median (us)', f'{median(times) * 1e6:.0f}'),
                       ('processing time, largest (us)', f'{max(times) * 1e6:.0f}')]
         for key, reason in (('dropped', DROPPED), ('incomplete', NOT_JOINED)):
@@ -261,7 +262,7 @@ class BaseDiagnostics(StatusPart):
                    for axis, number in zip('xyz', self._row[part], strict=False)]
         lack, rejected = self._lack(now), self.held.of(REJECTED, now)
         return Status(self.name, *(rejected if rejected.level > lack.level else lack),
-                      values + self._rejections())
+                      values + self._rejection_values())
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """Return that there are no forces, and that there are again; rejections are logged."""

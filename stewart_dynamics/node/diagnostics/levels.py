@@ -165,6 +165,6 @@ class StatusPart:
         self._logged[cause] = level
         return [LogLine(level, f'{self.name}: {message}')]
 
-    def _rejections(self) -> Values:
+    def _rejection_values(self) -> Values:
         return [(f'rejected, {topic}: {reason}', str(n))
                 for (topic, reason), n in sorted(self.rejections.items())]

@@ -90,7 +90,7 @@ class ExternalWrenchDiagnostics(StatusPart):
             values += self._numbers(self._estimate)
         message = (self._no_wrench(now) if self._is_stale(now)
                    else self.held.at(now).message or 'no overload')
-        return Status(self.name, self.level(now), message, values + self._rejections())
+        return Status(self.name, self.level(now), message, values + self._rejection_values())
 
     def _is_stale(self, now: float) -> bool:
         return now - max(self._begun, self._estimated_at) > self._timeout

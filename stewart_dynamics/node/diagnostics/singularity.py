@@ -76,7 +76,7 @@ class SingularityDiagnostics(StatusPart):
 
     def answered(self, output: Output, now: float) -> bool:
         """Note an output; return whether it must be reported at once, at any level."""
-        before = self._answers.before
+        before = self._answers.output_before
         if before is None:
             self._other_side = other_side(output.determinant, self._at_home)
         if output.condition > self._largest:
@@ -106,7 +106,7 @@ class SingularityDiagnostics(StatusPart):
             worst = max(range(6), key=forces.__getitem__)
             crossing = output.singularity.time_to_crossing
             of_the_last_second = max(
-                output.condition, answers.present.condition, answers.previous.condition)
+                output.condition, answers.second.condition, answers.second_before.condition)
             values = [
                 ('det(J) (m^3)', f'{output.determinant:.9g}'),
                 ('d(det(J))/dt (m^3/s)', f'{output.determinant_rate:.9g}'),
