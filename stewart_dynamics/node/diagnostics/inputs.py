@@ -13,29 +13,26 @@
 # limitations under the License.
 
 """
-The statuses of inputs and answers: ``setpoints``, ``timing`` and ``base``.
+The statuses of inputs: ``setpoints`` and ``base``.
 
-Silent topics, rejections and other publishers of setpoints; processing times, and setpoints
-dropped for lack of time; whether the base's motion is known, omitted if the base is fixed.
+Silent topics, rejections and other publishers of setpoints; whether the base's motion is known,
+omitted if the base is fixed.
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 import math
-from statistics import median
 
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
+from stewart_dynamics.node.diagnostics.answers import Answers
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import SECONDS
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
-from stewart_dynamics.setpoints.step import Output, Setpoint
+from stewart_dynamics.setpoints.step import Setpoint
 
 INCOMPLETE, _UNKNOWN = 'incomplete', 'unknown'  # causes of a level besides rejections
 # Time after which arriving messages that complete no setpoint are logged [s].
@@ -43,53 +40,6 @@ _PATIENCE = 0.9
 _OF_BASE = (('gravity', 'm/s^2', GRAVITY), ('acceleration', 'm/s^2', BASE_ACCELERATION),
             ('angular velocity', 'rad/s', BASE_ANGULAR_VELOCITY),
             ('angular acceleration', 'rad/s^2', BASE_ANGULAR_ACCELERATION))
-
-
-@dataclass
-class Second:
-    """Answers of at least one second, which ends with a report."""
-
-    begin: float
-    times: list[float] = field(default_factory=list)  # from the last message to the answer [s]
-    condition: float = 1.0  # the largest condition number
-
-
-class Answers:
-    """Answered setpoints: their number, the last two outputs, and the last two seconds."""
-
-    def __init__(self, parameters: Parameters, now: float) -> None:
-        self.parameters = parameters  # may be replaced at any time
-        self.number = 0
-        self.at = now  # time of the last one
-        self.output: Output | None = None
-        self.output_before: Output | None = None
-        self.second, self.second_before = Second(now), Second(now)
-        self._timeout: float = parameters['setpoint.timeout']
-
-    def add(self, output: Output, seconds: float, now: float) -> None:
-        """Note an answer, and its processing time."""
-        self.number += 1
-        self.at = now
-        self.output_before, self.output = self.output, output
-        self.second.times.append(seconds)
-        if output.condition > self.second.condition:
-            self.second.condition = output.condition
-
-    def end_second(self, now: float) -> None:
-        """End the present second after a report: reports may be much less than one apart."""
-        if now - self.second.begin >= 1.0:
-            self.second_before, self.second = self.second, Second(now)
-
-    def stale(self, now: float) -> bool:
-        """Return whether there is no recent answer."""
-        return not self.number or now - self.at > self._timeout
-
-    def state(self, state: Level, otherwise: str, now: float) -> Level:
-        """Return a state of the answers: with another message if empty, with the age if stale."""
-        if not self.number:
-            return Level(state.level, state.message or 'no setpoint yet')
-        age = f' (of the last setpoint, {now - self.at:.1f} s ago)' if self.stale(now) else ''
-        return Level(state.level, (state.message or otherwise) + age)
 
 
 class SetpointDiagnostics(StatusPart):
@@ -188,28 +138,6 @@ class SetpointDiagnostics(StatusPart):
             or self.held.of(REJECTED, now).message
             or 'all topics arrive, but none is joined: their stamps differ by more than '
             f'setpoint.sync_tolerance, {parameters["setpoint.sync_tolerance"]:g} s')
-
-
-class TimingDiagnostics(StatusPart):
-    """The processing times of the last one or two seconds; dropped setpoints are a warning."""
-
-    name = 'timing'
-
-    def __init__(self, answers: Answers, of_setpoints: Counter[Rejection]) -> None:
-        super().__init__(REJECTED)
-        self._answers = answers
-        self._of_setpoints = of_setpoints
-
-    def status(self, now: float) -> Status:
-        """Return the status."""
-        values = []
-        if times := self._answers.second_before.times + self._answers.second.times:
-            values = [('processing time, median (us)', f'{median(times) * 1e6:.0f}'),
-                      ('processing time, largest (us)', f'{max(times) * 1e6:.0f}')]
-        for key, reason in (('dropped', DROPPED), ('incomplete', NOT_JOINED)):
-            values.append((key, str(sum(n for rejection, n in self._of_setpoints.items()
-                                        if rejection.reason == reason))))
-        return Status(self.name, *self._answers.state(self.held.at(now), 'on time', now), values)
 
 
 class BaseDiagnostics(StatusPart):

@@ -19,13 +19,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
+from stewart_dynamics.node.diagnostics.answers import (
+    Answers, LimitsDiagnostics, SingularityDiagnostics, TimingDiagnostics)
 from stewart_dynamics.node.diagnostics.inputs import (
-    Answers, BaseDiagnostics, INCOMPLETE, SetpointDiagnostics, TimingDiagnostics)
+    BaseDiagnostics, INCOMPLETE, SetpointDiagnostics)
 from stewart_dynamics.node.diagnostics.levels import LogLine, PERIOD, REJECTED, Status, StatusPart
-from stewart_dynamics.node.diagnostics.limits import LimitsDiagnostics
 from stewart_dynamics.node.diagnostics.outcomes import (
     ExternalWrenchDiagnostics, PayloadDiagnostics, PlannedTrajectoryDiagnostics)
-from stewart_dynamics.node.diagnostics.singularity import SingularityDiagnostics
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 from stewart_dynamics.setpoints.step import Output
