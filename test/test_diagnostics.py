@@ -225,8 +225,9 @@ def test_another_node_of_the_same_name_is_logged_once() -> None:
 def test_an_error_is_not_hidden_by_silence_and_both_are_stated() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
-    diagnostics.setpoints.found(dict.fromkeys(TOPICS, 2), {}, '')
+    diagnostics.setpoints.found(dict.fromkeys(TOPICS, 2), {'leg_states': 3}, '')
     of = status(diagnostics, 'setpoints', BEGIN + 3.0)
+    assert dict(of.values)['leg_states: readers'] == '3'
     assert of.level == ERROR
     assert of.message == (
         f'{POSE} has 2 writers, {TWIST} has 2 writers, {ACCEL} has 2 writers, no setpoint: '
@@ -339,6 +340,8 @@ def test_a_warning_states_its_reason_with_its_own_numbers(
     assert (of.level, of.message) == (WARN, message)
     assert dict(of.values)['time to crossing (s)'] == f'{time:.3f}'
     assert dict(of.values)['crossings'] == '4'
+    answered(diagnostics, BEGIN + 2.0)
+    assert logged(diagnostics, BEGIN + 2.0) == [(OK, 'singularity: clear')]
 
 
 def near(condition: float, stamp: int = 0) -> Output:
@@ -424,7 +427,9 @@ def test_the_worst_condition_is_kept_for_a_second_or_two() -> None:
     assert dict(status(diagnostics, 'singularity', BEGIN).values)[key] == '40'
     for second, worst in ((1.0, '40'), (2.0, '40'), (3.0, '4')):
         answered(diagnostics, BEGIN + second, CLEAR._replace(condition=4.0))
-        assert dict(status(diagnostics, 'singularity', BEGIN + second).values)[key] == worst
+        values = dict(status(diagnostics, 'singularity', BEGIN + second).values)
+        assert values[key] == worst
+        assert values['worst condition number since activation'] == '40'
 
 
 # Limits
