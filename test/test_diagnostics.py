@@ -222,6 +222,14 @@ def test_another_node_of_the_same_name_is_logged_once() -> None:
     assert lines == 2 * [(WARN, 'setpoints: 2 nodes')]
 
 
+def test_another_writer_is_an_error_as_long_as_it_is_there() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN)
+    for writers, level in ((1, OK), (2, ERROR), (1, OK)):
+        diagnostics.setpoints.found_writers(POSE, writers)
+        assert diagnostics.setpoints.level(BEGIN) == level
+
+
 def test_an_error_is_not_hidden_by_silence_and_both_are_stated() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
@@ -554,6 +562,20 @@ def test_a_change_of_level_is_pending_until_it_is_reported() -> None:
     diagnostics.report(BEGIN + 0.03)
     assert not diagnostics.level_changed(BEGIN + 0.04)
     assert diagnostics.level_changed(BEGIN + 0.14)  # stale
+
+
+def test_a_report_is_due_each_second_while_setpoints_are_answered_after_an_answer() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN)
+    diagnostics.report(BEGIN)
+    for n in range(1, 100):
+        assert not answered(diagnostics, BEGIN + 0.01 * n)
+    assert not diagnostics.due_at_tick(BEGIN + 1.02)
+    assert diagnostics.due_at_tick(BEGIN + 1.05)
+    assert answered(diagnostics, BEGIN + 1.0)
+    diagnostics.report(BEGIN + 2.0)  # no setpoint
+    assert not diagnostics.due_at_tick(BEGIN + 2.97)
+    assert diagnostics.due_at_tick(BEGIN + 2.98)  # half a tick early
 
 
 # Every value
