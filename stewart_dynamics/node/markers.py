@@ -29,8 +29,8 @@ from stewart_dynamics.arrays import Array, SECOND, Six
 from stewart_dynamics.mechanics.frames.rotation import quaternion_of
 from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
 from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
-from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, WARN
-from stewart_dynamics.node.diagnostics.singularity import singularity_state
+from stewart_dynamics.node.diagnostics.answers import singularity_state
+from stewart_dynamics.node.diagnostics.levels import ERROR, OK, WARN
 from stewart_dynamics.parameters.table import BASE_OUTLINE, Parameters, PLATFORM_OUTLINE
 from stewart_dynamics.setpoints.step import Output
 from visualization_msgs.msg import Marker

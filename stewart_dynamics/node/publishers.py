@@ -1,0 +1,169 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Publishers of topics that are not published with each answer: at a limited rate or period."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import math
+import sys
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+import numpy as np
+from rclpy.node import Node
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
+
+from stewart_dynamics.capability.capability import Capability
+from stewart_dynamics.compilation.functions import Preparation
+from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.limits import (
+    CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, OF_JOINTS)
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.node.diagnostics.levels import OK, Status
+from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
+from stewart_dynamics.node.topics import DIAGNOSTICS, NodeTopics
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.ros.repeated_log import RepeatedLog
+
+# The topics for controllers; diagnostics give the number of their subscribers.
+_READ = ('leg_states', 'leg_forces')
+
+_TRAVEL_RATE = 10.0  # [Hz]
+# Directions in the order of the message: each of x y z rx ry rz to minus, then to plus.
+_DIRECTIONS = np.stack([-np.eye(6), np.eye(6)], axis=1).reshape(12, 6)
+# Values where nothing limits, since no output is infinite: the largest number [m]; one turn [rad].
+_UNLIMITED = np.repeat([sys.float_info.max, 2.0 * math.pi], 6)
+_LAYOUT = MultiArrayLayout(dim=[
+    MultiArrayDimension(label='x y z rx ry rz', size=6, stride=12),
+    MultiArrayDimension(label='minus plus', size=2, stride=2)])
+_ENDING = LENGTH_MIN, LENGTH_MAX, *OF_JOINTS, CLEARANCE_MIN
+NO_LIMIT = (f'~/travel: none of {", ".join(_ENDING)} is set: it ends '
+            'at singularity.stop_condition alone')
+
+
+class PublisherAtRate:
+    """
+    Publishes the last data noted, at most at a given rate, while there are subscribers.
+
+    publisher: None if nothing is to be published.
+    rate: maximum rate [Hz].
+    write: makes the message; called with the data.
+    """
+
+    def __init__(self, publisher: Any, rate: float, write: Callable[..., Any]) -> None:
+        self.write = write  # may be replaced at any time
+        self._publisher = publisher
+        self._period = 1.0 / rate if rate else 0.0
+        self._due = 0.0
+        self._unpublished: tuple[Any, ...] | None = None
+
+    def note(self, *data: Any) -> None:
+        """Note the data of the next message."""
+        self._unpublished = data
+
+    def publish_due(self, now: float) -> None:
+        """Publish the last data noted if publication is due and there is a subscriber."""
+        if self._unpublished is None or self._publisher is None or now < self._due:
+            return
+        last = self._unpublished
+        # A later subscriber must not get data of an old setpoint.
+        self._unpublished = None
+        self._due = now + self._period
+        if self._publisher.get_subscription_count():
+            self._publisher.publish(self.write(*last))
+
+
+class TravelPublisher(PublisherAtRate):
+    """
+    Publishes ``~/travel``: how far the platform can go from the pose of the last setpoint.
+
+    parameters: geometry and limits; ``use`` replaces them.
+    code: machine code that is compiled once somebody subscribes.
+    """
+
+    def __init__(self, parameters: Parameters, publisher: Any, code: Preparation) -> None:
+        super().__init__(publisher, _TRAVEL_RATE, self._message)
+        self._code = code
+        self._read = self._said = False
+        self.use(parameters)
+
+    def use(self, parameters: Parameters) -> None:
+        """Use other parameters from now on."""
+        self._parameters = parameters
+        self._capability: Capability | None = None
+
+    def look(self) -> str:
+        """Check whether there is a subscriber; return a notice where no limit is set, once."""
+        subscribed = self._publisher.get_subscription_count() > 0
+        self._read = subscribed and self._code.begin()
+        if not subscribed:
+            return ''
+        unlimited = all(self._parameters[name] is None for name in _ENDING)
+        said, self._said = self._said, True
+        return NO_LIMIT if unlimited and not said else ''
+
+    def note(self, *data: Any) -> None:
+        """Note a row of motion."""
+        if self._read:
+            super().note(*data)
+
+    def _message(self, motion: Sequence[float]) -> Float64MultiArray:
+        if self._capability is None:
+            self._capability = Capability(StewartPlatform(self._parameters))
+        try:
+            values = self._capability.travel(Motion.of_rows(np.array(motion)), _DIRECTIONS).value
+        except MotionError:  # not decided within the largest number of steps
+            values = np.zeros(12)
+        values = np.where(np.isposinf(values), _UNLIMITED, values)
+        return Float64MultiArray(layout=_LAYOUT, data=values.tolist())
+
+
+class DiagnosticsPublisher:
+    """Publishes and logs reports."""
+
+    def __init__(self, node: Node, topics: NodeTopics, log: RepeatedLog) -> None:
+        self._node = node
+        self._topics = topics
+        self._log = log
+        # The first one takes milliseconds: rclpy loads the type support.
+        serialize_message(self._message([Status('', OK, '', [('', '')])]))
+
+    def publish(self, diagnostics: DynamicsDiagnostics) -> None:
+        """Count publishers and subscribers; publish and log a report."""
+        node, publishers = self._node, self._topics.publishers
+        namesakes = node.get_node_names_and_namespaces().count(
+            (node.get_name(), node.get_namespace()))
+        diagnostics.setpoints.found(
+            self._topics.writers(),
+            {topic: publishers[topic].get_subscription_count() for topic in _READ},
+            f'{namesakes} nodes are named {node.get_fully_qualified_name()}'
+            if namesakes > 1 else '')
+        statuses, lines = diagnostics.report(time.monotonic())
+        self._log.write(lines)
+        publishers[DIAGNOSTICS].publish(self._message(statuses))
+
+    def _message(self, statuses: list[Status]) -> DiagnosticArray:
+        name = self._node.get_fully_qualified_name().lstrip('/')
+        return DiagnosticArray(
+            header=Header(stamp=self._node.get_clock().now().to_msg()),
+            status=[DiagnosticStatus(
+                level=bytes([status.level]), name=f'{name}: {status.name}',
+                message=status.message, hardware_id=name,
+                values=[KeyValue(key=key, value=value) for key, value in status.values])
+                for status in statuses])
