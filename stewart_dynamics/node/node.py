@@ -42,7 +42,7 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics, TICK
 from stewart_dynamics.node.markers import Markers
-from stewart_dynamics.node.publishers import (
+from stewart_dynamics.node.publishers_at_rate import (
     DiagnosticsPublisher, PublisherAtRate, TravelPublisher)
 from stewart_dynamics.node.tasks import (
     inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)

@@ -30,19 +30,21 @@ from statistics import median
 from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, JUMP, LENGTH_MAX, LIMITS, OF_MOTORS, QUANTITIES)
+    ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, OF_MOTORS,
+    QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
 from stewart_dynamics.parameters.tolerances import HYSTERESIS
 from stewart_dynamics.setpoints.motor_step import DEMANDED_TORQUES, RISES, SPEEDS
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 from stewart_dynamics.setpoints.step import Output
 
 _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singularity
-_OF_MOTORS = (('motor speed', 'rad/s', SPEEDS), ('motor torque demanded', 'N m', DEMANDED_TORQUES),
-              ('temperature rise', 'K', RISES))
+# Where the values of limits are in a row of motors.
+_OF_MOTORS = {SPEED_MAX: SPEEDS, TORQUE_MAX: DEMANDED_TORQUES, TEMPERATURE_RISE_MAX: RISES}
+_DEMANDED = FORCE_MAX, TORQUE_MAX
 _LIMITS = *LIMITS, *OF_MOTORS, JUMP
 # Factor by which legs exceed their maximum length if positions are in mm instead of m.
 _MILLIMETRES = 1000.0
@@ -124,7 +126,7 @@ def singularity_state(output: Output, parameters: Parameters) -> Level:
     state = output.singularity
     if state.stopped:
         is_suppressed = output.demanded_forces is not None and (
-            parameters['singularity.action'] == 'suppress_forces')
+            parameters['singularity.action'] == SUPPRESS_FORCES)
         suppressed = ': forces suppressed' if is_suppressed else ''
         return Level(ERROR, f'inside stop_condition{suppressed}: '
                      + _condition(output, parameters, 'stop_condition'))
@@ -261,7 +263,7 @@ class LimitsDiagnostics(StatusPart):
 
     def _note_exceedances(self, output: Output, now: float) -> None:
         suppressed = output.forces is None and output.demanded_forces is not None and (
-            self._answers.parameters['limits.action'] == 'suppress_forces')
+            self._answers.parameters['limits.action'] == SUPPRESS_FORCES)
         self._suppressed += suppressed
         mistake = self._mistake(output)
         for name in _LIMITS:
@@ -283,8 +285,8 @@ class LimitsDiagnostics(StatusPart):
         """Return the status, with all causes of its level."""
         values = []
         if self._answers.output is not None:
-            values = [(f'{leg}: {quantity} ({unit})', f'{number:.6g}')
-                      for quantity, unit, numbers in self._of_legs(self._answers.output)
+            values = [(f'{leg}: {quantity}', f'{number:.6g}')
+                      for quantity, numbers in self._of_legs(self._answers.output)
                       for leg, number in zip(self._joints, numbers, strict=False)
                       if not math.isnan(number)]
         if self._largest_force:
@@ -299,15 +301,16 @@ class LimitsDiagnostics(StatusPart):
             values.append(('setpoints without forces, by limits.action', str(self._suppressed)))
         return Status(self.name, *self._answers.state(self.held.at(now), 'all held', now), values)
 
-    def _of_legs(self, output: Output) -> list[tuple[str, str, Sequence[float]]]:
-        """Return quantity, unit and six numbers; empty or nan where they are not computed."""
-        return [
-            ('length', 'm', output.lengths),
-            ('rate', 'm/s', output.rates),
-            ('force demanded', 'N', output.demanded_forces or ()),
-            *((*QUANTITIES[limit], output.joint_angles[where]) for limit, where in ANGLES.items()),
-            (*QUANTITIES[CLEARANCE_MIN], output.clearances),
-            *((quantity, unit, output.motors[where]) for quantity, unit, where in _OF_MOTORS)]
+    def _of_legs(self, output: Output) -> list[tuple[str, Sequence[float]]]:
+        """Return each quantity with its unit, and six numbers, where they are computed or not."""
+        numbers: dict[str, Sequence[float]] = {
+            LENGTH_MAX: output.lengths, VELOCITY_MAX: output.rates,
+            FORCE_MAX: output.demanded_forces or (),
+            **{limit: output.joint_angles[where] for limit, where in ANGLES.items()},
+            CLEARANCE_MIN: output.clearances,
+            **{limit: output.motors[where] for limit, where in _OF_MOTORS.items()}}
+        return [(f'{QUANTITIES[limit].name}{" demanded" * (limit in _DEMANDED)} '
+                 f'({QUANTITIES[limit].unit})', each) for limit, each in numbers.items()]
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """Return the changes of each kind of limit."""
