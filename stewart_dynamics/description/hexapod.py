@@ -166,9 +166,9 @@ COLORS: dict[str, Color] = {
     'joint': (0.12, 0.12, 0.12, 1.0)}
 
 # Radii and thickness in terms of the mean distance of the platform joints from their center.
-_BARREL, _ROD, _BALL, _PLATE = 0.05, 0.0275, 0.07, 0.05
+BARREL, ROD, BALL, PLATE = 0.05, 0.0275, 0.07, 0.05
 # Parts of the shortest leg length, or of the length at home if there is no limit.
-_BARREL_LENGTH, _ROD_LENGTH, _OF_HOME = 0.9, 0.95, 0.7
+BARREL_LENGTH, _ROD_LENGTH, _OF_HOME = 0.9, 0.95, 0.7
 
 
 class VisualShape(NamedTuple):
@@ -192,13 +192,13 @@ def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[VisualShape, 
     found = {}
     for name, kind, joints in ((hexapod.base, 'base', base),
                                (hexapod.platform, 'platform', platform)):
-        found[name] = _mesh(hexapod, kind, uris) or (_plate(kind, joints, _PLATE * size), *(
-            VisualShape('sphere', 'joint', joint, np.eye(3), _BALL * size) for joint in joints))
+        found[name] = _mesh(hexapod, kind, uris) or (_plate(kind, joints, PLATE * size), *(
+            VisualShape('sphere', 'joint', joint, np.eye(3), BALL * size) for joint in joints))
     for leg in hexapod.legs:
         found[leg.cylinder.name] = _mesh(hexapod, 'cylinder', uris) or (
-            _rod('cylinder', _BARREL * size, _BARREL_LENGTH * _shortest(leg), 1.0),)
+            _rod('cylinder', BARREL * size, BARREL_LENGTH * _shortest(leg), 1.0),)
         found[leg.piston.name] = _mesh(hexapod, 'piston', uris) or (
-            _rod('piston', _ROD * size, _ROD_LENGTH * _shortest(leg), -1.0),)
+            _rod('piston', ROD * size, _ROD_LENGTH * _shortest(leg), -1.0),)
     return found
 
 
