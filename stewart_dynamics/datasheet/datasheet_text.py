@@ -27,9 +27,9 @@ from typing import Any, NamedTuple
 from stewart_dynamics.datasheet.ratings import AXES
 from stewart_dynamics.mechanics.limits import QUANTITIES, short_name, SINGULARITY
 from stewart_dynamics.parameters.table import FIXED
+from stewart_dynamics.reporting.pages import typeset
 
 _DIGITS = 4
-_THIN_SPACE = '\u202f'
 
 
 class Unit(NamedTuple):
@@ -77,7 +77,7 @@ def down(value: float | None) -> str:
     # a value that is exact in four digits is not to lose its last one by rounding errors
     shortened = math.trunc(value * power * (1.0 + 1e-12)) / power
     text = f'{shortened:,.{max(places, 0)}f}'
-    return text.replace(',', _THIN_SPACE).replace('-', '−')
+    return typeset(text)
 
 
 def both_ways(values: Mapping[str, Any], axis: str, unit: Unit) -> str:

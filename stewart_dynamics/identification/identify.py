@@ -47,6 +47,7 @@ from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
+from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import FIXED, NEGATIVE, Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
@@ -357,7 +358,7 @@ class Identification:
         whole = np.concatenate(residuals)
         if np.isnan(whole).all(axis=0).any():
             return 0
-        deviation = np.nanmedian(np.abs(whole), axis=0) / 0.6745
+        deviation = BY_MEDIAN * np.nanmedian(np.abs(whole), axis=0)
         far = [np.abs(each) > _OUTLIER * deviation for each in residuals]
         number = sum(map(np.count_nonzero, far))
         if number > _MOST_OUTLIERS * whole.size:

@@ -45,7 +45,7 @@ from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
-from stewart_dynamics.replay.summary import Answered, margin_key
+from stewart_dynamics.replay.summary import Answered, margin_key, PARTS, unit_key
 from stewart_dynamics.reporting.colors import FORCE_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
@@ -58,8 +58,9 @@ from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
 from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')
-# A frame of the moving platform: position, rotation, lengths, forces.
-_FRAME = 24
+# Where the numbers of the moving platform are in a frame; angles in degrees.
+_FRAME = {'position': (0, 3), 'rotation': (3, 12), 'angles': (12, 15), 'lengths': (15, 21),
+          'forces': (21, 27)}
 # Maximum number of listed times of one kind, the first ones.
 _MOST_TIMES = 20
 
@@ -81,7 +82,7 @@ class Report:
         self._curves = Curves(timeout)
         self._places: dict[str, slice] = {}
         self._spectrum = Spectrum(6, timeout, folder)
-        self._frames = Frames(_FRAME)
+        self._frames = Frames(max(end for _, end in _FRAME.values()))
         self._compared = Curves(timeout) if measured else None
         self._places_compared: dict[str, slice] = {}
         self._angles: Array = np.zeros((1, 3))
@@ -94,10 +95,10 @@ class Report:
         motions, forces = setpoints.motions, outputs.demanded_forces
         with np.errstate(over='ignore'):
             powers = forces * outputs.rates
+        angles = self._continued(np.degrees(to_euler(motions[:, ROTATION].reshape(-1, 3, 3))))
         quantities = {
             'position': motions[:, POSITION],
-            'angles': self._continued(np.degrees(to_euler(
-                motions[:, ROTATION].reshape(-1, 3, 3)))),
+            'angles': angles,
             'velocity': motions[:, LINEAR_VELOCITY],
             'angular_velocity': np.degrees(motions[:, ANGULAR_VELOCITY]),
             'acceleration': motions[:, LINEAR_ACCELERATION],
@@ -124,7 +125,7 @@ class Report:
         self._places = _add(self._curves, seconds, quantities)
         self._spectrum.add(seconds, base_wrenches.T)
         self._frames.add(seconds, np.concatenate(
-            [motions[:, POSE], outputs.lengths, forces], axis=1))
+            [motions[:, POSE], angles, outputs.lengths, forces], axis=1))
 
     def add_measured(
             self, seconds: Array, measured: Array, computed: Array, wrench: Array) -> None:
@@ -156,7 +157,8 @@ class Report:
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
             date=date(summary['setpoints']['first_stamp_ns']), quantities=QUANTITIES,
             units={name: each.unit or '' for name, each in PARAMETERS.items()},
-            most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM,
+            most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS,
+            unit_key=unit_key,
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})
         write_files({path: text})
@@ -195,7 +197,8 @@ class Report:
             'forceColors': FORCE_COLORS,
             'baseJoints': p['geometry.base_joints'].tolist(),
             'platformJoints': p['geometry.platform_joints'].tolist(),
-            'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8')},
+            'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8'),
+                       'places': _FRAME},
             'warnings': singularity['warnings_from_to_s'],
             'crossings': singularity['crossings_at_s'],
             'contacts': [[each['from_s'], each['to_s']] for each in (

@@ -37,10 +37,12 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Bytes, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.external_wrench.estimate import external_wrenches
+from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader, MISSING_JOINTS, NUMBERS_END
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.summary import COMPONENTS, unit_key
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
 from stewart_dynamics.reporting.block_statistics import Extreme
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
@@ -86,8 +88,8 @@ class Efforts:
 _SETPOINTS_WAITING = 2 ** 15
 _SAMPLES_WAITING = 2 ** 18
 
-AXES = ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
-_UNITS = ('n',) * 3 + ('n_m',) * 3
+AXES = tuple(COMPONENTS)
+_UNITS = tuple(map(unit_key, COMPONENTS.values()))
 
 # Columns of the rows kept of setpoints.
 _SECONDS, _POSE, _FORCES = 0, slice(1, 13), slice(13, 19)
@@ -334,7 +336,7 @@ class WrenchBins:
         if not len(one):
             return np.zeros(6), np.zeros(6)
         median = np.median(one, axis=0)
-        return median, 1.4826 * np.median(np.abs(one - median), axis=0)
+        return median, BY_MEDIAN * np.median(np.abs(one - median), axis=0)
 
     def contacts(self, median: Array, threshold: Array, gap: float) -> list[Contact]:
         """Return the intervals with values above the threshold; shorter gaps are bridged."""

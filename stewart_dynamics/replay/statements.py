@@ -30,7 +30,7 @@ from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, CLIPPED, Exceedance, LENGTH_MAX, PLATFORM_ANGLE_MAX, QUANTITIES, SPEED_MAX,
     TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.replay.motor_loads import NEEDS
-from stewart_dynamics.replay.summary import margin_key
+from stewart_dynamics.replay.summary import margin_key, PARTS, unit_key
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
 
 Summary = Mapping[str, Any]  # the content of summary.json
@@ -204,8 +204,8 @@ def _angle(radians: float) -> str:
 
 
 def _loads(found: Summary) -> Iterator[Statement]:
-    for name, unit, key in (('force', 'N', 'n'), ('moment', 'N m', 'n_m')):
-        each = found[name]
+    for name, unit in PARTS.items():
+        each, key = found[name], unit_key(unit)
         if each[f'peak_{key}'] is not None:
             rms = '-' if each[f'rms_{key}'] is None else f'{each[f"rms_{key}"]:.1f}'
             yield Statement(LOADS, 'none', f'{name} on the base: {each[f"peak_{key}"]:.1f} {unit} '
@@ -224,11 +224,10 @@ def _motors(summary: Summary) -> Iterator[Statement]:
         yield Statement(
             MOTORS, 'warn', f'drive.torque_continuous, exceeded by the RMS torque of {worst}'
             f'{others}: {legs[worst]["torque_rms_n_m"]:.4g} N m, by {-margin:.4g} N m')
-    for name, peak, unit_key in ((TORQUE_MAX, 'torque_peak', 'n_m'),
-                                 (SPEED_MAX, 'speed_peak', 'rad_s'),
-                                 (TEMPERATURE_RISE_MAX, 'temperature_rise_max', 'k')):
-        if values := values_of(legs, f'{peak}_{unit_key}'):
-            quantity = QUANTITIES[name]
+    for name, peak in ((TORQUE_MAX, 'torque_peak'), (SPEED_MAX, 'speed_peak'),
+                       (TEMPERATURE_RISE_MAX, 'temperature_rise_max')):
+        quantity = QUANTITIES[name]
+        if values := values_of(legs, f'{peak}_{unit_key(quantity.unit)}'):
             value, most = max(values, key=lambda each: abs(each[0]))
             yield Statement(
                 MOTORS, 'none', f'{quantity.name}: {value:.4g} {quantity.unit} at most, {most},',

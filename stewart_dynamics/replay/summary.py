@@ -44,15 +44,20 @@ _OF_VELOCITY = (
     'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
     'power_mean_w', 'energy_driving_j', 'energy_braking_j')
 _AT_REST = ('gravity', 'wrench', 'base motion')
-# Columns of the base wrench: force and moment, then their components.
-_BASE_WRENCH = (
-    'force', 'moment', 'force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
-_BASE_UNITS = ('n', 'n_m', 'n', 'n', 'n', 'n_m', 'n_m', 'n_m')
+# Units of the parts of a wrench, and of their components.
+PARTS = {'force': 'N', 'moment': 'N m'}
+COMPONENTS = {f'{part}_{axis}': unit for part, unit in PARTS.items() for axis in 'xyz'}
+_BASE_WRENCH = PARTS | COMPONENTS
 
 
 def margin_key(quantity: Quantity) -> str:
     """Return the key, in a leg of summary.json, of the margin of a quantity from its limits."""
-    return f'{quantity.key}_margin_{quantity.unit.lower().replace("/", "_")}'
+    return f'{quantity.key}_margin_{unit_key(quantity.unit)}'
+
+
+def unit_key(unit: str) -> str:
+    """Return a unit as keys of summary.json end with it: n_m, rad_s."""
+    return unit.lower().replace('/', '_').replace(' ', '_')
 
 
 class Answered(NamedTuple):
@@ -319,6 +324,6 @@ class _BaseWrench:
         numbers = zip(np.sqrt(squares).tolist(), means, self._peaks.values.tolist(),
                       self._peaks.at.tolist(), strict=True)
         return {name: dict(zip(
-            (f'rms_{unit}', f'mean_{unit}', f'peak_{unit}', 'peak_at_s'), map(finite, each),
-            strict=True)) for name, unit, each in zip(
-                _BASE_WRENCH, _BASE_UNITS, numbers, strict=True)}
+            (f'rms_{unit_key(unit)}', f'mean_{unit_key(unit)}', f'peak_{unit_key(unit)}',
+             'peak_at_s'), map(finite, each), strict=True))
+            for (name, unit), each in zip(_BASE_WRENCH.items(), numbers, strict=True)}

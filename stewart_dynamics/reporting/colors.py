@@ -43,9 +43,10 @@ FORCE_COLORS = '#1f5fb4', '#86b0dc', '#c4c4c4', '#e79a7d', '#b2182b'
 
 
 def custom_properties(dark: bool = False) -> str:
-    """Return the colors as properties for style sheets and scripts: --ink, --leg0."""
+    """Return colors as properties for style sheets and scripts: --ink, --leg0; --leg in .leg0."""
     named = ROLES | {f'leg{n}': color for n, color in enumerate(LEG_COLORS)}
-    light = f':root {{ {_properties(named)} }}\n'
+    light = f':root {{ {_properties(named)} }}\n' + ''.join(
+        f'.leg{n} {{ --leg: var(--leg{n}); }}\n' for n in range(len(LEG_COLORS)))
     return light if not dark else (
         f'{light}@media screen and (prefers-color-scheme: dark) {{ :root {{ '
         f'color-scheme: dark; {_properties(_DARK)} }} }}\n')

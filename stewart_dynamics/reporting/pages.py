@@ -49,7 +49,7 @@ def number(value: float | None, decimals: int) -> str:
     """Return a number with a given number of decimals, without decimals from 1e5 on."""
     if value is None or not math.isfinite(value):
         return '–'
-    return _typeset(f'{value:,.{decimals}f}') if abs(value) < 1e5 else digits(value)
+    return typeset(f'{value:,.{decimals}f}') if abs(value) < 1e5 else digits(value)
 
 
 def digits(value: float | None) -> str:
@@ -57,18 +57,19 @@ def digits(value: float | None) -> str:
     if value is None or not math.isfinite(value):
         return '–'
     if not 1e3 <= abs(value) < 1e10:
-        return _typeset(f'{value:.5g}')
+        return typeset(f'{value:.5g}')
     text = f'{value:.5g}' if abs(value) < 1e5 else f'{value:.0f}'
     decimals = len(text.partition('.')[2]) if 'e' not in text else 0
-    return _typeset(f'{value:,.{decimals}f}')
+    return typeset(f'{value:,.{decimals}f}')
 
 
 def thousands(count: int) -> str:
     """Return a count with spaces between thousands."""
-    return _typeset(f'{count:,}')
+    return typeset(f'{count:,}')
 
 
-def _typeset(text: str) -> str:
+def typeset(text: str) -> str:
+    """Return numbers with narrow spaces for commas, and true minus signs."""
     return text.replace(',', _THIN_SPACE).replace('-', '−')
 
 

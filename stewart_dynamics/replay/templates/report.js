@@ -502,21 +502,25 @@ class SpectrumPlot extends TimePlot {
 
 // ---- the hexapod in three dimensions
 
-const NUMBERS = 24;  // position 3, rotation 9, lengths 6, forces 6
 const FORCE_SCALE = report.forceColors.map((each, n, all) => [n / (all.length - 1), each]);
 const PLATFORM = color('platform'), PLATFORM_EDGE = color('platform-edge');
 
 const frames = {
   times: decode(report.frames.times, Float64Array), numbers: decode(report.frames.numbers, Float64Array)};
 
+const placesInFrame = Object.entries(report.frames.places);
+const NUMBERS = Math.max(...placesInFrame.map(([, [, end]]) => end));
+
+// Position, rotation, angles, lengths and forces.
 function frameAt(number) {
-  return frames.numbers.subarray(NUMBERS * number, NUMBERS * (number + 1));
+  return Object.fromEntries(placesInFrame.map(
+    ([name, [begin, end]]) => [name, frames.numbers.subarray(NUMBERS * number + begin, NUMBERS * number + end)]));
 }
 
 // Where the platform joints are in a frame, base axes.
 function platformJoints(frame) {
   return report.platformJoints.map(p => [0, 1, 2].map(
-    k => frame[k] + frame[3 + 3 * k] * p[0] + frame[4 + 3 * k] * p[1] + frame[5 + 3 * k] * p[2]));
+    k => frame.rotation.subarray(3 * k, 3 * k + 3).reduce((sum, r, n) => sum + r * p[n], frame.position[k])));
 }
 
 const column = (points, k) => points.map(point => point[k]);
@@ -539,7 +543,7 @@ function legLines(joints) {
 }
 
 function legColors(frame) {
-  return [...frame.subarray(18)].flatMap(force => Array(3).fill(Number.isFinite(force) ? force : 0));
+  return [...frame.forces].flatMap(force => Array(3).fill(Number.isFinite(force) ? force : 0));
 }
 
 // A narrow scene is seen from farther away.
@@ -591,7 +595,7 @@ function drawScene(canvas, traces, numbers, below = 0) {
 function colorReach() {
   const sizes = [];
   for (let n = 0; n < frames.times.length; n++) {
-    for (const force of frameAt(n).subarray(18, 24)) if (Number.isFinite(force)) sizes.push(Math.abs(force));
+    for (const force of frameAt(n).forces) if (Number.isFinite(force)) sizes.push(Math.abs(force));
   }
   if (!sizes.length) return 1;
   sizes.sort((a, b) => a - b);
@@ -662,13 +666,12 @@ class Player extends Drawing {
   }
 
   showValues(number) {
-    const frame = frameAt(number), r = frame.subarray(3, 12), degrees = 180 / Math.PI;
+    const frame = frameAt(number);
     this.legValues.forEach(([force, length], n) => {
-      force.textContent = Number.isFinite(frame[18 + n]) ? shown(frame[18 + n]) : 'none';
-      length.textContent = shown(frame[12 + n]);
+      force.textContent = Number.isFinite(frame.forces[n]) ? shown(frame.forces[n]) : 'none';
+      length.textContent = shown(frame.lengths[n]);
     });
-    const pose = [frame[0], frame[1], frame[2], degrees * Math.atan2(r[7], r[8]),
-      degrees * Math.atan2(-r[6], Math.hypot(r[0], r[3])), degrees * Math.atan2(r[3], r[0])];
+    const pose = [...frame.position, ...frame.angles];
     this.poseValues.forEach(([cell], n) => { cell.textContent = shown(pose[n]); });
     this.sample.textContent = `sample at t = ${grouped(frames.times[number], 3)} s`
       + (frames.times.length < report.samples ? `, one of ${grouped(frames.times.length)} shown` : '');
