@@ -34,6 +34,7 @@ from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit
+from stewart_dynamics.setpoints.output_messages import LEG_STATES
 
 # Legs are at rest while no position changes by more than this part of the characteristic length,
 # for at least this time [s], of which this part at each end is left out: the platform settles.
@@ -59,7 +60,7 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
     with closing(Recording(path)) as recording:
         topics = {
             recording.find_topic(type_names.JOINT_STATE, measured, f'{node}/{MEASURED_LEGS}',
-                                 '--measured', {f'{node}/leg_states'}): 'legs',
+                                 '--measured', {f'{node}/{LEG_STATES}'}): 'legs',
             recording.find_topic(type_names.POSE_STAMPED, pose, '', '--pose'): 'pose'}
         reader = JointStateReader(parameters['joints'], ['position'])
         leg_stamps: list[Stamps] = []

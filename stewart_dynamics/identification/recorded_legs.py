@@ -31,6 +31,7 @@ from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import (
     FIELDS, JointStateReader, NUMBERS_END)
 from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.setpoints.output_messages import LEG_STATES
 
 JOINT_STATE = type_names.JOINT_STATE
 # Maximum number of samples in a window, so that it and its extract fit into memory.
@@ -56,7 +57,7 @@ def find_topics(recording: Recording, node: str, measured: str | None, efforts: 
         recording.checked_topic(efforts, JOINT_STATE)
     # ~/leg_states is computed, not measured
     legs = recording.find_topic(JOINT_STATE, measured, f'{node}/{MEASURED_LEGS}', '--measured',
-                                {f'{node}/leg_states', efforts or ''})
+                                {f'{node}/{LEG_STATES}', efforts or ''})
     return Topics(legs, efforts or legs)
 
 

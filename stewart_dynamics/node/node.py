@@ -99,7 +99,7 @@ class DynamicsNode(LifecycleNode):
     def __init__(self) -> None:
         # Undeclared parameters are allowed so that our own check rejects them, with a better
         # text.
-        super().__init__('stewart_dynamics', automatically_declare_parameters_from_overrides=True,
+        super().__init__(Parameters.node, automatically_declare_parameters_from_overrides=True,
                          allow_undeclared_parameters=True)
         self._settings = declare_parameters(self, Parameters)
         self._log = RepeatedLog(self.get_logger())

@@ -40,9 +40,10 @@ from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostic
 from stewart_dynamics.node.topics import DIAGNOSTICS, NodeTopics
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import RepeatedLog
+from stewart_dynamics.setpoints.output_messages import LEG_FORCES, LEG_STATES
 
 # The topics for controllers; diagnostics give the number of their subscribers.
-_READ = ('leg_states', 'leg_forces')
+_READ = LEG_STATES, LEG_FORCES
 
 _TRAVEL_RATE = 10.0  # [Hz]
 # Directions in the order of the message: each of x y z rx ry rz to minus, then to plus.

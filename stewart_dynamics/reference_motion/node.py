@@ -60,7 +60,7 @@ class TrajectoryNode(Node):
 
     def __init__(self, done: Future) -> None:
         super().__init__(
-            'stewart_trajectory', automatically_declare_parameters_from_overrides=True,
+            ReferenceMotionParameters.node, automatically_declare_parameters_from_overrides=True,
             allow_undeclared_parameters=True)
         self._settings = declare_parameters(self, ReferenceMotionParameters)
         self._done = done

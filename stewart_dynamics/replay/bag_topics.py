@@ -27,6 +27,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
+from stewart_dynamics.setpoints.output_messages import LEG_STATES
 
 MEASURED = 'measured'
 _OF_BASE = tuple(dict.fromkeys(key for keys in inputs.BASE_SOURCES.values() for key in keys))
@@ -84,7 +85,7 @@ def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Para
     if base:
         notices.append(f'{joined(base)}: not used: base.source is {parameters["base.source"]}')
     legs = recording.topics_of(type_names.JOINT_STATE, {
-        *topics.values(), f'{options.node}/leg_states', f'{options.node}/{JOINT_STATES}'})
+        *topics.values(), f'{options.node}/{LEG_STATES}', f'{options.node}/{JOINT_STATES}'})
     if legs and MEASURED not in topics:
         notices.append(f'{joined(legs)}: not used; --measured compares the efforts of measured '
                        'legs with the computed forces')
