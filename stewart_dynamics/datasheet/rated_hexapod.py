@@ -26,7 +26,7 @@ from stewart_dynamics.capability.reachable import Reachable
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
-from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import LIMITS, Limits
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
@@ -111,14 +111,7 @@ class RatedHexapod:
 
     def moved_by(self, direction: Array, by: float = 1.0) -> Pose:
         """Return the pose after a translation and a rotation vector (6,), base axes."""
-        turn = by * direction[3:]
-        angle = float(np.linalg.norm(turn))
-        rotation = self.pose.rotation
-        if angle > 0.0:
-            x, y, z = turn / angle
-            k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-            rotation = (np.eye(3) + np.sin(angle) * k
-                        + (1.0 - np.cos(angle)) * k @ k) @ rotation
+        rotation = from_rotation_vector(by * direction[3:]) @ self.pose.rotation
         return Pose(self.pose.position + by * direction[:3], rotation)
 
     def clearance(self) -> float | None:
