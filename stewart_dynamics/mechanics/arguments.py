@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.errors import MotionError
 
 
@@ -39,9 +39,15 @@ def as_array(name: str, value: ArrayLike, tail: tuple[int, ...]) -> Array:
         raise MotionError(f'{name}: shape {array.shape}: must end in {tail}')
     finite = np.isfinite(array)
     if not finite.all():
-        at = tuple(map(int, np.argwhere(~finite)[0]))
-        raise MotionError(f'{name}{list(at)}: {array[at]}: must be finite')
+        at, name = first_of(name, ~finite)
+        raise MotionError(f'{name}: {array[at]}: must be finite')
     return array
+
+
+def first_of(name: str, wrong: Flags) -> tuple[tuple[int, ...], str]:
+    """Return the first index where an argument is wrong, and the argument's name with it."""
+    at = tuple(map(int, np.argwhere(wrong)[0]))
+    return at, f'{name}{list(at) if at else ""}'
 
 
 def optional_array(name: str, value: ArrayLike | None, tail: tuple[int, ...]) -> Array:
