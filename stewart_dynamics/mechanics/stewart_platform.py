@@ -145,7 +145,7 @@ class StewartPlatform:
 
         """
         known = singular in ('raise', 'nan')
-        result = self._single.inverse_dynamics(motion, wrench, base) if known else None
+        result = self._single.inverse_dynamics(motion, None, wrench, base) if known else None
         if result is not None:
             return InverseDynamics(result)
         _, _, results, unsolvable, shape = self._solved(motion, wrench, base, singular)
@@ -255,7 +255,7 @@ class StewartPlatform:
         singular poses are allowed.
         """
         base = self._still if base is None else base
-        result = self._single.base_wrench(motion, wrench, base)
+        result = self._single.base_wrench(motion, None, wrench, base)
         if result is not None:
             return result
         rows, wrenches, bases, shape = loaded(motion, wrench, base)
