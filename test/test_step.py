@@ -31,9 +31,9 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, any_exceeded, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JITTER, JUMP,
-    LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, OF_JOINTS, OF_RESULTS, PLATFORM_ANGLE_MAX, TOLERANCE,
-    VELOCITY_MAX)
+    angle_values, ANGLES, any_exceeded, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX,
+    JITTER, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, OF_JOINTS, OF_RESULTS,
+    PLATFORM_ANGLE_MAX, result_values, TOLERANCE, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, NO_BASE, RATES, RESULT
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import LEG_SHAPE
@@ -445,7 +445,7 @@ def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: i
                 expected = [exceeded and other == limit and n == leg for n in range(6)]
                 assert limits.exceeds(other, result[PLACES[other]]).tolist() == expected
             of_sample = (tuple(result[at].tolist()) for at in (LENGTHS, RATES, FORCES))
-            assert limits.exceeded(*of_sample) == (
+            assert limits.exceeded(result_values(*of_sample)) == (
                 (Exceedance(limit, leg, value, bound),) if exceeded else ())
 
 
@@ -461,7 +461,7 @@ def test_sample_and_array_agree_on_the_angle_of_each_joint(limit: str, leg: int)
         for other in OF_JOINTS:
             expected = [exceeded and other == limit and n == leg for n in range(6)]
             assert limits.exceeds(other, angles[ANGLES[other]]).tolist() == expected
-        assert limits.exceeded_angles(tuple(angles.tolist())) == (
+        assert limits.exceeded(angle_values(tuple(angles.tolist()))) == (
             (Exceedance(limit, leg, value, bound),) if exceeded else ())
 
 
@@ -469,8 +469,8 @@ def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
     limits = Limits(symmetric_parameters())
     huge = rng().choice([-1e300, 1e300], (5, 6))
     assert not any(limits.exceeds(limit, huge).any() for limit in LIMITS)
-    assert limits.exceeded((1e300,) * 6, (-1e300,) * 6, (1e300,) * 6) == ()
-    assert limits.exceeded_angles((3.14,) * 12) == ()
+    for value in (1e300, -1e300):
+        assert limits.exceeded(dict.fromkeys(LIMITS, (value,) * 6)) == ()
     assert np.isinf(limits.force_max).all() and not limits.bounds
 
 
@@ -479,7 +479,7 @@ def test_unknown_forces_exceed_no_limit() -> None:
     result = row()
     result[FORCES] = np.nan
     assert any_exceeded(limits.thresholds[:4].ravel(), result) == (False, False)
-    assert limits.exceeded((1.2,) * 6, (0.0,) * 6, None) == ()
+    assert limits.exceeded(result_values((1.2,) * 6, (0.0,) * 6, None)) == ()
 
 
 @pytest.mark.parametrize(('exceedance', 'words'), [

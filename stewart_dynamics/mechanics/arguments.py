@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Checks of array arguments: real, finite, of the right shape; else MotionError."""
+"""Array arguments: checked (real, finite, of the right shape; else MotionError), as rows."""
 
 from __future__ import annotations
 
@@ -84,3 +84,18 @@ def _shown(value: object) -> str:
     if isinstance(value, str | bool | int | float | complex) and len(f'{value!r}') < 40:
         return f'{value!r}'
     return 'None' if value is None else f'a value of type {type(value).__name__}'
+
+
+def copies(array: Array, shape: tuple[int, ...]) -> Array:
+    """Return a copy as rows (N, ...) of an array that is broadcast to a leading shape."""
+    last = array.shape[-1]
+    if array.shape[:-1] != shape:
+        array = np.broadcast_to(array, (*shape, last))
+    return np.array(array, order='C').reshape(-1, last)
+
+
+def place(at: int, shape: tuple[int, ...]) -> str:
+    """Return the index of a sample in the leading shape, as text."""
+    if len(shape) < 2:
+        return str(at)
+    return str(list(map(int, np.unravel_index(at, shape))))

@@ -27,7 +27,7 @@ from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.mechanics import batch, stiffness
 from stewart_dynamics.mechanics.arguments import (
-    as_array, check_finite, common_shape, optional_array, wrong_type)
+    as_array, check_finite, common_shape, copies, optional_array, place, wrong_type)
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL, MOTORS, Motors
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, lagrange, regressor
 from stewart_dynamics.mechanics.dynamics.force_breakdown import (
@@ -37,13 +37,11 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     LINEAR, linear_parameters, names_of)
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
-from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
+from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
-from stewart_dynamics.mechanics.platform_arguments import (
-    base_rows, check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
     FORCES, GRAVITY, JOINT_ANGLES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
@@ -156,11 +154,11 @@ class StewartPlatform:
             self, motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
             singular: str) -> tuple[Array, tuple[Array, Array], Array, Integers, tuple[int, ...]]:
         """Return rows of motion, of wrenches and base, of results; the unsolvable; the shape."""
-        rows, wrenches, bases, shape = loaded(motion, wrench, base)
+        rows, wrenches, bases, shape = batch.loaded(motion, wrench, base)
         results = self.solve(rows, wrenches, bases)
         check_finite('motion', results.reshape(*shape, RESULT), len(shape))
-        return (rows, (wrenches, bases), results, find_unsolvable(rows, results, shape, singular),
-                shape)
+        unsolvable = batch.find_unsolvable(rows, results, shape, singular)
+        return rows, (wrenches, bases), results, unsolvable, shape
 
     def force_breakdown(
             self, motion: Motion, wrench: ArrayLike | None = None,
@@ -258,7 +256,7 @@ class StewartPlatform:
         result = self._single.base_wrench(motion, None, wrench, base)
         if result is not None:
             return result
-        rows, wrenches, bases, shape = loaded(motion, wrench, base)
+        rows, wrenches, bases, shape = batch.loaded(motion, wrench, base)
         results = self.base_wrenches(rows, wrenches, bases)
         return check_finite('motion', results.reshape(*shape, WRENCH), len(shape))
 
@@ -376,7 +374,7 @@ class StewartPlatform:
         given = as_array('rates', rates, (6,))
         shape = common_shape(pose=pose.shape, rates=given.shape[:-1])
         given, rows = copies(given, shape), motion_rows(pose, shape)
-        find_unsolvable(rows, self.solve(rows), shape, 'raise')
+        batch.find_unsolvable(rows, self.solve(rows), shape, 'raise')
         forward_kinematics.twists(self.constants, given, rows)
         return check_finite('twist', rows[:, TWIST].reshape(*shape, 6).copy(), len(shape))
 
@@ -480,7 +478,7 @@ class StewartPlatform:
             ``J_inv^T k J_inv`` in [N/m], [N] and [N m/rad]; see ``mechanics.stiffness``.
 
         """
-        legs = leg_stiffnesses(leg_stiffness)
+        legs = stiffness.leg_stiffnesses(leg_stiffness)
         j_inv = self.inverse_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):
@@ -494,7 +492,7 @@ class StewartPlatform:
         ``actuator.reflected_mass``, as for compliance in the position control; for compliance
         between held actuators and the platform, set it to zero (``parameters.replaced``).
         """
-        legs = leg_stiffnesses(leg_stiffness)
+        legs = stiffness.leg_stiffnesses(leg_stiffness)
         mass, j_inv = self.mass_matrix(pose), self.inverse_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):

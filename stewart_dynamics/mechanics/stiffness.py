@@ -27,9 +27,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.dynamics.lagrange import Legs, skew
 
 
@@ -56,6 +58,16 @@ class NaturalModes(NamedTuple):
             return f'<NaturalModes of shape {self.frequencies.shape[:-1]}>'
         listed = ', '.join(f'{each:.4g}' for each in self.frequencies)
         return f'<NaturalModes: {listed} Hz>'
+
+
+def leg_stiffnesses(value: ArrayLike) -> Array:
+    """Return stiffnesses (..., 6) [N/m]; MotionError where one is not positive."""
+    is_number = np.isscalar(value) or getattr(value, 'shape', None) == ()
+    legs = as_array('leg_stiffness', value, () if is_number else (6,))
+    legs = np.full(6, legs) if is_number else legs
+    if not (legs > 0.0).all():
+        raise MotionError(f'leg_stiffness: {legs.min():g} N/m: must be more than 0')
+    return legs
 
 
 def platform_stiffness(inverse_jacobian: Array, leg_stiffness: Array) -> Array:

@@ -27,10 +27,11 @@ from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.dynamics.base_load import carried
 from stewart_dynamics.mechanics.frames.motion import (
-    as_rotation, Field, listed, Motion, Pose, row_by_row, RowSamples)
+    as_rotation, check_kind, Field, listed, Motion, Pose, row_by_row, RowSamples)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
-    BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, ROTATION)
+    BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, NO_BASE,
+    ROTATION)
 from stewart_dynamics.mechanics.vectors import Matrix3, rotate, rotate_back, subtract, Vector3
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
@@ -96,8 +97,7 @@ class BaseMotion(RowSamples):
             World axes [m/s^2].
 
         """
-        if not isinstance(pose, Pose | Motion):
-            raise wrong_type('pose', pose, 'a Pose or a Motion')
+        check_kind(pose, Pose, Motion)
         return cls._of_columns(row_of_pose, pose=pose.rows[..., ROTATION],
                                gravity=as_array('gravity', gravity, (3,)))
 
@@ -114,8 +114,7 @@ class BaseMotion(RowSamples):
             World axes [m/s^2].
 
         """
-        if not isinstance(motion, Motion):
-            raise wrong_type('motion', motion, 'a Motion')
+        check_kind(motion, Motion)
         rotation, acceleration, spin, spin_rate = (motion.rows[..., part] for part in (
             ROTATION, LINEAR_ACCELERATION, ANGULAR_VELOCITY, ANGULAR_ACCELERATION))
         return cls._of_columns(row_of_motion, motion=rotation, acceleration=acceleration,
@@ -171,6 +170,16 @@ class BaseMotion(RowSamples):
                 f'{listed(self.linear_acceleration)} m/s^2, turning '
                 f'{listed(self.angular_velocity)} rad/s, {listed(self.angular_acceleration)} '
                 'rad/s^2')
+
+
+def base_rows(base: BaseMotion | None) -> Array:
+    """Return the rows (..., BASE) of the base's motion; a row of nan for None."""
+    if base is None:
+        return np.array(NO_BASE)
+    if not isinstance(base, BaseMotion):
+        raise wrong_type('base', base, 'a BaseMotion')
+    # A row of nan would stand for a still base.
+    return check_finite('base', base.rows, len(base.shape))
 
 
 # The same for one sample and for many: each number is a float, or an array of samples.

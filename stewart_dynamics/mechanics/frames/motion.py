@@ -28,7 +28,7 @@ from stewart_dynamics.mechanics.arguments import (
     as_array, common_shape, first_of, optional_array, wrong_type)
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
-    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE,
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION)
 from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
 
@@ -377,8 +377,7 @@ class Motion(Posed):
             linear_acceleration: ArrayLike | None = None,
             angular_acceleration: ArrayLike | None = None) -> Motion:
         """Return the motion at a pose, by default at rest; other arguments are as in Motion."""
-        if not isinstance(pose, Pose | Motion):
-            raise wrong_type('pose', pose, 'a Pose or a Motion')
+        check_kind(pose, Pose, Motion)
         return cls(pose.position, pose.rotation, linear_velocity, angular_velocity,
                    linear_acceleration, angular_acceleration)
 
@@ -431,6 +430,23 @@ class Motion(Posed):
     def pose(self) -> Pose:
         """Return the pose alone; it shares the motion's memory."""
         return Pose.of_rows(self.rows[..., POSE])
+
+
+def check_kind(value: object, *kinds: type[Pose] | type[Motion], name: str = '') -> None:
+    """Raise MotionError if an argument is not of one of these types."""
+    if isinstance(value, kinds):
+        return
+    name = name or ('pose' if Pose in kinds else 'motion')
+    hint = '; Motion.from_pose makes one at rest' if isinstance(value, Pose) else ''
+    raise wrong_type(name, value, ' or '.join(f'a {kind.__name__}' for kind in kinds) + hint)
+
+
+def motion_rows(pose: Pose | Motion, shape: tuple[int, ...] | None = None) -> Array:
+    """Return rows of motion (N, MOTION) at rest in a pose that is broadcast to a leading shape."""
+    check_kind(pose, Pose, Motion)
+    rows = np.zeros((*(pose.shape if shape is None else shape), MOTION))
+    rows[..., POSE] = pose.rows[..., POSE]
+    return rows.reshape(-1, MOTION)
 
 
 def _apply(matrix: Array, vector: Array) -> Array:
