@@ -81,15 +81,7 @@ def geometric_stiffness(legs: Legs, forces: Array) -> Array:
     """
     Return the part (..., 6, 6) of K that is due to the forces of the legs.
 
-    It is symmetric if the moment of all forces about the platform's origin is zero.
-
-    Parameters
-    ----------
-    legs : Legs
-        Legs at poses (...).
-    forces : (..., 6)
-        Their forces [N], + pushes.
-
+    It is symmetric if the moment of all forces (..., 6) [N] about the platform's origin is zero.
     """
     s, arm = skew(legs.directions), skew(legs.arms)
     across = s @ s / legs.lengths[..., None, None]  # -(1 - s s^T) / L

@@ -72,15 +72,9 @@ class Field:
 
 class RowSamples:
     """
-    Samples of any leading shape.
+    Samples of any leading shape (...), () for one.
 
-    Attributes
-    ----------
-    rows : (..., n)
-        All numbers of each sample in a row, SI units, base axes.
-    shape : tuple of int
-        The leading shape; () for one sample.
-
+    rows (..., n): all numbers of each sample, SI units, base axes.
     """
 
     rows: Array
