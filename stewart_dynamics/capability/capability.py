@@ -186,14 +186,9 @@ class Capability:
         rows = motion_rows(pose, shape)
         values = np.empty(len(rows))
         codes, legs = (np.empty(len(rows), dtype=np.int64) for _ in range(2))
-
-        stop = self.platform.parameters['singularity.stop_condition']
-
-        def solve(constants: Array, *arrays: Any) -> None:
-            travel.travels(constants, self._axes, self._bounds, self._shapes, *self._plates,
-                           stop, *arrays)
-
-        in_parts(solve, self.platform.constants, rows, copies(directions, shape),
+        constants = (self.platform.constants, self._axes, self._bounds, self._shapes,
+                     *self._plates, self.platform.parameters['singularity.stop_condition'])
+        in_parts(travel.travels, constants, rows, copies(directions, shape),
                  copies(pivots, shape), values, codes, legs,
                  scratch=travel.memory_of(self._plates))
         if np.isnan(values).any():

@@ -85,7 +85,7 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None,
     bases = _NO_BASE if bases is None else compact(bases)
     results = np.empty((len(motions), RESULT))
     sound = np.empty(len(motions) if condition else 0, dtype=bool)
-    in_parts(inverse_dynamics.solve, constants, motions, wrenches, bases, results, sound,
+    in_parts(inverse_dynamics.solve, (constants,), motions, wrenches, bases, results, sound,
              scratch=(inverse_dynamics.TILE,))
     return results
 
@@ -121,7 +121,7 @@ def leg_lengths(constants: Array, poses: Array) -> Array:
     return lengths
 
 
-def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[Any],
+def in_parts(compute: Callable[..., object], constants: tuple[Any, ...], *arrays: NDArray[Any],
              scratch: tuple[int, ...] = ()) -> None:
     """
     Call a function with constants and rows of arrays; large batches in parts on all processors.
@@ -130,7 +130,7 @@ def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[
     Each call gets scratch memory of a shape as its last argument, if it needs any.
     """
     def call(*rows: NDArray[Any]) -> None:
-        compute(constants, *rows, *([np.empty(scratch)] if scratch else []))
+        compute(*constants, *rows, *([np.empty(scratch)] if scratch else []))
 
     samples = len(arrays[0])
     threads = min(_CPUS, samples // _SAMPLES_FOR_A_THREAD) if COMPILED else 1

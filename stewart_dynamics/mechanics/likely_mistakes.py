@@ -23,7 +23,7 @@ telescope on cables of 300 m; a value outside is a warning, not an error.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import combinations, permutations
 import math
 
@@ -32,6 +32,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.drives import likely_mistakes as drives
 from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
@@ -43,6 +44,7 @@ from stewart_dynamics.parameters.table import (
 
 # Digits of the position of a joint in a message.
 _DIGITS = 5
+_listed = partial(listed, digits=3)
 
 # The largest known, the six cables of a radio telescope's cabin, hang from towers on a circle
 # of 300 m, and the circle of the cabin's joints is 90 times smaller.
@@ -197,7 +199,7 @@ def _frames(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
         return  # heights are guesses
     if np.linalg.norm(middle - from_base) < _AT_HOME * height and (
             np.linalg.norm(center) < 0.5 * np.linalg.norm(center - middle)):
-        yield (f'geometry.platform_joints: {_listed(middle.round(9) + 0.0)} m is their center, '
+        yield (f'geometry.platform_joints: {_listed(middle.round(9))} m is their center, '
                'where it is at home in the base frame, but platform.center_of_mass is '
                f'{np.linalg.norm(center - middle):.3g} m away from it: are the joints given in '
                'the base frame?')
@@ -359,9 +361,9 @@ def _symmetry(p: Parameters) -> Iterator[str]:
                      if n != odd.joint and np.array_equal(joints[n], joints[odd.joint])]
             same = f', the same as {twins[0]}' if twins else ''
             yield (f'geometry.{name}: {p["joints"][odd.joint]}: '
-                   f'{_listed(joints[odd.joint], _DIGITS)} m'
+                   f'{listed(joints[odd.joint], _DIGITS)} m'
                    f'{same}: the other five {odd.symmetry}, as all six would with '
-                   f'{_listed(odd.expected, _DIGITS)} m: a sign or a digit?')
+                   f'{listed(odd.expected, _DIGITS)} m: a sign or a digit?')
 
 
 def _singular(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
@@ -370,26 +372,21 @@ def _singular(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
              for yaw in (0.0, 20.0, -20.0, 45.0, -45.0) for tilt in (0.0, _TILT, -_TILT)]
     heights, angles, tilts = np.array(tried).T
     turned = turns_about(2, angles) @ turns_about(0, tilts) @ turns_about(1, 0.5 * tilts)
-    anywhere = _conditions(p, shape, heights, turned)
-    stop = p['singularity.stop_condition']
-    best = float(anywhere.min())
-    if best >= stop:
-        yield (f'geometry: {_kind(best)} at every pose of {len(tried)} tried: the condition '
-               f'number is at least {best:.3g}, singularity.stop_condition is {stop:g}: are base '
-               'and platform joints similar hexagons, two legs the same, or the joints in '
-               'another order?')
-        return
     home = home_of(p, shape, reach)
-    turned = turns_about(2, np.full(len(home.heights), home.yaw))
-    at_home = float(_conditions(p, shape, home.heights, turned).min())
-    if at_home >= stop:
-        yield (f'geometry: {_kind(at_home)} at home ({home.text}): the condition number is '
-               f'{at_home:.3g}, singularity.stop_condition is {stop:g}: is the platform turned '
-               'against the base there, or the joints in another order?')
-
-
-def _kind(condition: float) -> str:
-    return 'singular' if condition >= UNSOLVABLE_CONDITION else 'nearly singular'
+    at_home = turns_about(2, np.full(len(home.heights), home.yaw))
+    stop = p['singularity.stop_condition']
+    for where, at, turns, suspected in (
+            (f'every pose of {len(tried)} tried: the condition number is at least',
+             heights, turned,
+             'are base and platform joints similar hexagons, two legs the same,'),
+            (f'home ({home.text}): the condition number is', home.heights, at_home,
+             'is the platform turned against the base there,')):
+        best = float(_conditions(p, shape, at, turns).min())
+        if best >= stop:
+            kind = 'singular' if best >= UNSOLVABLE_CONDITION else 'nearly singular'
+            yield (f'geometry: {kind} at {where} {best:.3g}, singularity.stop_condition is '
+                   f'{stop:g}: {suspected} or the joints in another order?')
+            return
 
 
 def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -> Array:
@@ -406,7 +403,3 @@ def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -
     values = np.linalg.svd(matrices, compute_uv=False)
     conditions: Array = np.where(values[:, 5] > 0.0, values[:, 0] / values[:, 5], np.inf)
     return conditions
-
-
-def _listed(values: Array, digits: int = 3) -> str:
-    return '[' + ', '.join(f'{value:.{digits}g}' for value in values) + ']'

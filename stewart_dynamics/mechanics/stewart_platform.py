@@ -226,7 +226,7 @@ class StewartPlatform:
         """Return ``regressor`` (N, 6, LINEAR) of rows of motion, unchecked, see ``solve``."""
         bases = np.array([NO_BASE]) if bases is None else bases
         matrices = np.empty((len(rows), 6, LINEAR))
-        batch.in_parts(regressor.regressors, self.constants, *map(
+        batch.in_parts(regressor.regressors, (self.constants,), *map(
             batch.compact, (rows, bases)), matrices, scratch=regressor.WORK)
         return matrices
 
@@ -264,7 +264,7 @@ class StewartPlatform:
         """Return rows (N, 6) of ``base_wrench`` of rows of motion, unchecked, see ``solve``."""
         bases = self._still.rows[None] if bases is None else bases
         results = np.empty((len(rows), WRENCH))
-        batch.in_parts(base_wrench.base_wrenches, self.constants, *map(
+        batch.in_parts(base_wrench.base_wrenches, (self.constants,), *map(
             batch.compact, (rows, wrenches, bases)), results)
         return results
 
@@ -300,7 +300,7 @@ class StewartPlatform:
                              wrench=load.shape[:-1], base=bases.shape[:-1])
         rows, pushes, load, bases = (
             copies(array, shape) for array in (motion.rows, pushes, load, bases))
-        batch.in_parts(forward_dynamics.solve, self.constants, rows, pushes, load, bases,
+        batch.in_parts(forward_dynamics.solve, (self.constants,), rows, pushes, load, bases,
                        scratch=forward_dynamics.WORK)
         rows = check_finite('accelerations', rows.reshape(*shape, MOTION), len(shape))
         return Motion.of_rows(rows)
@@ -346,7 +346,7 @@ class StewartPlatform:
         wanted, rows = copies(wanted, shape), motion_rows(guess, shape)
         codes, steps = np.empty(len(rows), dtype=np.int64), np.empty(len(rows), dtype=np.int64)
         residuals = np.empty(len(rows))
-        batch.in_parts(forward_kinematics.poses, self.constants, wanted, rows, codes, steps,
+        batch.in_parts(forward_kinematics.poses, (self.constants,), wanted, rows, codes, steps,
                        residuals)
         if codes.any():
             at = int(np.argmax(codes > 0))

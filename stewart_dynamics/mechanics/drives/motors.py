@@ -313,12 +313,9 @@ class Drives:
     def __call__(self, motions: Array, results: Array) -> Array:
         """Return rows (N, MOTORS) for rows of motion and results, unchecked."""
         rows = np.empty((len(motions), MOTORS))
-        batch.in_parts(self._compute, self.arguments[0], *map(batch.compact, (
+        batch.in_parts(motor_rows, self.arguments, *map(batch.compact, (
             motions, results, results[:, FORCES])), rows)
         return rows
-
-    def _compute(self, _: Array, *rows: Array) -> None:
-        motor_rows(*self.arguments, *rows)
 
 
 def motor_ratio(parameters: Parameters) -> Array:

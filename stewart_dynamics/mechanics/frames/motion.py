@@ -137,9 +137,9 @@ class RowSamples:
         raise NotImplementedError
 
 
-def listed(numbers: Array) -> str:
+def listed(numbers: Array, digits: int = 6) -> str:
     """Return a vector as text."""
-    return '[' + ', '.join(f'{number + 0.0:.6g}' for number in numbers) + ']'
+    return '[' + ', '.join(f'{number + 0.0:.{digits}g}' for number in numbers) + ']'
 
 
 # A rotation matrix further from orthogonal than this is rejected.
