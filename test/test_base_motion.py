@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import (
-    each_relative, friction, PinocchioReferee,
+    assert_uncompiled_gives_the_same, each_relative, friction, PinocchioReferee,
     random_base_motion, random_direction, random_motion, random_parameters, random_wrench,
-    relative, rng, rotation_about, size_of, STANDARD_GRAVITY, uncompiled)
+    relative, rng, rotation_about, size_of, STANDARD_GRAVITY)
 
 from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.dynamics import base_wrench
@@ -217,9 +217,7 @@ def test_a_motion_in_the_world_is_turned_into_base_axes() -> None:
 def test_samples_of_any_shape() -> None:
     platform, motion, wrench, base = case(14, 6)
     truth = platform.inverse_dynamics(motion, wrench, base)
-    shaped = Motion(*(part.reshape(2, 3, *part.shape[1:]) for part in (
-        motion.position, motion.rotation, motion.linear_velocity, motion.angular_velocity,
-        motion.linear_acceleration, motion.angular_acceleration)))
+    shaped = Motion.of_rows(motion.rows.reshape(2, 3, -1))
     found = platform.inverse_dynamics(
         shaped, wrench.reshape(2, 3, 6), BaseMotion.of_rows(base.rows.reshape(2, 3, 12)))
     assert np.array_equal(found.rows.reshape(6, -1), truth.rows)
@@ -288,12 +286,6 @@ def test_a_base_of_another_type_or_shape_is_rejected(call: str) -> None:
 
 def test_uncompiled_base_wrenches_are_the_compiled_ones_bit_for_bit() -> None:
     platform, motion, wrench, base = case(16)
-    given = {'hexapod': platform.constants, 'rows': motion.rows, 'wrench': wrench,
-             'base': base.rows, 'found': np.empty((STATES, 6))}
-    plain = uncompiled(
-        'from stewart_dynamics.mechanics.dynamics.base_wrench import base_wrenches\n'
-        "base_wrenches(*(given[name] for name in ('hexapod', 'rows', 'wrench', 'base', "
-        "'found')))\n", given)
-    base_wrench.base_wrenches(
-        platform.constants, motion.rows, wrench, base.rows, given['found'])
-    assert np.array_equal(plain['found'], given['found'])
+    assert_uncompiled_gives_the_same(
+        base_wrench.base_wrenches, platform.constants, motion.rows, wrench, base.rows,
+        np.empty((STATES, 6)))

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    QUARTER_TURN, random_direction, random_motion, random_parameters, rng, ROOT,
-    rotation_about, size_of, symmetric_parameters, uncompiled)
+    assert_uncompiled_gives_the_same, QUARTER_TURN, random_direction, random_motion,
+    random_parameters, rng, ROOT, rotation_about, size_of, symmetric_parameters)
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import (
@@ -256,18 +256,8 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     rows = Motion.from_pose(away(motion, random, 0.1, 0.1)).rows.copy()
     rows[4, 3:12] = QUARTER_TURN.ravel()
     codes, steps, residuals = np.empty(10, dtype=int), np.empty(10, dtype=int), np.empty(10)
-    given = {'constants': platform.constants, 'lengths': lengths, 'rates': rates,
-             'rows': rows.copy(), 'codes': codes.copy(), 'steps': steps.copy(),
-             'residuals': residuals.copy()}
-    plain = uncompiled(
-        'from stewart_dynamics.mechanics.kinematics.forward_kinematics import poses, twists\n'
-        "poses(given['constants'], given['lengths'], given['rows'], given['codes'],\n"
-        "      given['steps'], given['residuals'])\n"
-        "twists(given['constants'], given['rates'], given['rows'])\n", given)
-    forward_kinematics.poses(platform.constants, lengths, rows, codes, steps, residuals)
-    forward_kinematics.twists(platform.constants, rates, rows)
+    assert_uncompiled_gives_the_same(
+        forward_kinematics.poses, platform.constants, lengths, rows, codes, steps, residuals)
     assert codes[3] != FOUND
     assert codes[4] == SINGULAR
-    for name, value in (('rows', rows), ('codes', codes), ('steps', steps),
-                        ('residuals', residuals)):
-        assert np.array_equal(plain[name], value), name
+    assert_uncompiled_gives_the_same(forward_kinematics.twists, platform.constants, rates, rows)
