@@ -39,7 +39,7 @@ PARAMETERS = symmetric_parameters().replaced({
 
 def advanced(state: Singularity, parameters: Parameters, *sample: float) -> Singularity:
     """Return the state after one more sample: det, its rate, condition number."""
-    numbers = np.array(state.numbers, dtype=float)
+    numbers = np.array(state, dtype=float)
     advance(numbers, thresholds(parameters), *sample)
     return Singularity.of(numbers.tolist())
 

@@ -119,7 +119,11 @@ def advance(state: Array, limits: Array, determinant: float, determinant_rate: f
 
 
 class Singularity(NamedTuple):
-    """The state of the warning after a sample; the first sample follows Singularity()."""
+    """
+    The state of the warning after a sample, in the order of an array (STATE,).
+
+    The first sample follows Singularity().
+    """
 
     cause: Cause = Cause.NONE
     stopped: bool = False  # inside stop_condition
@@ -137,11 +141,6 @@ class Singularity(NamedTuple):
         """Return the state of an array (STATE,)."""
         cause, stopped, determinant, time, crossings = numbers
         return cls(_CAUSES[int(cause)], stopped > 0.0, determinant, time, int(crossings))
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Return the state as numbers, in the order of an array (STATE,)."""
-        return self.cause, self.stopped, self.determinant, self.time_to_crossing, self.crossings
 
 
 _CAUSES = tuple(Cause)  # far faster to look up by number than Cause(number)

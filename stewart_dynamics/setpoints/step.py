@@ -295,7 +295,7 @@ class Step:
             elapsed = since + (self._slack if setpoint.stamped else self._slack_of_arrival)
         _GIVEN.pack_into(
             self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
-            *(setpoint.base or NO_BASE), *(before.singularity or _FIRST).numbers,
+            *(setpoint.base or NO_BASE), *(before.singularity or _FIRST),
             *(before.lengths or _NO_LENGTHS), elapsed, setpoint.restart,
             -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
         self._solve()
@@ -370,7 +370,7 @@ class Step:
         results = self._platform.solve(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
         number = len(results)
-        state = np.array((before.singularity or _FIRST).numbers)
+        state = np.array(before.singularity or _FIRST)
         followed_at = np.array([before.stamp])
         followed = np.array(before.lengths or _NO_LENGTHS)
         forces, states = np.empty((number, 6)), np.empty((number, STATE))
