@@ -233,20 +233,6 @@ def test_a_guess_is_a_motion_or_a_pose(hexapod: StewartPlatform) -> None:
                          - truth.position)) < 1e-15
 
 
-def test_leading_shapes_broadcast(hexapod: StewartPlatform) -> None:
-    poses = legal_poses(hexapod.parameters, rng(), 12)
-    lengths = hexapod.inverse_kinematics(poses)
-    one_by_one = [hexapod.forward_kinematics(each, AT_HOME) for each in lengths]
-    shaped = hexapod.forward_kinematics(lengths.reshape(3, 4, 6), AT_HOME)
-    assert shaped.position.shape == (3, 4, 3)
-    assert shaped.rotation.shape == (3, 4, 3, 3)
-    assert np.array_equal(shaped.position.reshape(12, 3), [each.position for each in one_by_one])
-    guesses = Pose(np.tile(HOME, (12, 1)), np.eye(3))
-    assert hexapod.forward_kinematics(lengths[0], guesses).position.shape == (12, 3)
-    assert hexapod.twist(shaped, np.ones(6)).shape == (3, 4, 6)
-    assert hexapod.twist(AT_HOME, np.ones((5, 6))).shape == (5, 6)
-
-
 def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     platform, random = StewartPlatform(symmetric_parameters()), rng()
     motion = random_motion(platform.parameters, random, 10)

@@ -50,10 +50,6 @@ from stewart_dynamics.mechanics.rows import (
 
 Array = NDArray[np.float64]
 
-# The numbers of a result for each sample.
-SIX = 'lengths', 'rates', 'forces', 'unit_load_forces'
-NUMBERS = 'determinant', 'determinant_rate', 'condition_number', 'time_to_crossing'
-
 PACKAGE = Path(stewart_dynamics.__file__).parent
 HEXAPODS = 12
 STATES = 15
@@ -353,45 +349,6 @@ def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit(
     alone = np.vstack([platform.solve(rows[n:n + 1], wrenches if one_wrench
                                       else wrenches[n:n + 1]) for n in range(len(rows))])
     assert np.array_equal(together, alone)
-
-
-def test_any_leading_shape_gives_the_same_samples() -> None:
-    random = rng()
-    p = random_parameters(random)
-    platform = StewartPlatform(p)
-    flat = random_motion(p, random, 12)
-    square = Motion.of_rows(flat.rows.reshape(3, 4, -1))
-    wrench = random_wrench(p, random, 12)
-    batch = platform.inverse_dynamics(flat, wrench)
-    grid = platform.inverse_dynamics(square, wrench.reshape(3, 4, 6))
-    for name in (*SIX, *NUMBERS):
-        of_batch, of_grid = getattr(batch, name), getattr(grid, name)
-        tail = of_batch.shape[1:]
-        assert tail == ((6,) if name in SIX else ())
-        assert of_grid.shape == (3, 4, *tail)
-        assert np.array_equal(of_grid.reshape(of_batch.shape), of_batch)
-        for n in range(12):
-            one = getattr(platform.inverse_dynamics(flat[n], wrench[n]), name)
-            assert np.shape(one) == tail
-            assert np.array_equal(one, of_batch[n])
-    for function in (platform.inverse_jacobian, platform.mass_matrix, platform.gravity_vector,
-                     platform.inverse_kinematics):
-        of_grid = function(square)
-        of_batch = function(flat)
-        assert of_grid.shape == (3, 4, *of_batch.shape[1:])
-        assert np.allclose(of_grid.reshape(of_batch.shape), of_batch, rtol=1e-14, atol=1e-14)
-        assert function(flat[0]).shape == of_batch.shape[1:]
-
-
-def test_many_loads_on_one_pose_are_many_samples() -> None:
-    platform = StewartPlatform(symmetric_parameters())
-    motion = turned(0.1)
-    pose = Motion(motion.position[0], motion.rotation[0])
-    loads = random_wrench(platform.parameters, rng(), 4)
-    forces = platform.inverse_dynamics(pose, loads).forces
-    assert forces.shape == (4, 6)
-    for n in range(4):
-        assert np.array_equal(forces[n], platform.inverse_dynamics(pose, loads[n]).forces)
 
 
 @pytest.mark.parametrize('position', [[1e200, 0.0, 1.0], None], ids=['far', 'no length'])

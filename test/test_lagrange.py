@@ -352,21 +352,6 @@ def test_a_singular_pose_has_accelerations() -> None:
     assert np.all(np.isfinite(accelerations(platform.forward_dynamics(motion, np.ones(6)))))
 
 
-def test_any_leading_shape_gives_the_same_samples() -> None:
-    p = random_parameters(rng())
-    platform = StewartPlatform(p)
-    motion = random_motion(p, rng(), 12)
-    forces, wrench = np.arange(12.0 * 6).reshape(12, 6), random_wrench(p, rng(), 12)
-    truth = platform.forward_dynamics(motion, forces, wrench).rows
-    shaped = Motion.of_rows(motion.rows.reshape(3, 4, -1))
-    found = platform.forward_dynamics(shaped, forces.reshape(3, 4, 6), wrench.reshape(3, 4, 6))
-    assert np.array_equal(found.rows.reshape(12, -1), truth)
-    one = motion[5]
-    assert np.array_equal(platform.forward_dynamics(one, forces[5], wrench[5]).rows, truth[5])
-    assert platform.forward_dynamics(one, forces).shape == (12,)
-    assert platform.forward_dynamics(motion, forces[0], wrench[0]).shape == (12,)
-
-
 def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     p = random_parameters(rng())
     rows, forces = random_motion(p, rng(), 10).rows, np.arange(60.0).reshape(10, 6)
