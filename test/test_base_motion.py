@@ -103,10 +103,12 @@ def test_one_sample_has_the_bits_of_many() -> None:
     platform, motion, wrench, base = case(3, 2 * LANES + 5)
     many = platform.inverse_dynamics(motion, wrench, base)
     wrenches = platform.base_wrench(motion, wrench, base)
+    still = platform.inverse_dynamics(motion)
     for n in (0, LANES - 1, LANES, 2 * LANES + 4):
         one = platform.inverse_dynamics(motion[n], wrench[n], base[n])
         assert np.array_equal(one.rows, many.rows[n])
         assert np.array_equal(platform.base_wrench(motion[n], wrench[n], base[n]), wrenches[n])
+        assert np.array_equal(platform.inverse_dynamics(motion[n]).rows, still.rows[n])
     for_all = platform.inverse_dynamics(motion, wrench, base[4])
     assert np.array_equal(
         for_all.rows[9], platform.inverse_dynamics(motion[9], wrench[9], base[4]).rows)

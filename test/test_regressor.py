@@ -123,6 +123,11 @@ def test_each_column_has_a_name_and_a_unit() -> None:
     whole = StewartPlatform(p).regressor(random_motion(p, rng(5), 12))
     assert whole.matrix.shape == (12, 6, LINEAR)
     assert len(whole.names) == len(set(whole.names)) == len(UNITS) == LINEAR
+    units = dict(zip(whole.names, UNITS, strict=True))
+    assert [units[f'{name}.{p["joints"][2]}'] for name in (
+        'legs.cylinder.mass', 'legs.piston.first_moment', 'legs.piston.second_moment',
+        'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction',
+        'effort_offset')] == ['kg', 'kg m', 'kg m^2', 'kg', 'N s/m', 'N', 'N']
     assert repr(whole).startswith('<Regressor of shape (12, 6, 70): platform.mass, ')
 
 

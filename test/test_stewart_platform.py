@@ -387,6 +387,7 @@ def test_one_result_shows_its_numbers() -> None:
     platform = StewartPlatform(EXAMPLE)
     result = platform.inverse_dynamics(Motion.from_pose(platform.home_pose()))
     text = repr(result)
+    assert isinstance(result.determinant, float)
     assert f'forces [{result.forces[0]:.6g}, ' in text
     assert f'condition number {result.condition_number:.6g}>' in text
     assert text.startswith(f'<InverseDynamics: lengths [{result.lengths[0]:.6g}, ')
