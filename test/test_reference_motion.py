@@ -23,7 +23,8 @@ import pytest
 
 from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics.frames import rotation as rotations
-from stewart_dynamics.mechanics.singularity_warning import Singularity
+from stewart_dynamics.mechanics.singularity_warning import (
+    advance, Singularity, STATE, thresholds)
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 from stewart_dynamics.reference_motion.motion import motion_at, sample_time, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
@@ -281,11 +282,12 @@ def limits_broken(platform: StewartPlatform, result: InverseDynamics) -> set[str
 
 
 def warnings(platform: StewartPlatform, result: InverseDynamics) -> list[Singularity]:
-    states = [Singularity()]
+    state, states = np.zeros(STATE), []
     for sample in zip(result.determinant, result.determinant_rate, result.condition_number,
                       strict=True):
-        states.append(states[-1].after(platform.parameters, *map(float, sample)))
-    return states[1:]
+        advance(state, thresholds(platform.parameters), *sample)
+        states.append(Singularity.of(state.tolist()))
+    return states
 
 
 @pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)

@@ -28,7 +28,8 @@ from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
-from stewart_dynamics.mechanics.limits import LIMITS, Limits
+from stewart_dynamics.mechanics.limits import (
+    angle_values, CLEARANCE_MIN, LIMITS, Limits, result_values)
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import (
@@ -136,15 +137,15 @@ class RatedHexapod:
                 f'pose: singular: the condition number of J_inv is {result.condition_number:.6g}, '
                 f'must be less than singularity.stop_condition, {stop:g}')
         limits = Limits(self.given)
-        found: Any = limits.exceeded(*(tuple(each.tolist()) for each in (
-            result.lengths, result.rates, result.forces)))
+        found: Any = limits.exceeded(result_values(*(tuple(each.tolist()) for each in (
+            result.lengths, result.rates, result.forces))))
         if not found and limits.of_joints:
-            found = limits.exceeded_angles(np.concatenate(whole.joint_angles(pose)).tolist())
+            found = limits.exceeded(angle_values(np.concatenate(
+                whole.joint_angles(pose)).tolist()))
         clearances = clearance_to_check(self.given)
         if not found and clearances is not None:
-            found = limits.exceeded_clearance(*(
-                each[0].tolist() for each in clearances.nearest(
-                    Motion.from_pose(pose).rows[None])))
+            distances, nearest = clearances.nearest(Motion.from_pose(pose).rows[None])
+            found = limits.exceeded({CLEARANCE_MIN: distances[0].tolist()}, nearest[0].tolist())
         if found:
             raise PoseError(f'pose: {found[0].words(self.joints)}')
 
