@@ -48,7 +48,7 @@ from stewart_dynamics.mechanics.rows import (
     RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import mean_radius, Parameters
 
 
 class StewartPlatform:
@@ -112,8 +112,7 @@ class StewartPlatform:
         """Return mass and sizes."""
         p = self.parameters
         base, platform = (
-            float(np.mean(np.linalg.norm(p[name] - p[name].mean(axis=0), axis=1)))
-            for name in ('geometry.base_joints', 'geometry.platform_joints'))
+            mean_radius(p[name]) for name in ('geometry.base_joints', 'geometry.platform_joints'))
         return (f'<StewartPlatform: {p["platform.mass"]:g} kg, joints on {base:.3g} m (base) and '
                 f'{platform:.3g} m (platform)>')
 

@@ -28,6 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.parameters.table import mean_radius
 
 # By the mean distance from the center: the largest misfit of symmetric joints, as in tables of two
 # or three digits; the largest deviation that is always accepted; and the smallest displacement of
@@ -52,7 +53,7 @@ class OddJoint(NamedTuple):
 
 def odd_joint(points: Array) -> OddJoint | None:
     """Return which of six points (6, 3) breaks a symmetry of the others; None if none does."""
-    size = float(np.mean(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+    size = mean_radius(points)
     if not np.isfinite(points).all() or size == 0.0:
         return None
     least = max(_LEAST, _UNITS * _unit(points) / size)
