@@ -22,6 +22,8 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
+from stewart_dynamics.messages.recorded import Messages
+
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
 POSE = 'geometry_msgs/msg/PoseStamped'
@@ -34,6 +36,16 @@ COMBINED = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
 HOME = (0.0, 0.0, 1.1)
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 REST = (0.0,) * 6
+
+
+def together(given: Sequence[tuple[str, bytes]], topics: Sequence[str], begin: int) -> Messages:
+    """Return messages as a bag has them, recorded a microsecond apart from a time [ns] on."""
+    sizes = np.array([len(data) for _, data in given], dtype=np.int64)
+    return Messages(
+        tuple(topics), np.array([topics.index(topic) for topic, _ in given], dtype=np.int64),
+        begin + 1000 * np.arange(len(given)),
+        np.frombuffer(b'?' + b''.join(data for _, data in given), dtype=np.uint8),
+        1 + np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64), sizes)
 
 
 def _new(kind: str, *fields: Any) -> Any:
