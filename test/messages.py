@@ -102,6 +102,14 @@ def imu(stamp: int, spin: Sequence[float] = REST[:3],
         _new('geometry_msgs/msg/Vector3', *force), of_force), little_endian)
 
 
+def joint_state(stamp: int, names: Sequence[str], position: Any, velocity: Any, effort: Any,
+                frame: str = '', little_endian: bool = True) -> bytes:
+    """Return a JointState."""
+    return _bytes(_new('sensor_msgs/msg/JointState', _header(stamp, frame), list(names), *(
+        np.array(numbers, dtype=float) for numbers in (position, velocity, effort))),
+        little_endian)
+
+
 def combined(
         stamp: int, position: Sequence[float] = HOME, quaternion: Sequence[float] = UPRIGHT,
         velocity: Sequence[float] = REST, acceleration: Sequence[float] = REST,

@@ -22,6 +22,7 @@ from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from lifecycle_msgs.msg import Transition
+from messages import joint_state
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
@@ -36,7 +37,7 @@ from stewart_dynamics.external_wrench.measured_legs import LegHistory, MeasuredL
 from stewart_dynamics.external_wrench.payload import identify, numbers_of, PayloadOutcome
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from test_external_wrench import (
-    BEGIN, HEXAPOD, HOME as AT_HOME, joint_state, JOINTS, LOAD, measured, message_of, MILLISECOND,
+    BEGIN, HEXAPOD, HOME as AT_HOME, JOINTS, LOAD, measured, message_of, MILLISECOND,
     resting, six, swing, times, ZERO_LENGTHS)
 from test_payload import excited, LOADED
 
