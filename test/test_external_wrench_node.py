@@ -348,21 +348,6 @@ def test_setpoints_are_answered_meanwhile_and_all_requests_are(carried: Carried)
     assert all(each.result().success for each in futures)
 
 
-def test_numbers_not_identifiable_at_rest_keep_their_values(carried: Carried) -> None:
-    stamps = [BEGIN + round(time * 1e9) for time in TIMES]
-    carried.move([message_of(each) for each in resting(LOADED, AT_HOME, NO_WRENCH, stamps)])
-    answer = carried.identify()
-    assert answer.success
-    unknown, _, given = answer.message.partition('; not identified, as in the parameters: ')[
-        2].partition('; ')
-    assert unknown == ('center of mass z, inertia ixx, inertia ixy, inertia ixz, inertia iyy, '
-                       'inertia iyz, inertia izz')
-    assert ', 0.12], inertia: [13.0, 0.3, -0.4, 14.0, 0.2, 22.0]' in given
-    carried.node.until_status(PAYLOAD, OK, 'identified')
-    values = carried.node.values(PAYLOAD)
-    assert values['inertia izz, half of the 95 % interval (kg m^2)'] == 'not identified'
-
-
 def test_a_request_is_answered_when_the_node_is_deactivated(carried: Carried) -> None:
     node = carried.node
     carried.move()
