@@ -22,8 +22,7 @@ import struct
 import time
 from typing import Any
 
-from geometry_msgs.msg import (
-    AccelStamped, PoseStamped, Transform, Twist, TwistStamped, WrenchStamped)
+from geometry_msgs.msg import Transform, Twist
 from hypothesis import example, given
 from hypothesis import strategies as st
 from messages import STORE
@@ -31,6 +30,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
+from running import Sample, wrench_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, MultiArrayDimension
 from stewart_dynamics.messages.cdr import MalformedError, STAMPS_END
@@ -61,36 +61,20 @@ stamps = st.integers(-2 ** 31 * SECOND, 2 ** 31 * SECOND - 1)
 sixes = st.tuples(*[st.floats()] * 6)
 
 
-def _set(of: Any, names: str, values: Sequence[float]) -> None:
-    for name, value in zip(names, values, strict=True):
-        setattr(of, name, value)
-
-
 def message(kind: str, stamp: int, frame: str, values: Sequence[float],
             names: Sequence[str] = ('platform',)) -> Any:
     """Return a real ROS message with these numbers."""
-    if kind.endswith('PoseStamped'):
-        of: Any = PoseStamped()
-        _set(of.pose.position, 'xyz', values[:3])
-        _set(of.pose.orientation, 'xyzw', values[3:])
-    elif kind.endswith('MultiDOFJointTrajectory'):
-        point = MultiDOFJointTrajectoryPoint(
-            transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()])
-        _set(point.transforms[0].translation, 'xyz', values[:3])
-        _set(point.transforms[0].rotation, 'xyzw', values[3:7])
-        for part, at in ((point.velocities[0], 7), (point.accelerations[0], 13)):
-            _set(part.linear, 'xyz', values[at:at + 3])
-            _set(part.angular, 'xyz', values[at + 3:at + 6])
-        point.time_from_start.sec = 7
-        of = MultiDOFJointTrajectory(joint_names=list(names), points=[point])
+    name, numbers = kind.rpartition('/')[2], tuple(values)
+    if name == 'WrenchStamped':
+        of: Any = wrench_message(numbers)
+    elif name == 'PoseStamped':
+        of = Sample(numbers[:3], numbers[3:]).messages(0)['setpoint/pose']
+    elif name == 'MultiDOFJointTrajectory':
+        of = Sample(numbers[:3], numbers[3:7], numbers[7:13], numbers[13:]).combined(0)
+        of.joint_names = list(names)
+        of.points[0].time_from_start.sec = 7
     else:
-        of, linear, angular = {
-            'TwistStamped': lambda: ((m := TwistStamped()), m.twist.linear, m.twist.angular),
-            'AccelStamped': lambda: ((m := AccelStamped()), m.accel.linear, m.accel.angular),
-            'WrenchStamped': lambda: ((m := WrenchStamped()), m.wrench.force, m.wrench.torque),
-        }[kind.rpartition('/')[2]]()
-        _set(linear, 'xyz', values[:3])
-        _set(angular, 'xyz', values[3:])
+        of = Sample(twist=numbers, accel=numbers).messages(0)[f'setpoint/{name[:5].lower()}']
     of.header.stamp.sec, of.header.stamp.nanosec = divmod(stamp, SECOND)
     of.header.frame_id = frame
     return of
