@@ -56,6 +56,12 @@ NOW = 1_700_000_000 * SECOND
 NAN, INF = math.nan, math.inf
 
 
+def good(topic: str, stamp: int, mark: float = 0.0) -> bytes:
+    """Return a good message of a topic, the mark in its first number."""
+    values = HOME if topic in (POSE, COMBINED) else REST
+    return WRITERS[topic](stamp, (mark, *values[1:]))
+
+
 class Feed:
     """Setpoints with given parameters; messages and callbacks are recorded."""
 
@@ -74,8 +80,7 @@ class Feed:
 
     def sample(self, topic: str, stamp: int, mark: float = 0.0) -> Setpoint | None:
         """Take a good message of a topic, the mark in its first number."""
-        values = HOME if topic in (POSE, COMBINED) else REST
-        return self(topic, WRITERS[topic](stamp, (mark, *values[1:])))
+        return self(topic, good(topic, stamp, mark))
 
     def whole(self, stamp: int, mark: float = 0.0) -> Setpoint | None:
         """Take good messages of all topics; the last one must be what completes it."""
@@ -195,8 +200,8 @@ def _spoilt() -> list[tuple[str, bytes, str, str]]:
             found.append((topic, NUMBERS[topic](values), NOT_FINITE, 'nan|inf'))
         found += [(topic, WRITERS[topic](SECOND, frame=frame), WRONG_FRAME, f"'{frame}'.*'base'")
                   for frame in ('map', '/base', 'Base')]
-        good = WRITERS[topic](SECOND)
-        found += [(topic, good[:-1], MALFORMED, f'{len(good) - 1} bytes'),
+        whole = good(topic, SECOND)
+        found += [(topic, whole[:-1], MALFORMED, f'{len(whole) - 1} bytes'),
                   (topic, b'', MALFORMED, '0 bytes')]
     for topic in (POSE, COMBINED):
         for length in (1 - 1.1e-3, 1 + 1.1e-3, 0.0, 2.0, 1e150):
@@ -467,31 +472,25 @@ def test_a_quaternion_is_brought_to_unit_length(
 
 # Any input at all
 
-def _garbage(random: np.random.Generator, good: bytes) -> bytes:
-    spoiled = bytearray(good)
-    for at in random.integers(0, len(good), 4):
+def _garbage(data: bytes) -> bytes:
+    random = rng(int.from_bytes(data[4:12], 'little'))
+    spoiled = bytearray(data)
+    for at in random.integers(0, len(data), 4):
         spoiled[at] = random.integers(0, 256)
-    return bytes(spoiled[:random.integers(0, len(good) + 1)])
+    return bytes(spoiled[:random.integers(0, len(data) + 1)])
 
 
-_FAULTS: dict[str, Callable[[str, int], bytes]] = {
-    'good': lambda topic, stamp: WRITERS[topic](stamp, _marked(topic, stamp)),
-    'nan': lambda topic, stamp: WRITERS[topic](stamp, (NAN, 0, 0, 0, 0, 0)[:_width(topic)]),
-    'frame': lambda topic, stamp: WRITERS[topic](stamp, frame='elsewhere'),
-    'quaternion': lambda topic, stamp: messages.pose(stamp, HOME, (1, 1, 1, 1)),
-    'cut': lambda topic, stamp: WRITERS[topic](stamp)[:-3],
-    'garbage': lambda topic, stamp: _garbage(rng(abs(stamp)), WRITERS[topic](stamp)),
-    'another type': lambda topic, stamp: messages.combined(stamp),
-}
-
-
-def _width(topic: str) -> int:
-    return 3 if topic in (POSE, COMBINED) else 6
-
-
-def _marked(topic: str, stamp: int) -> tuple[float, ...]:
-    """Return numbers of which the first is the stamp."""
-    return (float(stamp), *(HOME if topic in (POSE, COMBINED) else REST)[1:])
+FAULTS: dict[str, Callable[[bytes], bytes]] = {
+    'none': lambda data: data,
+    'nan': lambda data: data[:-8] + np.array(NAN).tobytes(),
+    'quaternion': lambda data: data[:-8] + np.array(1.5).tobytes(),  # of a pose
+    'frame': lambda data: data.replace(b'base', b'besa'),
+    'cut': lambda data: data[:-5],
+    'garbage': _garbage,
+    'another type': lambda data: messages.combined(SECOND)}
+STAMPS: dict[str, Callable[[bytes], bytes]] = {
+    'zero': lambda data: data[:4] + bytes(8) + data[12:],
+    'back': lambda data: data[:4] + bytes(7) + b'\1' + data[12:]}
 
 
 samples = st.lists(st.tuples(
@@ -499,7 +498,7 @@ samples = st.lists(st.tuples(
     # steps of 10 ms around zero, many of them twice; a few jumps that exceed the timeout
     st.integers(-3, 25).map(lambda n: n * 10 * MS) | st.integers(-500, 500).map(
         lambda n: n * 7 * MS),
-    st.sampled_from(['good'] * 12 + list(_FAULTS))), max_size=80)
+    st.sampled_from(['none'] * 12 + list(FAULTS))), max_size=80)
 
 
 def _drained(feed: Feed, answers: list[Setpoint]) -> None:
@@ -516,7 +515,7 @@ def test_every_message_is_answered_or_counted(
     feed = Feed(sync_tolerance=tolerance)
     answers: list[Setpoint] = []
     for topic, stamp, fault in sequence:
-        if (answer := feed(topic, _FAULTS[fault](topic, stamp))) is not None:
+        if (answer := feed(topic, FAULTS[fault](good(topic, stamp)))) is not None:
             answers.append(answer)
         waiting = {t: feed.given[t] - len(answers) - sum(
             n for (of, _), n in feed.counts.items() if of == t) for t in TOPICS}
@@ -540,7 +539,7 @@ def test_only_stamps_within_the_tolerance_are_joined(
         sequence: list[tuple[str, int, str]], tolerance: int) -> None:
     feed = Feed(sync_tolerance=tolerance * 1e-3)
     for topic, stamp, _ in sequence:
-        answer = feed(topic, _FAULTS['good'](topic, stamp))
+        answer = feed.sample(topic, stamp, float(stamp))
         if answer is not None:
             marks = [answer.motion[0], answer.motion[12], answer.motion[18]]
             assert answer.stamp in (NOW, *marks)
@@ -636,8 +635,7 @@ def test_many_combined_are_what_they_are_one_by_one() -> None:
     assert check_many(given, (20, 40, 80), source='combined') == 99
 
 
-FATES = ['as it is'] * 12 + [
-    'lost', 'twice', 'late', 'nan', 'cut', 'zero', 'frame', 'back', 'big-endian', 'quaternion']
+FATES = [*['none'] * 12, 'lost', 'twice', 'late', 'big-endian', *FAULTS, *STAMPS]
 
 
 @given(st.lists(st.sampled_from(FATES), max_size=90), st.lists(st.integers(0, 90), max_size=6),
@@ -657,20 +655,9 @@ def test_many_of_any_kind_are_what_they_are_one_by_one(
         if fate == 'late':
             late.append((topic, data))
             continue
-        if fate == 'nan':
-            data = data[:-8] + np.array(NAN).tobytes()
-        elif fate == 'cut':
-            data = data[:-5]
-        elif fate == 'zero':
-            data = data[:4] + bytes(8) + data[12:]
-        elif fate == 'back':
-            data = data[:4] + bytes(7) + b'\1' + data[12:]
-        elif fate == 'frame':
-            data = data.replace(b'base', b'besa')
-        elif fate == 'quaternion' and topic == POSE:
-            data = data[:-8] + np.array(1.5).tobytes()
-        elif fate == 'big-endian' and topic == POSE:
+        if fate == 'big-endian' and topic == POSE:
             data = messages.pose(20 * MS + random.randrange(20 * MS), little_endian=False)
+        data = {**FAULTS, **STAMPS}.get(fate, FAULTS['none'])(data)
         found += [(topic, data)] * {'lost': 0, 'twice': 2}.get(fate, 1)
         if late and random.random() < 0.5:
             found.append(late.pop())
