@@ -100,20 +100,16 @@ def test_arguments_that_do_not_fit_are_errors(change: dict[str, object], said: s
 
 # Rejected
 
-def legs_of(parameters: Parameters, rows: Array) -> Array:
-    """Return results of rows of motion."""
-    return StewartPlatform(parameters).solve(rows)
-
-
 def between_points(times: Sequence[int], rows: Array, count: int = 4001) -> tuple[Array, Array]:
-    """Return times and rows of the motion of the platform, sampled densely between points."""
+    """Return times [s], dense between points, and the results of the platform's motion there."""
     seconds = np.array(times) * 1e-9
     motion = motion_of(rows)
     between = Interpolation(np.diff(seconds), motion.rows)
     part = np.linspace(0.0, 1.0, count)
     both = [(begin + part * (end - begin), between.at(np.full(len(part), n), part))
             for n, (begin, end) in enumerate(pairwise(seconds))]
-    return np.concatenate([each[0] for each in both]), np.concatenate([each[1] for each in both])
+    return np.concatenate([each[0] for each in both]), StewartPlatform(FREE).solve(
+        np.concatenate([each[1] for each in both]))
 
 
 def cubic_between(times: Sequence[int], rows: Array) -> tuple[Array, Array, Array]:
@@ -150,9 +146,8 @@ def test_a_limit_exceeded_between_points_alone_is_found(
         whose: str, limit: str, sign: float, of: dict[str, Array], words: str) -> None:
     rows = of[whose].copy()
     rows[:, 7:] *= sign
-    dense, motions = between_points(TIMES, rows)
+    dense, results = between_points(TIMES, rows)
     cubic_dense, lengths, rates = cubic_between(TIMES, rows)
-    results = legs_of(FREE, motions)
     values = {'platform': sign * results[:, RATES if words == 'rate' else LENGTHS],
               'legs': sign * (rates if words == 'rate' else lengths)}
     highest, other = sorted((each.max() for each in values.values()), reverse=True)
@@ -228,8 +223,8 @@ def test_a_force_exceeded_between_points_alone_is_found(duration: int) -> None:
     """At rest at both ends, 10 cm or 0.2 mm apart: what moves it lies between."""
     times = [0, duration]
     rows = heave(0.1 if duration == SECOND else 2e-4)
-    dense, motions = between_points(times, rows)
-    forces = np.abs(legs_of(FREE, motions)[:, FORCES])
+    dense, results = between_points(times, rows)
+    forces = np.abs(results[:, FORCES])
     points = forces[[0, -1]].max()
     assert forces.max() > 1.2 * points
     bound = 0.5 * (forces.max() + points)
@@ -273,11 +268,9 @@ def test_the_clear_trajectory_is_accepted(step: int) -> None:
 
 @pytest.mark.parametrize('step', [SECOND // 1000, SECOND // 10, SECOND])
 def test_the_singular_trajectory_is_rejected(step: int) -> None:
-    times, rows = sampled('singular', step)
-    data = (times, rows)
+    data = times, rows = sampled('singular', step)
     every = max(1, SECOND // 10 // step)
-    fine, motions = between_points(times[::every], rows[::every], 401 if step < SECOND else 4001)
-    results = legs_of(FREE, motions)
+    fine, results = between_points(times[::every], rows[::every], 401 if step < SECOND else 4001)
     crossing = fine[np.argmax(results[:, DETERMINANT] * results[0, DETERMINANT] < 0.0)]
     forces = fine[np.argmax(np.abs(results[:, FORCES]).max(axis=1) > 6000.0)]
     stop = fine[np.argmax(results[:, CONDITION] >= 100.0)]
@@ -321,9 +314,8 @@ def test_a_double_crossing_between_two_points_is_found(
 
     def leap(top: float) -> tuple[Trajectory, Array, Array]:
         times, rows = parabola(start, top, duration, 1)
-        dense, motions = between_points(times, rows)
-        return ((times, rows), dense,
-                legs_of(UNBOUND, motions)[:, DETERMINANT])
+        dense, results = between_points(times, rows)
+        return (times, rows), dense, results[:, DETERMINANT]
 
     # The singularity is not at 90 degrees to the last digit: the joints are rounded.
     data, dense, det = leap(highest)
@@ -333,8 +325,7 @@ def test_a_double_crossing_between_two_points_is_found(
     result = check(data, UNBOUND)
     assert result.reason == SINGULAR
     assert 'det(J) crosses zero' in result.message
-    time = result.time
-    assert time == pytest.approx(dense[np.argmax(crossed)], abs=1e-3 * seconds)
+    assert result.time == pytest.approx(dense[np.argmax(crossed)], abs=1e-3 * seconds)
     short_of = 90.0 - 2.0 * (highest - 90.0)
     data, _, det = leap(short_of)
     assert np.all(det * det[0] > 0.0)
@@ -349,8 +340,7 @@ def test_a_singularity_of_the_legs_on_a_wide_way_is_found() -> None:
                                [[-0.5036, 0.3398, 0.2156], [-0.5072, 0.5726, -1.1678]])
     rows = np.column_stack([motion.position, to_quaternion(motion.rotation), np.zeros((2, 12))])
     times = [0, 20 * SECOND]
-    conditions = legs_of(FREE, between_points(times, rows)[1])[:, CONDITION]
-    assert conditions.max() < 16.0
+    assert between_points(times, rows)[1][:, CONDITION].max() < 16.0
     result = check((times, rows), FREE)
     assert result.reason == SINGULAR
     assert result.time == pytest.approx(10.1, abs=0.1)
@@ -392,9 +382,7 @@ def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded() -> Non
 
 
 def test_a_singularity_is_reported_before_exceeded_limits() -> None:
-    rows = np.array([[0.0, 0.0, 0.0, *HOME[3:], *REST, *REST]])
-    result = check(([0], rows))
-    assert result.reason == SINGULAR
+    assert check(([0], np.array([[0.0, 0.0, 0.0, *HOME[3:], *REST, *REST]]))).reason == SINGULAR
 
 
 def test_a_singularity_on_the_way_of_the_legs_is_found() -> None:
@@ -405,8 +393,7 @@ def test_a_singularity_on_the_way_of_the_legs_is_found() -> None:
     between that there are only beyond the singularity: for no pose at all on this side.
     """
     times, rows = parabola(80.0, 89.0, SECOND, 1)
-    motions = between_points(times, rows)[1]
-    determinants = legs_of(UNBOUND, motions)[:, DETERMINANT]
+    determinants = between_points(times, rows)[1][:, DETERMINANT]
     assert np.all(determinants * determinants[0] > 0.0)
     squares = cubic_between(times, rows)[1] ** 2
     apart = np.abs(squares[:, ::2].sum(axis=1) - squares[:, 1::2].sum(axis=1))
@@ -416,14 +403,13 @@ def test_a_singularity_on_the_way_of_the_legs_is_found() -> None:
     result = check((times, rows), UNBOUND)
     assert result.reason == SINGULAR
     assert "the legs' cubics lead to" in result.message
-    dense = parabola(80.0, 89.0, SECOND, 20)
-    assert check(dense, UNBOUND).accepted
+    assert check(parabola(80.0, 89.0, SECOND, 20), UNBOUND).accepted
 
 
 def test_stop_condition_met_between_two_points_alone_is_found() -> None:
     times, rows = parabola(80.0, 89.0, SECOND, 20)
-    dense, motions = between_points(times, rows)
-    condition = legs_of(FREE, motions)[:, CONDITION]
+    dense, results = between_points(times, rows)
+    condition = results[:, CONDITION]
     highest = condition.max()
     assert condition[0] < 0.5 * highest
     for stop, rejected in ((0.99 * highest, True), (1.01 * highest, False)):
@@ -432,9 +418,8 @@ def test_stop_condition_met_between_two_points_alone_is_found() -> None:
         result = check((times, rows), parameters)
         assert result.accepted != rejected
         if rejected:
-            time = result.time
             inside = dense[condition >= stop]
-            assert inside[0] <= time <= inside[-1]
+            assert inside[0] <= result.time <= inside[-1]
             assert 'reaches singularity.stop_condition' in result.message
         else:
             assert result.warning
@@ -456,8 +441,7 @@ def dipping(gap: float, depth: float, extra: float) -> Trajectory:
 def test_a_crossing_within_a_dip_of_the_determinant_is_found() -> None:
     """No sample is needed between the two points, and their cubic of det(J) stays clear."""
     trajectory = dipping(0.1, 0.5, 0.6)
-    dense, motions = between_points(*trajectory)
-    results = legs_of(UNBOUND, motions)
+    dense, results = between_points(*trajectory)
     determinants = results[:, DETERMINANT]
     crossed = determinants * determinants[0] < 0.0
     assert crossed.any()
