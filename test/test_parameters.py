@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -67,15 +67,13 @@ def written(path: Path, text: str) -> Path:
     return file
 
 
-def assert_rejected(path: Path, text: str, words: Sequence[str],
+def assert_rejected(path: Path, text: str, said: str,
                     read: Callable[[Path], object] = Parameters.from_yaml) -> None:
-    """Check that a file with this text is rejected in one short line with these words in it."""
+    """Check that a file with this text is rejected in one short line that begins so."""
     with pytest.raises(ParameterError) as caught:
         read(written(path, text))
     message = str(caught.value)
-    assert message.startswith(f'{path / "hexapod.yaml"}: ')
-    for word in words:
-        assert word in message
+    assert message.startswith(f'{path / "hexapod.yaml"}: {said}')
     assert message.isprintable()
     assert len(message) < 450 + len(str(path))
 
@@ -151,96 +149,99 @@ other_node:
     assert Parameters.from_yaml(written(tmp_path, GOOD + later))['platform.mass'] == 160.0
 
 
-# Invalid files: the line that is changed, its new text, and the words of the error
+# Invalid files: the part of the valid file that is changed, its new text, and the error
 
-BAD = {
-    'missing required value': ('      mass: 150.0\n', '', ['platform.mass', 'missing']),
-    'unknown name in a group': ('warn_condition', 'warn_conditions', [
-        'singularity.warn_conditions', 'unknown', 'do you mean singularity.warn_condition?']),
-    'unknown name of which there are two': ('visualization_rate: 25.0', 'limits.angle_max: 0.5', [
-        'limits.angle_max: unknown parameter; do you mean limits.base_joint_angle_max or '
-        'limits.platform_joint_angle_max?']),
-    'unknown name like no other': ('visualization_rate: 25.0', 'qqq: 25.0', [
-        'qqq: unknown parameter']),
-    'integer for a double': ('mass: 150.0', 'mass: 150', [
-        'platform.mass', '150', 'is an integer, must be a double', 'write 150.0']),
-    'integer in an array': ('[20.0, 1.0,', '[20.0, 1,', [
-        'platform.inertia', ' 1:', 'is an integer', 'write 1.0']),
-    'string for a number': ('mass: 150.0', "mass: '150.0'", [
-        'platform.mass', "'150.0'", 'must be a double']),
-    'number for a string': ('joints: [a,', 'joints: [1,', ['joints', '1', 'must be a string']),
-    'a joint that no message can name': (
-        'joints: [a,', 'joints: ["a\\e",', ['joints', 'printable']),
-    'number for a bool': ('visualization_rate: 25.0', 'autostart: 1', [
-        'autostart', '1', 'must be a bool']),
-    'array for a single value': ('mass: 150.0', 'mass: [150.0, 1.0]', [
-        'platform.mass', '[150.0, 1.0]', 'must be a single double']),
-    'single value for an array': ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: 0.1', [
-        'platform.center_of_mass', '0.1', 'must be an array of 3']),
-    'wrong length': ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: [0.01, 0.1]', [
-        'platform.center_of_mass', '[0.01, 0.1]', 'must have 3 entries, has 2']),
-    'empty array': ('[6.0, 6.1, 6.2, 6.3, 6.4, 6.5]', '[]', [
-        'legs.piston.mass: []: ROS accepts no empty list: leave the name out']),
-    'group for a value': ('mass: 150.0', 'mass: {kg: 150.0}', [
-        'platform.mass.kg', 'unknown parameter', 'do you mean platform.mass?']),
-    'value for a group': ('limits: {length_min: 0.8, length_max: 1.4}', 'limits: 0.8', [
-        'limits', 'unknown parameter']),
-    'bad choice': ('warn_condition: 40.0', 'warn_condition: 40.0, action: stop', [
-        'singularity.action', "'stop'", 'must be one of warn, suppress_forces']),
-    'inertia of no body': (
-        '[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]', [
-            'platform.inertia', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]', 'positive definite',
-            '-1 kg m^2', 'ixx ixy ixz iyy iyz izz']),
-    'shortest not below longest': ('length_max: 1.4', 'length_max: 0.8', [
-        'limits.length_min', '0.8', 'must be less than limits.length_max', '0.8']),
-    'one leg shortest above longest': (
-        'length_max: 1.4', 'length_max: [1.4, 1.4, 1.4, 0.7, 1.4, 1.4]', [
-            'limits.length_min', 'must be less than limits.length_max', '0.7']),
-    'stop before warn': ('stop_condition: 400.0', 'stop_condition: 39.0', [
-        'singularity.stop_condition', '39.0', 'must be at least singularity.warn_condition',
-        '40.0']),
-    'not a number': ('mass: 150.0', 'mass: .nan', ['platform.mass', 'nan kg', 'must be finite']),
-    'two legs of one name': ('[a, b, c, d, e, f]', '[a, b, c, d, e, a]', [
-        'joints', "['a', 'b', 'c', 'd', 'e', 'a']", 'six different names']),
-    'a platform that is one point': (
-        'platform_joints: [0.4, 0.4, 0.0,  0.2, 0.5, 0.0,  -0.6, 0.1, 0.0,\n'
-        '                        -0.6, -0.1, 0.0,  0.2, -0.5, 0.0,  0.4, -0.4, 0.0]',
-        f'platform_joints: {[0.5] * 18}', ['geometry.platform_joints', 'one point']),
-    'not yaml': ('mass: 150.0', 'mass: [150.0', ['not YAML', 'line']),
-    'a tab': ('      mass: 150.0', '\tmass: 150.0', [
-        'not YAML: line 10', 'line 10 is indented with a tab: use spaces']),
-    'no space': ('      mass: 150.0', '      mass:150.0', [
-        'not YAML: line 11', 'line 10: a space is missing after the colon of mass']),
-    'no space in a group': ('{mass: 12.0,', '{mass:12.0,', [
-        'legs.cylinder.mass:12.0: has no value',
-        'space is missing after the colon of legs.cylinder.mass']),
-    'lists in a list': ('[0.01, 0.0, 0.1]', '[[0.01, 0.0, 0.1]]', [
-        'platform.center_of_mass: [[0.01, 0.0, 0.1]]', 'one after the other']),
-    'null': ('mass: 150.0', 'mass: null', ['platform.mass: missing, it has no default']),
-    'a truth for a text': ('visualization_rate: 25.0', 'base_frame: on', [
-        'base_frame', 'True', 'must be a string: put it in quotes']),
-    'a tag': ('mass: 150.0', 'mass: !!float 150', [
-        'line 10, column 13', "a tag, 'tag:yaml.org,2002:float'"]),
-    'a list for a name': ('mass: 150.0', '? [a]\n      : 150.0', [
-        'not YAML: line 10, column 9: a list, a group or an alias in place of a name']),
-    'given twice in two spellings': ('visualization_rate: 25.0', 'platform.mass: 25.0', [
-        'platform.mass: given twice under /**']),
-    'a list in a list of another node': ('/**:', 'a: {ros__parameters: {b: [[1]]}}\n/**:', [
-        'b: [[1]]', 'one after the other']),
-    'a name of two lines': ('visualization_rate', '"two\\nlines\\e[31m"', [
-        "'two\\nlines\\x1b[31m': unknown"]),
-    'duplicate keys': ('      mass: 150.0\n', '      mass: 150.0\n      mass: 160.0\n', [
-        'not YAML', 'duplicate key', 'mass', 'line']),
-    'an alias, which ROS rejects': (
-        'mass: 150.0', 'mass: *m', ['alias', 'write the value out']),
-    'a name without a value': ('mass: 150.0', 'mass:', ['platform.mass', 'has no value']),
-    'two documents': ('/**:', 'a: 1\n---\n/**:', [
-        'not YAML: line 2, column 1: expected a single document in the stream, but found ano']),
-    'no section of ours': ('/**:', 'other_node:', [
-        'holds other_node', "no parameters under '/**:' or 'stewart_dynamics:'"]),
-    'no ros__parameters': ('ros__parameters:', 'parameters:', [
-        '/**', "must hold 'ros__parameters:'"]),
-}
+BAD = [
+    ('      mass: 150.0\n', '', 'platform.mass: missing, it has no default'),
+    ('mass: 150.0', 'mass: null', 'platform.mass: missing, it has no default'),
+    ('mass: 150.0', 'mass:', 'platform.mass: has no value'),
+    # names
+    ('warn_condition', 'warn_conditions', 'singularity.warn_conditions: unknown parameter; '
+     'do you mean singularity.warn_condition?'),
+    ('visualization_rate: 25.0', 'limits.angle_max: 0.5', 'limits.angle_max: unknown parameter; '
+     'do you mean limits.base_joint_angle_max or limits.platform_joint_angle_max?'),
+    ('visualization_rate: 25.0', 'qqq: 25.0', 'qqq: unknown parameter'),
+    ('visualization_rate', '"two\\nlines\\e[31m"', r"'two\nlines\x1b[31m': unknown parameter"),
+    ('mass: 150.0', 'mass: {kg: 150.0}',
+     'platform.mass.kg: unknown parameter; do you mean platform.mass?'),
+    ('limits: {length_min: 0.8, length_max: 1.4}', 'limits: 0.8', 'limits: unknown parameter'),
+    ('visualization_rate: 25.0', 'platform.mass: 25.0', 'platform.mass: given twice under /**'),
+    # types
+    ('mass: 150.0', 'mass: 150',
+     'platform.mass: 150: is an integer, must be a double: write 150.0'),
+    ('[20.0, 1.0,', '[20.0, 1,',
+     'platform.inertia: 1: is an integer, must be a double: write 1.0'),
+    ('mass: 150.0', "mass: '150.0'", "platform.mass: '150.0': must be a double"),
+    ('joints: [a,', 'joints: [1,', 'joints: 1: must be a string: put it in quotes'),
+    ('visualization_rate: 25.0', 'base_frame: on',
+     'base_frame: True: must be a string: put it in quotes'),
+    ('joints: [a,', 'joints: ["a\\e",', r"joints: 'a\x1b': must be printable text"),
+    ('visualization_rate: 25.0', 'autostart: 1', 'autostart: 1: must be a bool'),
+    # sizes
+    ('mass: 150.0', 'mass: [150.0, 1.0]',
+     'platform.mass: [150.0, 1.0]: must be a single double'),
+    ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: 0.1',
+     'platform.center_of_mass: 0.1 m: must be an array of 3'),
+    ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: [0.01, 0.1]',
+     'platform.center_of_mass: [0.01, 0.1]: must have 3 entries, has 2'),
+    ('[6.0, 6.1, 6.2, 6.3, 6.4, 6.5]', '[]',
+     'legs.piston.mass: []: ROS accepts no empty list: leave the name out'),
+    ('[0.01, 0.0, 0.1]', '[[0.01, 0.0, 0.1]]', 'platform.center_of_mass: [[0.01, 0.0, 0.1]]: '
+     'has a list or a group in the list: write the numbers one after the other'),
+    ('/**:', 'a: {ros__parameters: {b: [[1]]}}\n/**:', 'b: [[1]]: has a list or a group in the '),
+    # values
+    ('warn_condition: 40.0', 'warn_condition: 40.0, action: stop',
+     "singularity.action: 'stop': must be one of warn, suppress_forces"),
+    ('[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]',
+     'platform.inertia: [20.0, 0.0, 0.0, 20.0, 0.0, -1.0]: must be positive definite, but its '
+     'smallest principal moment is -1 kg m^2 (the order is ixx ixy ixz iyy iyz izz)'),
+    ('length_max: 1.4', 'length_max: 0.8', 'limits.length_min: [0.8, 0.8, 0.8, 0.8, 0.8, 0.8]: '
+     'must be less than limits.length_max, [0.8, 0.8, 0.8, 0.8, 0.8, 0.8]'),
+    ('length_max: 1.4', 'length_max: [1.4, 1.4, 1.4, 0.7, 1.4, 1.4]',
+     'limits.length_min: [0.8, 0.8, 0.8, 0.8, 0.8, 0.8]: must be less than limits.length_max, '),
+    ('stop_condition: 400.0', 'stop_condition: 39.0', 'singularity.stop_condition: 39.0: '
+     'must be at least singularity.warn_condition, 40.0'),
+    ('mass: 150.0', 'mass: .nan', 'platform.mass: nan kg: must be finite'),
+    ('[a, b, c, d, e, f]', '[a, b, c, d, e, a]',
+     "joints: ['a', 'b', 'c', 'd', 'e', 'a']: six different names needed"),
+    ('platform_joints: [0.4, 0.4, 0.0,  0.2, 0.5, 0.0,  -0.6, 0.1, 0.0,\n'
+     '                        -0.6, -0.1, 0.0,  0.2, -0.5, 0.0,  0.4, -0.4, 0.0]',
+     f'platform_joints: {[0.5] * 18}', 'geometry.platform_joints: all six are at one point'),
+    # YAML
+    ('mass: 150.0', 'mass: [150.0', 'not YAML: line 11, column 21: '),
+    ('      mass: 150.0', '\tmass: 150.0', 'not YAML: line 10, column 1: found character that '
+     'cannot start any token; line 10 is indented with a tab: use spaces'),
+    ('      mass: 150.0', '      mass:150.0', 'not YAML: line 11, column 21: mapping values are '
+     'not allowed in this context; line 10: a space is missing after the colon of mass'),
+    ('{mass: 12.0,', '{mass:12.0,', 'legs.cylinder.mass:12.0: has no value; '
+     'a space is missing after the colon of legs.cylinder.mass'),
+    ('mass: 150.0', 'mass: !!float 150',
+     "not YAML: line 10, column 13: a tag, 'tag:yaml.org,2002:float': ROS ignores it, "),
+    ('mass: 150.0', '? [a]\n      : 150.0',
+     'not YAML: line 10, column 9: a list, a group or an alias in place of a name'),
+    ('      mass: 150.0\n', '      mass: 150.0\n      mass: 160.0\n',
+     "not YAML: line 11, column 7: duplicate key 'mass'"),
+    ('mass: 150.0', 'mass: *m',
+     'not YAML: line 10, column 13: has a YAML alias (*): write the value out'),
+    # sections
+    ('/**:', 'a: 1\n---\n/**:',
+     'not YAML: line 2, column 1: expected a single document in the stream, but found another'),
+    ('/**:', 'other_node:',
+     "holds other_node, but no parameters under '/**:' or 'stewart_dynamics:'"),
+    ('ros__parameters:', 'parameters:', "/**: must hold 'ros__parameters:'"),
+    (GOOD, '', "must begin with '/**:' or a node's name"),
+    (GOOD, 'just words\n', "must begin with '/**:' or a node's name"),
+    (GOOD, '/**: {ros__parameters: [1, 2]}\n',
+     'ros__parameters: [1, 2]: must hold names and values'),
+    (GOOD, '/**: {ros__parameters: }\n', 'holds /**, but no parameters under '),
+    (GOOD, '/**: \x07\n', 'not YAML: line 1: control characters are not allowed')]
+
+
+@pytest.mark.parametrize(('old', 'new', 'said'), BAD, ids=[said[:60] for _, _, said in BAD])
+def test_the_error_of_a_bad_file_names_parameter_value_and_rule(
+        tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert GOOD.count(old) == 1
+    assert_rejected(tmp_path, GOOD.replace(old, new), said)
 
 
 @pytest.mark.parametrize(('name', 'value', 'rule'), [
@@ -267,27 +268,6 @@ def test_a_value_that_breaks_a_rule_is_rejected(name: str, value: Any, rule: str
         Parameters({**GIVEN, name: value})
     assert str(caught.value).startswith(f'parameters: {name}: ')
     assert rule in str(caught.value)
-
-
-@pytest.mark.parametrize('case', BAD)
-def test_the_error_of_a_bad_file_names_parameter_value_and_rule(
-        tmp_path: Path, case: str) -> None:
-    old, new, words = BAD[case]
-    assert GOOD.count(old) == 1
-    assert_rejected(tmp_path, GOOD.replace(old, new), words)
-
-
-@pytest.mark.parametrize(('text', 'words'), [
-    ('', ["must begin with '/**:' or a node's name"]),
-    ('just words\n', ['must begin with']),
-    ('/**: 3\n', ['/**', "must hold 'ros__parameters:'"]),
-    ('/**: {ros__parameters: [1, 2]}\n', ['ros__parameters', '[1, 2]', 'names and values']),
-    ('/**: {ros__parameters: }\n', ['no parameters']),
-    ('/**: \x07\n', ['not YAML: line 1', 'control characters']),
-])
-def test_the_error_of_a_file_with_another_root_says_what_it_must_be(
-        tmp_path: Path, text: str, words: list[str]) -> None:
-    assert_rejected(tmp_path, text, words)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
@@ -319,14 +299,14 @@ def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
 
 
 @pytest.mark.parametrize('text, said', [
-    ('x: &a {b: *a}', 'alias'),
-    ('a: ' + '{a: ' * 30, 'line 3, column 76: nests deeper than 20'),
-    (f'{"a" * 1000}: 1.0', 'unknown parameter'),
-    (f'platform.mass: {"9" * 90000}', 'must be finite'),
-    ('platform: {mass: 0x' + 'f' * 5000 + '}', 'platform.mass')])
+    ('x: &a {b: *a}', 'not YAML: line 3, column 15: has a YAML alias (*): write the value out'),
+    ('a: ' + '{a: ' * 30, 'not YAML: line 3, column 76: nests deeper than 20'),
+    (f'{"a" * 1000}: 1.0', f'{"a" * 77}...: unknown parameter'),
+    (f'platform.mass: {"9" * 90000}', 'platform.mass: inf kg: must be finite'),
+    ('platform: {mass: 0x' + 'f' * 5000 + '}', "platform.mass: '0xfff")])
 def test_difficult_yaml_is_rejected_in_one_short_line(
         tmp_path: Path, text: str, said: str) -> None:
-    assert_rejected(tmp_path, f'/**:\n  ros__parameters:\n    {text}\n', [said],
+    assert_rejected(tmp_path, f'/**:\n  ros__parameters:\n    {text}\n', said,
                     Parameters.check_file)
 
 
