@@ -88,6 +88,16 @@ class Feed:
         assert answers[:-1] == [None] * (len(answers) - 1)
         return answers[-1]
 
+    def used(self, samples: Sequence[tuple[str, float]]) -> list[float]:
+        """Take samples without stamps, topics and marks; return the mark of each setpoint."""
+        found = []
+        for topic, mark in samples:
+            if (setpoint := self.sample(topic, 0, mark)) is not None:
+                assert setpoint.stamp == NOW
+                assert setpoint.motion[0] == setpoint.motion[12] == setpoint.motion[18]
+                found.append(setpoint.motion[0])
+        return found
+
     @property
     def counts(self) -> dict[tuple[str, str], int]:
         """Return the rejections; the callback must have got each."""
@@ -341,16 +351,16 @@ def test_a_restart_drops_samples_waiting_from_before_it() -> None:
 
 # Without stamps
 
+def without_stamps(marks: Sequence[float], topics: Sequence[str] = TOPICS,
+                   ) -> list[tuple[str, float]]:
+    """Return topics and marks, all topics of a mark before the next."""
+    return [(topic, mark) for mark in marks for topic in topics]
+
+
 @pytest.mark.parametrize('order', ORDERS)
 def test_samples_without_stamps_are_joined_in_order_of_arrival(order: Sequence[str]) -> None:
     feed = Feed()
-    for mark in (1.0, 2.0, 3.0):
-        for topic in order[:2]:
-            assert feed.sample(topic, 0, mark) is None
-        setpoint = feed.sample(order[2], 0, mark)
-        assert setpoint is not None
-        assert setpoint.stamp == NOW
-        assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (mark,) * 3
+    assert feed.used(without_stamps((1.0, 2.0, 3.0), order)) == [1.0, 2.0, 3.0]
     assert not feed.counts
     assert len(feed.notices) == 1
     assert 'zero' in feed.notices[0]
@@ -359,45 +369,25 @@ def test_samples_without_stamps_are_joined_in_order_of_arrival(order: Sequence[s
 @pytest.mark.parametrize('order', ORDERS)
 def test_a_topic_that_arrives_earlier_is_not_joined_late(order: Sequence[str]) -> None:
     feed = Feed()
-    early, last = order[:2], order[2]
-    for mark in (1.0, 2.0, 3.0):
-        for topic in early:
-            assert feed.sample(topic, 0, mark) is None
-    setpoint = feed.sample(last, 0, 3.0)
-    assert setpoint is not None
-    assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (3.0,) * 3
-    assert feed.counts == {(topic, NOT_JOINED): 2 for topic in early}
+    assert feed.used([*without_stamps((1.0, 2.0, 3.0), order[:2]), (order[2], 3.0)]) == [3.0]
+    assert feed.counts == {(topic, NOT_JOINED): 2 for topic in order[:2]}
 
 
-@pytest.mark.parametrize(('spoilt', 'arrives'), [
-    (POSE, False), (TWIST, False), (ACCEL, False), (POSE, True), (TWIST, True), (ACCEL, True)])
+@pytest.mark.parametrize('instead', [[], [math.nan]], ids=['lost', 'rejected'])
+@pytest.mark.parametrize('spoilt', TOPICS)
 def test_a_lost_or_rejected_sample_without_a_stamp_costs_its_setpoint_and_no_other(
-        spoilt: str, arrives: bool) -> None:
-    feed = Feed()
-    used = []
-    for n in range(1, 9):
-        for topic in TOPICS:
-            if n == 4 and topic == spoilt:
-                if arrives:
-                    assert feed.sample(topic, 0, math.nan) is None
-                continue
-            if (setpoint := feed.sample(topic, 0, float(n))) is not None:
-                marks = {setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]}
-                assert len(marks) == 1, marks
-                used += marks
-    assert used == [1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0]
+        spoilt: str, instead: list[float]) -> None:
+    sequence = without_stamps([float(n) for n in range(1, 9)])
+    at = sequence.index((spoilt, 4.0))
+    sequence[at:at + 1] = [(spoilt, mark) for mark in instead]
+    assert Feed().used(sequence) == [1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0]
 
 
 def test_samples_without_stamps_that_come_in_bunches_are_lost_but_never_mixed() -> None:
     feed = Feed()
-    assert feed.whole(0, 1.0) is not None
-    for topic in TOPICS:
-        for mark in (2.0, 3.0, 4.0):
-            assert feed.sample(topic, 0, mark) is None
-    for mark in (5.0, 6.0, 7.0):
-        setpoint = feed.whole(0, mark)
-        assert setpoint is not None
-        assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (mark,) * 3
+    bunches = [(topic, mark) for topic in TOPICS for mark in (2.0, 3.0, 4.0)]
+    assert feed.used([*without_stamps([1.0]), *bunches, *without_stamps((5.0, 6.0, 7.0))]) == [
+        1.0, 5.0, 6.0, 7.0]
     assert feed.counts == {(topic, NOT_JOINED): 3 for topic in TOPICS}
 
 
