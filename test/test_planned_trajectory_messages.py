@@ -25,7 +25,7 @@ from hypothesis import given, strategies as st
 import messages
 import numpy as np
 import pytest
-from referees import rng, ROOT
+from referees import rng
 from scipy.spatial.transform import Rotation
 from stewart_dynamics import (
     BaseMotion, check_planned_trajectory, Motion, Parameters, StewartPlatform)
@@ -67,18 +67,20 @@ def decoded(outcome: PlannedOutcome) -> Any:
 
 # Accepted
 
+@pytest.mark.parametrize('effort', [True, False], ids=['effort', 'no effort'])
 @pytest.mark.parametrize(('points', 'frame', 'names', 'little_endian'), [
-    (1, '', (), True), (2, 'base', ('platform',), False), (3, '', (), False),
+    (1, '', (), True), (2, 'base', ('platform',), False), (6, '', (), False),
     (PIECE, '', ('p',), False), (PIECE + 1, 'base', ('moving',), True), (1000, '', ('',), True)])
 def test_points_are_answered_with_the_bits_of_the_library(
-        points: int, frame: str, names: tuple[str, ...], little_endian: bool) -> None:
+        points: int, frame: str, names: tuple[str, ...], little_endian: bool, effort: bool,
+        ) -> None:
     times, rows = some(points)
     wrench = (100.0, -50.0, -300.0, 20.0, 10.0, -5.0)
     # Names of any length, so that doubles stand at another place in the message.
     joints = [f'{"x" * points}{name}' for name in PARAMETERS['joints']]
     if points > 2:
         joints = [name[-3 - points % 4:] for name in joints]
-    parameters = PARAMETERS.replaced({'joints': joints})
+    parameters = PARAMETERS.replaced({'joints': joints, 'trajectory.effort': effort})
     outcome = outcome_of(messages.trajectory(STAMP, times, rows, frame, names, little_endian),
                          parameters, wrench)
     assert outcome.message == (f'accepted: {points} point{"s" * (points > 1)} over '
@@ -91,25 +93,11 @@ def test_points_are_answered_with_the_bits_of_the_library(
             for point in got.points] == times
     result = StewartPlatform(parameters).inverse_dynamics(motion_of(rows), wrench)
     for field, expected in (('positions', result.lengths - parameters['geometry.zero_length']),
-                            ('velocities', result.rates), ('effort', result.forces)):
+                            ('velocities', result.rates),
+                            ('effort', result.forces[:, :6 if effort else 0])):
         assert np.array([getattr(point, field) for point in got.points]).tobytes() \
             == np.ascontiguousarray(expected).tobytes()
     assert all(len(point.accelerations) == 0 for point in got.points)
-
-
-@pytest.mark.parametrize('joint', ['a', 'ab', 'abc', 'abcd', 'abcde'])
-def test_without_effort_points_have_none(joint: str) -> None:
-    times, rows = some(5)
-    parameters = PARAMETERS.replaced({
-        'trajectory.effort': False, 'joints': [joint + str(n) for n in range(6)]})
-    data = messages.trajectory(STAMP, times, rows)
-    got, with_it = decoded(outcome_of(data, parameters)), decoded(outcome_of(data))
-    for point, other in zip(got.points, with_it.points, strict=True):
-        assert len(point.effort) == 0
-        assert len(other.effort) == 6
-        assert np.array_equal(point.positions, other.positions)
-        assert np.array_equal(point.velocities, other.velocities)
-        assert point.time_from_start == other.time_from_start
 
 
 def on_base(many: int) -> tuple[list[list[float]], BaseMotion]:
@@ -436,14 +424,13 @@ def test_dropped_trajectories_are_counted_and_not_continued() -> None:
 
 # The status of planned trajectories, within the node's diagnostics
 
-PLATFORM = ROOT / 'config' / 'platform.yaml'
 BEGIN = 100.0
 ACCEPTED = PlannedOutcome('accepted: 2 points', answer=b'1')
 REJECTED = PlannedOutcome('rejected: x', 'why', values=(('points', '3'),))
 
 
 def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
-    diagnostics = DynamicsDiagnostics(Parameters.from_yaml(PLATFORM), ['setpoint/pose'], (), BEGIN)
+    diagnostics = DynamicsDiagnostics(PARAMETERS, ['setpoint/pose'], (), BEGIN)
     report, planned = diagnostics.report, diagnostics.planned_trajectory
     assert [each.name for each in report.make(BEGIN)[0]][-1] == 'timing'
     planned.done(ACCEPTED, 0.25)
@@ -464,29 +451,19 @@ def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
     assert report.make(BEGIN)[0][-1].level == WARN
 
 
-def test_outcomes_that_took_long_are_logged() -> None:
+def test_each_rejection_is_logged_and_what_took_long_and_of_others_the_changes() -> None:
     planned = PlannedTrajectoryDiagnostics()
-    for outcome, seconds in ((ACCEPTED, 1.9), (ACCEPTED, 2.14), (ACCEPTED, 3.0), (REJECTED, 4.0)):
-        planned.done(outcome, seconds)
-    assert planned.log_lines(BEGIN) == [
-        LogLine(OK, 'planned trajectory: accepted: 2 points (took 2.1 s)'),
-        LogLine(OK, 'planned trajectory: accepted: 2 points (took 3.0 s)'),
-        LogLine(ERROR, 'planned trajectory rejected: x (took 4.0 s)', 'why')]
-
-
-def test_each_rejection_is_logged_and_of_other_outcomes_the_changes() -> None:
-    planned = DynamicsDiagnostics(
-        Parameters.from_yaml(PLATFORM), ['setpoint/pose'], (), BEGIN).planned_trajectory
-    planned.done(ACCEPTED, 0.1)
-    assert planned.log_lines(BEGIN) == []
-    for _ in range(2):
-        planned.done(REJECTED, 0.1)
-    assert planned.log_lines(BEGIN) == 2 * [
-        LogLine(ERROR, 'planned trajectory rejected: x', 'why')]
-    assert planned.log_lines(BEGIN) == []
-    for outcome in (ACCEPTED, ACCEPTED, ACCEPTED._replace(warning=True), REJECTED):
-        planned.done(outcome, 0.1)
-    assert planned.log_lines(BEGIN) == [
-        LogLine(OK, 'planned trajectory: accepted: 2 points'),
-        LogLine(WARN, 'planned trajectory: accepted: 2 points'),
-        LogLine(ERROR, 'planned trajectory rejected: x', 'why')]
+    warned = ACCEPTED._replace(warning=True)
+    text = 'planned trajectory: accepted: 2 points'
+    rejected = LogLine(ERROR, 'planned trajectory rejected: x', 'why')
+    outcomes: list[tuple[PlannedOutcome, float]]
+    for outcomes, lines in (
+            ([(ACCEPTED, 0.1)], []), ([(REJECTED, 0.1)] * 2, [rejected] * 2), ([], []),
+            ([(ACCEPTED, 0.1), (ACCEPTED, 1.9), (warned, 0.1), (REJECTED, 0.1)],
+             [LogLine(OK, text), LogLine(WARN, text), rejected]),
+            ([(ACCEPTED, 2.14), (ACCEPTED, 3.0), (REJECTED, 4.0)],
+             [LogLine(OK, f'{text} (took 2.1 s)'), LogLine(OK, f'{text} (took 3.0 s)'),
+              LogLine(ERROR, 'planned trajectory rejected: x (took 4.0 s)', 'why')])):
+        for outcome, seconds in outcomes:
+            planned.done(outcome, seconds)
+        assert planned.log_lines(BEGIN) == lines
