@@ -28,7 +28,7 @@ import pytest
 from referees import (
     printed_compiled_and_not, random_motion, random_parameters, random_wrench, relative, rng, ROOT,
     smooth_motion)
-from simulated import simulated
+from simulated import FRICTIONLESS, simulated
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
@@ -238,14 +238,11 @@ def test_noise_is_bounded_however_short_the_time_between_measurements(interval: 
     The gain is K x (1 - exp(-x)) sqrt(2 / (1 + exp(-x))) / x^2 with x = K dt, from the filter's
     transfer function, K (1 - z^-1) (1 - a) / x / (1 - a z^-1).
     """
-    frictionless = HEXAPOD.replaced(
-        {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0})
-    deviation, many = 1e-4, 20_000
+    frictionless, deviation, many = HEXAPOD.replaced(FRICTIONLESS), 1e-4, 20_000
     found = estimates(ExternalWrench(frictionless),
                       noisy(frictionless, interval, many, deviation, 5)[0])
     platform = StewartPlatform(frictionless)
-    per_rate = platform.mass_matrix(HOME) @ np.linalg.inv(
-        platform.inverse_jacobian(HOME))
+    per_rate = platform.mass_matrix(HOME) @ np.linalg.inv(platform.inverse_jacobian(HOME))
     gain = 2.0 * math.pi * 10.0
     x = gain * interval * 1e-9
     expected = deviation * gain * -math.expm1(-x) / x * math.sqrt(2.0 / (1.0 + math.exp(-x)))
@@ -261,17 +258,15 @@ def test_noise_is_bounded_however_short_the_time_between_measurements(interval: 
 
 def test_the_estimate_is_that_of_a_momentum_observer() -> None:
     """De Luca's residual, r = K (p - integral(J_inv^T f - G + r)), of the same noisy data."""
-    frictionless = HEXAPOD.replaced(
-        {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0})
+    frictionless = HEXAPOD.replaced(FRICTIONLESS)
     platform = StewartPlatform(frictionless)
     interval, many = 100_000, 10_000
     data, noise = noisy(frictionless, interval, many, 1e-4, 6)
     touched = resting(frictionless, HOME, LOAD, [0])[0].forces
     data = [each._replace(forces=touched) if 3000 <= n < 7000 else each
             for n, each in enumerate(data)]
-    mass = platform.mass_matrix(HOME)
+    mass, gravity = platform.mass_matrix(HOME), platform.gravity_vector(HOME)
     jacobian = platform.inverse_jacobian(HOME)
-    gravity = platform.gravity_vector(HOME)
     momentum = np.linalg.solve(jacobian, noise.T).T @ mass
     gain, dt = 2.0 * math.pi * 10.0, interval * 1e-9
     residual, integral, observed = np.zeros(6), np.zeros(6), []
@@ -347,8 +342,6 @@ def test_lengths_of_no_pose_are_an_error() -> None:
     for lengths in ((0.1, *at.lengths[1:]), (-1.0,) * 6, (1e300,) * 6):
         with pytest.raises((PoseError, SingularityError), match=r'lengths \['):
             step(at._replace(lengths=six(lengths)), None, NO_WRENCH, HOME.rows.tolist())
-    with pytest.raises(PoseError, match=r'did not converge: residual .* m after \d+ iterations'):
-        step(at._replace(lengths=(9.0, *at.lengths[1:])), None, NO_WRENCH, HOME.rows.tolist())
 
 
 @pytest.mark.parametrize('changed', [

@@ -52,10 +52,8 @@ HOME = Motion([0.0, 0.0, 1.1], np.eye(3))
 class Noise(NamedTuple):
     """Standard deviations of the measurements."""
 
-    rate: float = 0.0
-    """[m/s]"""
-    force: float = 0.0
-    """[N]"""
+    rate: float = 0.0  # [m/s]
+    force: float = 0.0  # [N]
 
 
 SENSORS = Noise(1e-3, 5.0)
@@ -206,8 +204,7 @@ def test_at_rest_the_interval_has_what_coulomb_friction_can_hold() -> None:
     friction = HEXAPOD['actuator.coulomb_friction']
     for sign in (-1.0, 1.0):
         payload = payload_of(recorded(at_rest, noise=Noise(), offset=0.7 * sign * friction))
-        error = payload.fitted.body.mass - TRUE[0]
-        assert abs(error) > 5.0
+        assert abs(payload.fitted.body.mass - TRUE[0]) > 5.0
         assert abs(errors(payload)[0]) < 2.0
     without = HEXAPOD.replaced({'actuator.coulomb_friction': 0.0})
     of_none = payload_of(recorded(at_rest, noise=Noise()), without)

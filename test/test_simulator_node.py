@@ -209,11 +209,9 @@ def begin(domain: int, tmp_path: Path) -> Iterator[Start]:
 
 def holding() -> list[float]:
     """Return the forces that hold the hexapod in its initial pose."""
-    plant = Plant(SimulatorParameters(GIVEN))
-    platform = StewartPlatform(plant.parameters)
-    pose = Pose(plant.state.pose[:3], np.eye(3))
-    forces: list[float] = np.linalg.solve(
-        platform.inverse_jacobian(pose).T, platform.gravity_vector(pose)).tolist()
+    home = Motion(GIVEN['initial_pose'][:3], np.eye(3))
+    forces: list[float] = StewartPlatform(SimulatorParameters(GIVEN)).inverse_dynamics(
+        home).forces.tolist()
     return forces
 
 
