@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-import gc
+from contextlib import closing, ExitStack
 import math
 from pathlib import Path
 import sys
@@ -31,13 +31,12 @@ from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValu
 from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, SetParameters, SetParametersAtomically)
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from referees import ROOT, symmetric_parameters
 from rosgraph_msgs.msg import Clock
-from running import SERVICES
+from running import Inside, Peer, SERVICES
 
 from stewart_dynamics import ParameterError, Parameters
 from stewart_dynamics.parameters.parameter_set import ParameterSet
@@ -47,58 +46,38 @@ from stewart_dynamics.reference_motion.parameters import (
 from stewart_dynamics.ros.declared_parameters import declare_parameters, log_changes
 from stewart_dynamics.ros.rclpy_workarounds import reject_impossible_times
 
-SECONDS = 30.0
-
 # Calls a node's service over ROS.
 Ask = Callable[[str, Any], Any]
 
 
 @pytest.fixture
-def declared(domain: int, monkeypatch: pytest.MonkeyPatch,
-             ) -> Iterator[Callable[..., Ask]]:
-    """Return a function that makes a node with declared parameters, and how to call it."""
-    monkeypatch.setenv('ROS_DOMAIN_ID', f'{domain}')
-    context = rclpy.Context()
-    made: list[Any] = []  # the executor, then the nodes
+def declared(domain: int) -> Iterator[Callable[..., Ask]]:
+    """Return a function that makes a node with declared parameters, and returns how to call it."""
+    with ExitStack() as stack:
+        def make(kind: type[Node], parameters: type[ParameterSet], file: str,
+                 *overrides: str) -> Ask:
+            def node() -> Node:
+                made = kind(parameters.node, allow_undeclared_parameters=True,
+                            automatically_declare_parameters_from_overrides=True)
+                declare_parameters(made, parameters)
+                return made
 
-    def make(kind: type[Node], parameters: type[ParameterSet], file: str,
-             *overrides: str, name: str = '') -> Ask:
-        arguments = ['--ros-args', '--params-file', str(ROOT / 'config' / file)]
-        arguments += [each for override in overrides for each in ('-p', override)]
-        monkeypatch.setattr(sys, 'argv', [parameters.node, *arguments])
-        rclpy.init(args=arguments, context=context)
-        executor = SingleThreadedExecutor(context=context)
-        node = kind(name or parameters.node, context=context, allow_undeclared_parameters=True,
-                    automatically_declare_parameters_from_overrides=True)
-        made.extend((executor, node))
-        declare_parameters(node, parameters)
-        asker = Node('asker', context=context, use_global_arguments=False)
-        made.append(asker)
-        executor.add_node(node)
-        executor.add_node(asker)
+            arguments = ['--ros-args', '--params-file', str(ROOT / 'config' / file)]
+            arguments += [each for override in overrides for each in ('-p', override)]
+            stack.callback(Inside(node, arguments, domain).kill)
+            peer = stack.enter_context(closing(Peer(domain)))
 
-        def ask(service: str, request: Any) -> Any:
-            client = asker.create_client(
-                SERVICES[service], f'/{parameters.node}/{service}')
-            assert client.wait_for_service(timeout_sec=SECONDS)
-            future = client.call_async(request)
-            executor.spin_until_future_complete(future, SECONDS)
-            assert future.done()
-            return future.result()
+            def ask(service: str, request: Any) -> Any:
+                client = peer.node.create_client(
+                    SERVICES[service], f'/{parameters.node}/{service}')
+                peer.until(client.service_is_ready, f'{service} is there')
+                future = client.call_async(request)
+                peer.until(future.done, f'{service} answers')
+                return future.result()
 
-        return ask
+            return ask
 
-    yield make
-    if made:
-        executor, *nodes = made
-        executor.shutdown()
-        for node in nodes:
-            node.destroy_node()
-    context.try_shutdown()
-    # Others see the nodes until the last that refers to them is gone.
-    made.clear()
-    context.destroy()
-    gc.collect()
+        yield make
 
 
 def described(ask: Ask, *names: str) -> list[ParameterDescriptor]:

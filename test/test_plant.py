@@ -503,53 +503,35 @@ def base_motion(parameters: Parameters, seed: int, scale: float = 1.0) -> Motion
     return at
 
 
-def rows_at(base: MotionOf, begin: Any, period: float, gravity: Any = GRAVITY) -> Array:
+def rows_at(base: MotionOf, begin: Any, period: float) -> Array:
     """Return the input of the plant for a period, or (..., 3, BASE) for several periods."""
     times = np.asarray(begin)[..., None] + period * np.array([0.0, 0.5, 1.0])
-    rows = BaseMotion.from_motion(base(times.ravel()), gravity).rows
-    return rows.reshape(*times.shape, -1)
+    return BaseMotion.from_motion(base(times.ravel()), GRAVITY).rows.reshape(*times.shape, -1)
 
 
-# Energy
+def end_on_base(rate: float, step: float, seconds: float, scale: float = 1.0,
+                twist: Any = ZERO) -> Array:
+    """Return the end of a run on a moving base."""
+    plant = Plant(random_simulated(6, rate=rate, step=step, gravity=GRAVITY.tolist(),
+                                   **FRICTIONLESS))
+    set_moving(plant, twist)
+    base = base_motion(plant.parameters, 9, scale)
+    for rows in rows_at(base, np.arange(round(seconds * rate)) / rate, 1.0 / rate):
+        plant.advance(ZERO, ZERO, rows)
+    return end_of(plant)
+
 
 def test_the_error_falls_with_the_fourth_power_of_the_period() -> None:
     # A violent motion of hexapod and base; a step is a period, so the base is at each stage right.
-    ends = []
-    for rate in (1000.0, 2000.0, 4000.0, 8000.0):
-        plant = Plant(random_simulated(6, rate=rate, step=1.0 / rate, gravity=GRAVITY.tolist(),
-                                       **FRICTIONLESS))
-        assert plant.steps == 1
-        base = base_motion(plant.parameters, 9, scale=3.0)
-        set_moving(plant, [2.0, -1.0, 3.0, 8.0, -5.0, 12.0])
-        for rows in rows_at(base, np.arange(round(0.2 * rate)) / rate, 1.0 / rate):
-            plant.advance(ZERO, ZERO, rows)
-        ends.append(end_of(plant))
-    assert_order(4.0, ends)
+    assert_order(4.0, [
+        end_on_base(rate, 1.0 / rate, 0.2, 3.0, [2.0, -1.0, 3.0, 8.0, -5.0, 12.0])
+        for rate in (1000.0, 2000.0, 4000.0, 8000.0)])
 
 
 def test_steps_within_a_period_follow_the_base_as_well() -> None:
     """Ten steps of a period of 10 ms come close to ten periods, the parabola being no sine."""
-    ends = []
-    for rate in (100.0, 1000.0):
-        plant = Plant(random_simulated(6, rate=rate, step=1e-3, gravity=GRAVITY.tolist(),
-                                       **FRICTIONLESS))
-        base = base_motion(plant.parameters, 9)
-        for rows in rows_at(base, np.arange(round(0.5 * rate)) / rate, 1.0 / rate):
-            plant.advance(ZERO, ZERO, rows)
-        ends.append(end_of(plant))
-    assert 0.0 < relative(ends[0], ends[1]) < 1e-6
-
-
-# Against solutions without dynamics of a moving base
-
-def followed(parameters: Any, rows: Array | None) -> PlantState:
-    """Return where it is after half a second under forces."""
-    plant = Plant(parameters)
-    for n in range(250):
-        force = 300.0 + 200.0 * np.sin(0.05 * n + np.arange(6.0))
-        plant.advance(tuple(force.tolist()), (20.0, 0.0, -30.0, 5.0, 0.0, 1.0), rows)
-    assert not plant.fault
-    return plant.state
+    tens, ones = (end_on_base(rate, 1e-3, 0.5) for rate in (100.0, 1000.0))
+    assert 0.0 < relative(tens, ones) < 1e-6
 
 
 @pytest.mark.parametrize('seed', range(3))
@@ -557,6 +539,11 @@ def test_a_constant_velocity_of_the_base_changes_nothing(seed: int) -> None:
     parameters = random_simulated(seed, gravity=GRAVITY.tolist())
     straight = Motion([0.0, 0.0, 0.0], np.eye(3), rng(seed).uniform(-10.0, 10.0, 3))
     rows = BaseMotion.from_motion(straight, GRAVITY).rows
-    for one, other in zip(followed(parameters, np.array([rows] * 3)),
-                          followed(parameters, None), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-10)
+    one, other = Plant(parameters), Plant(parameters)
+    for n in range(250):
+        force = tuple((300.0 + 200.0 * np.sin(0.05 * n + np.arange(6.0))).tolist())
+        one.advance(force, (20.0, 0.0, -30.0, 5.0, 0.0, 1.0), np.array([rows] * 3))
+        other.advance(force, (20.0, 0.0, -30.0, 5.0, 0.0, 1.0), None)
+    assert not one.fault and not other.fault
+    for of_one, of_other in zip(one.state, other.state, strict=True):
+        np.testing.assert_allclose(of_one, of_other, rtol=1e-11, atol=1e-10)
