@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 import math
 from typing import Any
@@ -24,6 +23,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 import messages
+from messages import NOW
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
@@ -39,13 +39,11 @@ from stewart_dynamics.setpoints.inputs import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, POSE, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (
-    MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE, Rejection, TOO_OLD,
-    TWICE, WRONG_FRAME)
-from stewart_dynamics.setpoints.step import Setpoint
+    MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE, TOO_OLD, TWICE,
+    WRONG_FRAME)
 
 MS = 1_000_000
 SECOND = 1000 * MS
-NOW = 1_700_000_000 * SECOND
 SOURCES = ('pose', 'motion', 'imu')
 PARAMETERS = symmetric_parameters().replaced({
     'setpoint.source': 'pose', 'base.timeout': 0.1, 'gravity': [0.3, -0.2, -9.7],
@@ -54,28 +52,12 @@ TURN = rotation_about([0.0, 0.0, 1.0], 0.3) @ rotation_about([1.0, 0.0, 0.0], 0.
 QUATERNION = Rotation.from_matrix(TURN).as_quat()
 
 
-class Feed:
-    """Setpoints on a base; notices are recorded."""
+class Feed(messages.Feed):
+    """Setpoints on a base."""
 
     def __init__(self, source: str, **given: object) -> None:
-        self.said: list[tuple[Rejection, str]] = []
-        self.notices: list[str] = []
-        self.setpoints = Setpoints(
-            PARAMETERS.replaced({'base.source': source, **{
-                name.replace('__', '.'): value for name, value in given.items()}}),
-            lambda rejection, details: self.said.append((rejection, details)),
-            self.notices.append)
-
-    def __call__(self, topic: str, data: bytes, now: int = NOW) -> Setpoint | None:
-        """Take one message as the node does."""
-        if topic in self.setpoints.base.topics:
-            self.setpoints.base.take(topic, data, lambda: now)
-            return None
-        if topic == WRENCH:
-            self.setpoints.take_wrench(data)
-            return None
-        setpoint = self.setpoints.take(topic, data, lambda: now)
-        return None if setpoint is None else self.setpoints.on_base(setpoint)
+        super().__init__(PARAMETERS.replaced({'base.source': source, **{
+            name.replace('__', '.'): value for name, value in given.items()}}))
 
     def sample(self, stamp: int, mark: float = 0.0) -> None:
         """Take good messages of all topics of the base, a mark in their numbers."""
@@ -87,12 +69,6 @@ class Feed:
         setpoint = self(POSE, messages.pose(stamp))
         assert setpoint is not None
         return setpoint.base
-
-    @property
-    def reasons(self) -> Counter[tuple[str, str]]:
-        """Return the rejections."""
-        return Counter({tuple(rejection): n
-                        for rejection, n in self.setpoints.counts.items()})  # type: ignore
 
 
 def sample(topics: Sequence[str], stamp: int, mark: float = 0.0) -> list[tuple[str, bytes]]:
@@ -253,7 +229,7 @@ def test_invalid_samples_are_rejected_and_the_last_one_holds(
     feed.sample(SECOND)
     before = feed.row(SECOND)
     feed(topic, bad(SECOND + MS))
-    assert feed.reasons == {(topic, reason): 1}
+    assert feed.counts == {(topic, reason): 1}
     assert feed.row(SECOND + 2 * MS) == before
     feed.sample(SECOND + 3 * MS)
     assert known(feed.row(SECOND + 3 * MS))
@@ -269,7 +245,7 @@ def test_the_first_frame_of_a_message_that_is_used_is_the_imus(
     for n, fields in enumerate(given):
         feed(BASE_IMU, messages.imu(SECOND + n * MS, **fields))
     assert known(feed.row(SECOND + len(given) * MS))
-    assert feed.reasons == {(BASE_IMU, reason): 1 for reason in reasons}
+    assert feed.counts == {(BASE_IMU, reason): 1 for reason in reasons}
     if WRONG_FRAME in reasons:
         assert feed.said[0][1] == "'other', must be 'imu' or empty"
 
@@ -297,7 +273,7 @@ def test_a_base_that_restarts_with_setpoints_is_followed(timeout: float) -> None
     assert not known(feed.row(SECOND))  # that of the time before the restart
     feed.sample(SECOND)
     assert known(feed.row(SECOND + MS))
-    assert not feed.reasons
+    assert not feed.counts
 
 
 def test_stamps_twice_or_back_are_rejected_and_a_jump_is_a_restart() -> None:
@@ -308,8 +284,8 @@ def test_stamps_twice_or_back_are_rejected_and_a_jump_is_a_restart() -> None:
             feed.sample(stamp)
         feed.sample(SECOND + 10 * MS)
         feed.sample(SECOND + 5 * MS)
-        assert feed.reasons[first, TWICE] == 1
-        assert feed.reasons[first, TOO_OLD] == 1
+        assert feed.counts[first, TWICE] == 1
+        assert feed.counts[first, TOO_OLD] == 1
         feed.sample(SECOND // 2, 0.5)
         assert feed.notices == ['base: stamps jumped back by 0.51 s: followed as a restart']
         assert known(feed.row(SECOND // 2))
@@ -336,7 +312,7 @@ def test_a_topic_that_is_missing_leaves_nothing_and_is_counted() -> None:
         feed(BASE_POSE, sample((BASE_POSE,), SECOND + n * MS)[0][1])
     assert feed.row(SECOND)[0] != feed.row(SECOND + MS)[0]  # nan
     feed.setpoints.end('the bag ends')
-    assert feed.reasons[BASE_POSE, NOT_JOINED] == 3
+    assert feed.counts[BASE_POSE, NOT_JOINED] == 3
 
 
 # Many at once
@@ -383,25 +359,8 @@ def recorded(source: str, fates: Sequence[str], period: int) -> list[tuple[str, 
        st.integers(1, 40), st.lists(st.integers(0, 300), max_size=4))
 def test_many_are_what_they_are_one_by_one(
         source: str, fates: Sequence[str], period: int, cuts: Sequence[int]) -> None:
-    given = recorded(source, fates, period)
-    one, many = Feed(source), Feed(source)
-    expected = [setpoint for n, (topic, data) in enumerate(given)
-                if (setpoint := one(topic, data, NOW + 1000 * n)) is not None]
-    found = []
-    edges = [0, *sorted(cut for cut in cuts if cut < len(given)), len(given)]
-    whole = messages.together(given, TOPICS, NOW)
-    for first, end in zip(edges[:-1], edges[1:], strict=True):
-        batch = many.setpoints.take_many(whole.chosen(slice(first, end)))
-        assert batch.bases is not None
-        assert batch.bases.shape == (len(batch.stamps), 12)
-        found += [Setpoint(stamp, tuple(motion), tuple(wrench), restart, tuple(base))
-                  for stamp, motion, wrench, restart, base in zip(*(
-                      part.tolist() for part in (*batch[:4], batch.bases)), strict=True)]
-    assert list(map(repr, found)) == list(map(repr, expected))
-    assert many.notices == one.notices
-    for feed in (one, many):
-        feed.setpoints.end('the bag ends')
-    assert many.reasons == one.reasons
+    messages.check_many(
+        Feed(source), Feed(source), recorded(source, fates, period), TOPICS, cuts)
 
 
 def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -411,7 +370,7 @@ def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPa
         with monkeypatch.context() as patch:
             patch.delattr(BaseInput, 'take')
             patch.delattr(Setpoints, 'take')
-            bases = [feed.setpoints.take_many(messages.together(part, TOPICS, NOW)).bases
+            bases = [feed.setpoints.take_many(messages.together(part, TOPICS)).bases
                      for part in (given[:103], given[103:])]
         assert all(map(np.any, map(np.isfinite, bases)))
         assert not feed.said

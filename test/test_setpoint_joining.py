@@ -26,7 +26,7 @@ from typing import Any
 from hypothesis import example, given
 from hypothesis import strategies as st
 import messages
-from messages import HOME, REST, UPRIGHT
+from messages import HOME, NOW, REST, UPRIGHT
 import numpy as np
 import pytest
 from referees import rng, symmetric_parameters
@@ -52,7 +52,6 @@ WRITERS: dict[str, Callable[..., bytes]] = {
 
 MS = 1_000_000
 SECOND = 1000 * MS
-NOW = 1_700_000_000 * SECOND
 NAN, INF = math.nan, math.inf
 
 
@@ -62,21 +61,18 @@ def good(topic: str, stamp: int, mark: float = 0.0) -> bytes:
     return WRITERS[topic](stamp, (mark, *values[1:]))
 
 
-class Feed:
-    """Setpoints with given parameters; messages and callbacks are recorded."""
+class Feed(messages.Feed):
+    """Setpoints with given parameters; the number of messages on each topic is kept, too."""
 
     def __init__(self, **given: object) -> None:
-        self.said: list[tuple[Rejection, str]] = []
-        self.notices: list[str] = []
+        super().__init__(
+            PARAMETERS.replaced({f'setpoint.{name}': value for name, value in given.items()}))
         self.given: Counter[str] = Counter()
-        self.setpoints = Setpoints(
-            PARAMETERS.replaced({f'setpoint.{name}': value for name, value in given.items()}),
-            lambda rejection, details: self.said.append((rejection, details)), self.notices.append)
 
-    def __call__(self, topic: str, data: bytes) -> Setpoint | None:
+    def __call__(self, topic: str, data: bytes, now: int = NOW) -> Setpoint | None:
         """Take one message."""
         self.given[topic] += 1
-        return self.setpoints.take(topic, data, lambda: NOW)
+        return super().__call__(topic, data, now)
 
     def sample(self, topic: str, stamp: int, mark: float = 0.0) -> Setpoint | None:
         """Take a good message of a topic, the mark in its first number."""
@@ -97,12 +93,6 @@ class Feed:
                 assert setpoint.motion[0] == setpoint.motion[12] == setpoint.motion[18]
                 found.append(setpoint.motion[0])
         return found
-
-    @property
-    def counts(self) -> dict[tuple[str, str], int]:
-        """Return the rejections; the callback must have got each."""
-        assert Counter(rejection for rejection, _ in self.said) == self.setpoints.counts
-        return {tuple(rejection): n for rejection, n in self.setpoints.counts.items()}
 
 
 # Joining
@@ -225,15 +215,12 @@ def _spoilt() -> list[tuple[str, bytes, str, str]]:
 def test_a_bad_message_is_rejected_and_the_good_one_used(
         topic: str, data: bytes, reason: str, words: str) -> None:
     feed = Feed(source='combined' if topic == COMBINED else 'separate')
-    if topic == WRENCH:
-        feed.setpoints.take_wrench(messages.wrench(0, (1, 2, 3, 4, 5, 6)))
-        feed.setpoints.take_wrench(data)
-        assert feed.setpoints.wrench == (1, 2, 3, 4, 5, 6)
-    else:
-        for other in feed.setpoints.topics:
-            if other != topic:
-                feed.sample(other, SECOND)
-        assert feed(topic, data) is None
+    feed(WRENCH, messages.wrench(0, (1, 2, 3, 4, 5, 6)))
+    for other in feed.setpoints.topics:
+        if other != topic:
+            feed.sample(other, SECOND)
+    assert feed(topic, data) is None
+    assert feed.setpoints.wrench == (1, 2, 3, 4, 5, 6)
     assert feed.counts == {(topic, reason): 1}
     assert re.search(words, feed.said[0][1])
     assert topic == WRENCH or feed.sample(topic, SECOND)
@@ -243,11 +230,7 @@ def test_a_bad_message_is_rejected_and_the_good_one_used(
 @pytest.mark.parametrize('topic', [*TOPICS, COMBINED, WRENCH])
 def test_the_base_frame_and_an_empty_one_are_accepted(topic: str, frame: str) -> None:
     feed = Feed(source='combined' if topic == COMBINED else 'separate')
-    data = WRITERS[topic](SECOND, frame=frame)
-    if topic == WRENCH:
-        feed.setpoints.take_wrench(data)
-    else:
-        feed(topic, data)
+    feed(topic, WRITERS[topic](SECOND, frame=frame))
     assert not feed.counts
 
 
@@ -541,37 +524,7 @@ def test_only_stamps_within_the_tolerance_are_joined(
 
 def check_many(given: Sequence[tuple[str, bytes]], cuts: Sequence[int], **options: object) -> int:
     """Check that messages give the same together and one by one; return their number."""
-    one, many = Feed(**options), Feed(**options)
-    expected, times = [], []
-    for n, (topic, data) in enumerate(given):
-        if topic == WRENCH:
-            one.setpoints.take_wrench(data)
-            continue
-        setpoint = one.setpoints.take(topic, data, lambda n=n: NOW + 1000 * n)
-        if setpoint is not None:
-            expected.append(setpoint)
-            times.append(NOW + 1000 * n)
-    found, found_times = [], []
-    edges = [0, *sorted(cut for cut in cuts if cut < len(given)), len(given)]
-    whole = messages.together(given, INPUTS, NOW)
-    for first, end in zip(edges[:-1], edges[1:], strict=True):
-        batch = many.setpoints.take_many(whole.chosen(slice(first, end)))
-        assert batch.motions.shape == (len(batch.stamps), 24)
-        assert batch.wrenches.shape == (len(batch.stamps), 6)
-        stamped = np.ones(len(batch.stamps), dtype=bool) if batch.stamped is None else (
-            batch.stamped)
-        found += [Setpoint(stamp, tuple(motion), tuple(wrench), restart, stamped=known)
-                  for stamp, motion, wrench, restart, known in zip(
-                      *(part.tolist() for part in (*batch[:4], stamped)), strict=True)]
-        found_times += batch.times.tolist()
-    # repr: the very same bits
-    assert list(map(repr, found)) == list(map(repr, expected))
-    assert found_times == times
-    assert many.notices == one.notices
-    for feed in (one, many):
-        feed.setpoints.end('the bag ends')
-    assert many.counts == one.counts
-    return len(found)
+    return messages.check_many(Feed(**options), Feed(**options), given, INPUTS, cuts)
 
 
 def stream(number: int, step: int = MS) -> list[tuple[str, bytes]]:
@@ -603,7 +556,7 @@ def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPa
     monkeypatch.delattr(SampleReader, 'read')
     given = stream(50)
     for part in (given[:61], given[61:]):
-        feed.setpoints.take_many(messages.together(part, INPUTS, NOW))
+        feed.setpoints.take_many(messages.together(part, INPUTS))
     assert not feed.counts
 
 
