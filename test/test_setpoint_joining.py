@@ -548,6 +548,7 @@ def test_many_in_order_are_what_they_are_one_by_one(cuts: Sequence[int]) -> None
     assert check_many([(topic, data) for topic, data in stream(100) if topic == POSE], cuts,
                       source='pose') == 100
     assert check_many(stream(100), cuts, sync_tolerance=1e-4) == 100
+    assert check_many([(topic, good(topic, 0)) for _ in range(3) for topic in TOPICS], cuts) == 3
 
 
 def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
