@@ -71,6 +71,7 @@ class Simulator:
     def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = (),
                  inside: bool = False) -> None:
         self.peer = Peer(domain)
+        self.until = self.peer.until
         self.raw = {topic: self.peer.listen(f'{SIMULATOR}/{topic}', kind)
                     for topic, kind in TYPES.items()}
         self.raw['clock'] = self.peer.listen('/clock', Clock)
@@ -85,14 +86,10 @@ class Simulator:
             Program([executable('stewart_simulator'), *arguments], domain, folder))
         self.peer.watched = self.program
 
-    def until(self, condition: Callable[[], Any], what: str) -> None:
-        """Take messages until a condition holds."""
-        self.peer.until(condition, what)
-
     def until_there(self) -> None:
         """Wait until both directions are connected."""
-        topics = {*TYPES, 'clock'} if self._stepped else set(TYPES)
-        self.until(lambda: all(self.raw[topic] for topic in topics)
+        self.until(lambda: all(self.raw[topic] for topic in TYPES)
+                   and (self.raw['clock'] or not self._stepped)
                    and self._commands.get_subscription_count()
                    and self._wrench.get_subscription_count(), 'the simulator is there')
 
