@@ -118,8 +118,10 @@ def begin(fresh: Start) -> Callable[..., Felt]:
 
 @pytest.fixture
 def felt(begin: Callable[..., Felt]) -> Iterator[Felt]:
-    """Return a node for this alone; it must be at work afterwards."""
+    """Return a node that has published a wrench; it must be at work afterwards."""
     each = begin('external_wrench.cutoff:=1000.0')
+    each.rest()
+    each.until_answered(each.rest())
     yield each
     assert np.all(np.isfinite(values(each.received())))
     each.node.state_of(each.node.send())
@@ -183,14 +185,12 @@ def test_thresholds_are_checked_and_can_be_changed_while_it_is_active(felt: Felt
 
 
 def test_names_in_another_order_after_the_hexapod_is_connected_again(felt: Felt) -> None:
-    last = felt.rest()
-    felt.until_answered(last := felt.rest())
     felt.disconnect()
     felt.node.until_status(STATUS, STALE, 'no wrench: measured_legs silent for ')
     felt.connect()
     felt.until_connected()
     names = ['gripper', *reversed(JOINTS)]
-    stamps = [last + n * MILLISECOND for n in range(1, 50)]
+    stamps = [felt.stamp + n * MILLISECOND for n in range(1, 50)]
     for at in resting(HEXAPOD, AT_HOME, LOAD, stamps):
         felt.publish(joint_state(at.stamp, names, *(
             [math.nan, *reversed(np.asarray(numbers).tolist())]
@@ -202,8 +202,6 @@ def test_names_in_another_order_after_the_hexapod_is_connected_again(felt: Felt)
 # Faults, as docs/faults.md has them
 
 def test_measured_legs_without_a_stamp_or_late_are_rejected(felt: Felt) -> None:
-    felt.rest()
-    felt.until_answered(felt.rest())
     many = len(felt.raw)
     for step, reason in ((-felt.stamp, 'without a stamp'), (0, 'same stamp twice'),
                          (-MILLISECOND, 'older than the last used')):
@@ -222,8 +220,6 @@ def test_measured_legs_without_a_stamp_or_late_are_rejected(felt: Felt) -> None:
 
 
 def test_measured_legs_that_stop_or_are_too_far_apart_are_reported(felt: Felt) -> None:
-    felt.rest()
-    felt.until_answered(felt.rest())
     felt.node.until_status(STATUS, STALE, 'no wrench: measured_legs silent for ')
     many = len(felt.raw)
 
@@ -239,8 +235,6 @@ def test_measured_legs_that_stop_or_are_too_far_apart_are_reported(felt: Felt) -
 
 
 def test_measured_legs_are_forgotten_at_a_deactivation(felt: Felt) -> None:
-    felt.rest()
-    felt.until_answered(felt.rest())
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
         assert felt.node.change(transition)
     many = len(felt.raw)
