@@ -23,8 +23,8 @@ import pytest
 
 from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics.frames import rotation as rotations
-from stewart_dynamics.mechanics.singularity_warning import Singularity
-from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
+from stewart_dynamics.mechanics.singularity_warning import (
+    advance, Singularity, STATE, thresholds)
 from stewart_dynamics.reference_motion.motion import motion_at, sample_time, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
@@ -247,36 +247,23 @@ def test_a_broken_rule_is_named(name: str, changes: dict[str, object], text: str
         parameters(name, **changes)
 
 
-def limits_broken(platform: StewartPlatform, result: InverseDynamics) -> set[str]:
-    p = platform.parameters
-    return {name for name, broken in {
-        'length': ((result.lengths < p['limits.length_min'])
-                   | (result.lengths > p['limits.length_max'])),
-        'velocity': np.abs(result.rates) > p['limits.velocity_max'],
-        'force': np.abs(result.forces) > p['limits.force_max'],
-    }.items() if np.any(broken)}
-
-
-def warnings(platform: StewartPlatform, result: InverseDynamics) -> list[Singularity]:
-    states = [Singularity()]
-    for sample in zip(result.determinant, result.determinant_rate, result.condition_number,
-                      strict=True):
-        states.append(states[-1].after(platform.parameters, *map(float, sample)))
-    return states[1:]
-
-
 @pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)
 def test_files_suit_the_hexapod(path: Path, platform: StewartPlatform) -> None:
-    p = ReferenceMotionParameters.from_yaml(path)
-    times = np.arange(0.0, 60.0, 0.01) if p['loop'] else sample_times(p) / 1e9
-    result = platform.inverse_dynamics(motion_at(p, times))
-    states = warnings(platform, result)
-    if path.stem == 'trajectory_singular':
-        assert limits_broken(platform, result) == {'force'}
-    else:
-        assert limits_broken(platform, result) == set()
-        assert not any(state.warning for state in states)
-        assert result.condition_number.max() < 5.0
+    motion, p = ReferenceMotionParameters.from_yaml(path), platform.parameters
+    times = np.arange(0.0, 60.0, 0.01) if motion['loop'] else sample_times(motion) / 1e9
+    result = platform.inverse_dynamics(motion_at(motion, times))
+    assert np.all(result.lengths >= p['limits.length_min'])
+    assert np.all(result.lengths <= p['limits.length_max'])
+    assert np.all(np.abs(result.rates) <= p['limits.velocity_max'])
+    singular = path.stem == 'trajectory_singular'
+    assert np.any(np.abs(result.forces) > p['limits.force_max']) == singular
+    warned, state = False, np.zeros(STATE)
+    for sample in zip(result.determinant, result.determinant_rate, result.condition_number,
+                      strict=True):
+        advance(state, thresholds(p), *sample)
+        warned |= Singularity.of(state.tolist()).warning
+    assert warned == singular
+    assert singular or result.condition_number.max() < 5.0
 
 
 def test_singular_path_crosses_once_between_8_and_9_s(platform: StewartPlatform) -> None:
