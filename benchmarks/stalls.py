@@ -29,7 +29,7 @@ import time
 import rclpy
 
 from stewart_dynamics.node.node import DynamicsNode
-from stewart_dynamics.ros.repeated_log import Series
+from stewart_dynamics.ros.repeated_log import RepeatedLog, WARNING
 
 REPEATED = 21
 REJECTION = 'setpoint/pose rejected: not finite'
@@ -54,11 +54,12 @@ def main() -> None:
     gc.unfreeze()
     rows = [('a full garbage collection', milliseconds(gc.collect), frozen)]
 
-    logger, series = node.get_logger(), Series()
-    series.add('rejected', REJECTION, 0.0)
+    logger = node.get_logger()
+    log = RepeatedLog(logger)
+    log.write([(WARNING, REJECTION, 'rejected')])
     rows.append(('a rejection in the log, while they come by the thousand',
                  milliseconds(lambda: logger.warning(REJECTION)),
-                 milliseconds(lambda: series.add('rejected', REJECTION, 1.0))))
+                 milliseconds(lambda: log.write([(WARNING, REJECTION, 'rejected')]))))
     for what, without, done in rows:
         print(f'{what}\t{without:.3f}\t{done:.3f}')
     node.destroy_node()

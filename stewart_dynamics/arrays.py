@@ -17,6 +17,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,4 +34,5 @@ Six = tuple[float, float, float, float, float, float]
 NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 SECOND = 1_000_000_000  # a second in the unit of stamps [ns]
+RPM = 30.0 / math.pi  # turns in a minute, of 1 rad/s
 NANOSECOND = 1e-9  # the unit of stamps [s]

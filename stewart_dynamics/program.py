@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 import io
@@ -34,23 +34,51 @@ from stewart_dynamics.errors import one_line, StewartError
 if TYPE_CHECKING:
     from stewart_dynamics.compilation.functions import EntryPoint
 
-DONE, BAD_INPUT, PARTLY_READ, INTERRUPTED = 0, 2, 3, 130
+DONE, STRICT, BAD_INPUT, PARTLY_READ, INTERRUPTED = 0, 1, 2, 3, 130
+NODE = '/stewart_dynamics'  # name of the node if no other is given
 SOFTWARE = f'stewart_dynamics {__version__}'  # name and version, as results have it
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Program:
-    """A program: its output and its end."""
+    """
+    A program: its output and its end.
 
-    def __init__(self, name: str) -> None:
+    bad: what ends it with BAD_INPUT, besides bad arguments.
+    strict: what ends it with STRICT if the user wants that.
+    partly: whether it can end with PARTLY_READ.
+    """
+
+    def __init__(self, name: str, bad: str, strict: str = '', partly: bool = False) -> None:
         self.name = name
+        self._bad, self._strict, self._partly = bad, strict, partly
 
-    def parser(self, description: str, epilog: str) -> argparse.ArgumentParser:
-        """Return a parser of arguments; the lines of the epilog stay."""
-        parser = argparse.ArgumentParser(prog=self.name, description=description, epilog=epilog,
-                                         formatter_class=argparse.RawDescriptionHelpFormatter)
+    def parser(self, description: str, files: str, more: str = '') -> argparse.ArgumentParser:
+        """Return a parser whose help ends with the files that are written and the exit codes."""
+        codes = {DONE: 'done', BAD_INPUT: f'bad arguments, {self._bad}',
+                 INTERRUPTED: f'interrupted{more}'}
+        if self._strict:
+            codes[STRICT] = f'with --strict, when {self._strict}'
+        if self._partly:
+            codes[PARTLY_READ] = 'part of a bag could not be read, the rest is done'
+        lines = [f'  {code:3} {what}' for code, what in sorted(codes.items())]
+        parser = argparse.ArgumentParser(
+            prog=self.name, description=description,
+            epilog='\n'.join([files, '', 'exit codes:', *lines]),
+            formatter_class=argparse.RawDescriptionHelpFormatter)
         parser.register('action', None, _StoreOnce)
         return parser
+
+    def add_results(self, parser: argparse.ArgumentParser, default: str = '') -> None:
+        """Add the options of the results: their folder, required without a default, and more."""
+        parser.add_argument('--output', type=folder, default=Path(default), metavar='DIR',
+                            required=not default,
+                            help=f'folder of the results (default: {default})' if default else
+                            'folder of the results')
+        parser.add_argument('--force', action='store_true', help='replace results that exist')
+        if self._strict:
+            parser.add_argument('--strict', action='store_true',
+                                help=f'exit code {STRICT} when {self._strict}')
 
     def prepare(self, functions: Iterable[EntryPoint], mistakes: Iterable[str]) -> None:
         """Compile functions side by side; print why that is not possible, and likely mistakes."""
@@ -84,6 +112,18 @@ class Program:
         except KeyboardInterrupt as exc:
             self.complain(f'interrupted: {exc}' if str(exc) else 'interrupted')
             return INTERRUPTED
+
+    def end(self, results: object, missing: Mapping[object, Iterable[str]], found: bool) -> int:
+        """
+        Print where the results are, and return the exit code.
+
+        missing: the parts of each bag that could not be read, by bag.
+        found: whether what gives STRICT was found, and the user wants that.
+        """
+        self.say(f'results: {results}')
+        for bag, parts in missing.items():
+            self.complain(partly_read(bag, parts))
+        return PARTLY_READ if missing else STRICT if found else DONE
 
     def say(self, text: str) -> None:
         """Print on stdout."""
@@ -197,12 +237,37 @@ def folder(text: str) -> Path:
     return Path(text)
 
 
-def add_results(parser: argparse.ArgumentParser, default: str, strict: str) -> None:
-    """Add the options of the results: their folder, and when ``--strict`` gives exit code 1."""
-    parser.add_argument('--output', type=folder, default=Path(default), metavar='DIR',
-                        help=f'folder of the results (default: {default})')
-    parser.add_argument('--force', action='store_true', help='replace results that exist')
-    parser.add_argument('--strict', action='store_true', help=f'exit code 1 when {strict}')
+def add_parameters(parser: argparse._ActionsContainer, more: str = '',
+                   required: bool = True) -> None:
+    """Add the option of the parameter file, and what it is besides."""
+    parser.add_argument('--params', required=required, type=Path, metavar='FILE',
+                        help=f'parameters of the hexapod, the file that the node takes{more}')
+
+
+def add_node(parser: argparse._ActionsContainer, more: str = '') -> None:
+    """Add the option of the node's name, and what it is besides."""
+    parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
+                        help=f'node whose parameters are read{more} (default: {NODE})')
+
+
+def add_accepted(parser: argparse._ActionsContainer) -> None:
+    """Add the option that writes results in spite of a likely mistake."""
+    parser.add_argument('--accept-mistakes', action='store_true',
+                        help='write results although a mistake is likely')
+
+
+def add_report(parser: argparse._ActionsContainer) -> None:
+    """Add the option by which no report is written."""
+    parser.add_argument('--no-report', dest='report', action='store_false',
+                        help='write no report.html')
+
+
+def names_of(text: str) -> tuple[str, ...]:
+    """Return the names that an option gives, with commas between them, each once."""
+    names = tuple(dict.fromkeys(each.strip() for each in text.split(',') if each.strip()))
+    if not names:
+        raise argparse.ArgumentTypeError('names nothing')
+    return names
 
 
 def arguments_of(given: argparse.Namespace, names: Container[str]) -> dict[str, Any]:

@@ -39,7 +39,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import main
 from stewart_dynamics.datasheet.datasheet import soft_legs
 from stewart_dynamics.datasheet.datasheet_text import (
-    between_setpoints, both_ways, down, LINEAR, motion_verdict, rated_payload, setpoints_used)
+    between_setpoints, both_ways, box_verdict, down, LINEAR, motion_verdict, rated_payload,
+    setpoints_used)
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads
@@ -395,6 +396,15 @@ def test_a_box_that_is_not_reachable_names_its_worst_displacement_or_a_singulari
                '--pose', 0, 0, 1.18, 0, 0, 0) == 0
     assert 'box not possible: singularity ' in capsys.readouterr().out
     assert json.loads((tmp_path / 'b' / 'datasheet.json').read_text())['box']['excess'] is None
+
+
+@pytest.mark.parametrize(('limit', 'text'), [
+    ('length_max', 'longest leg (leg_1) exceeded by 10.00 mm'),
+    ('leg_clearance_min', 'clearance between legs (leg_1) exceeded by 10.00 mm'),
+    ('base_joint_angle_max', 'joint angle at the base (leg_1) exceeded by 0.5729 °')])
+def test_the_excess_of_a_box_has_the_unit_of_its_limit(limit: str, text: str) -> None:
+    assert box_verdict({'possible': False, 'factor': None, 'displacement': {'x': 0.5},
+                        'limit': limit, 'leg': 'leg_1', 'excess': 0.01}) == f'{text} at x 500.0 mm'
 
 
 def test_without_limits_there_is_no_datasheet_and_ratings_without_theirs_are_left_out(

@@ -24,12 +24,9 @@ import pytest
 from referees import ROOT, symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
-from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.node.diagnostics.outcomes import (
-    PayloadDiagnostics, PlannedTrajectoryDiagnostics)
-from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, LogLine, OK, STALE, Status, StatusPart, WARN)
-from stewart_dynamics.ros.repeated_log import SECONDS, Series
+from stewart_dynamics.node.diagnostics.levels import ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
+from stewart_dynamics.ros.repeated_log import RepeatedLog, SECONDS
 from stewart_dynamics.setpoints.inputs import ACCEL, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
@@ -72,12 +69,12 @@ def status(diagnostics: DynamicsDiagnostics, name: str, now: float) -> Status:
 
 
 def report(diagnostics: DynamicsDiagnostics, now: float) -> list[Status]:
-    return diagnostics.report.make(now)[0]
+    return diagnostics.report(now)[0]
 
 
 def logged(diagnostics: DynamicsDiagnostics, now: float) -> list[tuple[int, str]]:
     """Return levels and texts that a report gives to the log."""
-    return [(level, text) for level, text, _ in diagnostics.report.make(now)[1]]
+    return [(level, text) for level, text, _ in diagnostics.report(now)[1]]
 
 
 # Silence
@@ -217,19 +214,28 @@ def test_rejections_are_counted_with_their_reason_and_are_a_warning() -> None:
 
 def test_another_node_of_the_same_name_is_logged_once() -> None:
     diagnostics = begun()
-    logged = []
-    for namesakes in (1, 2, 2, 3, 1, 2):
+    lines = []
+    for namesakes in ('', '2 nodes', '2 nodes', '3 nodes', '', '2 nodes'):
         answered(diagnostics, BEGIN)
-        diagnostics.setpoints.found({}, {}, '/node', namesakes)
-        logged += diagnostics.setpoints.log_lines(BEGIN)
-    assert logged == 2 * [LogLine(WARN, 'setpoints: 2 nodes are named /node')]
+        diagnostics.setpoints.found({}, {}, namesakes)
+        lines += logged(diagnostics, BEGIN)
+    assert lines == 2 * [(WARN, 'setpoints: 2 nodes')]
+
+
+def test_another_writer_is_an_error_as_long_as_it_is_there() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN)
+    for writers, level in ((1, OK), (2, ERROR), (1, OK)):
+        diagnostics.setpoints.found_writers(POSE, writers)
+        assert diagnostics.setpoints.level(BEGIN) == level
 
 
 def test_an_error_is_not_hidden_by_silence_and_both_are_stated() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
-    diagnostics.setpoints.found(dict.fromkeys(TOPICS, 2), {}, '/node', 1)
+    diagnostics.setpoints.found(dict.fromkeys(TOPICS, 2), {'leg_states': 3}, '')
     of = status(diagnostics, 'setpoints', BEGIN + 3.0)
+    assert dict(of.values)['leg_states: readers'] == '3'
     assert of.level == ERROR
     assert of.message == (
         f'{POSE} has 2 writers, {TWIST} has 2 writers, {ACCEL} has 2 writers, no setpoint: '
@@ -250,13 +256,13 @@ def test_the_status_names_the_rejection_if_all_messages_are_rejected() -> None:
 def test_processing_times_are_those_of_the_last_seconds() -> None:
     diagnostics = begun()
     assert status(diagnostics, 'timing', BEGIN)[1:] == (
-        OK, 'no setpoint yet', (('dropped', '0'), ('incomplete', '0')))
+        OK, 'no setpoint yet', [('dropped', '0'), ('incomplete', '0')])
     for took in (100e-6, 900e-6, 200e-6):
         answered(diagnostics, BEGIN, took=took)
     of = status(diagnostics, 'timing', BEGIN)
     assert (of.level, of.message) == (OK, 'on time')
-    assert of.values[:2] == (
-        ('processing time, median (us)', '200'), ('processing time, largest (us)', '900'))
+    assert of.values[:2] == [
+        ('processing time, median (us)', '200'), ('processing time, largest (us)', '900')]
     for second in (1.0, 2.0, 3.0):
         answered(diagnostics, BEGIN + second, took=50e-6)
         of = status(diagnostics, 'timing', BEGIN + second)
@@ -278,7 +284,7 @@ def test_a_backlog_is_a_warning_for_a_second_and_its_losses_stay_counted() -> No
     answered(diagnostics, BEGIN + 1.5)
     of = status(diagnostics, 'timing', BEGIN + 1.5)
     assert (of.level, of.message) == (OK, 'on time')
-    assert of.values[-2:] == (('dropped', '3'), ('incomplete', '1'))
+    assert of.values[-2:] == [('dropped', '3'), ('incomplete', '1')]
 
 
 def test_the_age_of_the_last_setpoint_is_stated() -> None:
@@ -342,6 +348,8 @@ def test_a_warning_states_its_reason_with_its_own_numbers(
     assert (of.level, of.message) == (WARN, message)
     assert dict(of.values)['time to crossing (s)'] == f'{time:.3f}'
     assert dict(of.values)['crossings'] == '4'
+    answered(diagnostics, BEGIN + 2.0)
+    assert logged(diagnostics, BEGIN + 2.0) == [(OK, 'singularity: clear')]
 
 
 def near(condition: float, stamp: int = 0) -> Output:
@@ -427,7 +435,9 @@ def test_the_worst_condition_is_kept_for_a_second_or_two() -> None:
     assert dict(status(diagnostics, 'singularity', BEGIN).values)[key] == '40'
     for second, worst in ((1.0, '40'), (2.0, '40'), (3.0, '4')):
         answered(diagnostics, BEGIN + second, CLEAR._replace(condition=4.0))
-        assert dict(status(diagnostics, 'singularity', BEGIN + second).values)[key] == worst
+        values = dict(status(diagnostics, 'singularity', BEGIN + second).values)
+        assert values[key] == worst
+        assert values['worst condition number since activation'] == '40'
 
 
 # Limits
@@ -442,14 +452,6 @@ def test_held_limits_are_ok() -> None:
         assert values[f'{name}: length (m)'] == f'{CLEAR.lengths[leg]:.6g}'
         assert values[f'{name}: rate (m/s)'] == f'{CLEAR.rates[leg]:.6g}'
         assert values[f'{name}: force demanded (N)'] == f'{CLEAR.demanded_forces[leg]:.6g}'
-
-
-def test_an_exceeded_limit_is_an_error_with_the_excess() -> None:
-    diagnostics = begun()
-    excess = Exceedance('limits.length_max', 1, 1.75, 1.5)
-    answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(excess,)))
-    of = status(diagnostics, 'limits', BEGIN)
-    assert (of.level, of.message) == (ERROR, excess.words(PARAMETERS['joints']))
 
 
 @pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
@@ -467,7 +469,7 @@ def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
     assert output is not None
     diagnostics = begun(limits__action=action, **limits)
     answered(diagnostics, BEGIN, output)
-    lines = [line.text for line in diagnostics.report.make(BEGIN)[1]]
+    lines = [line.text for line in diagnostics.report(BEGIN)[1]]
     of = status(diagnostics, 'limits', BEGIN)
     assert of.level == ERROR
     suppressed = '; forces suppressed' if action == 'suppress_forces' else ''
@@ -546,20 +548,34 @@ def test_a_level_holds_for_a_second_after_its_cause() -> None:
 
 def test_a_change_of_level_is_pending_until_it_is_reported() -> None:
     diagnostics = begun()
-    diagnostics.report.make(BEGIN)
-    assert not diagnostics.report.level_changed(BEGIN)
+    diagnostics.report(BEGIN)
+    assert not diagnostics.level_changed(BEGIN)
     assert answered(diagnostics, BEGIN)  # from stale to ok
-    assert diagnostics.report.level_changed(BEGIN)
-    diagnostics.report.make(BEGIN)
+    assert diagnostics.level_changed(BEGIN)
+    diagnostics.report(BEGIN)
     assert not answered(diagnostics, BEGIN + 0.01)
     diagnostics.rejected(Rejection(POSE, TWICE), '', BEGIN + 0.01)
-    assert diagnostics.report.level_changed(BEGIN + 0.01)
-    diagnostics.report.make(BEGIN + 0.01)
+    assert diagnostics.level_changed(BEGIN + 0.01)
+    diagnostics.report(BEGIN + 0.01)
     assert not answered(diagnostics, BEGIN + 0.02)
     assert answered(diagnostics, BEGIN + 0.03, output_of(QUARTER))
-    diagnostics.report.make(BEGIN + 0.03)
-    assert not diagnostics.report.level_changed(BEGIN + 0.04)
-    assert diagnostics.report.level_changed(BEGIN + 0.14)  # stale
+    diagnostics.report(BEGIN + 0.03)
+    assert not diagnostics.level_changed(BEGIN + 0.04)
+    assert diagnostics.level_changed(BEGIN + 0.14)  # stale
+
+
+def test_a_report_is_due_each_second_while_setpoints_are_answered_after_an_answer() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN)
+    diagnostics.report(BEGIN)
+    for n in range(1, 100):
+        assert not answered(diagnostics, BEGIN + 0.01 * n)
+    assert not diagnostics.due_at_tick(BEGIN + 1.02)
+    assert diagnostics.due_at_tick(BEGIN + 1.05)
+    assert answered(diagnostics, BEGIN + 1.0)
+    diagnostics.report(BEGIN + 2.0)  # no setpoint
+    assert not diagnostics.due_at_tick(BEGIN + 2.97)
+    assert diagnostics.due_at_tick(BEGIN + 2.98)  # half a tick early
 
 
 # Every value
@@ -605,7 +621,7 @@ def test_every_value_is_finite_and_every_key_has_its_unit(
         else:
             answered(diagnostics, now, output)
             state = output.state
-        diagnostics.setpoints.found({POSE: 2}, {'leg_states': 1}, '/node', 1)
+        diagnostics.setpoints.found({POSE: 2}, {'leg_states': 1}, '')
         _check_values(diagnostics, now)
 
 
@@ -628,46 +644,58 @@ def test_a_level_lasts_as_long_as_the_output_that_caused_it() -> None:
 
 # The log lines of repeated events
 
+class Log:
+    """A log at chosen times, and what it has written."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.lines: list[str] = []
+        self.log = RepeatedLog(self, lambda: self.now)
+
+    def warning(self, text: str) -> None:
+        """Take a line, as the logger of a node does."""
+        self.lines.append(text)
+
+    def add(self, text: str, now: float, kind: str = 'a') -> None:
+        """Let one more event happen."""
+        self.now = now
+        self.log.write([(WARN, text, kind)])
+
+
 def test_the_first_is_logged_at_once_and_the_last_when_the_series_ends() -> None:
-    series = Series()
-    assert series.add('a', 'one', 0.0) == 'one'
-    assert series.add('a', 'two', 1.0) is None
-    assert series.add('a', 'three', 2.0) is None
-    assert series.over(2.0 + 0.99 * SECONDS) == []
-    assert series.over(2.0 + SECONDS) == ['three (the last of 3)']
-    assert series.over(100.0) == []
-    assert series.add('a', 'anew', 101.0) == 'anew'
+    of = Log()
+    of.add('one', 0.0)
+    assert of.lines == ['one']
+    of.add('two', 1.0)
+    of.add('three', 2.0)
+    of.log.write_last(2.0 + 0.99 * SECONDS)
+    assert of.lines == ['one']
+    of.log.write_last(2.0 + SECONDS)
+    of.log.write_last()
+    of.add('anew', 101.0)
+    assert of.lines == ['one', 'three (the last of 3)', 'anew']
 
 
 def test_frequent_events_are_logged_every_five_seconds_with_their_number() -> None:
-    series = Series()
-    lines = [(n, line) for n in range(101)
-             if (line := series.add('a', f'number {n}', 0.1 * n)) is not None]
-    assert lines == [(0, 'number 0'), (50, 'number 50 (and 49 before it)'),
-                     (100, 'number 100 (and 49 before it)')]
-    # the last one has been logged
-    assert series.over(100.0) == []
-
-
-def test_two_in_a_series_that_are_far_apart_are_both_logged() -> None:
-    series = Series()
-    assert series.add('a', 'one', 0.0) == 'one'
-    assert series.add('a', 'two', SECONDS) == 'two'
+    of = Log()
+    for n in range(101):
+        of.add(f'number {n}', 0.1 * n)
+    of.log.write_last()  # the last one has been logged
+    assert of.lines == ['number 0', 'number 50 (and 49 before it)',
+                        'number 100 (and 49 before it)']
 
 
 @given(st.lists(st.tuples(st.sampled_from('ab'), st.floats(0.0, 4.0)), min_size=1))
 def test_first_and_last_are_logged_and_none_is_lost(events: list[tuple[str, float]]) -> None:
-    series, now = Series(), 0.0
-    said: list[str] = []
+    of, now = Log(), 0.0
     for n, (kind, pause) in enumerate(events):
         now += pause
-        said += series.over(now)
-        line = series.add(kind, f'{kind} {n}.', now)
-        said += [line] if line is not None else []
-    said += series.over(now + 2.0 * SECONDS)
+        of.log.write_last(now)
+        of.add(f'{kind} {n}.', now, kind)
+    of.log.write_last()
     for kind in {kind for kind, _ in events}:
-        own = [n for n, (of, _) in enumerate(events) if of == kind]
-        lines = [line for line in said if line.startswith(kind)]
+        own = [n for n, (each, _) in enumerate(events) if each == kind]
+        lines = [line for line in of.lines if line.startswith(kind)]
         assert lines[0] == f'{kind} {own[0]}.'
         assert lines[-1].startswith(f'{kind} {own[-1]}.')
 
@@ -675,6 +703,5 @@ def test_first_and_last_are_logged_and_none_is_lost(events: list[tuple[str, floa
 def test_the_page_of_the_node_names_each_status() -> None:
     page = (ROOT / 'docs/node.md').read_text(encoding='utf-8')
     table = page.partition('| status | contents |')[2].partition('\n\n')[0]
-    parts = [*StatusPart.__subclasses__(), PayloadDiagnostics, PlannedTrajectoryDiagnostics]
     assert set(re.findall(r'^\| ([a-z ]+) \|', table, re.MULTILINE)) == {
-        part.name for part in parts if part.name}
+        part.name for part in begun().parts}

@@ -42,14 +42,18 @@ from stewart_dynamics.export.c_project import (
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS, hexapod_constants
+from stewart_dynamics.mechanics.frames.motion import ORTHOGONALITY
 from stewart_dynamics.mechanics.frames.rotation import (
     from_euler, from_quaternion, quaternion_length)
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
-from stewart_dynamics.mechanics.limits import JUMP, LIMITS
+from stewart_dynamics.mechanics.limits import JITTER, JUMP, LIMITS, TOLERANCE
+from stewart_dynamics.mechanics.matrix6 import SMALLEST_PIVOT
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, DETERMINANT, FORCES, LENGTHS, MOTION, NO_BASE, RESULT, UNIT_LOAD_FORCES,
     WRENCH)
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import OUTLINES
+from stewart_dynamics.parameters.tolerances import HYSTERESIS, QUATERNION_TOLERANCE
 from stewart_dynamics.setpoints.step import Setpoint, Step
 from test_drives import driven
 
@@ -441,6 +445,16 @@ def test_the_source_is_short_and_needs_math_alone() -> None:
     assert sum(text.count('\n') for text in texts) < 900
     assert all(len(line) < 100 for text in texts for line in text.splitlines())
     assert set(re.findall('#include <(.*)>', ''.join(texts))) == {'math.h', 'stddef.h', 'stdint.h'}
+
+
+def test_tolerances_are_those_of_the_library() -> None:
+    source = (FOLDER / 'stewart_dynamics.c').read_text()
+    found = {name: float(value) for name, value in re.findall(
+        r'^#define ([A-Z_]+) ([0-9.e-]+)\b', source, re.MULTILINE)}
+    assert found.items() >= {
+        'SMALLEST_PIVOT': SMALLEST_PIVOT, 'UNSOLVABLE_CONDITION': UNSOLVABLE_CONDITION,
+        'ORTHOGONALITY': ORTHOGONALITY, 'QUATERNION_TOLERANCE': QUATERNION_TOLERANCE,
+        'LIMIT_TOLERANCE': TOLERANCE, 'HYSTERESIS': HYSTERESIS, 'JITTER': JITTER}.items()
 
 
 @needs_compiler

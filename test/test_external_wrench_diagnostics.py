@@ -25,9 +25,10 @@ from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS
-from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.node.diagnostics.external_wrench import ExternalWrenchDiagnostics
-from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.node.diagnostics.levels import (
+    ERROR, NEVER, OK, STALE, Status, StatusPart, WARN)
+from stewart_dynamics.node.diagnostics.outcomes import ExternalWrenchDiagnostics
+from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import NOT_MEASURED, Rejection, Rejections
@@ -51,17 +52,22 @@ CLEAR = found()
 OVER = found(force_max=300.0, moment_max=100.0)
 
 
-def felt(diagnostics: ExternalWrenchDiagnostics, now: float, estimate: Estimate = CLEAR) -> bool:
+def felt(diagnostics: ExternalWrenchDiagnostics, now: float, estimate: Estimate = CLEAR) -> None:
     diagnostics.heard(now)
-    return diagnostics.estimated(estimate, TARGET, now)
+    diagnostics.estimated(estimate, TARGET, now)
 
 
-def status(diagnostics: ExternalWrenchDiagnostics, now: float) -> Status:
-    only = diagnostics.status(now)
+def status(part: StatusPart, now: float) -> Status:
+    """Return the status of a part, whose level is the one that is judged after each answer."""
+    only = part.status(now)
     assert only is not None
-    assert only.name == 'external wrench'
-    assert only.level == diagnostics.level(now)
+    assert only.name == part.name
+    assert only.level == part.level(now)
     return only
+
+
+def logged(part: StatusPart, now: float) -> list[tuple[int, str]]:
+    return [(level, text) for level, text, _ in part.log_lines(status(part, now), now)]
 
 
 def test_the_status_exists_after_the_first_measurement() -> None:
@@ -74,22 +80,21 @@ def test_the_status_exists_after_the_first_measurement() -> None:
 
 def test_the_age_is_that_of_the_last_measurement_in_use() -> None:
     diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
-    assert diagnostics.age(5.0) == np.inf
+    assert (diagnostics.heard_at, diagnostics.used_at) == (NEVER, NEVER)
     felt(diagnostics, 6.0, FIRST)  # without a wrench, but with a pose
     diagnostics.heard(6.5)  # and rejected
-    assert diagnostics.silence(7.0) == 0.5
-    assert diagnostics.age(7.0) == 1.0
+    assert (diagnostics.heard_at, diagnostics.used_at) == (6.5, 6.0)
 
 
 def test_the_status_of_the_wrench_is_the_last() -> None:
     diagnostics = DynamicsDiagnostics(HEXAPOD, ('setpoint/pose',), (), 0.0)
     names = ['setpoints', 'singularity', 'limits', 'timing']
-    assert [each.name for each in diagnostics.report.make(0.0)[0]] == names
-    assert not diagnostics.report.level_changed(0.0)
+    assert [each.name for each in diagnostics.report(0.0)[0]] == names
+    assert not diagnostics.level_changed(0.0)
     felt(diagnostics.external_wrench, 0.1, OVER)
-    assert diagnostics.report.level_changed(0.1)
-    assert [each.name for each in diagnostics.report.make(0.1)[0]] == [*names, 'external wrench']
-    assert not diagnostics.report.level_changed(0.1)
+    assert diagnostics.level_changed(0.1)
+    assert [each.name for each in diagnostics.report(0.1)[0]] == [*names, 'external wrench']
+    assert not diagnostics.level_changed(0.1)
 
 
 def test_the_status_has_force_and_moment() -> None:
@@ -130,18 +135,18 @@ def test_how_far_it_is_from_the_setpoint(angle: float) -> None:
 
 def test_an_overload_is_an_error_and_held_for_a_second() -> None:
     diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
-    assert not felt(diagnostics, 1.0)
+    felt(diagnostics, 1.0)
     assert status(diagnostics, 1.0).level == OK
-    assert felt(diagnostics, 1.01, OVER)
+    felt(diagnostics, 1.01, OVER)
     now = status(diagnostics, 1.01)
     assert now.level == ERROR
     assert now.message == (
         f'force {OVER.force:.6g} N is {OVER.force - 300.0:.6g} N above '
         f'external_wrench.force_max, moment {OVER.moment:.6g} N m is '
         f'{OVER.moment - 100.0:.6g} N m above external_wrench.moment_max')
-    assert not felt(diagnostics, 1.5)
+    felt(diagnostics, 1.5)
     assert status(diagnostics, 1.5).level == ERROR
-    assert felt(diagnostics, 2.02)
+    felt(diagnostics, 2.02)
     assert status(diagnostics, 2.02).level == OK
 
 
@@ -151,7 +156,7 @@ def test_silence_is_stale() -> None:
     assert status(diagnostics, 1.09).level == OK
     now = status(diagnostics, 3.5)
     assert (now.level, now.message) == (STALE, 'no wrench: measured_legs silent for 2.5 s')
-    assert felt(diagnostics, 4.0)
+    felt(diagnostics, 4.0)
     assert status(diagnostics, 4.0).level == OK
 
 
@@ -174,7 +179,7 @@ def test_a_rejection_is_reported_and_counted() -> None:
     assert (now.level, now.message) == (
         WARN, 'measured_legs: lacks one of the joints (leg_6)')
     assert dict(now.values)['rejected, measured_legs: lacks one of the joints'] == '1'
-    assert [(level, text) for level, text, _ in diagnostics.log_lines(1.02)] == [
+    assert logged(diagnostics, 1.02) == [
         (WARN, 'external wrench: measured_legs: lacks one of the joints (leg_6)')]
     for n in range(10):
         diagnostics.heard(1.1 + 0.1 * n)
@@ -221,23 +226,13 @@ def setpoint(known: bool) -> Setpoint:
 
 def state(of: DynamicsDiagnostics, now: float) -> tuple[int, str]:
     """Return level and words of the status."""
-    status = of.base.status(now)
-    assert status is not None
-    assert of.base.level(now) == status.level
-    return status.level, status.message
-
-
-def values(status: Status | None) -> dict[str, str]:
-    """Return keys and values."""
-    assert status is not None
-    return dict(status.values)
+    return status(of.base, now)[1:3]
 
 
 def test_a_fixed_base_has_no_status() -> None:
     of = diagnostics()
     assert of.base.status(START) is None
     assert of.base.level(START + 100.0) == OK
-    assert of.base.log_lines(START + 100.0) == []
 
 
 def test_missing_topics_are_named() -> None:
@@ -245,33 +240,33 @@ def test_missing_topics_are_named() -> None:
     assert state(of, START) == (ERROR, 'no forces: base/pose never came, base/twist never came, '
                                 'base/accel never came')
     for topic in (BASE_POSE, BASE_TWIST, BASE_ACCEL):
-        of.base.heard(topic, START + 1.0)
+        of.base.heard[topic] = START + 1.0
     assert state(of, START + 1.05) == (
         ERROR, 'no forces: its topics arrive, but are not joined: their stamps differ')
     of.base.sampled(base_with_a_sample(), START + 1.06)
     assert state(of, START + 1.1) == (OK, 'its motion is known')
-    of.base.heard(BASE_POSE, START + 3.0)
+    of.base.heard[BASE_POSE] = START + 3.0
     assert state(of, START + 3.05) == (
         ERROR, 'no forces: base/twist silent for 2.0 s, base/accel silent for 2.0 s')
 
 
 def test_base_stamps_that_differ_from_those_of_setpoints_are_reported() -> None:
     of = diagnostics(BASE_IMU)
-    of.base.heard(BASE_IMU, START)
+    of.base.heard[BASE_IMU] = START
     of.base.sampled(base_with_a_sample(), START)
     of.base.answered(setpoint(known=False), START + 0.01)
     why = 'no forces: the stamps of the base and of setpoints differ by more than base.timeout, ' \
         '0.1 s'
     assert state(of, START + 0.02) == (ERROR, why)
-    assert [line.text for line in of.base.log_lines(START + 0.02)] == [f'base: {why}']
-    assert of.base.log_lines(START + 0.03) == []
+    assert logged(of.base, START + 0.02) == [(ERROR, f'base: {why}')]
+    assert logged(of.base, START + 0.03) == []
     of.base.answered(setpoint(known=True), START + 0.05)
     assert state(of, START + 0.06)[0] == ERROR  # for a second
-    of.base.heard(BASE_IMU, START + 1.05)
+    of.base.heard[BASE_IMU] = START + 1.05
     of.base.sampled(base_with_a_sample(), START + 1.05)
     assert state(of, START + 1.06) == (OK, 'its motion is known')
-    assert [line.text for line in of.base.log_lines(START + 1.06)] == ['base: its motion is known']
-    assert values(of.base.status(START + 1.06))[
+    assert logged(of.base, START + 1.06) == [(OK, 'base: its motion is known')]
+    assert dict(status(of.base, START + 1.06).values)[
         'setpoints without forces, as the base was not known'] == '1'
 
 
@@ -280,36 +275,36 @@ def test_a_base_that_comes_after_the_last_setpoint_is_known_within_a_second() ->
     of.base.answered(setpoint(known=False), START)
     assert state(of, START + 0.01) == (ERROR, 'no forces: base/imu never came')
     for n in range(120):
-        of.base.heard(BASE_IMU, START + 0.01 * n)
+        of.base.heard[BASE_IMU] = START + 0.01 * n
         of.base.sampled(base_with_a_sample(), START + 0.01 * n)
     assert state(of, START + 1.2) == (OK, 'its motion is known')
 
 
 def test_before_anything_has_come_nothing_is_logged() -> None:
     of = diagnostics(BASE_IMU)
-    assert of.base.log_lines(START + 10.0) == []
+    assert logged(of.base, START + 10.0) == []
     of.base.answered(setpoint(known=False), START + 10.0)
-    assert [line.level for line in of.base.log_lines(START + 10.0)] == [ERROR]
+    assert [level for level, _ in logged(of.base, START + 10.0)] == [ERROR]
 
 
 def test_rejections_of_the_base_are_counted_here() -> None:
     of = diagnostics(BASE_IMU)
-    of.base.heard(BASE_IMU, START)
+    of.base.heard[BASE_IMU] = START
     of.base.sampled(base_with_a_sample(), START)
     rejection = Rejection(BASE_IMU, NOT_MEASURED)
     for _ in range(2):
         of.rejected(rejection, 'why', START + 0.01)
     assert state(of, START + 0.02) == (WARN, 'base/imu: not measured (why)')
-    assert of.base.log_lines(START + 0.02) == []  # each is logged by itself
-    assert values(of.base.status(START + 0.02))['rejected, base/imu: not measured'] == '2'
-    assert 'rejected, base/imu: not measured' not in values(of.setpoints.status(START + 0.02))
+    assert logged(of.base, START + 0.02) == []  # each is logged by itself
+    assert dict(status(of.base, START + 0.02).values)['rejected, base/imu: not measured'] == '2'
+    assert not any('rejected' in key for key, _ in status(of.setpoints, START + 0.02).values)
 
 
 def test_the_numbers_of_the_last_sample_have_their_units() -> None:
     of = diagnostics(BASE_IMU)
-    of.base.heard(BASE_IMU, START)
+    of.base.heard[BASE_IMU] = START
     of.base.sampled(base_with_a_sample(), START)
-    found = values(of.base.status(START + 0.05))
+    found = dict(status(of.base, START + 0.05).values)
     assert found['gravity z (m/s^2)'] == '-9.80665'
     assert found['angular velocity x (rad/s)'] == '0.25'
     assert found['angular acceleration y (rad/s^2)'] == '0'

@@ -207,7 +207,7 @@ def test_windows_end_at_gaps(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('options', 'named'), [
-    (('--measured', '/other'), 'has no topic /other; of type sensor_msgs/msg/JointState it has '),
+    (('--measured', '/other'), 'has no topic /other; it contains '),
     (('--cutoff', '0.5'), 'nothing to identify from: 500 samples, of which no'),
     (('--identify', 'mass,colour'), "'colour': cannot be identified"),
     (('--motor-torque',), 'actuator.screw_lead: has no value'),

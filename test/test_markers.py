@@ -35,7 +35,7 @@ from stewart_dynamics import Parameters, Pose, StewartPlatform  # noqa: E402
 from stewart_dynamics.arrays import SECOND  # noqa: E402
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.node import markers as module  # noqa: E402
-from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, WARN  # noqa: E402
+from stewart_dynamics.node.diagnostics.levels import ERROR, OK, WARN  # noqa: E402
 from stewart_dynamics.node.markers import Markers  # noqa: E402
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402

@@ -195,7 +195,9 @@ def test_only_mass_and_horizontal_center_are_identified_at_rest() -> None:
     assert f'; not identified, as in the parameters: {", ".join(NAMES[3:])}; ' in outcome.message
     assert ', 0.12], inertia: [13.0, 0.3, -0.4, 14.0, 0.2, 22.0]' in outcome.message
     diagnostics.done(outcome, 0.1)
-    assert dict(diagnostics.values(0.0) or ())[
+    status = diagnostics.status(0.0)
+    assert status is not None
+    assert dict(status.values)[
         'inertia izz, half of the 95 % interval (kg m^2)'] == 'not identified'
 
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 import math
 from typing import Any
@@ -31,9 +31,8 @@ from stewart_dynamics import (
     BaseMotion, check_planned_trajectory, Motion, Parameters, StewartPlatform)
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.compilation.functions import Preparation
-from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.node.diagnostics.outcomes import PlannedTrajectoryDiagnostics
-from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
+from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, OK, WARN
+from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.node.tasks import LENGTH, TaskQueue
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
 from stewart_dynamics.planned.messages import PlannedOutcome
@@ -362,17 +361,26 @@ class Timed:
         self.running = False
         self.pieces: list[str] = []
         self.done: list[tuple[str, float]] = []
-        self.queue = TaskQueue(
-            self._start, Preparation(),
+        self.queue: TaskQueue[PlannedOutcome] = TaskQueue(
+            self._timer, Preparation(),
             lambda outcome, came: self.done.append((outcome.message, came)))
 
-    def _start(self) -> None:
+    def _timer(self, callback: Callable[[], None]) -> Any:
+        self._callback = callback
+        return self
+
+    def start(self) -> None:
+        """Start the timer."""
         self.running = True
 
-    def tick(self) -> None:
-        """Tick, as the timer does once after each start."""
+    def stop(self) -> None:
+        """Stop the timer."""
         self.running = False
-        self.queue.tick()
+
+    def tick(self) -> None:
+        """Call back, as the timer does once after each start."""
+        self.running = False
+        self._callback()
 
     def work(self, name: str, pieces: int = 2) -> Iterator[PlannedOutcome | None]:
         """Yield None after each piece, and the outcome at the end."""
@@ -416,7 +424,7 @@ def test_dropped_trajectories_are_counted_and_not_continued() -> None:
         timed.queue.add(timed.work(name), 0.0)
     timed.tick()
     assert timed.queue.drop() == 2
-    timed.tick()  # the timer may be due already
+    assert timed.queue.empty
     assert timed.pieces == ['first']
     assert not timed.done
     assert not timed.running
@@ -429,30 +437,38 @@ ACCEPTED = PlannedOutcome('accepted: 2 points', answer=b'1')
 REJECTED = PlannedOutcome('rejected: x', 'why', values=(('points', '3'),))
 
 
+def diagnostics() -> DynamicsDiagnostics:
+    return DynamicsDiagnostics(PARAMETERS, ['setpoint/pose'], (), BEGIN)
+
+
+def logged(of: DynamicsDiagnostics) -> list[LogLine]:
+    return [line for line in of.report(BEGIN)[1] if line.text.startswith('planned')]
+
+
 def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
-    diagnostics = DynamicsDiagnostics(PARAMETERS, ['setpoint/pose'], (), BEGIN)
-    report, planned = diagnostics.report, diagnostics.planned_trajectory
-    assert [each.name for each in report.make(BEGIN)[0]][-1] == 'timing'
+    of = diagnostics()
+    planned = of.planned_trajectory
+    assert [each.name for each in of.report(BEGIN)[0]][-1] == 'timing'
     planned.done(ACCEPTED, 0.25)
-    assert report.make(BEGIN)[0][-1] == ('planned trajectory', OK, 'accepted: 2 points', (
-        ('accepted', '1'), ('rejected', '0'), ('time it took (s)', '0.250')))
-    assert not report.level_changed(BEGIN)
+    assert of.report(BEGIN)[0][-1] == ('planned trajectory', OK, 'accepted: 2 points', [
+        ('accepted', '1'), ('rejected', '0'), ('time it took (s)', '0.250')])
+    assert not of.level_changed(BEGIN)
     planned.done(REJECTED, 0.1)
-    assert report.level_changed(BEGIN)
+    assert of.level_changed(BEGIN)
     # It lasts until the next.
     for now in (BEGIN, BEGIN + 100.0):
-        status = report.make(now)[0][-1]
+        status = of.report(now)[0][-1]
         assert status.name == 'planned trajectory'
         assert status.level == ERROR
         assert dict(status.values) == {
             'accepted': '1', 'rejected': '1', 'rejected: why': '1', 'points': '3',
             'time it took (s)': '0.100'}
     planned.done(ACCEPTED._replace(warning=True), 0.1)
-    assert report.make(BEGIN)[0][-1].level == WARN
+    assert of.report(BEGIN)[0][-1].level == WARN
 
 
 def test_each_rejection_is_logged_and_what_took_long_and_of_others_the_changes() -> None:
-    planned = PlannedTrajectoryDiagnostics()
+    of = diagnostics()
     warned = ACCEPTED._replace(warning=True)
     text = 'planned trajectory: accepted: 2 points'
     rejected = LogLine(ERROR, 'planned trajectory rejected: x', 'why')
@@ -465,5 +481,5 @@ def test_each_rejection_is_logged_and_what_took_long_and_of_others_the_changes()
              [LogLine(OK, f'{text} (took 2.1 s)'), LogLine(OK, f'{text} (took 3.0 s)'),
               LogLine(ERROR, 'planned trajectory rejected: x (took 4.0 s)', 'why')])):
         for outcome, seconds in outcomes:
-            planned.done(outcome, seconds)
-        assert planned.log_lines(BEGIN) == lines
+            of.planned_trajectory.done(outcome, seconds)
+        assert logged(of) == lines

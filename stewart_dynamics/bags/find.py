@@ -29,11 +29,18 @@ from stewart_dynamics.parameters.yaml_file import read_document
 # Suffixes of the files of a bag, also of files compressed as a whole.
 STORAGES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd', '.bag')
 METADATA = 'metadata.yaml'
+# In a folder of results of a replay: the file by which it is known, and the output bag.
+RESULT, OUTPUT_BAG = 'summary.json', 'bag'
 _LARGEST_METADATA = 1_000_000
 FLEET_TABLE, FLEET_PAGE = 'fleet.csv', 'index.html'
 
 # rosbag2 numbers the files of a recording: <name of the bag>_0.mcap, ...
 _NUMBERED = re.compile(r'(.*)_\d+(\.\w+(?:\.zstd)?)')
+
+
+def is_bag_file(path: Path) -> bool:
+    """Return whether a file is a bag, or one of a bag, by its name."""
+    return path.name.endswith(STORAGES)
 
 
 def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
@@ -73,7 +80,7 @@ def _below(folder: Path, leave_out: Path | None) -> Iterator[Path]:
     if folder / METADATA in files:
         yield folder
         return
-    storages = [file for file in files if file.name.endswith(STORAGES)]
+    storages = [file for file in files if is_bag_file(file)]
     below = [bag for each in folders if each.resolve() != leave_out and not _holds_results(each)
              for bag in _below(each, leave_out)]
     yield from [folder] if storages and not below and _one_recording(storages) else storages
@@ -88,7 +95,7 @@ def _one_recording(files: Sequence[Path]) -> bool:
 
 def _holds_results(folder: Path) -> bool:
     try:
-        return (folder / 'summary.json').is_file() and (folder / 'bag' / METADATA).is_file()
+        return (folder / RESULT).is_file() and (folder / OUTPUT_BAG / METADATA).is_file()
     except PermissionError:
         return False
 
@@ -106,7 +113,7 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
         if not bag.is_file():
             raise BagError(f'{bag}: not a bag that can be read: no such file or folder')
         return [bag]
-    found = sorted((file for file in bag.iterdir() if file.name.endswith(STORAGES)
+    found = sorted((file for file in bag.iterdir() if is_bag_file(file)
                     and _is_inside(file, bag)), key=_by_number)
     # rosbags' own reader of this file opens and decompresses all listed files, or none.
     try:

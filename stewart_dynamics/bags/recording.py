@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 import tempfile
 
@@ -43,6 +43,8 @@ _PART = 1 << 20
 # Messages that are read of a file of any size. Of larger ones no more are read than they have
 # bytes: no recording is compressed as well, but files made to occupy the reader for hours are.
 _MESSAGES = 100_000
+# Maximum number of listed texts of a kind.
+LISTED = 20
 
 
 class Recording:
@@ -87,6 +89,47 @@ class Recording:
                     self.missing.append(f'{file.name}: topic {shown_name(topic)} of type '
                                         f'{shown_name(kind)}: at most {_LONGEST_NAME} characters')
         self.topics = {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
+
+    def find_topic(self, kind: str, given: str | None, usual: str, option: str,
+                   left_out: Container[str] = (), advice: str = '') -> str:
+        """
+        Return a topic of a type: the given one, the usual one, or the only other one.
+
+        option: the option that gives it. left_out: topics that are something else.
+        Raises BagError if there is no such topic, or several; ``advice`` follows the first text.
+        """
+        if given or usual in self.topics:
+            return self.checked_topic(given or usual, kind)
+        others = self.topics_of(kind, left_out)
+        if len(others) == 1:
+            return others[0]
+        lacking = f'no topic {usual}, and ' if usual else ''
+        if others:
+            raise BagError(f'{self.path}: has {lacking}several of type {kind}: {joined(others)}: '
+                           f'select one by {option}')
+        raise BagError(f'{self.path}: has {lacking}no other of type {kind}; it contains '
+                       f'{self.contents}{advice}')
+
+    def topics_of(self, kind: str, left_out: Container[str] = ()) -> list[str]:
+        """Return the topics of a type but some."""
+        return sorted(name for name, other in self.topics.items()
+                      if other == kind and name not in left_out)
+
+    def checked_topic(self, name: str, kind: str) -> str:
+        """Return a topic; raise BagError if there is none of that name, or of another type."""
+        if name not in self.topics:
+            raise BagError(f'{self.path}: has no topic {name}; it contains {self.contents}')
+        if self.topics[name] != kind:
+            raise BagError(f'{self.path}: {name}: is a {self.topics[name]}, must be a {kind}')
+        return name
+
+    @property
+    def contents(self) -> str:
+        """Return the topics with their types, and what could not be read."""
+        held = joined([f'{name} ({kind})' for name, kind in sorted(
+            self.topics.items())]) or 'no topics'
+        damage = listed(self.damage)
+        return held + (f'; could not be read: {"; ".join(damage)}' if damage else '')
 
     def messages(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
         """
@@ -154,6 +197,18 @@ class Recording:
             self._folder = tempfile.TemporaryDirectory()
         folder = Path(self._folder.name)
         return folder / f'{len(list(folder.iterdir()))}'
+
+
+def listed(texts: Sequence[str]) -> list[str]:
+    """Return the first texts, and the number of the others."""
+    if len(texts) <= LISTED:
+        return list(texts)
+    return [*texts[:LISTED], f'and {len(texts) - LISTED} more']
+
+
+def joined(names: Sequence[str]) -> str:
+    """Return names with commas, the first of them."""
+    return ', '.join(listed(names))
 
 
 def _unpack(file: Path, unpacked: Path) -> str:

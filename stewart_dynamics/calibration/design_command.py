@@ -21,8 +21,7 @@ from pathlib import Path
 
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import between, whole
-
-POSES, TRAJECTORY = 'poses.csv', 'trajectory.csv'
+from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_POSES, WAY_THROUGH_POSES
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -30,16 +29,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group('design of poses (--design)')
     group.add_argument('--design', type=whole(8, 500), metavar='N',
                        help='calibrate nothing, but choose the N poses within the limits that '
-                            f'identify best: DIR/{POSES}, and DIR/{TRAJECTORY} that visits them '
-                            '(default DIR: designed)')
+                            f'identify best: DIR/{DESIGNED_POSES}, and DIR/{WAY_THROUGH_POSES} '
+                            f'that visits them (default DIR: {DESIGNED})')
     group.add_argument('--rest', type=between(0.0, 3600.0), default=3.0, metavar='S',
                        help='time at rest in each pose (default: %(default)g)')
     group.add_argument('--seed', type=whole(0, 2 ** 32 - 1), default=0, metavar='N',
                        help='equal seeds give equal poses (default: %(default)s)')
 
 
-def run(given: argparse.Namespace, parameters: Parameters) -> str:
-    """Design poses, write them and return the text for the terminal."""
+def run(given: argparse.Namespace, parameters: Parameters, folder: Path) -> str:
+    """Design poses, write them into a folder and return the text for the terminal."""
     # Imported here, so that --help is fast.
     from stewart_dynamics.calibration.design import design_poses, NOISE, trajectory_csv, visit
     from stewart_dynamics.calibration.equations import BASE, PLATFORM, ZERO
@@ -52,18 +51,19 @@ def run(given: argparse.Namespace, parameters: Parameters) -> str:
     from stewart_dynamics.whole_file import write_files
     from tqdm import tqdm
 
-    folder = Path('designed') if given.output == Path('calibrated') else given.output
     options = CalibrationOptions(force=given.force)
-    check_free(folder, options, POSES)
+    check_free(folder, options, DESIGNED_POSES)
     remove_abandoned([folder])
     platform = StewartPlatform(parameters)
     noise = Noise(*given.noise) if given.noise else NOISE
     found = design_poses(platform, given.design, noise, given.seed)
     with tqdm(total=given.design, disable=None, leave=False, unit='pose') as bar:
         motion = visit(platform, found.poses, given.rest, lambda done: bar.update(done - bar.n))
-    with whole_folder(folder, options, POSES) as partial:
-        write_files({partial / POSES: poses_csv(parameters['joints'], found.lengths, found.poses),
-                     partial / TRAJECTORY: trajectory_csv(motion)})
+    with whole_folder(folder, options, DESIGNED_POSES) as partial:
+        write_files({
+            partial / DESIGNED_POSES: poses_csv(
+                parameters['joints'], found.lengths, found.poses),
+            partial / WAY_THROUGH_POSES: trajectory_csv(motion)})
     lines = ['predicted 95 % intervals, widest of the legs, for noise of '
              f'{1e6 * noise.length:.3g} um, {1e6 * noise.position:.3g} um and '
              f'{1e6 * noise.rotation:.3g} urad:',
@@ -75,5 +75,5 @@ def run(given: argparse.Namespace, parameters: Parameters) -> str:
                   for each in (found.half_widths, found.random_half_widths))
         lines += [f'  {name + axis:28}{f"+- {own:.3g}":>10}  +- {other:.3g} mm'
                   for axis, own, other in zip(axes, *widest, strict=True)]
-    return '\n'.join([*lines, f'{given.design} poses: {folder / POSES}; {motion.times[-1]:.0f} s '
-                      f'through them: {folder / TRAJECTORY}'])
+    return '\n'.join([*lines, f'{given.design} poses: {folder / DESIGNED_POSES}; '
+                      f'{motion.times[-1]:.0f} s through them: {folder / WAY_THROUGH_POSES}'])

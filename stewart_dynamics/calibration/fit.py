@@ -31,7 +31,7 @@ from stewart_dynamics.calibration.equations import (
 from stewart_dynamics.calibration.noise import (
     covariances, Noise, ROUNDING, VarianceComponents, whitening)
 from stewart_dynamics.mechanics.least_squares import (
-    Identifiability, identifiability, LARGEST_ERROR, normal)
+    BY_MEDIAN, Identifiability, identifiability, LARGEST_ERROR, normal)
 
 # Change of a joint that would matter, by the characteristic length; the same of a frame's angles.
 _SCALE = 0.01
@@ -191,7 +191,7 @@ def outliers(equations: Equations, unknowns: Unknowns) -> Outliers:
         r = equations.at(values).residuals
         count = 6 * np.count_nonzero(sound)
         wider = np.sqrt(count / max(count - what.rank, 1))
-        deviations = 1.4826 * wider * np.median(np.abs(r[sound]), axis=0) + (
+        deviations = BY_MEDIAN * wider * np.median(np.abs(r[sound]), axis=0) + (
             10.0 * ROUNDING * unknowns.size)
         return Outliers(r, deviations, np.abs(r) > _OUTLIER * deviations, values)
 

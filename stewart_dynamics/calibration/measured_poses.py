@@ -27,7 +27,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import shown, shown_name, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.parameters.tolerances import is_unit
+from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
 from stewart_dynamics.whole_file import read_text
 
 POSITION = ('x', 'y', 'z')
@@ -102,8 +102,7 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
                              turns)
     sizes = np.linalg.norm(turns, axis=1)
     for n in np.flatnonzero(~is_unit(sizes))[:1]:
-        raise StewartError(f'{path}: row {n + 2}: quaternion of length {sizes[n]:.6g}: must be 1 '
-                           'within 0.001')
+        raise StewartError(f'{path}: row {n + 2}: quaternion: {unit_rule(sizes[n])}')
     return MeasuredPoses(lengths, Pose.from_quaternion(positions, turns), names)
 
 

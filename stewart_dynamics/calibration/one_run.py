@@ -29,10 +29,9 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import HOLD_OUT
 from stewart_dynamics.reporting.results_folder import (
-    CALIBRATION, check_free, remove_abandoned, whole_folder)
+    CALIBRATED_PARAMETERS, CALIBRATION, check_free, remove_abandoned, REPORT_PAGE, whole_folder)
 from stewart_dynamics.whole_file import write_json
 
-PARAMETERS, RESULT, REPORT = 'calibrated.yaml', CALIBRATION, 'report.html'
 # Functions that every calibration needs as machine code.
 FUNCTIONS = (forward_kinematics.poses,)
 
@@ -65,16 +64,16 @@ def run(measured: MeasuredPoses, source: str, parameters: Parameters, folder: Pa
     ``source`` names the measured poses, ``parameters`` are those of the drawing. StewartError if
     the poses do not support a calibration: nothing is written.
     """
-    check_free(folder, options, RESULT)
+    check_free(folder, options, CALIBRATION)
     remove_abandoned([folder])
     found = calibrate(
         StewartPlatform(parameters), measured.lengths, measured.poses, fixed=options.fixed,
         frames=options.frames, noise=options.noise, hold_out=options.hold_out,
         angles=measured.angles, degrees=options.degrees, accept_mistakes=options.accept_mistakes)
     result = document(found, measured, source, options.shown())
-    with whole_folder(folder, options, RESULT) as partial:
-        found.parameters.to_yaml(partial / PARAMETERS, comments(result))
-        write_json(partial / RESULT, result)
+    with whole_folder(folder, options, CALIBRATION) as partial:
+        found.parameters.to_yaml(partial / CALIBRATED_PARAMETERS, comments(result))
+        write_json(partial / CALIBRATION, result)
         if options.report:
-            write_report(partial / REPORT, result, found)
+            write_report(partial / REPORT_PAGE, result, found)
     return result

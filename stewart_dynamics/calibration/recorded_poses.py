@@ -34,6 +34,7 @@ from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit
+from stewart_dynamics.setpoints.output_messages import LEG_STATES
 
 # Legs are at rest while no position changes by more than this part of the characteristic length,
 # for at least this time [s], of which this part at each end is left out: the platform settles.
@@ -58,9 +59,9 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
     """
     with closing(Recording(path)) as recording:
         topics = {
-            _topic(recording, type_names.JOINT_STATE, measured, f'{node}/{MEASURED_LEGS}',
-                   '--measured'): 'legs',
-            _topic(recording, type_names.POSE_STAMPED, pose, '', '--pose'): 'pose'}
+            recording.find_topic(type_names.JOINT_STATE, measured, f'{node}/{MEASURED_LEGS}',
+                                 '--measured', {f'{node}/{LEG_STATES}'}): 'legs',
+            recording.find_topic(type_names.POSE_STAMPED, pose, '', '--pose'): 'pose'}
         reader = JointStateReader(parameters['joints'], ['position'])
         leg_stamps: list[Stamps] = []
         leg_values: list[Array] = []
@@ -111,17 +112,6 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
     table = np.array(rows)
     return RecordedPoses(MeasuredPoses(
         table[:, :6], Pose.from_quaternion(table[:, 6:9], table[:, 9:]), tuple(names)), missing)
-
-
-def _topic(recording: Recording, kind: str, wanted: str | None, usual: str, option: str) -> str:
-    found = sorted(name for name, of in recording.topics.items() if of == kind)
-    name = wanted or (usual if usual in found else found[0] if len(found) == 1 else None)
-    if name in found:
-        return str(name)
-    listed = ', '.join(found) or 'no topic'
-    raise BagError(f'{recording.path}: ' + (
-        f'{option} {wanted}: not a topic of type {kind}, which {listed} has' if wanted else
-        f'{listed} of type {kind}: {option} selects one'))
 
 
 def _rests(stamps: Stamps, lengths: Array, tolerance: float) -> Iterator[tuple[int, int]]:

@@ -32,6 +32,7 @@ from stewart_dynamics.capability.motions import (
     constant, Deviations, faster, timed)
 from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
+from stewart_dynamics.capability.travel import ENDS
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
@@ -49,12 +50,11 @@ from stewart_dynamics.mechanics.kinematics.leg_clearance import (
     clearance_to_check, LegClearance)
 from stewart_dynamics.mechanics.platform_arguments import check_kind, copies, motion_rows
 from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, TWIST
+from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, NaturalModes
 
-# Names of the codes of ``travel``.
-_ENDS = np.array(['length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_angle_max',
-                  'leg_clearance_min', 'singularity', ''])
+_ENDS = np.array(ENDS)
 # Rounds in which the least tilt between two azimuths is found.
 _ZOOMS = 6
 # Step of a numerical derivative by the pose [m, rad].
@@ -594,11 +594,13 @@ class Capability:
             exceeded = self._limits.exceeds(name, each).reshape(-1, 6)
             if exceeded.any():
                 sample, leg = (int(n) for n in np.argwhere(exceeded)[0])
-                return Extent(0.0, name.removeprefix('limits.'), leg, sample)
+                return Extent(0.0, limits.short_name(name), leg, sample)
         side = np.ravel(solved.determinant)
-        singular = ~(np.ravel(solved.condition_number) <= self.platform.parameters[
-            'singularity.stop_condition']) | ~(side * side[:1] > 0.0)
-        return Extent(0.0, 'singularity', -1, int(singular.argmax())) if singular.any() else None
+        singular = ~(np.ravel(solved.condition_number) < stop_condition_of(
+            self.platform.parameters)) | ~(side * side[:1] > 0.0)
+        if not singular.any():
+            return None
+        return Extent(0.0, limits.SINGULARITY, -1, int(singular.argmax()))
 
     def _of_rates(self, motion: Motion, solved: InverseDynamics) -> list[tuple[Array, Any]]:
         """Return multiples (..., 6) of the twist at which legs and motors are too fast."""
@@ -606,11 +608,11 @@ class Capability:
         if limits.VELOCITY_MAX in self._limits.bounds:
             found.append((largest_multiple(
                 np.zeros(6), solved.rates, self._limits.bounds[limits.VELOCITY_MAX]),
-                'velocity_max'))
+                limits.short_name(limits.VELOCITY_MAX)))
         if self._motors is not None and self._motors.limits_speeds:
             found.append((largest_multiple(
                 np.zeros(6), self._motors.moving(motion.rows, solved.rows).speeds,
-                self._motors.fastest), 'speed_max'))
+                self._motors.fastest), limits.short_name(limits.SPEED_MAX)))
         return found
 
     def _speed_of_forces(self, motion: Motion, wrench: ArrayLike | None,
@@ -643,7 +645,8 @@ class Capability:
         found: list[tuple[Array, Any]] = []
         for forces, direction, begin, end in pieces:
             if strongest is not None:
-                found.append((quadratic_exit(forces, strongest, begin, end), 'force_max'))
+                found.append((quadratic_exit(forces, strongest, begin, end),
+                              limits.short_name(limits.FORCE_MAX)))
             if self._motors is not None and torques:
                 motors = self._motors.moving(rows, solved.rows)
                 none = np.zeros(6)
@@ -683,7 +686,8 @@ class Capability:
         found: list[tuple[Array, Any]] = []
         if limits.FORCE_MAX in self._limits.bounds:
             found.append((largest_multiple(
-                forces, change, self._limits.bounds[limits.FORCE_MAX]), 'force_max'))
+                forces, change, self._limits.bounds[limits.FORCE_MAX]),
+                limits.short_name(limits.FORCE_MAX)))
         if self._motors is not None and self._motors.limited:
             found.append(self._torques(self._motors, motion, forces, change, directions))
         if not found:

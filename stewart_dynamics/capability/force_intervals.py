@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.drives.motor_limits import exceeds
 from stewart_dynamics.mechanics.limits import TOLERANCE
 
 
@@ -33,7 +34,7 @@ def largest_multiple(values: Array, changes: Array, bounds: Array) -> Array:
     room = np.where(changes > 0.0, bounds - values, bounds + values)
     with np.errstate(divide='ignore', invalid='ignore'):
         multiples = np.where(changes == 0.0, np.inf, room / np.abs(changes))
-    return np.where(np.abs(values) > bounds * (1.0 + TOLERANCE), 0.0, np.maximum(multiples, 0.0))
+    return np.where(exceeds(values, bounds), 0.0, np.maximum(multiples, 0.0))
 
 
 def quadratic_exit(values: tuple[Array, ...], bounds: Array, begin: Array, end: Array,

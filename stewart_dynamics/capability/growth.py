@@ -35,7 +35,7 @@ from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.limits import FORCE_MAX, VELOCITY_MAX
+from stewart_dynamics.mechanics.limits import FORCE_MAX, short_name, SPEED_MAX, VELOCITY_MAX
 from stewart_dynamics.mechanics.rows import BASE, FORCES, RATES, UNIT_LOAD_FORCES, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
@@ -77,8 +77,8 @@ class Growth:
                  wrench: ArrayLike | None = None, base: BaseMotion | None = None) -> None:
         self._platform, self._motors, self._deviations = platform, motors, deviations
         self._limits = {name: limits[name] for name in (VELOCITY_MAX, FORCE_MAX) if name in limits}
-        self.names = [name.removeprefix('limits.') for name in self._limits] + (
-            [] if motors is None else ['speed_max', 'torque'])
+        self.names = [short_name(name) for name in self._limits] + (
+            [] if motors is None else [short_name(SPEED_MAX), 'torque'])
         self._count = len(deviations.changes)
         p = platform.parameters
         self._wrench = np.broadcast_to(

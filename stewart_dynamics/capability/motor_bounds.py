@@ -26,7 +26,7 @@ from stewart_dynamics.capability.force_intervals import quadratic_exit
 from stewart_dynamics.mechanics.drives.motor_limits import bound_of, largest_torques
 from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS, drive_constants, Drives, Motors, SPEEDS)
-from stewart_dynamics.mechanics.limits import SPEED_MAX, TORQUE_MAX, TORQUE_SPEED
+from stewart_dynamics.mechanics.limits import short_name, SPEED_MAX, TORQUE_MAX, TORQUE_SPEED
 from stewart_dynamics.mechanics.rows import MOTION, RESULT
 from stewart_dynamics.parameters.table import GUIDED, Parameters
 
@@ -102,7 +102,8 @@ class MotorBounds:
         return self._names(Motors.of_rows(self._drives(motions, results)).available_torques)
 
     def _names(self, largest: Array) -> Array:
-        return np.where(largest < self._strongest, 'torque_speed', 'torque_max')
+        return np.where(
+            largest < self._strongest, short_name(TORQUE_SPEED), short_name(TORQUE_MAX))
 
     def between(self, low: Array, high: Array, friction: tuple[Array, Array], band: Array,
                 ) -> list[Array]:

@@ -30,20 +30,19 @@ from stewart_dynamics.capability.box_clearance import clearance_in_box, PAIRS
 from stewart_dynamics.capability.box_condition import condition_in_box
 from stewart_dynamics.capability.box_legs import legs_in_box
 from stewart_dynamics.capability.clearance_bounds import CORNER, rows_of
-from stewart_dynamics.capability.travel import CLEARANCE_MIN
+from stewart_dynamics.capability.travel import CLEARANCE_MIN, ENDS
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import characteristic_length_of
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.mechanics.limits import TOLERANCE
+from stewart_dynamics.mechanics.limits import SINGULARITY, TOLERANCE
 from stewart_dynamics.mechanics.rows import POSE
-from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Largest numbers of cells: for each limit of each leg, for the clearance of each pair of legs, and
 # for the condition number.
 _MOST_OF_LEGS, _MOST_OF_CLEARANCE, _MOST_OF_CONDITION = 20_000, 100_000, 100_000
-_CODES = ('length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_angle_max')
 # The largest excess of a clearance is found to this part.
 _COARSE = 0.1
 # Factors of a box are found to this part.
@@ -119,7 +118,7 @@ class Boxes:
         self._bounds, self._shapes, self._plates = bounds[:CLEARANCE_MIN], shapes, plates
         self._nearest = float(bounds[CLEARANCE_MIN, 0])
         self._row, self._pivot = row, pivot
-        self._stop = min(platform.parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
+        self._stop = stop_condition_of(platform.parameters)
         self._legs = np.empty((6, LEG))
         self._cells = np.empty((DEPTH + 2, CELL))
         self._work = np.empty((7, box_condition.WORK))
@@ -177,7 +176,7 @@ class Boxes:
         parts = np.where(limited, found[:, EXCESS] / sizes, -math.inf)
         at = int(parts.argmax())
         certain = bool(np.all(found[:, UPPER] <= TOLERANCE * sizes))
-        return _Proof(Worst(self.poses(found[at, POINT]), at % 6, _CODES[at // 6],
+        return _Proof(Worst(self.poses(found[at, POINT]), at % 6, ENDS[at // 6],
                             float(found[at, EXCESS])), certain, float(parts[at]))
 
     def _worst_clearance(self, box: Array, coarse: float = _COARSE) -> _Proof:
@@ -192,8 +191,7 @@ class Boxes:
         certain = bool(np.all(found[:, UPPER] <= TOLERANCE * self._nearest))
         size = self._platform.parameters['singularity.characteristic_length']
         return _Proof(Worst(self.poses(found[at, POINT]), PAIRS[at][0],
-                            'leg_clearance_min',
-                            excess), certain, excess / size)
+                            ENDS[CLEARANCE_MIN], excess), certain, excess / size)
 
     def _worst_condition(self, box: Array) -> _Proof:
         """Return the worst pose by condition number, and whether it stays below its limit."""
@@ -202,7 +200,7 @@ class Boxes:
             self._platform.constants, self._axes, self._row, self._pivot, box, self._stop,
             _MOST_OF_CONDITION, self._legs, self._cells, self._work, found, count)
         excess = float(found[EXCESS])
-        return _Proof(Worst(self.poses(found[POINT]), -1, 'singularity', excess),
+        return _Proof(Worst(self.poses(found[POINT]), -1, SINGULARITY, excess),
                       bool(found[UPPER] == 0.0), excess / self._stop)
 
     def poses(self, points: Array) -> Pose:

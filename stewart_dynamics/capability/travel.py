@@ -34,10 +34,15 @@ from stewart_dynamics.capability.travel_legs import (
     BASE_ANGLE_MAX, end_of_leg, LEG, LENGTH_MAX, LENGTH_MIN, PLATFORM_ANGLE_MAX, prepare_legs,
     Way, way_of)
 from stewart_dynamics.compilation.functions import compiled, entry_point
+from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.vectors import norm, put3
 
 CLEARANCE_MIN, SINGULARITY, NOTHING = 4, 5, 6
 """Codes of the limit that ends a travel, behind those of ``travel_legs``."""
+ENDS = (*(limits.short_name(limit) for limit in (
+    limits.LENGTH_MIN, limits.LENGTH_MAX, *limits.OF_JOINTS, limits.CLEARANCE_MIN)),
+    limits.SINGULARITY, '')
+"""Names of the limits by their codes."""
 
 
 def memory_of(plates: Sequence[Array]) -> tuple[int, int]:

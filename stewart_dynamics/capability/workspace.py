@@ -38,8 +38,10 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    BASE_ANGLE_MAX, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, Limits, OF_JOINTS)
+    BASE_ANGLE_MAX, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, Limits, OF_JOINTS, short_name,
+    SINGULARITY)
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, LENGTHS, MOTION, POSITION
+from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Points of a curve at least, and steps of a bisection.
@@ -116,7 +118,7 @@ class _Plane:
         longest = self._limits.bounds[LENGTH_MAX][:, None]
         self._low, self._high = (tips - longest).max(axis=0), (tips + longest).min(axis=0)
         self._side = float(platform.solve(start.rows[None])[0, DETERMINANT])
-        self._stop = platform.parameters['singularity.stop_condition']
+        self._stop = stop_condition_of(platform.parameters)
         self._clearance = clearance_to_check(platform.parameters)
 
     def regular(self, points: Array) -> Flags:
@@ -191,7 +193,7 @@ class _Plane:
         """Yield the boundary at singularities, in the range that the other limits leave."""
         for piece in self._edges(self.regular):
             if self.within(piece).all() and self.clear(piece).all():
-                yield Boundary('singularity', -1, piece)
+                yield Boundary(SINGULARITY, -1, piece)
 
     def too_near(self) -> Iterator[Boundary]:
         """Yield the boundary at which legs are too near, in the range that other limits leave."""
@@ -200,7 +202,7 @@ class _Plane:
         for piece in self._edges(self.clear):
             if self.within(piece).all() and self.regular(piece).all():
                 leg = int(self._clearance(self._rows(piece[:1]))[0].argmin())
-                yield Boundary('leg_clearance_min', leg, piece)
+                yield Boundary(short_name(CLEARANCE_MIN), leg, piece)
 
     def _edges(self, kept: Callable[[Array], Flags]) -> Iterator[Array]:
         """Yield pieces (2, 3) of the boundary of a condition, between lines of a grid."""
@@ -284,7 +286,7 @@ def _curves(platform: StewartPlatform, axes: Array, start: Motion, normal: int,
             points[:, normal] = height
             return points
 
-        yield name.removeprefix('limits.'), leg, circle, np.array(crossings)
+        yield short_name(name), leg, circle, np.array(crossings)
     for name in OF_JOINTS:
         for leg, bound in enumerate(bounds.get(name, ())):
             axis = axes[leg] if name == BASE_ANGLE_MAX else rotation @ axes[6 + leg]
@@ -311,7 +313,7 @@ def _curves(platform: StewartPlatform, axes: Array, start: Motion, normal: int,
                 at: Array = np.arctan2(lines[:, 1], lines[:, 0])[np.abs(off) < _ON]
                 return at
 
-            yield name.removeprefix('limits.'), leg, conic, angles_on
+            yield short_name(name), leg, conic, angles_on
 
 
 def _chained(pieces: Iterable[Boundary]) -> Iterator[Boundary]:

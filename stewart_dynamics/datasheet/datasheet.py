@@ -40,11 +40,11 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.replay_options import Options
-from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, whole_folder
+from stewart_dynamics.reporting.results_folder import (
+    DATASHEET, DATASHEET_PAGE, whole_folder, WORKSPACE)
 from stewart_dynamics.whole_file import write_files, write_json
 
 VERSION = 1  # version of datasheet.json; increased when the meaning of a key changes
-TABLE = 'workspace.csv'
 
 # Heights of the tilt chart, as parts of the travel along z both ways.
 _HEIGHTS = {'at the pose': 0.0, 'half way up': 0.5, 'half way down': -0.5}
@@ -132,7 +132,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
                         None if recorded is None else recorded.seconds, used)
     with whole_folder(folder, options, DATASHEET) as partial:
         write_json(partial / DATASHEET, sheet)
-        write_files({partial / TABLE: workspace.table(sections, tilts, hexapod)})
+        write_files({partial / WORKSPACE: workspace.table(sections, tilts, hexapod)})
         write_page(partial / DATASHEET_PAGE, sheet, hexapod, pictures)
     return sheet
 

@@ -24,13 +24,12 @@ import sys
 from typing import Any
 
 from stewart_dynamics.program import (
-    add_results, DONE, frequency, interrupt_on_signals, node_name, PARTLY_READ, partly_read,
-    Program)
-from stewart_dynamics.replay.replay_options import NODE, Options
+    add_node, add_parameters, frequency, interrupt_on_signals, NODE, Program)
+from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import DATASHEETS
 
-NOT_POSSIBLE = 1
-_PROGRAM = Program('stewart_capability')
+_PROGRAM = Program('stewart_capability', 'parameters or bags',
+                   'the motion or the box is not possible', partly=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -43,13 +42,8 @@ def _arguments() -> argparse.ArgumentParser:
     parser = _PROGRAM.parser(
         description='Write the datasheet of a hexapod: what it can reach, carry and follow, and '
                     'what limits it.',
-        epilog='DIR/ gets datasheet.html, datasheet.json and workspace.csv.\n\n'
-               'exit codes: 0 done; 1 with --strict, when the motion or the box is not '
-               'possible;\n2 bad arguments, parameters or bags; 3 part of the bag could not be '
-               'read, the rest is done; 130 interrupted')
-    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
-                        help='parameters of the hexapod, the file that the node takes; with the '
-                             'limits that rate it')
+        files='DIR/ gets datasheet.html, datasheet.json and workspace.csv.')
+    add_parameters(parser, '; with the limits that rate it')
     parser.add_argument('--pose', nargs=6, type=_number, metavar=(
         'X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA'),
         help='pose that is rated [m, rad] (default: home)')
@@ -65,10 +59,8 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--box', type=Path, metavar='FILE',
                         help='YAML file of a claimed set of ranges, x y z [m] rx ry rz [rad] from '
                              'the pose: is all of it reachable?')
-    add_results(parser, DATASHEETS, 'the motion or the box is not possible')
-    parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
-                        help='node whose parameters are read, and name before the usual topics '
-                             f'(default: {NODE})')
+    _PROGRAM.add_results(parser, DATASHEETS)
+    add_node(parser, ', and name before the usual topics')
     motion = parser.add_argument_group('a recorded motion')
     motion.add_argument('--motion', type=Path, metavar='BAG',
                         help='bag with setpoints: is it possible, and how much faster?')
@@ -139,9 +131,6 @@ def _run(given: argparse.Namespace) -> int:
         sheet: dict[str, Any] = write_datasheet(
             parameters, order, given.output, options, Progress(stage, bar.update))
     _PROGRAM.say(sheet_text(sheet))
-    _PROGRAM.say(f'results: {given.output}')
     missing = sheet['motion']['missing'] if sheet['motion'] else []
-    if missing:
-        _PROGRAM.complain(partly_read(given.motion, missing))
-        return PARTLY_READ
-    return NOT_POSSIBLE if given.strict and not is_possible(sheet) else DONE
+    return _PROGRAM.end(given.output, {given.motion: missing} if missing else {},
+                        given.strict and not is_possible(sheet))

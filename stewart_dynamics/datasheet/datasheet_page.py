@@ -33,7 +33,7 @@ from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.datasheet.ratings import AXES, grid, Payloads, poses_of
 from stewart_dynamics.datasheet.workspace import (
     Boundary, Frequencies, PLANES, rotations_over_height)
-from stewart_dynamics.parameters.table import inertia_matrix
+from stewart_dynamics.parameters.table import inertia_matrix, PARAMETERS
 from stewart_dynamics.reporting.pages import link_to_other, page
 from stewart_dynamics.reporting.results_folder import REPLAYS, REPORT_PAGE
 from stewart_dynamics.reporting.vector_picture import Picture
@@ -301,10 +301,9 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
     for name, value in p.items():
         if name.startswith('limits.') and name != 'limits.action' and value is not None and (
                 not name.startswith('limits.length_m')):
-            angle = 'angle' in name
-            unit = ('°' if angle else ' m/s' if 'velocity' in name else ' N' if 'force' in name
-                    else ' m')
-            rows.append((name, numbers(value, DEGREE.factor if angle else 1.0, unit)))
+            unit = PARAMETERS[name].unit
+            rows.append((name, numbers(value, DEGREE.factor, DEGREE.name) if unit == 'rad' else
+                         numbers(value, 1.0, f' {unit}')))
     if sheet['leg_clearance'] is not None:
         rows.append(('Clearance between legs at the pose',
                      numbers(sheet['leg_clearance'], 1e3, ' mm')))

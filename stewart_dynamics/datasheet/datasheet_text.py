@@ -25,10 +25,11 @@ import math
 from typing import Any, NamedTuple
 
 from stewart_dynamics.datasheet.ratings import AXES
-
+from stewart_dynamics.mechanics.limits import QUANTITIES, short_name, SINGULARITY
+from stewart_dynamics.parameters.table import FIXED
+from stewart_dynamics.reporting.pages import typeset
 
 _DIGITS = 4
-_THIN_SPACE = '\u202f'
 
 
 class Unit(NamedTuple):
@@ -39,6 +40,8 @@ class Unit(NamedTuple):
 
 
 MM, DEGREE = Unit('mm', 1e3), Unit('°', math.degrees(1.0))
+# Units in which those of limits are written.
+_UNITS = {'m': MM, 'rad': DEGREE}
 LINEAR = {'travel': MM, 'velocity': Unit('mm/s', 1e3), 'acceleration': Unit('m/s²', 1.0),
           'force': Unit('N', 1.0), 'stiffness': Unit('N/µm', 1e-6)}
 ANGULAR = {'travel': DEGREE, 'velocity': Unit('°/s', DEGREE.factor),
@@ -74,7 +77,7 @@ def down(value: float | None) -> str:
     # a value that is exact in four digits is not to lose its last one by rounding errors
     shortened = math.trunc(value * power * (1.0 + 1e-12)) / power
     text = f'{shortened:,.{max(places, 0)}f}'
-    return text.replace(',', _THIN_SPACE).replace('-', '−')
+    return typeset(text)
 
 
 def both_ways(values: Mapping[str, Any], axis: str, unit: Unit) -> str:
@@ -123,7 +126,7 @@ def sheet_text(sheet: dict[str, Any]) -> str:
 def rated_payload(sheet: Mapping[str, Any]) -> tuple[str, float | None]:
     """Return the payload at rest; of any orientation of the base, and so named, if that moves."""
     found = sheet['payload']
-    if sheet['parameters']['base.source'] != 'fixed' and found['any_orientation'] is not None:
+    if sheet['parameters']['base.source'] != FIXED and found['any_orientation'] is not None:
         return ', base in any orientation', found['any_orientation']
     return '', found['value']
 
@@ -197,7 +200,8 @@ def _exceeded(found: dict[str, Any]) -> str:
         return f'{limit} between the rated pose and a pose'
     if excess <= 0.0:
         return f'not proven: no pose exceeds a limit as far as searched, {limit} is nearest'
-    if found['limit'] == 'singularity':
+    if found['limit'] == SINGULARITY:
         return f'{limit}: condition number exceeded by {down(excess)}'
-    unit = MM if found['limit'].startswith('length') else DEGREE
+    unit = next(_UNITS[quantity.unit] for name, quantity in QUANTITIES.items()
+                if short_name(name) == found['limit'])
     return f'{limit} exceeded by {down(excess * unit.factor)} {unit.name}'

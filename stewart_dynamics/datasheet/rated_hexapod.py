@@ -29,6 +29,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import LIMITS, Limits
+from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import (
     inertia_matrix, LEG_SHAPE, Parameters, PLATFORM_OUTLINE)
@@ -136,7 +137,7 @@ class RatedHexapod:
     def _check(self, whole: StewartPlatform, pose: Pose) -> None:
         """Raise where a limit is exceeded at the pose already."""
         result = whole.inverse_dynamics(Motion.from_pose(pose), singular='nan')
-        stop = self.given['singularity.stop_condition']
+        stop = stop_condition_of(self.given)
         if not result.condition_number < stop:
             raise SingularityError(
                 f'pose: singular: the condition number of J_inv is {result.condition_number:.6g}, '

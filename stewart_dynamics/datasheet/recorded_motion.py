@@ -33,6 +33,7 @@ from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
+from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics
@@ -140,7 +141,7 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
             found[CLEARANCE] = np.where(
                 distances > 0.0, p[limits.CLEARANCE_MIN] / distances, np.inf)
     found = {name: each.max(axis=-1) for name, each in found.items()}
-    condition = result.condition_number / p['singularity.stop_condition']
+    condition = result.condition_number / stop_condition_of(p)
     crossed = np.diff(np.sign(result.determinant), prepend=np.sign(result.determinant[0])) != 0.0
     found[SINGULARITY] = np.where(crossed, np.inf, condition)
     return found
@@ -159,10 +160,10 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
         'largest_use': {name: float(each.max()) if np.isfinite(each.max()) else None
                         for name, each in used.items()},
         'largest_use_limit': worst, 'largest_use_at_s': float(recorded.seconds[sample])}
-    singular = used[SINGULARITY].max() > 1.0
+    singular = used[SINGULARITY].max() >= 1.0
     if singular:
         at = int(used[SINGULARITY].argmax())
-        return found | {'factor': 0.0, 'limit': 'singularity', 'leg': None,
+        return found | {'factor': 0.0, 'limit': limits.SINGULARITY, 'leg': None,
                         'at_s': float(recorded.seconds[at]), 'between_setpoints': None,
                         'amplitude': None, 'payload': None}
     if found['possible'] and not (c.limits_rates or c.limits_forces):

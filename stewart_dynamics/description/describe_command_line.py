@@ -23,14 +23,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.program import DONE, folder, Program
+from stewart_dynamics.program import add_node, add_parameters, DONE, Program, STRICT
 from stewart_dynamics.whole_file import check_new, write_new
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
-LIKELY_MISTAKE = 1
-_PROGRAM = Program('stewart_describe')
+_PROGRAM = Program('stewart_describe', 'parameters or files, or no hexapod found',
+                   'a likely mistake was found')
 _INTERFACES = ('position', 'velocity', 'effort')
 
 
@@ -44,24 +44,15 @@ def _arguments() -> argparse.ArgumentParser:
     parser = _PROGRAM.parser(
         description='Write a hexapod as URDF, SDFormat and MJCF, or read one from these formats '
                     'into a parameter file.',
-        epilog='DIR gets NAME.urdf, NAME.sdf and NAME.xml (MJCF), or with --from NAME.yaml.\n\n'
-               'exit codes: 0 done; 1 with --strict, where a likely mistake was found; 2 bad '
-               'arguments, parameters or\nfiles, or no hexapod found; 130 interrupted')
+        files='DIR gets NAME.urdf, NAME.sdf and NAME.xml (MJCF), or with --from NAME.yaml.')
     source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument('--params', type=Path, metavar='FILE',
-                        help='parameters of the hexapod, the file that the node takes')
+    add_parameters(source, required=False)
     source.add_argument('--from', dest='source', type=Path, metavar='FILE',
                         help='URDF, SDFormat or MJCF (needs mujoco) of a hexapod')
-    parser.add_argument('--output', type=folder, default=Path('.'), metavar='DIR',
-                        help='folder of the results (default: the current one)')
+    _PROGRAM.add_results(parser, '.')
     parser.add_argument('--name', type=_name, metavar='NAME',
                         help='name of the model and of the files (default: that of FILE)')
-    parser.add_argument('--node', default='', metavar='NAME',
-                        help='name of the node whose parameters are read (default: '
-                             'stewart_dynamics)')
-    parser.add_argument('--force', action='store_true', help='replace files that exist')
-    parser.add_argument('--strict', action='store_true',
-                        help='exit code 1 where a likely mistake was found')
+    add_node(parser)
     control = parser.add_argument_group('ros2_control', 'a block in the URDF')
     control.add_argument('--ros2-control', type=_interfaces, metavar='INTERFACES',
                          help='command interfaces of the legs: effort, velocity or position, or '
@@ -130,4 +121,4 @@ def _judge(parameters: Parameters, given: argparse.Namespace) -> int:
     mistakes = likely_mistakes(parameters)
     for mistake in mistakes:
         _PROGRAM.complain(f'warning: {mistake}')
-    return LIKELY_MISTAKE if mistakes and given.strict else DONE
+    return STRICT if mistakes and given.strict else DONE

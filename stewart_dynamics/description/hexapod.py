@@ -34,7 +34,7 @@ from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import homes, level_axes
 from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
-from stewart_dynamics.parameters.table import inertia_matrix, Parameters
+from stewart_dynamics.parameters.table import inertia_matrix, mean_radius, Parameters
 
 # A body that a tool simulates needs mass and inertia about each axis. What a parameter file gives
 # as zero is replaced by these: the forces of a hexapod change by about 5e-4 of the largest.
@@ -166,9 +166,9 @@ COLORS: dict[str, Color] = {
     'joint': (0.12, 0.12, 0.12, 1.0)}
 
 # Radii and thickness in terms of the mean distance of the platform joints from their center.
-_BARREL, _ROD, _BALL, _PLATE = 0.05, 0.0275, 0.07, 0.05
+BARREL, ROD, BALL, PLATE = 0.05, 0.0275, 0.07, 0.05
 # Parts of the shortest leg length, or of the length at home if there is no limit.
-_BARREL_LENGTH, _ROD_LENGTH, _OF_HOME = 0.9, 0.95, 0.7
+BARREL_LENGTH, _ROD_LENGTH, _OF_HOME = 0.9, 0.95, 0.7
 
 
 class VisualShape(NamedTuple):
@@ -188,17 +188,17 @@ def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[VisualShape, 
     """Return the shapes of each body, by its name; without ``uris`` only meshes that are paths."""
     p = hexapod.parameters
     base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
-    size = float(np.mean(np.linalg.norm(platform - platform.mean(axis=0), axis=1)))
+    size = mean_radius(platform)
     found = {}
     for name, kind, joints in ((hexapod.base, 'base', base),
                                (hexapod.platform, 'platform', platform)):
-        found[name] = _mesh(hexapod, kind, uris) or (_plate(kind, joints, _PLATE * size), *(
-            VisualShape('sphere', 'joint', joint, np.eye(3), _BALL * size) for joint in joints))
+        found[name] = _mesh(hexapod, kind, uris) or (_plate(kind, joints, PLATE * size), *(
+            VisualShape('sphere', 'joint', joint, np.eye(3), BALL * size) for joint in joints))
     for leg in hexapod.legs:
         found[leg.cylinder.name] = _mesh(hexapod, 'cylinder', uris) or (
-            _rod('cylinder', _BARREL * size, _BARREL_LENGTH * _shortest(leg), 1.0),)
+            _rod('cylinder', BARREL * size, BARREL_LENGTH * _shortest(leg), 1.0),)
         found[leg.piston.name] = _mesh(hexapod, 'piston', uris) or (
-            _rod('piston', _ROD * size, _ROD_LENGTH * _shortest(leg), -1.0),)
+            _rod('piston', ROD * size, _ROD_LENGTH * _shortest(leg), -1.0),)
     return found
 
 

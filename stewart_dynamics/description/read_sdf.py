@@ -27,8 +27,9 @@ from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
     SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.description.read_urdf import body_of, numbers_of, unit
-from stewart_dynamics.description.xml_text import CARRIED, INERTIA
+from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.parameters.table import INERTIA
 
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL}

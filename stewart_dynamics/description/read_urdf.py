@@ -26,9 +26,9 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
     SLIDE, UNIVERSAL)
-from stewart_dynamics.description.xml_text import CARRIED, INERTIA
+from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.parameters.table import inertia_matrix
+from stewart_dynamics.parameters.table import INERTIA, inertia_matrix
 
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'ball': BALL, 'spherical': BALL, 'revolute2': UNIVERSAL}

@@ -25,7 +25,7 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.description.hexapod import RigidBody
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import INERTIA, Parameters
 
 CARRIED = 'stewart_dynamics'
 """Name of the block, or prefix of the elements, of parameters without an own element."""
@@ -39,7 +39,6 @@ _IN_ELEMENTS = frozenset((
     *LIMITS, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
     'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
     'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'))
-INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')  # names of the inertia in URDF and SDFormat
 NOT_CHECKED = 'none'  # value there of a limit that is not checked
 
 

@@ -32,7 +32,8 @@ from stewart_dynamics.mechanics.drives.motors import (
     BASE_AXIS, drive_constants, PLATFORM_AXIS, TWIST)
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.limits import Limits
-from stewart_dynamics.parameters.table import LEG_SHAPE, OUTLINES, PARAMETERS, Parameters
+from stewart_dynamics.parameters.table import (
+    LEG_SHAPE, OUTLINES, PARAMETERS, Parameters, SUPPRESS_FORCES)
 
 SOURCES = 'stewart_dynamics.h', 'stewart_dynamics.c'  # files that are the same for every hexapod
 
@@ -136,7 +137,7 @@ def field_values(parameters: Parameters) -> dict[str, Any]:
         value = parameters[name]
         if value is None:
             value = _IF_NOT_SET.get(name, math.inf if name.startswith('limits.') else 0.0)
-        values[name] = int(value == 'suppress_forces') if isinstance(value, str) else value
+        values[name] = int(value == SUPPRESS_FORCES) if isinstance(value, str) else value
     angles = angles_to_check(parameters, Limits(parameters).of_joints)
     axes = np.zeros((12, 3)) if angles is None else np.nan_to_num(angles.axes)
     values['geometry.base_joint_axes'] = axes[:6]

@@ -18,12 +18,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 
-from stewart_dynamics.program import DONE, folder, Program
+from stewart_dynamics.program import add_node, add_parameters, DONE, Program
 from stewart_dynamics.whole_file import write_new
 
-_PROGRAM = Program('stewart_export')
+_PROGRAM = Program('stewart_export', 'parameters, or files that exist or cannot be written')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,25 +35,18 @@ def _arguments() -> argparse.ArgumentParser:
     parser = _PROGRAM.parser(
         description='Write the computation of the node for one hexapod as C99 source and as an '
                     'FMU, for real-time\ncomputers.',
-        epilog='DIR gets stewart_dynamics.h and .c, the same for every hexapod; NAME.h and .c, '
-               'this hexapod;\ngolden.csv and test_golden.c, results to compare with; and '
-               'CMakeLists.txt; with --fmu NAME.fmu, which has its sources inside, and a binary '
-               'for this computer\nwhere a C compiler is found ($CC, cc, gcc or clang).\n\n'
-               'exit codes: 0 done; 2 bad arguments or parameters, or files that exist or cannot '
-               'be written;\n130 interrupted')
-    parser.add_argument('--params', type=Path, required=True, metavar='FILE',
-                        help='parameters of the hexapod, the file that the node takes')
-    parser.add_argument('--output', type=folder, required=True, metavar='DIR',
-                        help='folder of the files')
+        files='DIR gets stewart_dynamics.h and .c, the same for every hexapod; NAME.h and .c, '
+              'this hexapod;\ngolden.csv and test_golden.c, results to compare with; and '
+              'CMakeLists.txt; with --fmu NAME.fmu,\nwhich has its sources inside, and a binary '
+              'for this computer where a C compiler is found\n($CC, cc, gcc or clang).')
+    add_parameters(parser)
+    _PROGRAM.add_results(parser)
     parser.add_argument('--fmu', nargs='?', const='3', choices=('3', '2'), metavar='VERSION',
                         help='write an FMU for co-simulation, too, of FMI 3.0 (3, the default) or '
                              'FMI 2.0 (2)')
     parser.add_argument('--name', default='hexapod', metavar='NAME',
                         help='name of the hexapod in C (default: hexapod)')
-    parser.add_argument('--node', default='', metavar='NAME',
-                        help='name of the node whose parameters are read (default: '
-                             'stewart_dynamics)')
-    parser.add_argument('--force', action='store_true', help='replace files that exist')
+    add_node(parser)
     return parser
 
 

@@ -36,7 +36,7 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.export.c_project import digest, hexadecimal, platform_source, source, SOURCES
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import INERTIA, Parameters, SUPPRESS_FORCES
 
 # SI base units of each unit, by their exponents in FMI.
 _UNITS = {'m': {'m': 1}, 'm/s': {'m': 1, 's': -1}, 'm/s2': {'m': 1, 's': -2}, 'm3': {'m': 3},
@@ -86,8 +86,8 @@ def variables(parameters: Parameters) -> list[Variable]:
              *np.zeros(9), parameters['platform.mass'], *parameters['platform.center_of_mass'],
              *parameters['platform.inertia'], parameters['singularity.warn_condition'],
              parameters['singularity.stop_condition'], parameters['singularity.warn_time'],
-             parameters['singularity.action'] == 'suppress_forces',
-             parameters['limits.action'] == 'suppress_forces']
+             parameters['singularity.action'] == SUPPRESS_FORCES,
+             parameters['limits.action'] == SUPPRESS_FORCES]
     given = [*_inputs(), *_tunable()]
     return [*(each._replace(start=float(value))
               for each, value in zip(given, start, strict=True)), *_outputs()]
@@ -116,7 +116,7 @@ def _tunable() -> Iterator[Variable]:
     for axis in 'xyz':
         yield Variable(f'platform.center_of_mass.{axis}', 'parameter',
                        'center of mass with payload, platform frame', 'm')
-    for moment in ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'):
+    for moment in INERTIA:
         yield Variable(f'platform.inertia.{moment}', 'parameter',
                        'inertia with payload about the center of mass, platform axes', 'kg.m2')
     yield Variable('singularity.warn_condition', 'parameter', 'condition number of the warning')

@@ -44,6 +44,7 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     COULOMB_FRICTION, PLATFORM, VISCOUS_FRICTION)
 from stewart_dynamics.mechanics.rows import ACCELERATION, FORCES, LENGTHS
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters import table
 
 FUNCTIONS = inverse_dynamics.solve, regressor.regressors
 
@@ -79,7 +80,7 @@ _COLUMNS = TEN + FRICTION  # of a leg; then its force less that of the model, an
 _LEAST_SCALE, _MOST_SCALE = 0.1, 10.0
 
 NAMES = ('mass', *(f'center of mass {axis}' for axis in 'xyz'),
-         *(f'inertia {axes}' for axes in ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')))
+         *(f'inertia {axes}' for axes in table.INERTIA))
 UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from stewart_dynamics.identification.unknowns import DEFAULT
-from stewart_dynamics.replay.replay_options import NODE
+from stewart_dynamics.program import NODE
 from stewart_dynamics.reporting.estimates import HOLD_OUT
 
 CUTOFF = 10.0

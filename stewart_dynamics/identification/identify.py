@@ -47,8 +47,9 @@ from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
+from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import NEGATIVE, Parameters
+from stewart_dynamics.parameters.table import FIXED, NEGATIVE, Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
@@ -131,7 +132,7 @@ class Identification:
     """Reads bags and identifies parameters, beginning with those of the file."""
 
     def __init__(self, parameters: Parameters, options: IdentificationOptions) -> None:
-        if parameters['base.source'] != 'fixed':
+        if parameters['base.source'] != FIXED:
             raise ParameterError(
                 f'base.source: {parameters["base.source"]}: hexapods are identified on a base at '
                 'rest: must be fixed')
@@ -357,7 +358,7 @@ class Identification:
         whole = np.concatenate(residuals)
         if np.isnan(whole).all(axis=0).any():
             return 0
-        deviation = np.nanmedian(np.abs(whole), axis=0) / 0.6745
+        deviation = BY_MEDIAN * np.nanmedian(np.abs(whole), axis=0)
         far = [np.abs(each) > _OUTLIER * deviation for each in residuals]
         number = sum(map(np.count_nonzero, far))
         if number > _MOST_OUTLIERS * whole.size:

@@ -28,18 +28,18 @@ from stewart_dynamics.identification.identification_options import (
     CUTOFF, DesignOptions, IdentificationOptions)
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
 from stewart_dynamics.program import (
-    add_results, arguments_of, between, DONE, interrupt_on_signals, node_name, PARTLY_READ,
-    partly_read, Program, whole)
-from stewart_dynamics.replay.replay_options import NODE
+    add_accepted, add_node, add_parameters, add_report, arguments_of, between, DONE,
+    interrupt_on_signals, names_of, Program, whole)
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
+from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_MOTION, IDENTIFIED
 
 if TYPE_CHECKING:
     from stewart_dynamics.identification.design import Design
     from stewart_dynamics.parameters.table import Parameters
 
-NOT_ALL_IDENTIFIED = 1
-TRAJECTORY = 'trajectory.yaml'
-_PROGRAM = Program('stewart_identify')
+_PROGRAM = Program(
+    'stewart_identify', 'parameters or bags, or a likely mistake',
+    'a requested parameter is not identifiable', partly=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -56,24 +56,17 @@ def _arguments() -> argparse.ArgumentParser:
     parser = _PROGRAM.parser(
         description='Identify mass, center of mass, inertia and friction of a hexapod from the '
                     'measured legs of recorded motions.',
-        epilog='DIR/ gets identified.yaml (the whole parameter file, for the node), '
-               'identification.json and report.html.\n\nexit codes: 0 done; 1 with --strict, '
-               'when a requested parameter is not identifiable;\n2 bad arguments, '
-               'parameters or bags, or a likely mistake; 3 part of a bag could not be read, the '
-               'rest is done; 130 interrupted')
+        files='DIR/ gets identified.yaml (the whole parameter file, for the node), '
+              'identification.json and report.html.')
     parser.add_argument('bags', nargs='*', type=Path, metavar='BAG',
                         help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
                              'with bags in it; several are of one and the same hexapod')
-    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
-                        help='parameters of the hexapod as far as they are known, the file that '
-                             'the node takes')
-    add_results(parser, 'identified', 'a requested parameter is not identifiable')
+    add_parameters(parser, ', as far as they are known')
+    _PROGRAM.add_results(parser, IDENTIFIED)
     parser.set_defaults(output=None)  # --design has another one
-    parser.add_argument('--no-report', dest='report', action='store_false',
-                        help='write no report.html')
+    add_report(parser)
     topics = parser.add_argument_group('topics')
-    topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
-                        help=f'name before the usual topic, NAME/measured_legs (default: {NODE})')
+    add_node(topics, ', and name before the usual topic, NAME/measured_legs')
     topics.add_argument('--measured', metavar='TOPIC',
                         help='JointState with positions and efforts, and rates where they are')
     topics.add_argument('--efforts', metavar='TOPIC',
@@ -99,8 +92,7 @@ def _arguments() -> argparse.ArgumentParser:
                            f'(default: {HOLD_OUT:g})')
     what.add_argument('--no-delay', dest='delay', action='store_false',
                       help='efforts are not delayed; by default the delay is estimated')
-    what.add_argument('--accept-mistakes', action='store_true',
-                      help='write results although a mistake is likely')
+    add_accepted(what)
     _add_design(parser)
     return parser
 
@@ -111,8 +103,8 @@ def _add_design(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group('design of a motion (--design)')
     group.add_argument('--design', action='store_true',
                        help='identify nothing, but design a motion from which the parameters of '
-                            f'--identify are identifiable: DIR/{TRAJECTORY} (default DIR: '
-                            'designed), for stewart_trajectory, within the limits of the '
+                            f'--identify are identifiable: DIR/{DESIGNED_MOTION} (default DIR: '
+                            f'{DESIGNED}), for stewart_trajectory, within the limits of the '
                             'parameter file')
     group.add_argument('--duration', type=between(2.0, 3600.0), default=default.duration,
                        metavar='S', help='of the motion (default: %(default)g)')
@@ -152,28 +144,21 @@ def _run(given: argparse.Namespace) -> int:
     if given.design:
         _design(given, parameters)
         return DONE
-    output = given.output or Path('identified')
+    output = given.output or Path(IDENTIFIED)
     bags = [bag for path in given.bags for bag in find_bags(path, output)]
     _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))
     result = run(bags, parameters, output, options, _PROGRAM.complain)
     _PROGRAM.say(result_text(result))
-    _PROGRAM.say(f'results: {output}')
-    missing = [bag for bag in result['bags'] if bag['missing']]
-    for bag in missing:
-        _PROGRAM.complain(partly_read(bag['bag'], bag['missing']))
-    if missing:
-        return PARTLY_READ
-    return NOT_ALL_IDENTIFIED if given.strict and not is_complete(result) else DONE
+    missing = {bag['bag']: bag['missing'] for bag in result['bags'] if bag['missing']}
+    return _PROGRAM.end(output, missing, given.strict and not is_complete(result))
 
 
 def _kinds(text: str) -> tuple[str, ...]:
-    kinds = tuple(dict.fromkeys(each.strip() for each in text.split(',') if each.strip()))
+    kinds = names_of(text)
     for kind in kinds:
         if kind not in KINDS:
             raise argparse.ArgumentTypeError(
                 f'{kind!r}: cannot be identified; known are {", ".join(KINDS)}')
-    if not kinds:
-        raise argparse.ArgumentTypeError('names nothing')
     return kinds
 
 
@@ -191,9 +176,9 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
     if given.frequency > given.cutoff:
         raise StewartError(f'--highest-frequency {given.frequency:g} Hz: must be at most '
                            f'--cutoff, {given.cutoff:g} Hz: nothing above passes the filter')
-    folder = given.output or Path('designed')
+    folder = given.output or Path(DESIGNED)
     options = IdentificationOptions(force=given.force)
-    check_free(folder, options, TRAJECTORY)
+    check_free(folder, options, DESIGNED_MOTION)
     remove_abandoned([folder])
     asked = DesignOptions(**arguments_of(given, DesignOptions._fields))
     print(f'designing a motion of {asked.duration:g} s in {asked.generations} generations: takes '
@@ -213,14 +198,14 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
     with tqdm(total=asked.generations, disable=None, leave=False, dynamic_ncols=True,
               bar_format='{percentage:3.0f}%|{bar}| designing, {remaining} left') as bar:
         designed = design(parameters, asked, progress)
-    with whole_folder(folder, options, TRAJECTORY) as partial:
-        path = partial / TRAJECTORY
+    with whole_folder(folder, options, DESIGNED_MOTION) as partial:
+        path = partial / DESIGNED_MOTION
         given_values = designed.trajectory.given
         head = ''.join(f'# {line}'.rstrip() + '\n' for line in _design_head(designed, asked))
         write_yaml(path, given_values, {
             name: designed.trajectory.table[name].unit for name in given_values}, head)
     print('\n'.join(_design_lines(designed, asked)))
-    print(f'\nmotion: {folder / TRAJECTORY}, for stewart_trajectory --ros-args --params-file')
+    print(f'\nmotion: {folder / DESIGNED_MOTION}, for stewart_trajectory --ros-args --params-file')
 
 
 def _design_head(designed: Design, asked: DesignOptions) -> Iterator[str]:

@@ -24,19 +24,18 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.errors import BagError
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.identification.windows import (
     FEWEST, period_of, segments, Signal, uniform, Window)
 from stewart_dynamics.messages import type_names
-from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, MISSING_JOINTS
+from stewart_dynamics.messages.joint_state import (
+    FIELDS, JointStateReader, NUMBERS_END)
 from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.setpoints.output_messages import LEG_STATES
 
 JOINT_STATE = type_names.JOINT_STATE
 # Maximum number of samples in a window, so that it and its extract fit into memory.
 _WINDOW = 1 << 16
-# Upper bound of positions [m] and forces [N]; larger values would overflow when squared.
-_END = 1e100
 _LEGS, _EFFORTS = 'legs', 'efforts'
 
 
@@ -54,24 +53,12 @@ def find_topics(recording: Recording, node: str, measured: str | None, efforts: 
 
     Raises BagError if no such topic is found, or several.
     """
-    usual, own = f'{node}/{MEASURED_LEGS}', f'{node}/leg_states'
-    found = sorted(name for name, kind in recording.topics.items() if kind == JOINT_STATE)
-    for name in (measured, efforts):
-        if name is not None and name not in found:
-            kind = recording.topics.get(name)
-            raise BagError(f'{recording.path}: ' + (
-                f'{name}: is a {kind}, must be a {JOINT_STATE}' if kind else
-                f'has no topic {name}; of type {JOINT_STATE} it has {", ".join(found) or "none"}'))
-    if measured is None:
-        others = [name for name in found if name not in (own, efforts)]
-        if usual not in found and len(others) != 1:
-            raise BagError(
-                f'{recording.path}: has no topic {usual}, and '
-                + (f'several of its type, {", ".join(others)}: select one by --measured' if others
-                   else f'no other of its type, {JOINT_STATE}'
-                   + (f' but {own}, which is computed, not measured' if own in found else '')))
-        measured = usual if usual in found else others[0]
-    return Topics(measured, efforts or measured)
+    if efforts is not None:
+        recording.checked_topic(efforts, JOINT_STATE)
+    # ~/leg_states is computed, not measured
+    legs = recording.find_topic(JOINT_STATE, measured, f'{node}/{MEASURED_LEGS}', '--measured',
+                                {f'{node}/{LEG_STATES}', efforts or ''})
+    return Topics(legs, efforts or legs)
 
 
 class RecordedLegs:
@@ -100,13 +87,8 @@ class RecordedLegs:
             while len(self._legs) > _WINDOW and (self._one or len(self._efforts) > FEWEST):
                 yield from self._released(last=False)
         yield from self._released(last=True)
-        for reader in self._readers.values():
-            if not reader.found and self.rejected[MISSING_JOINTS]:
-                missing = [joint for joint in self._joints if joint not in reader.other_names]
-                raise BagError(
-                    f'{self._recording.path}: {self._topics.legs}: no message contains '
-                    f'{", ".join(missing)}; they contain {", ".join(reader.other_names)}: they '
-                    'must be those of the parameter joints')
+        for key, reader in self._readers.items():
+            reader.check(f'{self._recording.path}: {getattr(self._topics, key)}')
 
     def _take(self, messages: Messages) -> None:
         for n, topic in enumerate(messages.topics):
@@ -138,7 +120,7 @@ class RecordedLegs:
               sizes: Stamps) -> tuple[Stamps, Array]:
         reader = self._readers.setdefault(key, JointStateReader(self._joints, fields))
         stamps, values, rejected = reader.read_many(messages.data, starts, sizes)
-        sound = (np.abs(values) < _END).all(axis=1) & (stamps > 0)
+        sound = (np.abs(values) < NUMBERS_END).all(axis=1) & (stamps > 0)
         self.rejected.update(rejected)
         if not sound.all():
             self.rejected['out of range or without a stamp'] += int(np.count_nonzero(~sound))

@@ -47,13 +47,12 @@ from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
-from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.estimates import (
     combined, estimate, IDENTIFIED, justified, NOT_IDENTIFIABLE, not_identifiable_lines,
     page_values, states_of, table_lines)
 from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
 from stewart_dynamics.reporting.results_folder import (
-    check_free, IDENTIFICATION, remove_abandoned, whole_folder)
+    check_free, IDENTIFICATION, IDENTIFIED_PARAMETERS, remove_abandoned, REPORT_PAGE, whole_folder)
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.whole_file import write_files, write_json
 from tqdm import tqdm
@@ -94,10 +93,10 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
         result = document(found, options)
         with whole_folder(folder, options, IDENTIFICATION) as partial:
             _rounded(found).to_yaml(
-                partial / 'identified.yaml', comments(result, found.unknowns))
+                partial / IDENTIFIED_PARAMETERS, comments(result, found.unknowns))
             write_json(partial / IDENTIFICATION, result)
             if options.report:
-                write_report(partial / 'report.html', work.extracts, found, result)
+                write_report(partial / REPORT_PAGE, work.extracts, found, result)
     return result
 
 
@@ -257,8 +256,8 @@ def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapp
     """Write the page of a result, with the content of identification.json."""
     legs = list(found.parameters['joints'])
     curves, spectra = _curves(extracts, found)
-    data = {'legs': legs, 'colors': LEG_COLORS,
-            'curves': [base64_of(column, '<f4') for column in curves.T], 'spectra': spectra}
+    data = {'legs': legs, 'curves': [base64_of(column, '<f4') for column in curves.T],
+            'spectra': spectra}
     script = plotly_script()
     bag = result['bags'][0]['bag']
     text = page(

@@ -39,11 +39,12 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
 from stewart_dynamics.mechanics.kinematics.home_pose import turns_about
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters import table
 from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
 
 # Platform parameters as defined in the parameter file.
 _PLATFORM = ('platform.mass', *(f'platform.center_of_mass.{axis}' for axis in 'xyz'),
-             *(f'platform.inertia.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')))
+             *(f'platform.inertia.{axes[1:]}' for axes in table.INERTIA))
 _PLATFORM_UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
 MASS, CENTER, INERTIA = slice(0, 1), slice(1, 4), slice(4, 10)
 PLATFORM = 10

@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, Stamps
+from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 
 # Minimum number of samples of a window.
 FEWEST = 8
@@ -142,7 +143,7 @@ def _without_outliers(values: Array, floor: float) -> tuple[Array, Flags]:
     """
     five = np.stack([np.roll(values, shift, axis=0) for shift in range(-2, 3)])
     off = np.abs(values - (4.0 * (five[1] + five[3]) - five[0] - five[4]) / 6.0)
-    usual = (np.median(off, axis=0) / 0.6745 + floor * np.std(values, axis=0)
+    usual = (BY_MEDIAN * np.median(off, axis=0) + floor * np.std(values, axis=0)
              + 1e-9 * np.abs(values).max(axis=0))
     wild = (off > _OUTLIER * usual) & (
         np.abs(values - np.median(five, axis=0)) > 0.5 * _OUTLIER * usual) & (

@@ -38,6 +38,8 @@ from stewart_dynamics.arrays import Array, Flags
 
 # Standard deviations on either side of the mean that include 95 % of a normal distribution.
 TWO_SIDED = 1.959964
+# Standard deviation of a normal distribution, by the median of its deviations' magnitudes.
+BY_MEDIAN = 1.482602218505602
 
 # A direction is known if its standard error is at most this, by the parameters' scales.
 LARGEST_ERROR = 0.25

@@ -39,7 +39,7 @@ from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import (
-    DRIVE_INERTIAS, inertia_matrix, Parameters, STANDARD_GRAVITY)
+    DRIVE_INERTIAS, FIXED, inertia_matrix, Parameters, STANDARD_GRAVITY)
 
 # Digits of the position of a joint in a message.
 _DIGITS = 5
@@ -183,7 +183,7 @@ def _frames(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
         yield (f'geometry.platform_joints: {shape.platform_radius:.3g} m from their center, the '
                f'base joints only {shape.base_radius:.3g} m: base and platform exchanged?')
     size = float(np.linalg.norm(p['gravity']))
-    if not reach.certain and p['base.source'] == 'fixed' and (
+    if not reach.certain and p['base.source'] == FIXED and (
             p['gravity'] @ away > _HANGING * size > 0.0):
         yield (f'gravity: {_listed(p["gravity"])} m/s^2 pulls the platform away from the base: a '
                'sign? For a hexapod that hangs, or whose axes point down, set '

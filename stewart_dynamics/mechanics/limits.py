@@ -51,20 +51,39 @@ JITTER = 1e-3
 # Thresholds in a row, in the order of OF_RESULTS.
 _SHORTEST, _LONGEST, _FASTEST, _STRONGEST = consecutive(6, 6, 6, 6)
 
-QUANTITIES = {LENGTH_MIN: ('length', 'm'), LENGTH_MAX: ('length', 'm'),
-              VELOCITY_MAX: ('rate', 'm/s'), FORCE_MAX: ('force', 'N'),
-              BASE_ANGLE_MAX: ('base joint angle', 'rad'),
-              PLATFORM_ANGLE_MAX: ('platform joint angle', 'rad'),
-              CLEARANCE_MIN: ('clearance', 'm'), TORQUE_MAX: ('motor torque', 'N m'),
-              TORQUE_SPEED: ('motor torque', 'N m'), SPEED_MAX: ('motor speed', 'rad/s'),
-              TEMPERATURE_RISE_MAX: ('temperature rise', 'K'),
-              JUMP: ('mean rate from the last setpoint', 'm/s')}
-"""Quantity and unit of each limit."""
+
+class Quantity(NamedTuple):
+    """A quantity that a limit bounds."""
+
+    name: str
+    unit: str
+
+    @property
+    def key(self) -> str:
+        """Return its key in summary.json, and that of its plot in a report."""
+        return self.name.replace(' ', '_')
+
+
+_LENGTH, _TORQUE = Quantity('length', 'm'), Quantity('motor torque', 'N m')
+QUANTITIES = {
+    LENGTH_MIN: _LENGTH, LENGTH_MAX: _LENGTH, VELOCITY_MAX: Quantity('rate', 'm/s'),
+    FORCE_MAX: Quantity('force', 'N'), BASE_ANGLE_MAX: Quantity('base joint angle', 'rad'),
+    PLATFORM_ANGLE_MAX: Quantity('platform joint angle', 'rad'),
+    CLEARANCE_MIN: Quantity('clearance', 'm'), TORQUE_MAX: _TORQUE, TORQUE_SPEED: _TORQUE,
+    SPEED_MAX: Quantity('motor speed', 'rad/s'),
+    TEMPERATURE_RISE_MAX: Quantity('temperature rise', 'K'),
+    JUMP: Quantity('mean rate from the last setpoint', 'm/s')}
+SINGULARITY = 'singularity'  # among short names: inside stop_condition, or beyond det(J) = 0
 CLIPPED = FORCE_MAX, TORQUE_MAX, TORQUE_SPEED
 """Limits to which published values are clipped; the others follow limits.action."""
 
 ANGLES = {BASE_ANGLE_MAX: BASE_JOINT_ANGLES, PLATFORM_ANGLE_MAX: PLATFORM_JOINT_ANGLES}
 """Where in a row of joint angles the values of a limit are."""
+
+
+def short_name(limit: str) -> str:
+    """Return the name of a limit without its section: length_max."""
+    return limit.rpartition('.')[2]
 
 
 class Exceedance(NamedTuple):

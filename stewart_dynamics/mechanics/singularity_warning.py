@@ -39,6 +39,11 @@ from stewart_dynamics.parameters.tolerances import HYSTERESIS
 UNSOLVABLE_CONDITION = 1e12
 
 
+def stop_condition_of(parameters: Parameters) -> float:
+    """Return the condition number from which on a pose counts as singular."""
+    return min(float(parameters['singularity.stop_condition']), UNSOLVABLE_CONDITION)
+
+
 class Cause(IntEnum):
     """Cause of the warning."""
 

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Bytes, Stamps
+from stewart_dynamics.errors import BagError
 from stewart_dynamics.messages.cdr import (
     aligned8, COUNT, finite, header, LITTLE_ENDIAN, MALFORMED, MalformedError, nanoseconds,
     NOT_FINITE, put_count, put_text, READ_ERRORS, sequence, short_sequence, text, TIME_AND_LENGTH)
@@ -39,6 +40,8 @@ FIELDS = ('position', 'velocity', 'effort')
 
 # Why a message is rejected, beside being malformed or not finite, or 'without effort'.
 MISSING_JOINTS = 'lacks one of the joints'
+# Upper bound of positions [m] and efforts [N]; larger ones would overflow when squared.
+NUMBERS_END = 1e100
 UNEVEN = 'not as many numbers as names'
 
 # Maximum number of names in the details of a rejection, and of characters of each.
@@ -128,8 +131,8 @@ class JointStateReader:
     """
 
     def __init__(self, joints: Sequence[str], fields: Sequence[str] = FIELDS) -> None:
-        self.found = False  # whether a message had all joints
-        self.other_names: list[str] = []  # the names in the first message that lacked one
+        self._found = self._lacking = False  # whether a message had all joints, or lacked one
+        self._others: list[str] = []  # the names in the first message that lacked one
         self._joints = list(joints)
         self._fields = list(fields)
         self._known: list[_Known] = []
@@ -203,14 +206,24 @@ class JointStateReader:
             left = take(known, left)
         return JointStates(stamps[used], values[used], dict(+rejected))
 
+    def check(self, where: str) -> None:
+        """Raise BagError if messages lacked a joint, and none had all joints."""
+        if self._lacking and not self._found:
+            missing = [joint for joint in self._joints if joint not in self._others]
+            raise BagError(
+                f'{where}: no message contains {", ".join(missing)}; they contain '
+                f'{", ".join(self._others) or "nothing"}: they must be those of the parameter '
+                'joints')
+
     def _learn(self, data: bytes) -> _Known:
         """Read a message field by field and remember its layout."""
         fields = _fields(data)
         known = self._judge(data, fields)
         if known.reason != MISSING_JOINTS:
-            self.found = True
+            self._found = True
         else:
-            self.other_names = self.other_names or fields.names
+            self._lacking = True
+            self._others = self._others or fields.names
         self._known = [known, *self._known[:_MOST_LAYOUTS - 1]]
         return known
 

@@ -26,16 +26,18 @@ from struct import pack, Struct
 
 import numpy as np
 from stewart_dynamics.arrays import Array, SECOND, Six
+from stewart_dynamics.description.hexapod import (
+    BALL, BARREL, BARREL_LENGTH, Color, COLORS, PLATE, ROD)
 from stewart_dynamics.mechanics.frames.rotation import quaternion_of
 from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
 from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
-from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, WARN
-from stewart_dynamics.node.diagnostics.singularity import singularity_state
-from stewart_dynamics.parameters.table import BASE_OUTLINE, Parameters, PLATFORM_OUTLINE
+from stewart_dynamics.node.diagnostics.answers import singularity_state
+from stewart_dynamics.node.diagnostics.levels import ERROR, OK, WARN
+from stewart_dynamics.parameters.table import (
+    BASE_OUTLINE, mean_radius, Parameters, PLATFORM_OUTLINE)
 from stewart_dynamics.setpoints.step import Output
 from visualization_msgs.msg import Marker
 
-Color = tuple[float, float, float, float]
 
 # Okabe and Ito's blue, vermillion and yellow, distinct for the colour-blind. A leg without load is
 # nearly white: the darker a leg, the larger its force, whether it pushes or pulls.
@@ -44,20 +46,17 @@ PULL: Color = (0.0, 0.447, 0.698, 1.0)
 NO_LOAD: Color = (0.95, 0.95, 0.95, 1.0)
 NO_FORCE: Color = (0.4, 0.4, 0.4, 1.0)
 PLATFORM: dict[int, Color] = {
-    OK: (0.62, 0.7, 0.76, 1.0), WARN: (0.941, 0.894, 0.259, 1.0), ERROR: PUSH}
-_BASE: Color = (0.3, 0.32, 0.35, 1.0)
-_JOINT: Color = (0.12, 0.12, 0.12, 1.0)
+    OK: COLORS['platform'], WARN: (0.941, 0.894, 0.259, 1.0), ERROR: PUSH}
 _CENTER_OF_MASS: Color = (0.8, 0.475, 0.655, 1.0)  # Okabe and Ito's reddish purple
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 _AXES: list[Color] = [(0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.1, 1.0), (0.1, 0.3, 0.9, 1.0)]
 
-# Relative to the platform's size, the mean distance of its joints from their center.
-_BARREL, _ROD, _BALL, _PLATE, _AXIS, _LINE = 0.1, 0.055, 0.14, 0.05, 1.2, 0.02
+# Relative to the platform's size, as the sizes of the description.
+_AXIS, _LINE = 1.2, 0.02
 _HEAVY = 0.2  # the ball at the centre of mass
 _TEXT_SIZE, _TEXT_ABOVE = 0.11, 1.4
 _NAME_OUTSIDE = 0.15  # relative to the base's size
-# Length of the cylinder, relative to limits.length_min or, if not set, to the leg's length.
-_OF_SHORTEST, _OF_LENGTH = 0.9, 0.5
+_OF_LENGTH = 0.5  # of the cylinder, of the leg's length where limits.length_min is not set
 
 # Lifetime of markers [s]: setpoints sent by hand typically arrive once per second. At a lower
 # visualization_rate it is two periods, at most one day: a Duration is limited to 68 years.
@@ -97,26 +96,25 @@ class Markers:
         self._platform = parameters['geometry.platform_joints']
         self._bounds = parameters['limits.force_max']
         self._shortest = parameters['limits.length_min']
-        size = float(np.mean(np.linalg.norm(
-            self._platform - self._platform.mean(axis=0), axis=1)))
-        self._radii = np.repeat([_BARREL * size, _ROD * size], 6)
+        size = mean_radius(self._platform)
+        self._diameters = np.repeat([2.0 * BARREL * size, 2.0 * ROD * size], 6)
         self._text_above = _TEXT_ABOVE * size
         self._frame = parameters['base_frame']
         rate = parameters['visualization_rate']
         self._stays = min(max(STAYS, 2.0 / rate if rate else 0.0), _LONGEST)
 
-        ball, line = (_BALL * size,) * 3, (_LINE * size, 0.0, 0.0)
+        ball, line = (2.0 * BALL * size,) * 3, (_LINE * size, 0.0, 0.0)
         text_size = 0.0, 0.0, _TEXT_SIZE * size
-        thickness = _PLATE * size
+        thickness = PLATE * size
         axes = np.zeros((6, 3))
         axes[[1, 3, 5], [0, 1, 2]] = _AXIS * size
         self._stamps: list[int] = []
         self._body = bytearray(LITTLE_ENDIAN)
         self._put(4, 'I', 0)  # how many there are
-        self._marker('base', 0, Marker.TRIANGLE_LIST, _BASE, points=_plate(
+        self._marker('base', 0, Marker.TRIANGLE_LIST, COLORS['base'], points=_plate(
             self._base if parameters[BASE_OUTLINE] is None else parameters[BASE_OUTLINE],
             thickness))
-        self._marker('base', 1, Marker.SPHERE_LIST, _JOINT, ball, self._base)
+        self._marker('base', 1, Marker.SPHERE_LIST, COLORS['joint'], ball, self._base)
         outside = self._base + _NAME_OUTSIDE * (self._base - self._base.mean(axis=0))
         for n, name in enumerate(self._names):
             self._marker('names', n, Marker.TEXT_VIEW_FACING, _WHITE, text_size,
@@ -127,7 +125,7 @@ class Markers:
             else parameters[PLATFORM_OUTLINE], thickness))
         self._with_platform = [
             self._plate,
-            self._marker('platform', 1, Marker.SPHERE_LIST, _JOINT, ball, self._platform),
+            self._marker('platform', 1, Marker.SPHERE_LIST, COLORS['joint'], ball, self._platform),
             self._marker('platform', 2, Marker.LINE_LIST, _WHITE, line, axes,
                          [color for color in _AXES for _ in range(2)]),
             self._marker('platform', 3, Marker.SPHERE_LIST, _CENTER_OF_MASS, (_HEAVY * size,) * 3,
@@ -175,7 +173,7 @@ class Markers:
         along = vectors / lengths[:, None]
         barrels = _OF_LENGTH * lengths
         if self._shortest is not None:
-            barrels = np.minimum(_OF_SHORTEST * self._shortest, lengths)
+            barrels = np.minimum(BARREL_LENGTH * self._shortest, lengths)
         numbers = np.zeros((12, 10))
         numbers[:6, :3] = self._base + 0.5 * barrels[:, None] * along
         numbers[6:, :3] = self._base + 0.5 * vectors
@@ -186,7 +184,7 @@ class Markers:
         numbers[:, 3] = np.tile(-0.5 * up[:, 1] / half, 2)
         numbers[:, 4] = np.tile(0.5 * up[:, 0] / half, 2)
         numbers[:, 6] = np.tile(half, 2)
-        numbers[:, 7] = numbers[:, 8] = self._radii
+        numbers[:, 7] = numbers[:, 8] = self._diameters
         numbers[:6, 9], numbers[6:, 9] = barrels, lengths
         rows: list[list[float]] = numbers.tolist()
         return rows

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 import gc
 import math
@@ -39,14 +39,14 @@ from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.node.diagnostics.diagnostic_array import DiagnosticsPublisher
-from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, TICK, WARN
-from stewart_dynamics.node.publishers_at_rate import MarkersPublisher, ModelPublisher
+from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, WARN
+from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics, TICK
+from stewart_dynamics.node.markers import Markers
+from stewart_dynamics.node.publishers_at_rate import (
+    DiagnosticsPublisher, PublisherAtRate, TravelPublisher)
 from stewart_dynamics.node.tasks import (
     inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)
 from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD, TRAVEL
-from stewart_dynamics.node.travel import TravelPublisher
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
@@ -99,7 +99,7 @@ class DynamicsNode(LifecycleNode):
     def __init__(self) -> None:
         # Undeclared parameters are allowed so that our own check rejects them, with a better
         # text.
-        super().__init__('stewart_dynamics', automatically_declare_parameters_from_overrides=True,
+        super().__init__(Parameters.node, automatically_declare_parameters_from_overrides=True,
                          allow_undeclared_parameters=True)
         self._settings = declare_parameters(self, Parameters)
         self._log = RepeatedLog(self.get_logger())
@@ -112,8 +112,7 @@ class DynamicsNode(LifecycleNode):
         self._travel_code = Preparation(travel.travels)
         self._base_wrench_read = False  # it has a subscriber
         self._planned: TaskQueue[planned.PlannedOutcome] = TaskQueue(
-            OneShotTimer(self, PAUSE, lambda: self._planned.tick()).start,
-            self._planned_code, self._on_outcome)
+            partial(OneShotTimer, self, PAUSE), self._planned_code, self._on_outcome)
         self._payload = PayloadService(self, self._identify_payload, self._on_payload)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         # A steady clock: ROS time may stand still or jump.
@@ -159,11 +158,11 @@ class DynamicsNode(LifecycleNode):
         self._last: Output | None = None
         self._target: tuple[float, ...] | None = None  # motion of the last answered setpoint
         self._restarting = False  # the last setpoint was a restart that could not be answered
-        publishers = self._topics.publishers
-        self._markers = MarkersPublisher(parameters, publishers.get(MARKERS))
-        self._model = ModelPublisher(
-            self._model_messages, parameters['visualization_rate'], publishers.get(JOINT_STATES),
-            publishers.get(TF))
+        publishers, rate = self._topics.publishers, parameters['visualization_rate']
+        self._markers = PublisherAtRate(publishers.get(MARKERS), rate, Markers(parameters).write)
+        self._joint_states = PublisherAtRate(
+            publishers.get(JOINT_STATES), rate, self._model_messages.joint_states)
+        self._transforms_read = False  # they have a subscriber
         self._travel = TravelPublisher(parameters, publishers[TRAVEL], self._travel_code)
         self._model_measured = parameters['joint_states.source'] == 'measured'
         self._handled, self._rested = -math.inf, False
@@ -253,9 +252,7 @@ class DynamicsNode(LifecycleNode):
         for setpoint, came in waiting if len(waiting) <= BACKLOG else [self._newest(waiting)]:
             self._answer(setpoint, came)
         now = time.monotonic()
-        self._markers.publish_due(now)
-        self._model.publish_due(now)
-        self._travel.publish_due(now)
+        self._publish_due(now)
         rested, self._rested = self._rested, False
         if not rested:
             self._gathering = True
@@ -287,21 +284,32 @@ class DynamicsNode(LifecycleNode):
         self._note(setpoint, output, came)
 
     def _note(self, setpoint: Setpoint, output: Output, came: float) -> None:
-        """Publish the base wrench; pass the answer to markers, model and diagnostics."""
+        """Publish the base wrench; pass the answer to other publishers and diagnostics."""
         if self._base_wrench_read:
             wrench = self._models.base_wrench(setpoint)
             if wrench is not None:
                 self._topics.publishers[BASE_WRENCH].publish(
                     self._messages.of_wrench(setpoint.stamp, wrench))
-        self._markers.answered(setpoint, output)
-        self._travel.answered(setpoint.motion)
+        self._markers.note(setpoint.motion, output)
+        self._travel.note(setpoint.motion)
         if not self._model_measured:
-            self._model.moved(setpoint.stamp, setpoint.motion)
+            self._moved(setpoint.stamp, setpoint.motion)
         now = time.monotonic()
         if setpoint.base is not None:
             self._diagnostics.base.answered(setpoint, now)
         if self._diagnostics.answered(output, came, now):
             self._report()
+
+    def _moved(self, stamp: int, pose: Sequence[float]) -> None:
+        """Publish the transform of a pose, a row of motion; note it for the joint states."""
+        self._joint_states.note(stamp, pose)
+        if self._transforms_read:
+            self._topics.publishers[TF].publish(self._model_messages.transform(stamp, pose))
+
+    def _publish_due(self, now: float) -> None:
+        self._markers.publish_due(now)
+        self._joint_states.publish_due(now)
+        self._travel.publish_due(now)
 
     def _is_only_writer(self, topic: str) -> bool:
         """Return whether a topic has only one writer; reject a message on it otherwise."""
@@ -320,7 +328,7 @@ class DynamicsNode(LifecycleNode):
     def _on_base(self, topic: str, data: bytes) -> None:
         if self._active:
             now = time.monotonic()
-            self._diagnostics.base.heard(topic, now)
+            self._diagnostics.base.heard[topic] = now
             if self._exclusive and not self._is_only_writer(topic):
                 return
             if self._setpoints.base.take(topic, data, self._ros_time):
@@ -337,19 +345,20 @@ class DynamicsNode(LifecycleNode):
             self._on_rejection(Rejection(MEASURED_LEGS, NOT_COMPILED), 'this takes seconds, once')
             return
         now = time.monotonic()
-        diagnostics, target = self._diagnostics.external_wrench, self._target
+        diagnostics = self._diagnostics.external_wrench
         diagnostics.heard(now)
         estimate = self._measured_legs.take(
-            data, self._setpoints.wrench, target, self._setpoints.base)
+            data, self._setpoints.wrench, self._target, self._setpoints.base)
         if estimate is None:
             return
         if self._model_measured:
-            self._model.moved(estimate.stamp, estimate.motion)
-            self._model.publish_due(now)
+            self._moved(estimate.stamp, estimate.motion)
+            self._joint_states.publish_due(now)
         if estimate.wrench is not None:
             self._topics.publishers[EXTERNAL_WRENCH].publish(
                 self._messages.of_wrench(estimate.stamp, estimate.wrench))
-        if diagnostics.estimated(estimate, target, now):
+        diagnostics.estimated(estimate, self._target, now)
+        if self._diagnostics.level_changed(now):
             self._report()
 
     def _identify_payload(
@@ -360,7 +369,7 @@ class DynamicsNode(LifecycleNode):
             return payload.PayloadOutcome(
                 'the code for measured legs is being compiled, which takes seconds, once: move '
                 'the hexapod for payload.window after that, and ask again')
-        silence = self._diagnostics.external_wrench.silence(time.monotonic())
+        silence = time.monotonic() - self._diagnostics.external_wrench.heard_at
         if self._settings['setpoint.timeout'] < silence < math.inf:
             return payload.PayloadOutcome(f'measured_legs silent for {silence:.1f} s')
         # Parameters are those of now, whatever changes meanwhile.
@@ -386,7 +395,7 @@ class DynamicsNode(LifecycleNode):
         # Parameters, load and gravity are those of now, whatever changes meanwhile.
         base = self._setpoints.base.at_rest(known=not self._diagnostics.base.stale(now))
         measured = (
-            self._measured_legs.motion if self._diagnostics.external_wrench.age(now)
+            self._measured_legs.motion if now - self._diagnostics.external_wrench.used_at
             <= self._settings['setpoint.timeout'] else None)
         self._planned.add(planned.answer(
             self._settings, self._setpoints.wrench, data, base, measured), now)
@@ -423,12 +432,12 @@ class DynamicsNode(LifecycleNode):
                             (MEASURED_LEGS, self._payload.code)):
             if not code.ready and self._topics.writers_of(topic):
                 code.begin()  # the first message will come soon
-        reads = self._topics.publishers[BASE_WRENCH].get_subscription_count() > 0
+        publishers = self._topics.publishers
+        reads = publishers[BASE_WRENCH].get_subscription_count() > 0
         self._base_wrench_read = reads and self._base_wrench_code.begin()
-        self._markers.publish_due(now)  # the last answer before a silence
-        self._model.publish_due(now)
-        self._model.look()
-        self._travel.publish_due(now)
+        self._publish_due(now)  # the last answer before a silence
+        self._transforms_read = (
+            TF in publishers and publishers[TF].get_subscription_count() > 0)
         if notice := self._travel.look():
             self._log.write([LogLine(WARN, notice)])
         if self._diagnostics.due_at_tick(now):
@@ -452,8 +461,8 @@ class DynamicsNode(LifecycleNode):
         self._settings, self._models = parameters, models
         if self._active:
             self._measured_legs.step = models.external_wrench
-            self._diagnostics.use(parameters)
-            self._markers.use(parameters)
+            self._diagnostics.answers.parameters = parameters
+            self._markers.write = Markers(parameters).write  # a payload moves the centre of mass
             self._travel.use(parameters)
         return SetParametersResult(successful=True)
 

@@ -12,37 +12,71 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Topics that are published at a limited rate, while there are subscribers.
-
-``~/markers`` and ``~/joint_states`` at most at ``visualization_rate``; with every pose the
-platform's transform on ``/tf``.
-"""
+"""Publishers of topics that are not published with each answer: at a limited rate or period."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+import math
+import sys
+import time
 from typing import Any
 
-from stewart_dynamics.description.model import ModelMessages
-from stewart_dynamics.node.markers import Markers
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+import numpy as np
+from rclpy.node import Node
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
+
+from stewart_dynamics.capability.capability import Capability
+from stewart_dynamics.compilation.functions import Preparation
+from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.limits import (
+    CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, OF_JOINTS)
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.node.diagnostics.levels import OK, Status
+from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
+from stewart_dynamics.node.topics import DIAGNOSTICS, NodeTopics
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.step import Output, Setpoint
+from stewart_dynamics.ros.repeated_log import RepeatedLog
+from stewart_dynamics.setpoints.output_messages import LEG_FORCES, LEG_STATES
+
+# The topics for controllers; diagnostics give the number of their subscribers.
+_READ = LEG_STATES, LEG_FORCES
+
+_TRAVEL_RATE = 10.0  # [Hz]
+# Directions in the order of the message: each of x y z rx ry rz to minus, then to plus.
+_DIRECTIONS = np.stack([-np.eye(6), np.eye(6)], axis=1).reshape(12, 6)
+# Values where nothing limits, since no output is infinite: the largest number [m]; one turn [rad].
+_UNLIMITED = np.repeat([sys.float_info.max, 2.0 * math.pi], 6)
+_LAYOUT = MultiArrayLayout(dim=[
+    MultiArrayDimension(label='x y z rx ry rz', size=6, stride=12),
+    MultiArrayDimension(label='minus plus', size=2, stride=2)])
+_ENDING = LENGTH_MIN, LENGTH_MAX, *OF_JOINTS, CLEARANCE_MIN
+NO_LIMIT = (f'~/travel: none of {", ".join(_ENDING)} is set: it ends '
+            'at singularity.stop_condition alone')
 
 
 class PublisherAtRate:
     """
     Publishes the last data noted, at most at a given rate, while there are subscribers.
 
-    publisher: publishes the message from ``_write``; None if nothing is to be published.
+    publisher: None if nothing is to be published.
     rate: maximum rate [Hz].
+    write: makes the message; called with the data.
     """
 
-    def __init__(self, publisher: Any, rate: float) -> None:
+    def __init__(self, publisher: Any, rate: float, write: Callable[..., Any]) -> None:
+        self.write = write  # may be replaced at any time
         self._publisher = publisher
         self._period = 1.0 / rate if rate else 0.0
         self._due = 0.0
         self._unpublished: tuple[Any, ...] | None = None
+
+    def note(self, *data: Any) -> None:
+        """Note the data of the next message."""
+        self._unpublished = data
 
     def publish_due(self, now: float) -> None:
         """Publish the last data noted if publication is due and there is a subscriber."""
@@ -53,55 +87,84 @@ class PublisherAtRate:
         self._unpublished = None
         self._due = now + self._period
         if self._publisher.get_subscription_count():
-            self._publisher.publish(self._write(*last))
-
-    def _write(self, *last: Any) -> Any:
-        raise NotImplementedError
+            self._publisher.publish(self.write(*last))
 
 
-class MarkersPublisher(PublisherAtRate):
-    """Publishes the markers of the last answer."""
+class TravelPublisher(PublisherAtRate):
+    """
+    Publishes ``~/travel``: how far the platform can go from the pose of the last setpoint.
 
-    def __init__(self, parameters: Parameters, publisher: Any) -> None:
-        super().__init__(publisher, parameters['visualization_rate'])
+    parameters: geometry and limits; ``use`` replaces them.
+    code: machine code that is compiled once somebody subscribes.
+    """
+
+    def __init__(self, parameters: Parameters, publisher: Any, code: Preparation) -> None:
+        super().__init__(publisher, _TRAVEL_RATE, self._message)
+        self._code = code
+        self._read = self._said = False
         self.use(parameters)
 
     def use(self, parameters: Parameters) -> None:
-        """Use other parameters from now on: a payload moves the centre of mass."""
-        if self._publisher is not None:
-            self._markers = Markers(parameters)
+        """Use other parameters from now on."""
+        self._parameters = parameters
+        self._capability: Capability | None = None
 
-    def answered(self, setpoint: Setpoint, output: Output) -> None:
-        """Note the last answer."""
-        self._unpublished = setpoint, output
+    def look(self) -> str:
+        """Check whether there is a subscriber; return a notice where no limit is set, once."""
+        subscribed = self._publisher.get_subscription_count() > 0
+        self._read = subscribed and self._code.begin()
+        if not subscribed:
+            return ''
+        unlimited = all(self._parameters[name] is None for name in _ENDING)
+        said, self._said = self._said, True
+        return NO_LIMIT if unlimited and not said else ''
 
-    def _write(self, setpoint: Setpoint, output: Output) -> bytes:
-        return self._markers.write(setpoint.motion, output)
-
-
-class ModelPublisher(PublisherAtRate):
-    """
-    Publishes the last pose as joint states, and each pose as a transform.
-
-    rate: maximum rate of ``~/joint_states`` [Hz].
-    joint_states, transforms: None if the rate is zero, or if ``publish_tf`` is false.
-    """
-
-    def __init__(self, messages: ModelMessages, rate: float, joint_states: Any, transforms: Any,
-                 ) -> None:
-        super().__init__(joint_states, rate)
-        self._messages, self._transforms = messages, transforms
-        self._read = False  # the transforms have a subscriber
-
-    def moved(self, stamp: int, pose: Sequence[float]) -> None:
-        """Note a pose, a row of motion at a stamp [ns], and publish its transform."""
-        self._unpublished = stamp, pose
+    def note(self, *data: Any) -> None:
+        """Note a row of motion."""
         if self._read:
-            self._transforms.publish(self._messages.transform(stamp, pose))
+            super().note(*data)
 
-    def look(self) -> None:
-        """Check whether the transforms have a subscriber."""
-        self._read = bool(self._transforms and self._transforms.get_subscription_count())
+    def _message(self, motion: Sequence[float]) -> Float64MultiArray:
+        if self._capability is None:
+            self._capability = Capability(StewartPlatform(self._parameters))
+        try:
+            values = self._capability.travel(Motion.of_rows(np.array(motion)), _DIRECTIONS).value
+        except MotionError:  # not decided within the largest number of steps
+            values = np.zeros(12)
+        values = np.where(np.isposinf(values), _UNLIMITED, values)
+        return Float64MultiArray(layout=_LAYOUT, data=values.tolist())
 
-    def _write(self, stamp: int, pose: Sequence[float]) -> bytes:
-        return self._messages.joint_states(stamp, pose)
+
+class DiagnosticsPublisher:
+    """Publishes and logs reports."""
+
+    def __init__(self, node: Node, topics: NodeTopics, log: RepeatedLog) -> None:
+        self._node = node
+        self._topics = topics
+        self._log = log
+        # The first one takes milliseconds: rclpy loads the type support.
+        serialize_message(self._message([Status('', OK, '', [('', '')])]))
+
+    def publish(self, diagnostics: DynamicsDiagnostics) -> None:
+        """Count publishers and subscribers; publish and log a report."""
+        node, publishers = self._node, self._topics.publishers
+        namesakes = node.get_node_names_and_namespaces().count(
+            (node.get_name(), node.get_namespace()))
+        diagnostics.setpoints.found(
+            self._topics.writers(),
+            {topic: publishers[topic].get_subscription_count() for topic in _READ},
+            f'{namesakes} nodes are named {node.get_fully_qualified_name()}'
+            if namesakes > 1 else '')
+        statuses, lines = diagnostics.report(time.monotonic())
+        self._log.write(lines)
+        publishers[DIAGNOSTICS].publish(self._message(statuses))
+
+    def _message(self, statuses: list[Status]) -> DiagnosticArray:
+        name = self._node.get_fully_qualified_name().lstrip('/')
+        return DiagnosticArray(
+            header=Header(stamp=self._node.get_clock().now().to_msg()),
+            status=[DiagnosticStatus(
+                level=bytes([status.level]), name=f'{name}: {status.name}',
+                message=status.message, hardware_id=name,
+                values=[KeyValue(key=key, value=value) for key, value in status.values])
+                for status in statuses])

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
+from functools import partial
 import time
 from typing import Any, Generic, TypeVar
 
@@ -49,14 +50,14 @@ class TaskQueue(Generic[Outcome]):
     """
     Works on tasks in order and in pieces, one at each tick of a timer.
 
-    start: starts the timer; it ticks once after each start.
+    timer: makes the timer, which calls back once after each start.
     code: compilation of the functions that a task calls; tasks wait until it is ready.
     done: called with an outcome and the time of arrival of its task [s].
     """
 
-    def __init__(self, start: Callable[[], None], code: Preparation,
+    def __init__(self, timer: Callable[[Callable[[], None]], OneShotTimer], code: Preparation,
                  done: Callable[[Outcome, float], None]) -> None:
-        self._start = start
+        self._timer = timer(self._on_timer)
         self._code = code
         self._done = done
         self._waiting: deque[tuple[Iterator[Outcome | None], float]] = deque()
@@ -75,14 +76,12 @@ class TaskQueue(Generic[Outcome]):
         """Add a task that arrived at a time [s]."""
         self._code.begin()
         self._waiting.append((work, came))
-        self._start()
+        self._timer.start()
 
-    def tick(self) -> None:
+    def _on_timer(self) -> None:
         """Do one piece of the first task."""
-        if not self._waiting:  # dropped
-            return
         if not self._code.ready:
-            self._start()
+            self._timer.start()
             return
         work, came = self._waiting[0]
         outcome = next(work)
@@ -90,10 +89,11 @@ class TaskQueue(Generic[Outcome]):
             self._waiting.popleft()
             self._done(outcome, came)
         if self._waiting:
-            self._start()
+            self._timer.start()
 
     def drop(self) -> int:
         """Drop all tasks and return their number."""
+        self._timer.stop()
         number = len(self._waiting)
         self._waiting.clear()
         return number
@@ -121,15 +121,14 @@ class PayloadService:
             done: Callable[[PayloadOutcome, float], None]) -> None:
         self.code = Preparation(*FUNCTIONS)
         self._begin, self._done = work, done
-        self._timer = OneShotTimer(node, _PAUSE, lambda: self._tasks.tick())
-        self._tasks: TaskQueue[PayloadOutcome] = TaskQueue(self._timer.start, self.code, self._end)
+        self._tasks: TaskQueue[PayloadOutcome] = TaskQueue(
+            partial(OneShotTimer, node, _PAUSE), self.code, self._end)
         self._waiting: list[Callable[[Any], None]] = []
         # Never destroyed before the node: a waiting request would get no answer.
         create_later_service(node, Trigger, f'~/{IDENTIFY_PAYLOAD}', self._on_request)
 
     def drop(self, reason: str) -> None:
         """End the task in progress, if any, without result."""
-        self._timer.stop()
         self._tasks.drop()
         self._answer(PayloadOutcome(reason))
 

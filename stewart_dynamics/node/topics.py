@@ -45,7 +45,8 @@ from stewart_dynamics.setpoints.inputs import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
     SOURCES, TWIST, WRENCH)
 from stewart_dynamics.setpoints.output_messages import (
-    MOTOR_STATES, MOTOR_TORQUES, MOTOR_TYPES, OUTPUT_TYPES)
+    DETERMINANT, LEG_FORCES, LEG_LENGTHS, LEG_STATES, MOTOR_STATES, MOTOR_TORQUES, MOTOR_TYPES,
+    OUTPUT_TYPES, WARNING)
 from stewart_dynamics.setpoints.sample_joining import WAITING
 
 DIAGNOSTICS, MARKERS, PAYLOAD, TRAVEL = '/diagnostics', 'markers', 'payload', 'travel'
@@ -104,13 +105,13 @@ def _output(name: str, meaning: str, details: str = '', latched: bool = False,
 
 
 PUBLISHED = (
-    _output('leg_states', 'name, position (length - `geometry.zero_length`), velocity and effort '
+    _output(LEG_STATES, 'name, position (length - `geometry.zero_length`), velocity and effort '
             '(force) of the six legs'),
-    _output('leg_lengths', 'six lengths, m'),
-    _output('leg_forces', 'six forces, N, + pushes; remap it to the `commands` of an effort '
+    _output(LEG_LENGTHS, 'six lengths, m'),
+    _output(LEG_FORCES, 'six forces, N, + pushes; remap it to the `commands` of an effort '
             'controller'),
-    _output('jacobian_determinant', 'det(J), m^3'),
-    _output('singularity_warning', 'true near and at a [singularity](theory.md#singularity)',
+    _output(DETERMINANT, 'det(J), m^3'),
+    _output(WARNING, 'true near and at a [singularity](theory.md#singularity)',
             '; with the first setpoint and on every change, latched (transient local)', True),
     _output(MOTOR_STATES, 'angle [rad], speed [rad/s] and torque [N m] of the six '
             '[motors](drives.md), named as the joints with `_motor` after it',

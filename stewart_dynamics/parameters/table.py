@@ -28,10 +28,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.tolerances import (
-    HYSTERESIS, is_unit, REFLECTED_MASS_TOLERANCE, unit_rule)
+    HYSTERESIS, is_unit, REFLECTED_MASS_TOLERANCE, START_TOLERANCE, unit_rule)
 
 
 # Corners of a plate are in a plane to this part of its size.
@@ -110,6 +111,9 @@ MOTOR_INERTIA, SCREW_INERTIA = DRIVE_INERTIAS = 'drive.motor_inertia', 'drive.sc
 """Parameters from which actuator.reflected_mass follows, where one of them is given."""
 AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'  # values of geometry.platform_side
 IGNORE, CHECK, PREPEND = 'ignore', 'check', 'prepend'  # values of trajectory.approach
+WARN, SUPPRESS_FORCES = ACTIONS = 'warn', 'suppress_forces'  # of singularity.action, limits.action
+SEPARATE, COMBINED, POSES_ALONE = 'separate', 'combined', 'pose'  # values of setpoint.source
+FIXED, AT_REST, MOVING, BY_IMU = 'fixed', 'pose', 'motion', 'imu'  # values of base.source
 LEG_SHAPE = 'legs.cylinder.radius', 'legs.cylinder.length', 'legs.piston.radius'
 """Parameters that the clearance of the legs needs."""
 BASE_OUTLINE, PLATFORM_OUTLINE = OUTLINES = 'geometry.base_outline', 'geometry.platform_outline'
@@ -218,7 +222,7 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('limits.action', 'string', 'action while a limit of length, rate, joint angle or '
               'clearance, or of speed or temperature of a motor, is exceeded, or a setpoint is '
               'too far from the last one for limits.velocity_max: warn only, or publish no forces '
-              'and torques', '', 'warn', choices=('warn', 'suppress_forces'), while_active=True),
+              'and torques', '', WARN, choices=ACTIONS, while_active=True),
     Parameter('singularity.characteristic_length', 'double', 'length by which moments are '
               'divided in the condition number; default: mean distance of the platform joints '
               'from their center', 'm', minimum=0.0, above=True),
@@ -234,11 +238,11 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'warn when the predicted time to a crossing of det(J) = 0 is shorter than this', 's',
               0.5, minimum=0.0, while_active=True),
     Parameter('singularity.action', 'string',
-              'action above stop_condition: warn only, or publish no forces', '', 'warn',
-              choices=('warn', 'suppress_forces'), while_active=True),
+              'action above stop_condition: warn only, or publish no forces', '', WARN,
+              choices=ACTIONS, while_active=True),
     Parameter('setpoint.source', 'string', 'setpoints on three topics, on one combined topic, or '
-              'poses alone (quasi-static: no motion terms)', '', 'separate',
-              choices=('separate', 'combined', 'pose')),
+              'poses alone (quasi-static: no motion terms)', '', SEPARATE,
+              choices=(SEPARATE, COMBINED, POSES_ALONE)),
     Parameter('setpoint.sync_tolerance', 'double',
               'largest difference between the stamps of one setpoint', 's', 0.0, minimum=0.0,
               maximum=1e9),
@@ -250,8 +254,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               default=False),
     Parameter('base.source', 'string', 'how the base moves: not at all, by its orientation in the '
               'world (~/base/pose, at rest), by its motion in the world (~/base/pose, twist and '
-              'accel), or as an IMU on it measures (~/base/imu)', '', 'fixed',
-              choices=('fixed', 'pose', 'motion', 'imu')),
+              'accel), or as an IMU on it measures (~/base/imu)', '', FIXED,
+              choices=(FIXED, AT_REST, MOVING, BY_IMU)),
     Parameter('base.timeout', 'double',
               'age of the last base motion above which no forces are published', 's', 0.1,
               minimum=0.0, above=True, maximum=1e9),
@@ -268,7 +272,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'a joint_trajectory_controller without an effort command interface rejects points '
               'with effort', default=True),
     Parameter('trajectory.approach', 'string', 'where ~/platform_trajectory may start: anywhere; '
-              'check: where the measured legs are, to 1 % of singularity.characteristic_length; '
+              f'check: where the measured legs are, to {START_TOLERANCE:.0%} of '
+              'singularity.characteristic_length; '
               'prepend: a motion from rest there to the first point is put before it', '',
               IGNORE, choices=(IGNORE, CHECK, PREPEND)),
     Parameter('external_wrench.cutoff', 'double',
@@ -331,8 +336,7 @@ class Parameters(ParameterSet):
             raise ParameterError(f'{source}: base.imu.orientation: '
                                  f'{self["base.imu.orientation"].tolist()}: {unit_rule(length)}')
         platform_joints = self['geometry.platform_joints']
-        size = float(np.mean(np.linalg.norm(
-            platform_joints - platform_joints.mean(axis=0), axis=1)))
+        size = mean_radius(platform_joints)
         if size == 0.0:
             raise ParameterError(
                 f'{source}: geometry.platform_joints: all six are at one point')
@@ -408,6 +412,14 @@ def _broken_rule_of_plate(corners: Any) -> str:
     if turns.min() < -_FLAT * size ** 2 or around > 3.0 * math.pi:
         return 'must be convex, its corners in order around it'
     return ''
+
+
+def mean_radius(points: Array) -> float:
+    """Return the mean distance of points (N, 3) from their center."""
+    return float(np.mean(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+
+
+INERTIA = 'ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'
 
 
 def inertia_matrix(six: ArrayLike) -> Any:

@@ -30,6 +30,12 @@ REFLECTED_MASS_TOLERANCE = 0.01
 Relative tolerance of actuator.reflected_mass if drive.* gives the inertias: both may be rounded.
 """
 
+START_TOLERANCE = 0.01
+"""
+The legs may be this far from where a planned trajectory starts, in characteristic lengths: where
+trajectory.approach has that checked.
+"""
+
 
 def is_unit(length: Any) -> Any:
     """Return whether a quaternion's length, or each of an array, is one within the tolerance."""

@@ -40,7 +40,7 @@ from stewart_dynamics.mechanics.limits import (
     SPEED_MAX, TEMPERATURE_RISE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.interpolation import Cubics
 from stewart_dynamics.planned.sampling import TOLERANCE
@@ -111,7 +111,7 @@ class Checks:
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._clearance = clearance_to_check(parameters)
         self._clearance_tolerance = _CLEARANCE * parameters['singularity.characteristic_length']
-        self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
+        self._stop = stop_condition_of(parameters)
         self._coulomb = parameters['actuator.coulomb_friction']
         self._coulomb_velocity = parameters['actuator.coulomb_velocity']
         self._parameters = parameters

@@ -40,7 +40,7 @@ from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
 from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
-from stewart_dynamics.parameters.tolerances import unit_rule
+from stewart_dynamics.parameters.tolerances import START_TOLERANCE, unit_rule
 from stewart_dynamics.planned.approach import approach_in_pieces
 from stewart_dynamics.planned.trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
@@ -60,9 +60,6 @@ QUEUE_FULL = 'queue full'
 NOT_MEASURED = 'measured legs not known'
 STARTS_ELSEWHERE = 'does not start where the legs are'
 NO_APPROACH = 'no approach to the first point'
-
-# Tolerance of the start for trajectory.approach, in characteristic lengths.
-START_TOLERANCE = 0.01
 
 _POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
 

@@ -32,6 +32,7 @@ from std_msgs.msg import Header
 from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
+from stewart_dynamics.parameters.table import COMBINED
 from stewart_dynamics.reference_motion.motion import motion_at, sample_count, sample_time
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.declared_parameters import declare_parameters
@@ -59,7 +60,7 @@ class TrajectoryNode(Node):
 
     def __init__(self, done: Future) -> None:
         super().__init__(
-            'stewart_trajectory', automatically_declare_parameters_from_overrides=True,
+            ReferenceMotionParameters.node, automatically_declare_parameters_from_overrides=True,
             allow_undeclared_parameters=True)
         self._settings = declare_parameters(self, ReferenceMotionParameters)
         self._done = done
@@ -72,7 +73,7 @@ class TrajectoryNode(Node):
         self._row()  # an error in it is raised before anything moves
         target = self._settings['target']
         qos = QoSProfile(depth=1000)
-        if self._settings['output'] == 'combined':
+        if self._settings['output'] == COMBINED:
             self._combined = self.create_publisher(
                 MultiDOFJointTrajectory, f'{target}/{inputs.COMBINED}', qos)
             self._outputs = [self._combined]

@@ -25,6 +25,7 @@ from types import MappingProxyType
 
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters.table import COMBINED, SEPARATE
 
 _POSE = 'X Y Z alpha beta gamma'
 
@@ -33,7 +34,7 @@ REFERENCE_MOTION_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name:
               default='stewart_dynamics'),
     Parameter('base_frame', 'string', 'frame of the setpoints', default='base'),
     Parameter('output', 'string', 'pose, twist and accel on three topics, or combined in one '
-              'message', default='separate', choices=('separate', 'combined')),
+              'message', default=SEPARATE, choices=(SEPARATE, COMBINED)),
     Parameter('rate', 'double', 'rate of the setpoints', 'Hz', 100.0, minimum=1e-3, maximum=1e4),
     Parameter('start_timeout', 'double', 'the motion starts half a second after all its topics '
               'have subscribers, at the latest after this time', 's', 5.0, minimum=0.0,

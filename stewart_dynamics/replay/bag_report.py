@@ -28,35 +28,39 @@ import hashlib
 import itertools
 from pathlib import Path
 import re
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, SECOND
+from stewart_dynamics.arrays import Array, RPM, SECOND
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, LIMITS, OF_JOINTS, QUANTITIES
+from stewart_dynamics.mechanics.frames.rotation import to_euler
+from stewart_dynamics.mechanics.limits import (
+    CLEARANCE_MIN, LIMITS, OF_JOINTS, QUANTITIES, Quantity)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE, POSITION,
     ROTATION)
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
+from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
-from stewart_dynamics.replay.summary import Answered
-from stewart_dynamics.reporting.colors import LEG_COLORS
+from stewart_dynamics.replay.summary import Answered, margin_key, PARTS, unit_key
+from stewart_dynamics.reporting.colors import FORCE_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
     base64_of, link, link_to_other, page, plotly_script)
 from stewart_dynamics.reporting.plots import (
-    base_wrench_plots, measured_plots, motion_plots, PLOT_OF, spectrum_plots)
+    base_wrench_plots, measured_plots, motion_plots, spectrum_plots)
 from stewart_dynamics.reporting.results_folder import DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
 from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')
-# A frame of the moving platform: position, rotation, lengths, forces.
-_FRAME = 24
+# Where the numbers of the moving platform are in a frame; angles in degrees.
+_FRAME = {'position': (0, 3), 'rotation': (3, 12), 'angles': (12, 15), 'lengths': (15, 21),
+          'forces': (21, 27)}
 # Maximum number of listed times of one kind, the first ones.
 _MOST_TIMES = 20
 
@@ -78,7 +82,7 @@ class Report:
         self._curves = Curves(timeout)
         self._places: dict[str, slice] = {}
         self._spectrum = Spectrum(6, timeout, folder)
-        self._frames = Frames(_FRAME)
+        self._frames = Frames(max(end for _, end in _FRAME.values()))
         self._compared = Curves(timeout) if measured else None
         self._places_compared: dict[str, slice] = {}
         self._angles: Array = np.zeros((1, 3))
@@ -91,9 +95,10 @@ class Report:
         motions, forces = setpoints.motions, outputs.demanded_forces
         with np.errstate(over='ignore'):
             powers = forces * outputs.rates
+        angles = self._continued(np.degrees(to_euler(motions[:, ROTATION].reshape(-1, 3, 3))))
         quantities = {
             'position': motions[:, POSITION],
-            'angles': self._continued(_euler(motions[:, ROTATION])),
+            'angles': angles,
             'velocity': motions[:, LINEAR_VELOCITY],
             'angular_velocity': np.degrees(motions[:, ANGULAR_VELOCITY]),
             'acceleration': motions[:, LINEAR_ACCELERATION],
@@ -120,7 +125,7 @@ class Report:
         self._places = _add(self._curves, seconds, quantities)
         self._spectrum.add(seconds, base_wrenches.T)
         self._frames.add(seconds, np.concatenate(
-            [motions[:, POSE], outputs.lengths, forces], axis=1))
+            [motions[:, POSE], angles, outputs.lengths, forces], axis=1))
 
     def add_measured(
             self, seconds: Array, measured: Array, computed: Array, wrench: Array) -> None:
@@ -150,10 +155,10 @@ class Report:
             data=self._data(summary), sources=sources_of(self._parameters),
             cards=cards(summary), margins=smallest_margins(summary),
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
-            date=date(summary['setpoints']['first_stamp_ns']), plot_of=PLOT_OF,
-            units={name: (each.unit or '').replace('^2', '²')
-                   for name, each in PARAMETERS.items()},
-            most_times=_MOST_TIMES,
+            date=date(summary['setpoints']['first_stamp_ns']), quantities=QUANTITIES,
+            units={name: each.unit or '' for name, each in PARAMETERS.items()},
+            most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS,
+            unit_key=unit_key,
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})
         write_files({path: text})
@@ -189,10 +194,11 @@ class Report:
             'begin': float(times[0]) if len(times) else 0.0,
             'end': float(times[-1]) if len(times) else 0.0,
             'legs': self._legs,
-            'colors': LEG_COLORS,
+            'forceColors': FORCE_COLORS,
             'baseJoints': p['geometry.base_joints'].tolist(),
             'platformJoints': p['geometry.platform_joints'].tolist(),
-            'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8')},
+            'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8'),
+                       'places': _FRAME},
             'warnings': singularity['warnings_from_to_s'],
             'crossings': singularity['crossings_at_s'],
             'contacts': [[each['from_s'], each['to_s']] for each in (
@@ -200,15 +206,6 @@ class Report:
             'curves': [_packed(*each) for each in curves],
             'plots': [plot.plain() for plot in plots],
         }
-
-
-def _euler(rotations: Array) -> Array:
-    """Return alpha, beta, gamma (N, 3) [deg] of rows of R = Rz(gamma) Ry(beta) Rx(alpha)."""
-    r = rotations.T
-    level = np.hypot(r[0], r[3])
-    angles: Array = np.degrees(np.stack([
-        np.arctan2(r[7], r[8]), np.arctan2(-r[6], level), np.arctan2(r[3], r[0])], axis=1))
-    return angles
 
 
 def _add(curves: Curves, seconds: Array, quantities: Mapping[str, Array]) -> dict[str, slice]:
@@ -246,36 +243,28 @@ def rejections(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
             for each in summary['rejected']]
 
 
-class MarginColumn(NamedTuple):
-    """The margins of a quantity from its limits."""
+def margin_columns(parameters: Parameters) -> list[tuple[Quantity, str, list[str]]]:
+    """
+    Return the quantities with limits, each with the key of its margin and its limits.
 
-    name: str
-    unit: str
-    key: str  # key of a leg in summary.json
-    limits: tuple[str, ...]
-
-
-def margin_columns(parameters: Parameters) -> list[MarginColumn]:
-    """Return the quantities with limits; joint angles and clearance only if theirs are given."""
+    Joint angles and clearance are left out if none of their limits is given.
+    """
     left_out: set[str] = set()
     for names in (OF_JOINTS, (CLEARANCE_MIN,)):
         if all(parameters[name] is None for name in names):
             left_out.update(names)
-    return [column for column in _MARGINS if column.limits[0] not in left_out]
-
-
-_MARGINS = [
-    MarginColumn(
-        name, unit, f'{name.replace(" ", "_")}_margin_{unit.lower().replace("/", "_")}',
-        tuple(limit for limit in LIMITS if QUANTITIES[limit] == (name, unit)))
-    for name, unit in dict.fromkeys(QUANTITIES[limit] for limit in LIMITS)]
+    limits: dict[Quantity, list[str]] = {}
+    for limit in LIMITS:
+        if limit not in left_out:
+            limits.setdefault(QUANTITIES[limit], []).append(limit)
+    return [(quantity, margin_key(quantity), names) for quantity, names in limits.items()]
 
 
 def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the smallest margins of all quantities with a limit, each with its leg."""
     found = []
-    for name, unit, key, _ in _MARGINS:
-        if margins := values_of(summary['legs'], key):
+    for name, unit in dict.fromkeys(QUANTITIES[limit] for limit in LIMITS):
+        if margins := values_of(summary['legs'], margin_key(Quantity(name, unit))):
             value, joint = min(margins, key=FIRST)
             found.append({'name': name, 'value': value, 'unit': unit, 'leg': joint})
     return found

@@ -24,6 +24,7 @@ import re
 import time
 from typing import Any, NamedTuple
 
+from stewart_dynamics.bags.find import OUTPUT_BAG, RESULT
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import BAD_INPUT, partly_read, unexpected
@@ -32,7 +33,7 @@ from stewart_dynamics.replay.legs_table import kind_of_table
 from stewart_dynamics.replay.one_bag import fingerprint, replay, VERSION
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.summary_text import summary_text
-from stewart_dynamics.reporting.results_folder import REPORT_PAGE, RESULT
+from stewart_dynamics.reporting.results_folder import REPORT_PAGE
 
 # Interval of progress reports, within one computer and on a cluster [s].
 LOCAL_INTERVAL, CLUSTER_INTERVAL = 0.1, 1.0
@@ -98,7 +99,7 @@ def finished(task: Task) -> Ended | None:
 def kept(task: Task) -> Ended | None:
     """Return the outcome of a bag whose results are there and whose inputs have not changed."""
     table = kind_of_table(task.options.parquet)
-    files = ['bag', table.FILE, *([REPORT_PAGE] if task.options.report else [])]
+    files = [OUTPUT_BAG, table.FILE, *([REPORT_PAGE] if task.options.report else [])]
     summary = _summary_of(task)
     if summary is None or not all((task.folder / name).exists() for name in files):
         return None

@@ -17,9 +17,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Iterable, Mapping
 
-from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.bags.recording import joined, Recording
 from stewart_dynamics.description.model import JOINT_STATES
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.messages import type_names
@@ -27,10 +27,9 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
+from stewart_dynamics.setpoints.output_messages import LEG_STATES
 
 MEASURED = 'measured'
-# Maximum number of listed texts of a kind.
-LISTED = 20
 _OF_BASE = tuple(dict.fromkeys(key for keys in inputs.BASE_SOURCES.values() for key in keys))
 
 
@@ -48,8 +47,9 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
     named = {key: name for key in of_base if (name := _named(recording, key, options))}
     found = {}
     for key in wanted:
-        found[key] = _named(recording, key, options) or _by_type(
-            recording, key, options, {*named.values()})
+        found[key] = _named(recording, key, options) or recording.find_topic(
+            inputs.INPUT_TYPES[key], None, f'{options.node}/{key}', _option(key),
+            _others(key, options, named.values()), _advice(recording, key))
     for key in of_base:
         found[key] = named.get(key) or _base_by_type(
             recording, key, options, parameters['base.source'], found)
@@ -57,7 +57,7 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
     if load := _named(recording, inputs.WRENCH, options, ending=False):
         found[inputs.WRENCH] = load
     if options.measured:
-        found[MEASURED] = _of_type(recording, options.measured, type_names.JOINT_STATE)
+        found[MEASURED] = recording.checked_topic(options.measured, type_names.JOINT_STATE)
     names = list(found.values())
     for name in names:
         if names.count(name) > 1:
@@ -73,23 +73,21 @@ def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Para
                for key, name in topics.items()
                if key in inputs.INPUT_TYPES and name != f'{options.node}/{key}'
                and name not in options.topics.values()]
-    loads = sorted(name for name, kind in recording.topics.items()
-                   if kind == inputs.INPUT_TYPES[inputs.WRENCH] and name not in topics.values()
-                   and name != f'{options.node}/{BASE_WRENCH}')
+    loads = recording.topics_of(inputs.INPUT_TYPES[inputs.WRENCH],
+                                {*topics.values(), f'{options.node}/{BASE_WRENCH}'})
     if loads and inputs.WRENCH not in topics:
-        notices.append(f'{_joined(loads)}: not used as external wrench; --wrench selects one')
+        notices.append(f'{joined(loads)}: not used as external wrench; --wrench selects one')
     base = sorted(
         name for name, kind in recording.topics.items() if name not in topics.values()
         and (name in [f'{options.node}/{key}' for key in _OF_BASE]
              or kind == inputs.INPUT_TYPES[inputs.BASE_IMU]
              or name.endswith(f'/{inputs.BASE_POSE}')))
     if base:
-        notices.append(f'{_joined(base)}: not used: base.source is {parameters["base.source"]}')
-    legs = sorted(name for name, kind in recording.topics.items()
-                  if kind == type_names.JOINT_STATE and name not in topics.values()
-                  and name not in (f'{options.node}/leg_states', f'{options.node}/{JOINT_STATES}'))
+        notices.append(f'{joined(base)}: not used: base.source is {parameters["base.source"]}')
+    legs = recording.topics_of(type_names.JOINT_STATE, {
+        *topics.values(), f'{options.node}/{LEG_STATES}', f'{options.node}/{JOINT_STATES}'})
     if legs and MEASURED not in topics:
-        notices.append(f'{_joined(legs)}: not used; --measured compares the efforts of measured '
+        notices.append(f'{joined(legs)}: not used; --measured compares the efforts of measured '
                        'legs with the computed forces')
     return notices
 
@@ -109,48 +107,31 @@ def _named(recording: Recording, key: str, options: Options, ending: bool = True
     usual = f'{options.node}/{key}'
     given = options.topics.get(name_of(key))
     if given or usual in recording.topics:
-        return _of_type(recording, given or usual, kind)
-    found = [name for name, other in recording.topics.items()
-             if other == kind and name.endswith(f'/{key}')] if ending else []
-    return found[0] if len(found) == 1 else None
+        return recording.checked_topic(given or usual, kind)
+    found = [name for name in recording.topics_of(kind) if name.endswith(f'/{key}')]
+    return found[0] if ending and len(found) == 1 else None
 
 
-def _by_type(recording: Recording, key: str, options: Options, taken: Container[str]) -> str:
-    """Return the only topic that has the type of an input and is not another input."""
-    kind = inputs.INPUT_TYPES[key]
-    usual = f'{options.node}/{key}'
-    candidates = _candidates(recording, key, options, taken)
-    if len(candidates) == 1:
-        return candidates[0]
-    if candidates:
-        raise BagError(f'{recording.path}: has no topic {usual}, and several of its type, '
-                       f'{kind}: {_joined(candidates)}: select one by {_option(key)}')
-    raise BagError(f'{recording.path}: has no topic {usual}, nor another of its type, {kind}; '
-                   f'it contains {_held(recording)}{_advice(recording, key)}')
+def _others(key: str, options: Options, taken: Iterable[str]) -> set[str]:
+    """Return the names of topics that are other inputs than one, by use or by name."""
+    return {*taken, *(f'{options.node}/{other}' for other in inputs.INPUT_TYPES if other != key)}
 
 
 def _base_by_type(recording: Recording, key: str, options: Options, source: str,
                   found: Mapping[str, str]) -> str:
     """Return the same for a topic of the base, unless setpoints are of its type, too."""
     kind = inputs.INPUT_TYPES[key]
-    candidates = _candidates(recording, key, options, found.values())
+    candidates = recording.topics_of(kind, _others(key, options, found.values()))
     if len(candidates) == 1 and kind not in {inputs.INPUT_TYPES[each] for each in found
                                              if each not in _OF_BASE}:
         return candidates[0]
     text = (f'{recording.path}: base.source is {source}, and the bag has no topic '
             f'{options.node}/{key}')
     if candidates:
-        raise BagError(f'{text}; of its type, {kind}, it has {_joined(candidates)}: '
+        raise BagError(f'{text}; of its type, {kind}, it has {joined(candidates)}: '
                        f'{_option(key)} selects one')
     raise BagError(f'{text}, nor another of its type, {kind}, that is no setpoint; it contains '
-                   f'{_held(recording)}')
-
-
-def _candidates(recording: Recording, key: str, options: Options, taken: Container[str],
-                ) -> list[str]:
-    others = [f'{options.node}/{other}' for other in inputs.INPUT_TYPES if other != key]
-    return sorted(name for name, kind in recording.topics.items()
-                  if kind == inputs.INPUT_TYPES[key] and name not in taken and name not in others)
+                   f'{recording.contents}')
 
 
 def _advice(recording: Recording, key: str) -> str:
@@ -160,30 +141,3 @@ def _advice(recording: Recording, key: str) -> str:
     if inputs.INPUT_TYPES[inputs.COMBINED] in kinds:
         return '; --combined reads setpoints in one message'
     return ''
-
-
-def _of_type(recording: Recording, name: str, kind: str) -> str:
-    if name not in recording.topics:
-        raise BagError(f'{recording.path}: has no topic {name}; it contains {_held(recording)}')
-    if recording.topics[name] != kind:
-        raise BagError(f'{recording.path}: {name}: is a {recording.topics[name]}, must be a '
-                       f'{kind}')
-    return name
-
-
-def _held(recording: Recording) -> str:
-    held = _joined([f'{name} ({kind})' for name, kind in sorted(
-        recording.topics.items())]) or 'no topics'
-    damage = listed(recording.damage)
-    return held + (f'; could not be read: {"; ".join(damage)}' if damage else '')
-
-
-def _joined(names: list[str]) -> str:
-    return ', '.join(listed(names))
-
-
-def listed(texts: list[str]) -> list[str]:
-    """Return the first texts, and the number of the others."""
-    if len(texts) <= LISTED:
-        return list(texts)
-    return [*texts[:LISTED], f'and {len(texts) - LISTED} more']

@@ -28,12 +28,17 @@ from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
+from stewart_dynamics.mechanics.limits import (
+    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, OF_JOINTS, OF_RESULTS, QUANTITIES, short_name,
+    VELOCITY_MAX)
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.legs_table import harmless
 from stewart_dynamics.replay.motor_loads import needed
 from stewart_dynamics.replay.replay_options import LIMIT_MET
 from stewart_dynamics.replay.statements import MEASURED, MISSING, needed_words, statements
+from stewart_dynamics.replay.summary import margin_key
 from stewart_dynamics.reporting.pages import page
+from stewart_dynamics.reporting.results_folder import REPORT_PAGE
 from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')
@@ -109,7 +114,7 @@ _largest = partial(max, key=abs)
 def _exceeded(summary: dict[str, Any]) -> str:
     legs: dict[str, list[str]] = {}
     for each in summary['limits']:
-        legs.setdefault(each['limit'].removeprefix('limits.'), []).append(each['leg'])
+        legs.setdefault(short_name(each['limit']), []).append(each['leg'])
     return '; '.join(f'{limit}: {", ".join(of)}' for limit, of in legs.items())
 
 
@@ -128,15 +133,10 @@ COLUMNS = (
     Column('force_worst_n', 'worst force', 'N', _of_worst_force(0), size=True),
     Column('force_worst_leg', 'of leg', '', _of_worst_force(1), number=False),
     Column('force_worst_at_s', 'at', 's', _of_worst_force(2)),
-    Column('force_margin_n', 'force margin', 'N', _of_legs('force_margin_n', min)),
-    Column('length_margin_m', 'length margin', 'm', _of_legs('length_margin_m', min)),
-    Column('rate_margin_m_s', 'rate margin', 'm/s', _of_legs('rate_margin_m_s', min)),
-    Column('base_joint_angle_margin_rad', 'base joint margin', 'rad',
-           _of_legs('base_joint_angle_margin_rad', min), optional=True),
-    Column('platform_joint_angle_margin_rad', 'platform joint margin', 'rad',
-           _of_legs('platform_joint_angle_margin_rad', min), optional=True),
-    Column('clearance_margin_m', 'clearance margin', 'm', _of_legs('clearance_margin_m', min),
-           optional=True),
+    *(Column(margin_key(quantity), f'{quantity.name} margin', quantity.unit,
+             _of_legs(margin_key(quantity), min), optional=limit not in OF_RESULTS)
+      for limit in (FORCE_MAX, LENGTH_MAX, VELOCITY_MAX, *OF_JOINTS, CLEARANCE_MIN)
+      for quantity in [QUANTITIES[limit]]),
     Column('limits_exceeded', 'limits exceeded', '', _exceeded, number=False),
     Column('force_rms_n', 'RMS force', 'N', _of_legs('force_rms_n', max)),
     Column('power_peak_w', 'peak power', 'W', _of_legs('power_peak_w', _largest), size=True),
@@ -265,6 +265,6 @@ def _link(output: Path, row: Row) -> str | None:
     """Return the link to the report of a bag, or to its folder if there is no report."""
     if row['results'] is None:
         return None
-    report = Path(str(row['results'])) / 'report.html'
+    report = Path(str(row['results'])) / REPORT_PAGE
     target = report if (output / report).is_file() else report.parent
     return quote(os.fsencode(target))

@@ -29,6 +29,7 @@ from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.replay.summary import Answered
+from stewart_dynamics.reporting.results_folder import LEGS_CSV, LEGS_PARQUET
 
 # Beginnings of text that spreadsheet programs execute.
 _FORMULA = ('=', '+', '-', '@', '\t', '\r', '\n')
@@ -102,7 +103,7 @@ class Table(ABC):
 class CsvTable(Table):
     """legs.csv: each number with the fewest digits that represent it exactly."""
 
-    FILE = 'legs.csv'
+    FILE = LEGS_CSV
 
     def _open(self, path: Path, names: Sequence[str]) -> None:
         self._file = path.open('wb')
@@ -143,7 +144,7 @@ def _quoted(text: str) -> str:
 class ParquetTable(Table):
     """legs.parquet: the columns of legs.csv; null: not known, or no force."""
 
-    FILE = 'legs.parquet'
+    FILE = LEGS_PARQUET
 
     def _open(self, path: Path, names: Sequence[str]) -> None:
         try:

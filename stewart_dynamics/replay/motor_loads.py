@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,9 +38,20 @@ from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
 MARGIN = 1.2  # factor on torques and speed of the motor that is needed
 CONTINUOUS = 'drive.torque_continuous'
 _OF_VELOCITY = TORQUE_SPEED, SPEED_MAX
-# Loads that a motor must bear, by the key of the motor that is needed.
-_NEEDED = {'torque_continuous_n_m': 'torque_rms_n_m', 'torque_peak_n_m': 'torque_peak_n_m',
-           'speed_rad_s': 'speed_peak_rad_s'}
+
+
+class Need(NamedTuple):
+    """What a motor must bear at least: the key of that load, its name and its unit."""
+
+    load: str
+    name: str
+    unit: str
+
+
+# By the key of the motor that is needed.
+NEEDS = {'torque_continuous_n_m': Need('torque_rms_n_m', 'continuous torque', 'N m'),
+         'torque_peak_n_m': Need('torque_peak_n_m', 'peak torque', 'N m'),
+         'speed_rad_s': Need('speed_peak_rad_s', 'speed', 'rad/s')}
 
 
 class MotorLoads:
@@ -99,7 +110,7 @@ class MotorLoads:
         """Return the part of summary.json, for a motion of a number of cycles."""
         loads = {name: self._motor(leg) for leg, name in enumerate(legs)}
         return {'legs': loads, 'bus': self._bus(cycles), 'needed': needed(
-            {key: load[key] for key in _NEEDED.values()} for load in loads.values())}
+            {key: load[key] for key, *_ in NEEDS.values()} for load in loads.values())}
 
     def _motor(self, leg: int) -> dict[str, float | None]:
         p = self._parameters
@@ -155,4 +166,4 @@ def needed(loads: Iterable[Mapping[str, Any]]) -> dict[str, float | None]:
     every = list(loads)
     return {'margin': MARGIN, **{
         key: max((MARGIN * abs(load[of]) for load in every if load[of] is not None), default=None)
-        for key, of in _NEEDED.items()}}
+        for key, (of, *_) in NEEDS.items()}}

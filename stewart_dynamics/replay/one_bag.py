@@ -34,23 +34,23 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.bags import recording as bag_recording
-from stewart_dynamics.bags.find import bytes_of
-from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.bags.find import bytes_of, RESULT
+from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.bag_report import Report
-from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
+from stewart_dynamics.replay.bag_topics import find_topics, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
-from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, RESULT, whole_folder
+from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
 from stewart_dynamics.setpoints import base_wrench, inputs, step
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
@@ -157,7 +157,7 @@ class _Run:
         self.notices: list[str] = []
         self._more = 0
         self._quasi_static = (
-            parameters['setpoint.source'] == 'pose' and options.cutoff is None)
+            parameters['setpoint.source'] == POSES_ALONE and options.cutoff is None)
         if self._quasi_static:
             self.notices.append('setpoint.source is pose: the forces are those at rest')
         self._firsts: dict[Rejection, _First] = {}

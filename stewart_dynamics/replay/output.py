@@ -51,7 +51,7 @@ from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.messages.standard import string, transforms
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.summary import Answered
-from stewart_dynamics.setpoints.output_messages import OutputMessages, Written
+from stewart_dynamics.setpoints.output_messages import OutputMessages, WARNING, Written
 from stewart_dynamics.setpoints.step import Outputs
 import yaml  # type: ignore[import-untyped]
 
@@ -67,7 +67,7 @@ MODEL_TYPES = {
 
 _LIBRARY = 'stewart_dynamics'
 # Late subscribers get their last message, in `ros2 bag play`, too.
-_LATCHED = 'singularity_warning', TF_STATIC, ROBOT_DESCRIPTION
+_LATCHED = WARNING, TF_STATIC, ROBOT_DESCRIPTION
 # Bytes of a message record before the message: opcode, length, channel, sequence, two times.
 _HEAD = 31
 # Opcode, length, times of first and last message, size, checksum, no compression, size.

@@ -30,6 +30,7 @@ import subprocess
 import sys
 from typing import Any
 
+from stewart_dynamics.bags.find import OUTPUT_BAG
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.parameters.table import Parameters
@@ -62,7 +63,7 @@ class OutputFiles:
             folder, parameters['joints'], quasi_static,
             any(parameters[name] is not None for name in OF_JOINTS),
             parameters[CLEARANCE_MIN] is not None)
-        self._bag = OutputBag(folder / 'bag', options.node, OutputMessages(parameters), model,
+        self._bag = OutputBag(folder / OUTPUT_BAG, options.node, OutputMessages(parameters), model,
                               parameters['visualization_rate'])
 
     def write(self, block: Answered) -> None:

@@ -23,14 +23,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.program import (
-    add_results, DONE, frequency, interrupt_on_signals, node_name, partly_read, Program)
-from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE, Options
+    add_node, add_parameters, add_report, frequency, interrupt_on_signals, Program)
+from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
 from stewart_dynamics.reporting.results_folder import REPLAYS
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
-_PROGRAM = Program('stewart_replay')
+_PROGRAM = Program('stewart_replay', 'parameters or bags',
+                   'a limit or singularity warning was met', partly=True)
 _CUTOFF = 10.0
 _TOPICS = {
     'pose': 'poses', 'twist': 'twists', 'accel': 'accelerations',
@@ -55,22 +56,18 @@ def _arguments() -> argparse.ArgumentParser:
     parser = _PROGRAM.parser(
         description='Compute leg lengths, forces and singularity warnings of recorded setpoints, '
                     'as the node does, bit for bit.',
-        epilog='For every bag, DIR/<name of the bag>/ gets bag/ (MCAP, the topics of the node), '
-               'legs.csv,\nsummary.json and report.html; of several bags DIR/ gets fleet.csv and '
-               'index.html.\n\nexit codes: 0 done; 1 with --strict, when a limit or singularity '
-               'warning was met;\n2 bad arguments, parameters or bags; 3 part of a bag could not '
-               'be read, the rest is done; 130 interrupted;\n'
-               'of several bags the most severe: 2, then 3, then 1')
+        files='For every bag, DIR/<name of the bag>/ gets bag/ (MCAP, the topics of the node), '
+              'legs.csv,\nsummary.json and report.html; of several bags DIR/ gets fleet.csv and '
+              'index.html.',
+        more='\nof several bags the most severe: 2, then 3, then 1')
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
                         help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
                              'with bags in it')
-    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
-                        help='parameters of the hexapod, the file that the node takes')
-    add_results(parser, REPLAYS, 'a limit or singularity warning was met')
+    add_parameters(parser)
+    _PROGRAM.add_results(parser, REPLAYS)
     topics = parser.add_argument_group(
         'topics', 'Inputs are looked for under the usual names, then by their type.')
-    topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
-                        help=f'name before the usual topics (default: {NODE})')
+    add_node(topics, ', and name before the usual topics')
     for name, what in _TOPICS.items():
         topics.add_argument(f'--{name.replace("_", "-")}', metavar='TOPIC',
                             help=f'topic of the {what}')
@@ -83,7 +80,7 @@ def _arguments() -> argparse.ArgumentParser:
                        help=f'cut-off frequency of the splines (default: {_CUTOFF:g}); as low as '
                             'the motion allows: noise grows with its power of 2.5')
     output = parser.add_argument_group('what is written')
-    output.add_argument('--no-report', action='store_true', help='write no report.html')
+    add_report(output)
     output.add_argument('--plotly', choices=('inline', 'shared'), default='inline',
                         help='shared: one file of plotly.js in DIR for all reports, which are '
                              '5 MB smaller and need it (default: inline)')
@@ -104,7 +101,7 @@ def _options(given: argparse.Namespace) -> Options:
         topics={name: getattr(given, name) for name in _TOPICS if getattr(given, name)},
         cutoff=(given.cutoff or _CUTOFF) if given.differentiate else None,
         measured=given.measured or None,
-        parquet=given.parquet, report=not given.no_report, force=given.force)
+        parquet=given.parquet, report=given.report, force=given.force)
 
 
 def _run(given: argparse.Namespace, options: Options) -> int:
@@ -156,10 +153,9 @@ def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, stri
 
         replayed = replay(bag, parameters, folder, options, progress)
     _PROGRAM.say(replayed.text)
-    _PROGRAM.say(f'results: {folder}')
-    if replayed.summary['missing']:
-        _PROGRAM.complain(partly_read(bag, replayed.summary['missing']))
-    return DONE if replayed.code == LIMIT_MET and not strict else replayed.code
+    missing = replayed.summary['missing']
+    return _PROGRAM.end(folder, {bag: missing} if missing else {},
+                        strict and replayed.code == LIMIT_MET)
 
 
 def _number(text: str) -> int:

@@ -21,13 +21,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from stewart_dynamics.program import DONE, PARTLY_READ
+from stewart_dynamics.program import DONE, NODE, PARTLY_READ, STRICT
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
-LIMIT_MET = 1
-NODE = '/stewart_dynamics'
+LIMIT_MET = STRICT
 
 
 class Options(NamedTuple):

@@ -36,20 +36,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Bytes, NANOSECOND, SECOND, Stamps
-from stewart_dynamics.errors import BagError
 from stewart_dynamics.external_wrench.estimate import external_wrenches
+from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.messages.joint_state import JointStateReader, MISSING_JOINTS
+from stewart_dynamics.messages.joint_state import JointStateReader, MISSING_JOINTS, NUMBERS_END
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.summary import COMPONENTS, unit_key
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
 from stewart_dynamics.reporting.block_statistics import Extreme
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
 
-# Larger than any force [N]: the square would overflow.
-_FORCE_END = 1e100
 # Messages without all joints from which on it is an error.
 _PATIENCE = 1000
 
@@ -58,7 +57,6 @@ class Efforts:
     """Reads measured efforts from JointState messages, which may contain other joints, too."""
 
     def __init__(self, joints: Sequence[str]) -> None:
-        self._joints = list(joints)
         self._reader = JointStateReader(joints, ['effort'])
         self._lacked = 0
 
@@ -72,7 +70,7 @@ class Efforts:
         none had all joints.
         """
         stamps, efforts, rejected = self._reader.read_many(data, starts, sizes)
-        in_range = (np.abs(efforts) < _FORCE_END).all(axis=1)
+        in_range = (np.abs(efforts) < NUMBERS_END).all(axis=1)
         if not in_range.all():
             rejected[OUT_OF_RANGE] = int(np.count_nonzero(~in_range))
             stamps, efforts = stamps[in_range], efforts[in_range]
@@ -83,20 +81,15 @@ class Efforts:
 
     def check(self) -> None:
         """Raise BagError if messages lacked a joint, and none had all joints."""
-        if self._lacked and not self._reader.found:
-            names = self._reader.other_names
-            missing = [joint for joint in self._joints if joint not in names]
-            raise BagError(
-                f'measured joint states: no message contains {", ".join(missing)}; they contain '
-                f'{", ".join(names) or "nothing"}: they must be those of the parameter joints')
+        self._reader.check('measured joint states')
 
 
 # The most setpoints and measured samples that wait to be matched.
 _SETPOINTS_WAITING = 2 ** 15
 _SAMPLES_WAITING = 2 ** 18
 
-AXES = ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
-_UNITS = ('n',) * 3 + ('n_m',) * 3
+AXES = tuple(COMPONENTS)
+_UNITS = tuple(map(unit_key, COMPONENTS.values()))
 
 # Columns of the rows kept of setpoints.
 _SECONDS, _POSE, _FORCES = 0, slice(1, 13), slice(13, 19)
@@ -343,7 +336,7 @@ class WrenchBins:
         if not len(one):
             return np.zeros(6), np.zeros(6)
         median = np.median(one, axis=0)
-        return median, 1.4826 * np.median(np.abs(one - median), axis=0)
+        return median, BY_MEDIAN * np.median(np.abs(one - median), axis=0)
 
     def contacts(self, median: Array, threshold: Array, gap: float) -> list[Contact]:
         """Return the intervals with values above the threshold; shorter gaps are bridged."""

@@ -26,8 +26,11 @@ import math
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from stewart_dynamics.mechanics.limits import CLIPPED, Exceedance, QUANTITIES, TORQUE_SPEED
-from stewart_dynamics.reporting.plots import PLOT_OF
+from stewart_dynamics.mechanics.limits import (
+    BASE_ANGLE_MAX, CLIPPED, Exceedance, LENGTH_MAX, PLATFORM_ANGLE_MAX, QUANTITIES, SPEED_MAX,
+    TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
+from stewart_dynamics.replay.motor_loads import NEEDS
+from stewart_dynamics.replay.summary import margin_key, PARTS, unit_key
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
 
 Summary = Mapping[str, Any]  # the content of summary.json
@@ -151,16 +154,16 @@ def _limits(summary: Summary) -> Iterator[Statement]:
         most = max(of_legs, key=lambda each: Exceedance(
             name, 0, each['worst'], each['bound']).excess)
         others = f' and {plural(len(of_legs) - 1, "other leg")}' if len(of_legs) > 1 else ''
-        unit = QUANTITIES[name][1]
+        quantity = QUANTITIES[name]
         at_worst = ' at that speed' if name == TORQUE_SPEED else ''
         yield Statement(
-            LIMITS, 'bad', f'{name}, {most["bound"]:g} {unit}{at_worst}, exceeded by '
-            f'{most["leg"]}{others}: {most["worst"]:.6g} {unit} at worst, first',
-            min(each['first_at_s'] for each in of_legs), PLOT_OF[name])
+            LIMITS, 'bad', f'{name}, {most["bound"]:g} {quantity.unit}{at_worst}, exceeded by '
+            f'{most["leg"]}{others}: {most["worst"]:.6g} {quantity.unit} at worst, first',
+            min(each['first_at_s'] for each in of_legs), quantity.key)
     if points['jumps']:
         yield Statement(
             LIMITS, 'bad', f'{plural(points["jumps"], "jump")}, first',
-            points['jumps_first_at_s'], 'lengths',
+            points['jumps_first_at_s'], QUANTITIES[LENGTH_MAX].key,
             ': the legs cannot follow within limits.velocity_max')
     for name in summary['limits_not_checked']:
         why = ': velocities are not known; --differentiate computes them from the poses'
@@ -178,14 +181,15 @@ def _limits(summary: Summary) -> Iterator[Statement]:
 
 def _joints(legs: Summary) -> Iterator[Statement]:
     """Yield the largest angles of the joints at both ends, and the smallest clearance."""
-    for joint in ('base', 'platform'):
-        angle, at, margin = (
-            f'{joint}_joint_angle_{key}' for key in ('max_rad', 'max_at_s', 'margin_rad'))
-        if (angles := values_of(legs, angle)) and (margins := values_of(legs, margin)):
+    for joint, limit in (('base', BASE_ANGLE_MAX), ('platform', PLATFORM_ANGLE_MAX)):
+        quantity = QUANTITIES[limit]
+        angles = values_of(legs, f'{quantity.key}_max_rad')
+        margins = values_of(legs, margin_key(quantity))
+        if angles and margins:
             (largest, most), (smallest, least) = max(angles, key=FIRST), min(margins, key=FIRST)
             yield Statement(
                 JOINTS, 'none', f'{joint} joints: {_angle(largest)} at most, {most}',
-                legs[most][at], '', f'; margin {_angle(smallest)}'
+                legs[most][f'{quantity.key}_max_at_s'], '', f'; margin {_angle(smallest)}'
                 + (f', {least}' if least != most else ''))
     if clearances := values_of(legs, 'clearance_min_m'):
         smallest, least = min(clearances, key=FIRST)
@@ -200,8 +204,8 @@ def _angle(radians: float) -> str:
 
 
 def _loads(found: Summary) -> Iterator[Statement]:
-    for name, unit, key in (('force', 'N', 'n'), ('moment', 'N m', 'n_m')):
-        each = found[name]
+    for name, unit in PARTS.items():
+        each, key = found[name], unit_key(unit)
         if each[f'peak_{key}'] is not None:
             rms = '-' if each[f'rms_{key}'] is None else f'{each[f"rms_{key}"]:.1f}'
             yield Statement(LOADS, 'none', f'{name} on the base: {each[f"peak_{key}"]:.1f} {unit} '
@@ -220,15 +224,14 @@ def _motors(summary: Summary) -> Iterator[Statement]:
         yield Statement(
             MOTORS, 'warn', f'drive.torque_continuous, exceeded by the RMS torque of {worst}'
             f'{others}: {legs[worst]["torque_rms_n_m"]:.4g} N m, by {-margin:.4g} N m')
-    for key, at, plot, text, unit in (
-            ('torque_peak_n_m', 'torque_peak_at_s', 'motor_torques', 'motor torque', 'N m'),
-            ('speed_peak_rad_s', 'speed_peak_at_s', 'motor_speeds', 'motor speed', 'rad/s'),
-            ('temperature_rise_max_k', 'temperature_rise_max_at_s', 'temperature_rises',
-             'temperature rise of the windings', 'K')):
-        if values := values_of(legs, key):
+    for name, peak in ((TORQUE_MAX, 'torque_peak'), (SPEED_MAX, 'speed_peak'),
+                       (TEMPERATURE_RISE_MAX, 'temperature_rise_max')):
+        quantity = QUANTITIES[name]
+        if values := values_of(legs, f'{peak}_{unit_key(quantity.unit)}'):
             value, most = max(values, key=lambda each: abs(each[0]))
-            yield Statement(MOTORS, 'none', f'{text}: {value:.4g} {unit} at most, {most},',
-                            legs[most][at], plot)
+            yield Statement(
+                MOTORS, 'none', f'{quantity.name}: {value:.4g} {quantity.unit} at most, {most},',
+                legs[most][f'{peak}_at_s'], quantity.key)
     if bus := motors['bus']:
         yield Statement(MOTORS, 'none', f'power of the bus: {bus["power_peak_w"]:.4g} W at most,',
                         bus['power_peak_at_s'], 'bus_power',
@@ -240,9 +243,8 @@ def _motors(summary: Summary) -> Iterator[Statement]:
 
 def needed_words(needed: Summary) -> str:
     """Return the motor that is needed in words; empty if it is not known."""
-    words = [f'{needed[key]:.4g} {unit}' for key, unit in (
-        ('torque_continuous_n_m', 'N m continuous'), ('torque_peak_n_m', 'N m peak'),
-        ('speed_rad_s', 'rad/s')) if needed[key] is not None]
+    words = [f'{name} {needed[key]:.4g} {unit}' for key, (_, name, unit) in NEEDS.items()
+             if needed[key] is not None]
     return f'{", ".join(words)}, with a margin of {100.0 * (needed["margin"] - 1.0):.3g} %' * bool(
         words)
 

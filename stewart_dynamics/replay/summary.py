@@ -30,8 +30,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA, QUANTITIES,
-    VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA,
+    OF_RESULTS, QUANTITIES, Quantity, VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.motor_loads import MotorLoads
@@ -44,10 +44,20 @@ _OF_VELOCITY = (
     'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
     'power_mean_w', 'energy_driving_j', 'energy_braking_j')
 _AT_REST = ('gravity', 'wrench', 'base motion')
-# Columns of the base wrench: force and moment, then their components.
-_BASE_WRENCH = (
-    'force', 'moment', 'force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
-_BASE_UNITS = ('n', 'n_m', 'n', 'n', 'n', 'n_m', 'n_m', 'n_m')
+# Units of the parts of a wrench, and of their components.
+PARTS = {'force': 'N', 'moment': 'N m'}
+COMPONENTS = {f'{part}_{axis}': unit for part, unit in PARTS.items() for axis in 'xyz'}
+_BASE_WRENCH = PARTS | COMPONENTS
+
+
+def margin_key(quantity: Quantity) -> str:
+    """Return the key, in a leg of summary.json, of the margin of a quantity from its limits."""
+    return f'{quantity.key}_margin_{unit_key(quantity.unit)}'
+
+
+def unit_key(unit: str) -> str:
+    """Return a unit as keys of summary.json end with it: n_m, rad_s."""
+    return unit.lower().replace('/', '_').replace(' ', '_')
 
 
 class Answered(NamedTuple):
@@ -87,12 +97,10 @@ class Summary:
         self._jumps = 0
         self._jumped_at: float | None = None
         self._seconds = self._gap_seconds = 0.0
-        self._shortest = Extreme(6, np.negative)
-        self._longest = Extreme(6, np.positive)
-        self._rate, self._force, self._published, self._power = (
-            Extreme(6, np.abs) for _ in range(4))
-        self._angles = {name: Extreme(6, np.positive) for name in ANGLES}
-        self._clearance = Extreme(6, np.negative)
+        # of the quantity of each limit, the value nearest to it or farthest beyond it
+        self._peaks = {
+            name: Extreme(6, np.negative if name in MINIMA else np.abs) for name in LIMITS}
+        self._published, self._power = Extreme(6, np.abs), Extreme(6, np.abs)
         # squares of the forces; driving power; braking power
         self._means = Integral(18)
         self._nearest = Extreme(1, lambda det: -np.abs(det))
@@ -153,20 +161,16 @@ class Summary:
             power = demanded * rates
             self._means.add(steps, np.concatenate(
                 (demanded ** 2, np.maximum(power, 0.0), np.maximum(-power, 0.0)), axis=1))
-        self._shortest.add(seconds, lengths)
-        self._longest.add(seconds, lengths)
-        self._rate.add(seconds, rates)
-        self._force.add(seconds, demanded)
         self._published.add(seconds, outputs.forces)
         self._power.add(seconds, power)
         values = {LENGTH_MIN: lengths, LENGTH_MAX: lengths, VELOCITY_MAX: rates,
                   FORCE_MAX: demanded}
         for name in self._limits.of_joints:
             values[name] = outputs.joint_angles[:, ANGLES[name]]
-            self._angles[name].add(seconds, values[name])
         if CLEARANCE_MIN in self._limits.bounds:
             values[CLEARANCE_MIN] = outputs.clearances
-            self._clearance.add(seconds, outputs.clearances)
+        for name, each in values.items():
+            self._peaks[name].add(seconds, each)
         for name, exceeded in self._exceeded.items():
             exceeded.add(seconds, self._limits.exceeds(name, values[name]), values[name],
                          self._limits.bounds[name])
@@ -239,35 +243,28 @@ class Summary:
         squares, driving, braking = self._means.mean.reshape(3, 6)[:, leg].tolist()
         _, energy_driving, energy_braking = self._means.values.reshape(3, 6)[:, leg].tolist()
         solved = self._without_force < self._answered
-        shortest, longest = self._shortest.values[leg], self._longest.values[leg]
-        rate, force = self._rate.values[leg], self._force.values[leg]
-        bounds = self._limits.bounds
-        least, most, fastest, strongest, *widest, nearest = (
-            bounds[name][leg] if name in bounds else None for name in LIMITS)
-        length_margins = [*([] if least is None else [shortest - least]),
-                          *([] if most is None else [most - longest])]
-        found = {
-            'length_min_m': finite(shortest), 'length_max_m': finite(longest),
-            **self._rate.named(leg, 'rate_peak', 'm_s'),
-            **self._force.named(leg, 'force_peak', 'n'),
+        peaks = self._peaks
+        found: dict[str, float | None] = {
+            'length_min_m': finite(peaks[LENGTH_MIN].values[leg]),
+            'length_max_m': finite(peaks[LENGTH_MAX].values[leg]),
+            **peaks[VELOCITY_MAX].named(leg, 'rate_peak', 'm_s'),
+            **peaks[FORCE_MAX].named(leg, 'force_peak', 'n'),
             'force_rms_n': finite(math.sqrt(squares)),
             'force_published_peak_n': finite(self._published.values[leg]),
             **self._power.named(leg, 'power_peak', 'w'),
             'power_mean_w': finite(driving - braking),
             'energy_driving_j': finite(energy_driving) if solved else None,
-            'energy_braking_j': finite(energy_braking) if solved else None,
-            'length_margin_m': finite(min(length_margins)) if length_margins else None,
-            'rate_margin_m_s': None if fastest is None else finite(fastest - abs(rate)),
-            'force_margin_n': None if strongest is None else finite(strongest - abs(force)),
-        }
-        for (name, angles), bound in zip(self._angles.items(), widest, strict=True):
-            key = QUANTITIES[name][0].replace(' ', '_')
-            found |= angles.named(leg, f'{key}_max', 'rad')
-            found[f'{key}_margin_rad'] = (
-                None if bound is None else finite(bound - angles.values[leg]))
-        found |= self._clearance.named(leg, 'clearance_min', 'm')
-        found['clearance_margin_m'] = (
-            None if nearest is None else finite(self._clearance.values[leg] - nearest))
+            'energy_braking_j': finite(energy_braking) if solved else None}
+        for name, peak in peaks.items():
+            quantity, bound = QUANTITIES[name], self._limits.bounds.get(name)
+            if name not in OF_RESULTS:
+                kind = 'min' if name in MINIMA else 'max'
+                found |= peak.named(leg, f'{quantity.key}_{kind}', quantity.unit)
+            excess = None if bound is None else finite(
+                Exceedance(name, leg, peak.values[leg], bound[leg]).excess)
+            margins = [found.get(margin_key(quantity)), None if excess is None else 0.0 - excess]
+            found[margin_key(quantity)] = min(
+                (each for each in margins if each is not None), default=None)
         return found | (dict.fromkeys(_OF_VELOCITY) if self._quasi_static else {})
 
     def _singularity(self) -> dict[str, Any]:
@@ -327,6 +324,6 @@ class _BaseWrench:
         numbers = zip(np.sqrt(squares).tolist(), means, self._peaks.values.tolist(),
                       self._peaks.at.tolist(), strict=True)
         return {name: dict(zip(
-            (f'rms_{unit}', f'mean_{unit}', f'peak_{unit}', 'peak_at_s'), map(finite, each),
-            strict=True)) for name, unit, each in zip(
-                _BASE_WRENCH, _BASE_UNITS, numbers, strict=True)}
+            (f'rms_{unit_key(unit)}', f'mean_{unit_key(unit)}', f'peak_{unit_key(unit)}',
+             'peak_at_s'), map(finite, each), strict=True))
+            for (name, unit), each in zip(_BASE_WRENCH.items(), numbers, strict=True)}

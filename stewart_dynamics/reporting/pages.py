@@ -49,7 +49,7 @@ def number(value: float | None, decimals: int) -> str:
     """Return a number with a given number of decimals, without decimals from 1e5 on."""
     if value is None or not math.isfinite(value):
         return '–'
-    return _typeset(f'{value:,.{decimals}f}') if abs(value) < 1e5 else digits(value)
+    return typeset(f'{value:,.{decimals}f}') if abs(value) < 1e5 else digits(value)
 
 
 def digits(value: float | None) -> str:
@@ -57,18 +57,19 @@ def digits(value: float | None) -> str:
     if value is None or not math.isfinite(value):
         return '–'
     if not 1e3 <= abs(value) < 1e10:
-        return _typeset(f'{value:.5g}')
+        return typeset(f'{value:.5g}')
     text = f'{value:.5g}' if abs(value) < 1e5 else f'{value:.0f}'
     decimals = len(text.partition('.')[2]) if 'e' not in text else 0
-    return _typeset(f'{value:,.{decimals}f}')
+    return typeset(f'{value:,.{decimals}f}')
 
 
 def thousands(count: int) -> str:
     """Return a count with spaces between thousands."""
-    return _typeset(f'{count:,}')
+    return typeset(f'{count:,}')
 
 
-def _typeset(text: str) -> str:
+def typeset(text: str) -> str:
+    """Return numbers with narrow spaces for commas, and true minus signs."""
     return text.replace(',', _THIN_SPACE).replace('-', '−')
 
 
@@ -76,7 +77,8 @@ def _typeset(text: str) -> str:
 def _environment(folder: Path) -> Environment:
     made = Environment(loader=FileSystemLoader([folder, _SHARED]), autoescape=True,
                        undefined=StrictUndefined, keep_trailing_newline=True)
-    made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr)
+    made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr,
+                        unit=lambda text: text.replace('^2', '²'))
     made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
     # Data cannot end the element that contains them: the filter escapes < > & and '.
     made.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
@@ -91,7 +93,8 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
     template: name of the template (.html), its style (.css) and its script (.js), if it has one.
     scripts: other scripts that the page is allowed to run.
     shared: the page is allowed to run scripts in files.
-    document: the page has the common style of documents (document.css) before its own.
+    document: the page has the common style of documents (document.css) before its own, and a
+        white ground; another page may follow the reader's dark screen.
     values: variables of the template.
     """
     style, script = folder.joinpath(f'{template}.css').read_text(encoding='utf-8'), ''
@@ -99,7 +102,7 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
     if own.is_file():
         script = f"\n{own.read_text(encoding='utf-8')}"
     common = _SHARED.joinpath('document.css').read_text(encoding='utf-8') if document else ''
-    style = custom_properties() + common + style
+    style = custom_properties(dark=not document) + common + style
     hashes = ' '.join([*(f"'sha256-{_digest(each)}'" for each in (*scripts, script) if each),
                        *(["'self'"] if shared else [])]) or "'none'"
     return _environment(folder).get_template(f'{template}.html').render(

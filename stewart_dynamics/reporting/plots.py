@@ -21,12 +21,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN,
-    OF_JOINTS, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED, VELOCITY_MAX)
+    ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS,
+    QUANTITIES, short_name, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.colors import AXIS_COLORS, LEG_COLORS, ROLES
 from stewart_dynamics.reporting.spectrum import Density
@@ -35,14 +35,6 @@ _BLACK = ROLES['black']
 _SOURCE_COLORS = dict(zip(SOURCES, (*LEG_COLORS, _BLACK), strict=True))
 
 BASE_SECTION = 'base_wrench'
-
-# The plot that shows the quantity of a limit.
-PLOT_OF = {
-    CLEARANCE_MIN: 'clearance',
-    LENGTH_MIN: 'lengths', LENGTH_MAX: 'lengths', VELOCITY_MAX: 'rates', FORCE_MAX: 'forces',
-    **{name: name.removeprefix('limits.').removesuffix('_max') for name in OF_JOINTS},
-    TORQUE_MAX: 'motor_torques', TORQUE_SPEED: 'motor_torques', SPEED_MAX: 'motor_speeds',
-    TEMPERATURE_RISE_MAX: 'temperature_rises'}
 
 Places = Mapping[str, slice]
 """The curves of each quantity, by its name: their numbers in the report."""
@@ -69,7 +61,7 @@ class Bound(NamedTuple):
 class Plot(NamedTuple):
     """A plot over time, or over frequency; the user selects one of its variants."""
 
-    key: str
+    key: str  # Quantity.key of a quantity with a limit
     figure: str
     title: str
     unit: str
@@ -105,8 +97,7 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool) -> list[Plot
         Plot('angular_acceleration', '14', 'Angular acceleration of the platform', 'deg/s²',
              _of_axes(at['angular_acceleration'], 'dw/dt x', 'dw/dt y', 'dw/dt z'), 'base axes')]
     of_rates = [
-        Plot('rates', '', 'Leg rates', 'm/s', _of_legs(joints, at['rates']), '+ extends',
-             _bounds('velocity_max', p['limits.velocity_max'], both=True)),
+        _bounded(p, [VELOCITY_MAX], 'Leg rates', at['rates'], '+ extends', both=True),
         Plot('powers', '', 'Mechanical power of the legs', 'W', _of_legs(joints, at['powers']),
              'demanded force times rate; + drives, − brakes', spikes=True)]
     return [
@@ -115,15 +106,13 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool) -> list[Plot
         Plot('angles', '12', 'Inputs: orientation of the platform', 'deg',
              _of_axes(at['angles'], 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
         *(of_motion if velocities_known else ()),
-        Plot('lengths', '15', 'Leg lengths', 'm', _of_legs(joints, at['lengths']),
-             'between the joint centers', [
-                 *_bounds('length_min', p['limits.length_min']),
-                 *_bounds('length_max', p['limits.length_max'])]),
-        *(_of_joints(p, at, limit) for limit in OF_JOINTS if p[limit] is not None),
-        *([] if p[CLEARANCE_MIN] is None else [Plot(
-            PLOT_OF[CLEARANCE_MIN], '', 'Clearance between the legs', 'm',
-            _of_legs(joints, at['clearances']), 'from each leg to the nearest other leg',
-            [Bound(p[CLEARANCE_MIN], 'leg_clearance_min')])]),
+        _bounded(p, [LENGTH_MIN, LENGTH_MAX], 'Leg lengths', at['lengths'],
+                 'between the joint centers', figure='15'),
+        *(_of_joints(p, limit, at['joint_angles'].start) for limit in OF_JOINTS
+          if p[limit] is not None),
+        *([] if p[CLEARANCE_MIN] is None else [
+            _bounded(p, [CLEARANCE_MIN], 'Clearance between the legs', at['clearances'],
+                     'from each leg to the nearest other leg')]),
         Plot('determinant', '17', 'det(J)', 'm³',
              {'': [Curve('det(J)', LEG_COLORS[0], at['determinant'].start)]},
              'zero at a singularity', [Bound(0.0, 'singular', ROLES['singular'])],
@@ -133,9 +122,8 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool) -> list[Plot
              'dimensionless; 1 is best', [
                  Bound(p['singularity.warn_condition'], 'warn', ROLES['near']),
                  Bound(p['singularity.stop_condition'], 'stop', ROLES['singular'])], log=True),
-        Plot('forces', '18', 'Leg forces', 'N', _of_legs(joints, at['forces']),
-             'demanded by the motion, + pushes',
-             _bounds('force_max', p['limits.force_max'], both=True), spikes=True),
+        _bounded(p, [FORCE_MAX], 'Leg forces', at['forces'], 'demanded by the motion, + pushes',
+                 figure='18', both=True, spikes=True),
         *(of_rates if velocities_known else ()),
         *(_of_motors(p, at, velocities_known) if p.drives else ()),
         Plot('force_breakdown', '', 'Leg force by source', 'N', {
@@ -145,15 +133,23 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool) -> list[Plot
             for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
 
 
-def _of_joints(p: Parameters, at: Places, limit: str) -> Plot:
-    name = limit.removeprefix('limits.')
-    which, first = ANGLES[limit], at['joint_angles'].start
-    joint = 'base' if limit == BASE_ANGLE_MAX else 'platform'
+def _bounded(p: Parameters, limits: Sequence[str], title: str, channels: slice, note: str,
+             figure: str = '', both: bool = False, spikes: bool = False) -> Plot:
+    """Return the plot of a quantity with limits, the lower one first; both: of either sign."""
+    quantity = QUANTITIES[limits[0]]
+    return Plot(quantity.key, figure, title, quantity.unit, _of_legs(p['joints'], channels), note,
+                [bound for limit in limits for bound in _bounds(limit, p[limit], both)],
+                spikes=spikes)
+
+
+def _of_joints(p: Parameters, limit: str, first: int) -> Plot:
+    """Return the plot of the angles of the joints that a limit bounds, in degrees."""
+    which, joint = ANGLES[limit], 'base' if limit == BASE_ANGLE_MAX else 'platform'
     return Plot(
-        PLOT_OF[limit], '', f'Angles of the {joint} joints', 'deg',
+        QUANTITIES[limit].key, '', f'Angles of the {joint} joints', 'deg',
         _of_legs(p['joints'], slice(first + which.start, first + which.stop)),
         f'between the leg and geometry.{joint}_joint_axes, by default its direction at home',
-        _bounds(name, np.degrees(p[limit])))
+        _bounds(limit, np.degrees(p[limit])))
 
 
 def base_wrench_plots(at: Places) -> list[Plot]:
@@ -204,22 +200,18 @@ def measured_plots(p: Parameters, at: Places) -> list[Plot]:
 
 
 def _of_motors(p: Parameters, at: Places, velocities_known: bool) -> Iterator[Plot]:
-    torques, speeds, rises = (
-        _of_legs(p['joints'], at[name]) for name in ('torques', 'speeds', 'rises'))
-    yield Plot(PLOT_OF[TORQUE_MAX], '', 'Torques of the motors', 'N m', torques,
-               'demanded by the motion, + extends',
-               _bounds('torque_max', p[TORQUE_MAX], both=True), spikes=True)
+    yield _bounded(p, [TORQUE_MAX], 'Torques of the motors', at['torques'],
+                   'demanded by the motion, + extends', both=True, spikes=True)
     if velocities_known:
-        yield Plot(PLOT_OF[SPEED_MAX], '', 'Speeds of the motors', 'rad/s', speeds, '+ extends',
-                   _bounds('speed_max', p[SPEED_MAX], both=True))
+        yield _bounded(p, [SPEED_MAX], 'Speeds of the motors', at['speeds'], '+ extends',
+                       both=True)
         if p['drive.resistance'] is not None:
             yield Plot('bus_power', '', 'Power of the bus', 'W', {
                 '': [Curve('bus', _BLACK, at['bus_power'].start)]},
                 'electrical, of all motors; − flows back', spikes=True)
     if p['drive.thermal_resistance'] is not None:
-        yield Plot(PLOT_OF[TEMPERATURE_RISE_MAX], '', 'Temperature rises of the windings', 'K',
-                   rises, 'above ambient, from ambient at the beginning',
-                   _bounds('temperature_rise_max', p[TEMPERATURE_RISE_MAX]))
+        yield _bounded(p, [TEMPERATURE_RISE_MAX], 'Temperature rises of the windings', at['rises'],
+                       'above ambient, from ambient at the beginning')
 
 
 def _of_legs(joints: Sequence[str], channels: slice) -> dict[str, list[Curve]]:
@@ -238,11 +230,12 @@ def _all_or_one(variants: Mapping[str, list[Curve]]) -> dict[str, list[Curve]]:
     return {'all': curves, **{curve.name: [curve] for curve in curves}}
 
 
-def _bounds(name: str, values: Array | None, both: bool = False) -> list[Bound]:
+def _bounds(limit: str, values: ArrayLike | None, both: bool = False) -> list[Bound]:
     """Return one line if the bound is the same for all legs, or one per leg in its color."""
     if values is None:
         return []
-    alike = bool(np.all(values == values[0]))
+    of_legs = np.broadcast_to(values, 6)
+    alike, name = bool(np.all(of_legs == of_legs[0])), short_name(limit)
     return [Bound(sign * float(value), name if alike else '', _BLACK if alike else color)
             for sign in ((1.0, -1.0) if both else (1.0,))
-            for value, color in list(zip(values, LEG_COLORS, strict=True))[:1 if alike else 6]]
+            for value, color in list(zip(of_legs, LEG_COLORS, strict=True))[:1 if alike else 6]]

@@ -32,28 +32,35 @@ import shutil
 import tempfile
 from typing import Protocol
 
+from stewart_dynamics.bags.find import METADATA, OUTPUT_BAG, RESULT
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.whole_file import named
 
-RESULT = 'summary.json'  # the file by which a folder is known as results of a replay
-IDENTIFICATION = 'identification.json'  # the same of an identification
-DATASHEET = 'datasheet.json'  # the same of a datasheet
-CALIBRATION = 'calibration.json'  # the same of a calibration
+# The files by which folders of results are known, as RESULT is that of a replay.
+IDENTIFICATION, DATASHEET, CALIBRATION = (
+    'identification.json', 'datasheet.json', 'calibration.json')
+DESIGNED_MOTION, DESIGNED_POSES = 'trajectory.yaml', 'poses.csv'  # the same of designs
 
+# What else the programs write there.
 DATASHEET_PAGE, REPORT_PAGE = 'datasheet.html', 'report.html'
-"""Pages of a datasheet and of a replay, which link to each other."""
-DATASHEETS, REPLAYS = 'datasheet', 'replayed'  # folders of their results if no other is given
+LEGS_CSV, LEGS_PARQUET, WORKSPACE = 'legs.csv', 'legs.parquet', 'workspace.csv'
+IDENTIFIED_PARAMETERS, CALIBRATED_PARAMETERS = 'identified.yaml', 'calibrated.yaml'
+WAY_THROUGH_POSES = 'trajectory.csv'
+DATASHEETS, REPLAYS, IDENTIFIED, CALIBRATED, DESIGNED = (
+    'datasheet', 'replayed', 'identified', 'calibrated', 'designed')
+"""Folders of the results of the programs, and of a design, if no other is given."""
 
 # For the file by which a folder is known: the kind of folder, and all that a program writes there.
 _KINDS = {
-    RESULT: ('replay results', {RESULT, REPORT_PAGE, 'legs.csv', 'legs.parquet', 'bag',
-                                'bag/bag.mcap', 'bag/metadata.yaml'}),
+    RESULT: ('replay results', {
+        RESULT, REPORT_PAGE, LEGS_CSV, LEGS_PARQUET, OUTPUT_BAG,
+        f'{OUTPUT_BAG}/{OUTPUT_BAG}.mcap', f'{OUTPUT_BAG}/{METADATA}'}),
     IDENTIFICATION: ('results of an identification',
-                     {IDENTIFICATION, 'identified.yaml', REPORT_PAGE}),
-    DATASHEET: ('a datasheet', {DATASHEET, DATASHEET_PAGE, 'workspace.csv'}),
-    CALIBRATION: ('results of a calibration', {CALIBRATION, 'calibrated.yaml', REPORT_PAGE}),
-    'trajectory.yaml': ('a designed motion', {'trajectory.yaml'}),
-    'poses.csv': ('designed poses', {'poses.csv', 'trajectory.csv'})}
+                     {IDENTIFICATION, IDENTIFIED_PARAMETERS, REPORT_PAGE}),
+    DATASHEET: ('a datasheet', {DATASHEET, DATASHEET_PAGE, WORKSPACE}),
+    CALIBRATION: ('results of a calibration', {CALIBRATION, CALIBRATED_PARAMETERS, REPORT_PAGE}),
+    DESIGNED_MOTION: ('a designed motion', {DESIGNED_MOTION}),
+    DESIGNED_POSES: ('designed poses', {DESIGNED_POSES, WAY_THROUGH_POSES})}
 
 _REPLACED = '.replaced'
 _PARTIAL = re.compile(

@@ -215,14 +215,8 @@ def _received(node: Node, message: Any) -> RosParameter:
 
 def _is_present(node: Node, parameter: RosParameter) -> bool:
     """Return whether a parameter has this type and value already."""
-    if not node.has_parameter(parameter.name):
-        return False
-    present = node.get_parameter(parameter.name)
-    if parameter.type_ != present.type_:
-        return False
-    if isinstance(parameter.value, str) or not hasattr(parameter.value, '__len__'):
-        return bool(parameter.value == present.value)
-    return list(parameter.value) == list(present.value)
+    return node.has_parameter(parameter.name) and bool(
+        parameter.to_parameter_msg() == node.get_parameter(parameter.name).to_parameter_msg())
 
 
 def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool) -> Parameters:

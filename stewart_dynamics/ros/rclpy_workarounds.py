@@ -74,47 +74,17 @@ def create_later_service(node: Node, kind: Any, name: str,
     """
     Return a new service that may answer requests after its callback has returned.
 
-    rclpy sends what the callback returns. A coroutine could wait, but the events executor does
-    not await it (https://github.com/ros2/rclpy/issues/1473, mended in later releases), and the
-    single-threaded one may not resume it (https://github.com/ros2/rclpy/issues/1462).
+    rclpy sends what the callback returns, by a method that is replaced here. A coroutine could
+    wait, but the events executor does not await it (https://github.com/ros2/rclpy/issues/1473,
+    mended in later releases), and the single-threaded one may not resume it
+    (https://github.com/ros2/rclpy/issues/1462).
 
     begin: called at each request with a function that sends the answer, once.
     """
-    def callback(request: Any, response: Any) -> _Later:
-        later = _Later(send)
-        begin(later.answer)
-        return later
-
-    def send_response(response: Any, header: Any) -> None:
-        if isinstance(response, _Later):
-            response.go_to(header)
-        else:
-            send(response, header)
-
-    service: Any = node.create_service(kind, name, callback)
-    send, service.send_response = service.send_response, send_response
+    service: Any = node.create_service(kind, name, lambda request, response: response)
+    send = service.send_response
+    service.send_response = lambda response, header: begin(lambda answer: send(answer, header))
     return service
-
-
-class _Later:
-    """An answer, which is sent when it and its request's header are there."""
-
-    def __init__(self, send: Callable[[Any, Any], None]) -> None:
-        self._send = send
-        self._response: Any = None
-        self._header: Any = None
-
-    def answer(self, response: Any) -> None:
-        self._response = response
-        self._try()
-
-    def go_to(self, header: Any) -> None:
-        self._header = header
-        self._try()
-
-    def _try(self) -> None:
-        if self._response is not None and self._header is not None:
-            self._send(self._response, self._header)
 
 
 class OneShotTimer:

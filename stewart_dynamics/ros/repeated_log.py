@@ -20,7 +20,7 @@ Lines that are no kind of repeated event are logged each.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 import math
 import time
@@ -33,8 +33,8 @@ SECONDS = 5.0
 
 
 @dataclass
-class _One:
-    """A series that is not over."""
+class _Series:
+    """Events of one kind, the last of them less than SECONDS ago."""
 
     text: str
     logged: float
@@ -43,64 +43,41 @@ class _One:
     number: int = 1
 
 
-class Series:
-    """The series of events, by their kind; times are seconds of a steady clock."""
-
-    def __init__(self) -> None:
-        self._of_kind: dict[Hashable, _One] = {}
-
-    def add(self, kind: Hashable, text: str, now: float) -> str | None:
-        """Return the line to log for one more event, None if it is too early for one."""
-        one = self._of_kind.get(kind)
-        if one is None:
-            self._of_kind[kind] = _One(text, now, now)
-            return text
-        one.text, one.seen = text, now
-        one.number += 1
-        if now - one.logged < SECONDS:
-            one.unlogged += 1
-            return None
-        before = f' (and {one.unlogged} before it)' if one.unlogged else ''
-        one.logged, one.unlogged = now, 0
-        return text + before
-
-    def over(self, now: float) -> list[str]:
-        """Return the lines of the series that are over: the last event of each, if not logged."""
-        lines = []
-        for kind, one in list(self._of_kind.items()):
-            if now - one.seen >= SECONDS:
-                del self._of_kind[kind]
-                if one.unlogged:
-                    lines.append(f'{one.text} (the last of {one.number})')
-        return lines
-
-
 class RepeatedLog:
     """Writes lines to the logger of a node; of repeated events only some."""
 
-    def __init__(self, logger: Any) -> None:
+    def __init__(self, logger: Any, clock: Callable[[], float] = time.monotonic) -> None:
         self._logger = logger
-        self._series: dict[int, Series] = {}
+        self._clock = clock
+        self._series: dict[tuple[int, Hashable], _Series] = {}
 
     def write(self, lines: Iterable[tuple[int, str, Hashable]]) -> None:
-        """
-        Write lines, each a level of diagnostics, a text, and the kind of repeated event or None.
-
-        Lines of one kind are written at most every few seconds.
-        """
+        """Write lines: a level of diagnostics, a text, and the kind of repeated event or None."""
         for level, text, kind in lines:
             if kind is None:
                 self._write(level, text)
                 continue
-            series = self._series.setdefault(level, Series())
-            if (line := series.add(kind, text, time.monotonic())) is not None:
-                self._write(level, line)
+            now, series = self._clock(), self._series.get((level, kind))
+            if series is None:
+                self._series[level, kind] = _Series(text, now, now)
+                self._write(level, text)
+                continue
+            series.text, series.seen = text, now
+            series.number += 1
+            if now - series.logged < SECONDS:
+                series.unlogged += 1
+                continue
+            before = f' (and {series.unlogged} before it)' if series.unlogged else ''
+            series.logged, series.unlogged = now, 0
+            self._write(level, text + before)
 
     def write_last(self, now: float = math.inf) -> None:
         """Write the last line of each series that has ended by ``now``, by default of all."""
-        for level, series in self._series.items():
-            for line in series.over(now):
-                self._write(level, line)
+        for (level, kind), series in list(self._series.items()):
+            if now - series.seen >= SECONDS:
+                del self._series[level, kind]
+                if series.unlogged:
+                    self._write(level, f'{series.text} (the last of {series.number})')
 
     def _write(self, level: int, text: str) -> None:
         # One call for each level: rclpy requires the level of a call to be constant.

@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.frames.base_motion import row_of_imu, row_of_mot
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import BASE, GRAVITY, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import BY_IMU, Parameters
 from stewart_dynamics.setpoints.inputs import BASE_SOURCES
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.setpoints.sample_joining import Joined, SampleJoining
@@ -58,7 +58,7 @@ class BaseInput:
         source = parameters['base.source']
         self.topics = BASE_SOURCES[source]  # topics of the base; empty if the base is fixed
         self.joining = SampleJoining(
-            self.topics, None if source == 'imu' else parameters['world_frame'],
+            self.topics, None if source == BY_IMU else parameters['world_frame'],
             parameters['setpoint.sync_tolerance'], parameters['base.timeout'], rejections,
             lambda text: noticed(f'base: {text}'))
         """Joins the samples of the topics."""
@@ -74,7 +74,7 @@ class BaseInput:
                 values[3:12], values[18:21], values[15:18], values[21:24], gravity)
 
         self._row_of: Callable[[int, _Row], _Row] = (
-            _OfImu(parameters) if source == 'imu' else
+            _OfImu(parameters) if source == BY_IMU else
             of_motion if source == 'motion' else of_pose)
         self._samples: deque[tuple[int, _Row]] = deque(maxlen=_KEPT)
 

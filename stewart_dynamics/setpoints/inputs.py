@@ -33,6 +33,7 @@ from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist
+from stewart_dynamics.parameters import table
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
 from stewart_dynamics.setpoints.rejections import (
@@ -63,10 +64,12 @@ INPUT_TYPES = {
 }
 
 # Topics that are joined, for each value of setpoint.source.
-SOURCES = {'separate': (POSE, TWIST, ACCEL), 'combined': (COMBINED,), 'pose': (POSE,)}
+SOURCES = {
+    table.SEPARATE: (POSE, TWIST, ACCEL), table.COMBINED: (COMBINED,), table.POSES_ALONE: (POSE,)}
 # Topics that are joined, for each value of base.source.
-BASE_SOURCES = {'fixed': (), 'pose': (BASE_POSE,), 'motion': (BASE_POSE, BASE_TWIST, BASE_ACCEL),
-                'imu': (BASE_IMU,)}
+BASE_SOURCES = {
+    table.FIXED: (), table.AT_REST: (BASE_POSE,),
+    table.MOVING: (BASE_POSE, BASE_TWIST, BASE_ACCEL), table.BY_IMU: (BASE_IMU,)}
 
 _READERS: dict[str, Callable[[bytes], Stamped]] = {
     POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: twist,

@@ -33,14 +33,16 @@ from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
 from stewart_dynamics.setpoints.motor_step import ANGLES, SOUND, SPEEDS, TORQUES
 from stewart_dynamics.setpoints.step import Output, Outputs
 
+LEG_STATES, LEG_LENGTHS, LEG_FORCES = 'leg_states', 'leg_lengths', 'leg_forces'
+DETERMINANT, WARNING = 'jacobian_determinant', 'singularity_warning'
 MOTOR_STATES, MOTOR_TORQUES = 'motor_states', 'motor_torques'
 # Topics relative to the node's name, in the order in which they are published for a setpoint.
 OUTPUT_TYPES = {
-    'leg_states': type_names.JOINT_STATE,
-    'leg_lengths': type_names.FLOAT64_MULTI_ARRAY,
-    'leg_forces': type_names.FLOAT64_MULTI_ARRAY,
-    'jacobian_determinant': type_names.FLOAT64,
-    'singularity_warning': type_names.BOOL,
+    LEG_STATES: type_names.JOINT_STATE,
+    LEG_LENGTHS: type_names.FLOAT64_MULTI_ARRAY,
+    LEG_FORCES: type_names.FLOAT64_MULTI_ARRAY,
+    DETERMINANT: type_names.FLOAT64,
+    WARNING: type_names.BOOL,
     BASE_WRENCH: type_names.WRENCH_STAMPED,
 }
 # With drive.*.
@@ -72,17 +74,17 @@ class OutputMessages:
         """Yield topics (keys of ``types``) and messages for an output; see of_wrench."""
         positions = map(sub, output.lengths, self._zero_lengths)
         if output.forces is None:
-            yield 'leg_states', self._without_effort.write_one(
+            yield LEG_STATES, self._without_effort.write_one(
                 output.stamp, positions, output.rates)
         else:
-            yield 'leg_states', self._with_effort.write_one(
+            yield LEG_STATES, self._with_effort.write_one(
                 output.stamp, positions, output.rates, output.forces)
-        yield 'leg_lengths', float64_array(output.lengths)
+        yield LEG_LENGTHS, float64_array(output.lengths)
         if output.forces is not None:
-            yield 'leg_forces', float64_array(output.forces)
-        yield 'jacobian_determinant', float64(output.determinant)
+            yield LEG_FORCES, float64_array(output.forces)
+        yield DETERMINANT, float64(output.determinant)
         if output.warning_changed:
-            yield 'singularity_warning', boolean(output.singularity.warning)
+            yield WARNING, boolean(output.singularity.warning)
         motors = output.motors
         if motors and self._motors is not None:
             torques = None if output.forces is None else motors[TORQUES]
@@ -104,19 +106,19 @@ class OutputMessages:
         having, lacking = np.flatnonzero(solved), np.flatnonzero(~solved)
         stamps, rates, forces = outputs.stamps, outputs.rates, outputs.forces
         messages = [
-            ('leg_states', having, self._with_effort.write(
+            (LEG_STATES, having, self._with_effort.write(
                 stamps[having], positions[having], rates[having], forces[having])),
-            ('leg_states', lacking, self._without_effort.write(
+            (LEG_STATES, lacking, self._without_effort.write(
                 stamps[lacking], positions[lacking], rates[lacking])),
-            ('leg_lengths', np.arange(len(stamps)), FLOAT64_ARRAY.write(
+            (LEG_LENGTHS, np.arange(len(stamps)), FLOAT64_ARRAY.write(
                 None, outputs.lengths)),
-            ('leg_forces', having, FLOAT64_ARRAY.write(None, forces[having])),
-            ('jacobian_determinant', np.arange(len(stamps)), FLOAT64.write(
+            (LEG_FORCES, having, FLOAT64_ARRAY.write(None, forces[having])),
+            (DETERMINANT, np.arange(len(stamps)), FLOAT64.write(
                 None, outputs.determinants[:, None])),
         ]
         changed = np.flatnonzero(outputs.changed)
         warnings = [boolean(on) for on in outputs.warnings[changed].tolist()]
-        messages.append(('singularity_warning', changed, np.frombuffer(
+        messages.append((WARNING, changed, np.frombuffer(
             b''.join(warnings), dtype=f'V{len(boolean(True))}')))
         if self._motors is not None:
             messages += self._of_motors(self._motors, outputs)

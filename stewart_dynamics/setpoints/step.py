@@ -44,7 +44,7 @@ from stewart_dynamics.mechanics.singularity_warning import (
     CAUSE, Singularity, STATE, STOPPED, thresholds, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import STAMPS_END
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
 from stewart_dynamics.setpoints.motor_step import (
     EXCEEDING, MotorStep, RUNNING, times_followed, TORQUES)
 from stewart_dynamics.setpoints.published_forces import (
@@ -254,8 +254,8 @@ class Step:
         self._numbers[_PLATFORM] = self._platform.constants
         self._settings = settings = self._numbers[_SETTINGS]
         settings[OF_WARNING] = thresholds(parameters)
-        settings[SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
-        self._limits_suppress = parameters['limits.action'] == 'suppress_forces'
+        settings[SUPPRESS] = parameters['singularity.action'] == SUPPRESS_FORCES
+        self._limits_suppress = parameters['limits.action'] == SUPPRESS_FORCES
         settings[LIMITS_SUPPRESS] = self._limits_suppress
         settings[LIMITS] = self._limits.thresholds[:len(OF_RESULTS)].ravel()
         settings[FORCE_MAX] = self._limits.force_max

@@ -24,7 +24,8 @@ from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints import inputs
-from stewart_dynamics.setpoints.output_messages import MOTOR_STATES, motor_states_writer
+from stewart_dynamics.setpoints.output_messages import (
+    LEG_STATES, MOTOR_STATES, motor_states_writer)
 from stewart_dynamics.simulator.imu import ImuWriter, SimulatedImu
 from stewart_dynamics.simulator.moving_base import BasePeriod
 from stewart_dynamics.simulator.parameters import SimulatorParameters
@@ -36,7 +37,7 @@ INPUT_TYPES = {
     'wrench': type_names.WRENCH_STAMPED,
 }
 OUTPUT_TYPES = {
-    'leg_states': type_names.JOINT_STATE,
+    LEG_STATES: type_names.JOINT_STATE,
     'pose': type_names.POSE_STAMPED,
     'twist': type_names.TWIST_STAMPED,
     'accel': type_names.ACCEL_STAMPED,
@@ -59,7 +60,7 @@ class StateMessages:
 
     def write(self, stamp: int, state: PlantState) -> Iterator[tuple[str, bytes]]:
         """Yield topics and messages of a state at a time [ns]."""
-        yield 'leg_states', self._joint_state.write(
+        yield LEG_STATES, self._joint_state.write(
             stamp, map(sub, state.lengths, self._zero_lengths), state.rates, state.forces)
         if state.motors and self._motors is not None:
             angles, speeds, torques = state.motors[:6], state.motors[6:12], state.motors[12:]

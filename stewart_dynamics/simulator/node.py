@@ -89,7 +89,7 @@ class SimulatorNode(Node):
 
     def __init__(self) -> None:
         super().__init__(
-            'stewart_simulator', automatically_declare_parameters_from_overrides=True,
+            SimulatorParameters.node, automatically_declare_parameters_from_overrides=True,
             allow_undeclared_parameters=True)
         self._settings = declare_parameters(self, SimulatorParameters)
         self._stepped = bool(self.get_parameter('use_sim_time').value)

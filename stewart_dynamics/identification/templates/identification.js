@@ -58,7 +58,7 @@ const spectra = data.spectra.map(({frequencies, values}) => ({x: numbers(frequen
 if (spectra.length) {
   const traces = spectra.map(({x, y}, n) => ({
     x, y, mode: 'lines', name: n < 6 ? 'by the file' : data.legs[n - 6], legendgroup: n < 6 ? 'file' : data.legs[n - 6],
-    showlegend: n === 0 || n > 5, line: {color: n < 6 ? color('faint') : data.colors[n - 6], width: n < 6 ? 1 : 1.5},
+    showlegend: n === 0 || n > 5, line: {color: color(n < 6 ? 'faint' : `leg${n - 6}`), width: n < 6 ? 1 : 1.5},
     opacity: n < 6 ? 0.6 : 1,
   }));
   Plotly.newPlot('spectrum', traces, layout('residual [N/√Hz]', {

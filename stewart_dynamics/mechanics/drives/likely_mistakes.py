@@ -22,6 +22,7 @@ import math
 
 import numpy as np
 
+from stewart_dynamics.arrays import RPM
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.parameters.table import MOTOR_INERTIA, Parameters, SCREW_INERTIA
 
@@ -50,7 +51,7 @@ def likely_mistakes(p: Parameters) -> Iterator[str]:
     for name, fastest in (('drive.speed_max', speed),
                           ('drive.torque_speed', None if curve is None else curve[-1:, 0])):
         if fastest is not None and fastest.max() > _FASTEST_MOTOR:
-            yield (f'{name}: {fastest.max():g} rad/s, {fastest.max() * 30.0 / math.pi:.0f} rpm: '
+            yield (f'{name}: {fastest.max():g} rad/s, {fastest.max() * RPM:.0f} rpm: '
                    'in rpm?')
             return
     yield from _inertia(p)

@@ -34,7 +34,7 @@ from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_consta
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, CONDITION, FORCES, GRAVITY, MOTION, RATES, TWIST)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
-from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
+from stewart_dynamics.parameters.table import DRIVE_INERTIAS, FIXED, Parameters
 
 
 class ForceBreakdown(NamedTuple):
@@ -96,7 +96,7 @@ _TOGETHER = 1024
 
 def sources_of(parameters: Parameters) -> tuple[str, ...]:
     """Return SOURCES, without the base's motion, the last, where ``base.source`` is fixed."""
-    return SOURCES[:-1] if parameters['base.source'] == 'fixed' else SOURCES
+    return SOURCES[:-1] if parameters['base.source'] == FIXED else SOURCES
 
 
 class ForceBreakdownRows:

@@ -13,8 +13,9 @@
 # limitations under the License.
 
 """
-The report of the dynamics node: one part for each status, see ``periodic_report``.
+The report of the dynamics node: one status for each of its parts.
 
-``dynamics`` puts the parts together. They use no ROS and no clock: callers pass events and their
-times, in seconds of a steady clock.
+``levels`` has the base class of a status; ``inputs``, ``answers`` and ``outcomes`` have the
+statuses; ``periodic_report`` puts them together. No module uses ROS or a clock: callers pass
+events and their times, in seconds of a steady clock.
 """

@@ -13,73 +13,169 @@
 # limitations under the License.
 
 """
-The statuses ``planned trajectory`` and ``payload``: the outcome of the last task of each.
+The statuses of measured legs and of longer tasks, each present after its first event.
 
-There is no status before the first outcome.
+``external wrench`` after the first measurement; ``planned trajectory`` and ``payload`` after the
+first outcome of a task.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
+import math
 
+from stewart_dynamics.external_wrench.estimate import Estimate, Overload
 from stewart_dynamics.external_wrench.payload import (
     NAMES, numbers_of, Payload, PayloadOutcome, UNITS)
-from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Level, LogLine, OK, OK_LEVEL, StatusPart, WARN)
+from stewart_dynamics.node.diagnostics.levels import (
+    ERROR, Level, LogLine, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.messages import PlannedOutcome
 
-_LONG = 2.0  # [s]
+_QUANTITIES = {'external_wrench.force_max': ('force', 'N'),
+               'external_wrench.moment_max': ('moment', 'N m')}
+_OVERLOAD = 'overload'  # a cause of a level
+_COMPONENTS = ('force x (N)', 'force y (N)', 'force z (N)', 'moment x (N m)', 'moment y (N m)',
+               'moment z (N m)')
+_LONG = 2.0  # duration of a task above which it is logged [s]
 
 
-class _LastOutcome(StatusPart):
-    """The level and values of the last outcome, until the next one."""
+class ExternalWrenchDiagnostics(StatusPart):
+    """Notes estimates from measured legs, and rejections of measurements."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._last = OK_LEVEL
-        self._values: list[tuple[str, str]] | None = None
-        self._lines: list[LogLine] = []
+    name = 'external wrench'
+
+    def __init__(self, parameters: Parameters) -> None:
+        super().__init__(_OVERLOAD, REJECTED)
+        self._joints = parameters['joints']
+        self._timeout: float = parameters['setpoint.timeout']
+        # Times of the first and the last message, and of the last one that was not rejected.
+        self._begun = self.heard_at = self.used_at = NEVER
+        self._estimated = 0
+        self._estimated_at = NEVER
+        self._estimate: Estimate | None = None
+        self._target: Sequence[float] | None = None
+
+    def heard(self, now: float) -> None:
+        """Note that a message has arrived."""
+        self.heard_at = now
+        if self._begun == NEVER:
+            self._begun = now
+
+    def estimated(self, estimate: Estimate, target: Sequence[float] | None, now: float) -> None:
+        """Note an estimate, and the row of motion of the last setpoint; None without one."""
+        self._estimate, self._target = estimate, target
+        self.used_at = now
+        if estimate.wrench is not None:
+            self._estimated += 1
+            self._estimated_at = now
+            self.held.see(Level(ERROR if estimate.overloads else OK,
+                                ', '.join(map(_words, estimate.overloads))), now, _OVERLOAD)
 
     def level(self, now: float) -> int:
         """Return the present level."""
-        return self._last.level
+        if self._begun == NEVER:
+            return OK
+        return STALE if self._is_stale(now) else self.held.level(now)
 
-    def state(self, now: float) -> Level:
-        """Return the level of the last outcome, and its message."""
+    def status(self, now: float) -> Status | None:
+        """Return the status; None before the first measurement."""
+        if self._begun == NEVER:
+            return None
+        values = [('wrenches', str(self._estimated))]
+        if self._estimated:
+            values.append(('age of the last (s)', f'{now - self._estimated_at:.3f}'))
+        if self._estimate is not None:
+            values += self._numbers(self._estimate)
+        message = (self._no_wrench(now) if self._is_stale(now)
+                   else self.held.at(now).message or 'no overload')
+        return Status(self.name, self.level(now), message, values + self._rejection_values())
+
+    def _is_stale(self, now: float) -> bool:
+        return now - max(self._begun, self._estimated_at) > self._timeout
+
+    def _no_wrench(self, now: float) -> str:
+        silent = now - self.heard_at
+        return 'no wrench: ' + (
+            f'measured_legs silent for {silent:.1f} s' if silent > self._timeout
+            else self.held.of(REJECTED, now).message
+            or f'measurements are farther apart than setpoint.timeout, {self._timeout:g} s')
+
+    def _numbers(self, estimate: Estimate) -> Values:
+        values = []
+        if estimate.wrench is not None and estimate.differences is not None:
+            values = [('force (N)', f'{estimate.force:.6g}'),
+                      ('moment (N m)', f'{estimate.moment:.6g}'),
+                      *((key, f'{value:.6g}') for key, value in zip(
+                          _COMPONENTS, estimate.wrench, strict=True))]
+            force, leg = max(zip(estimate.differences, self._joints, strict=True),
+                             key=lambda each: abs(each[0]))
+            values += [('largest measured - model force of a leg (N)', f'{force:.6g}'),
+                       ('its leg', leg)]
+        if self._target is not None:
+            distance, angle = _apart(estimate.motion, self._target)
+            values += [('distance from the last setpoint (m)', f'{distance:.6g}'),
+                       ('turn from the last setpoint (rad)', f'{angle:.6g}')]
+        return values
+
+
+def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, float]:
+    """Return the distance [m] and the angle [rad] between the poses of two rows of motion."""
+    # The difference of two rotations has the norm sqrt(8) sin(angle / 2), exact for small angles.
+    half = math.dist(motion[3:12], target[3:12]) / math.sqrt(8.0)
+    return math.dist(motion[:3], target[:3]), 2.0 * math.asin(min(half, 1.0))
+
+
+def _words(overload: Overload) -> str:
+    quantity, unit = _QUANTITIES[overload.limit]
+    return (f'{quantity} {overload.value:.6g} {unit} is {overload.value - overload.bound:.6g} '
+            f'{unit} above {overload.limit}')
+
+
+class _OutcomeDiagnostics(StatusPart):
+    """Keeps the status of the last outcome of a task, and the log lines since the last report."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._last: Status | None = None
+        self._lines: list[LogLine] = []
+
+    def level(self, now: float) -> int:
+        """Return the level of the last outcome."""
+        return self._last.level if self._last else OK
+
+    def status(self, now: float) -> Status | None:
+        """Return the status; None before the first outcome."""
         return self._last
 
-    def values(self, now: float) -> list[tuple[str, str]] | None:
-        """Return keys and values; None before the first outcome."""
-        return self._values
-
-    def log_lines(self, now: float) -> list[LogLine]:
+    def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """Return the lines since the last call."""
         lines, self._lines = self._lines, []
         return lines
 
 
-class PlannedTrajectoryDiagnostics(_LastOutcome):
-    """Keeps the outcome of the last planned trajectory, and counts them all."""
+class PlannedTrajectoryDiagnostics(_OutcomeDiagnostics):
+    """Counts planned trajectories."""
 
     name = 'planned trajectory'
 
     def __init__(self) -> None:
         super().__init__()
-        self._counts: Counter[str] = Counter()
+        self._counts = Counter[str]()
 
     def done(self, outcome: PlannedOutcome, seconds: float) -> None:
         """Note an outcome, and the time from the message to the outcome [s]."""
         level = ERROR if outcome.reason else WARN if outcome.warning else OK
         counts = self._counts
         counts[f'rejected: {outcome.reason}' if outcome.reason else 'accepted'] += 1
-        self._last = Level(level, outcome.message)
-        self._values = [
+        self._last = Status(self.name, level, outcome.message, [
             ('accepted', str(counts['accepted'])),
             ('rejected', str(counts.total() - counts['accepted'])),
             *((reason, str(n)) for reason, n in sorted(counts.items()) if reason != 'accepted'),
-            *outcome.values, ('time it took (s)', f'{seconds:.3f}')]
+            *outcome.values, ('time it took (s)', f'{seconds:.3f}')])
         message = outcome.message + (f' (took {seconds:.1f} s)' if seconds > _LONG else '')
-        lines = self._changed(Level(level, message))
+        lines = self._changed(level, message)
         if outcome.reason:  # each one is logged
             lines = [LogLine(ERROR, f'{self.name} {message}', outcome.reason)]
         elif seconds > _LONG:
@@ -87,22 +183,22 @@ class PlannedTrajectoryDiagnostics(_LastOutcome):
         self._lines += lines
 
 
-class PayloadDiagnostics(_LastOutcome):
-    """Keeps the outcome of the last request to identify the payload."""
+class PayloadDiagnostics(_OutcomeDiagnostics):
+    """Requests to identify the payload."""
 
     name = 'payload'
 
     def done(self, outcome: PayloadOutcome, seconds: float) -> None:
         """Note an outcome, and the duration of the task [s]."""
         payload = outcome.payload
-        self._last = Level(OK, f'identified from {payload.seconds:.1f} s') if payload else (
-            Level(WARN, f'not identified: {outcome.message}'))
-        self._values = [*(_values_of(payload) if payload else ()),
-                        ('time it took (s)', f'{seconds:.3f}')]
-        self._lines += self._changed(self._last)
+        level, message = (OK, f'identified from {payload.seconds:.1f} s') if payload else (
+            WARN, f'not identified: {outcome.message}')
+        self._last = Status(self.name, level, message, [
+            *(_values_of(payload) if payload else ()), ('time it took (s)', f'{seconds:.3f}')])
+        self._lines += self._changed(level, message)
 
 
-def _values_of(payload: Payload) -> list[tuple[str, str]]:
+def _values_of(payload: Payload) -> Values:
     fitted, values = payload.fitted, []
     for name, unit, value, half, known in zip(
             NAMES, UNITS, numbers_of(fitted.body), fitted.half_widths, fitted.known,

@@ -93,7 +93,7 @@ function listIn(readout, heads, names) {
   return cells;
 }
 
-const INK = color('ink'), FAINT = color('faint');
+const PAPER = color('paper'), INK = color('ink'), FAINT = color('faint');
 const FONT = {family: getComputedStyle(document.body).fontFamily, size: 12.5, color: INK};
 // Fingers scroll the page, and turn the hexapod.
 const TOUCH = window.matchMedia('(pointer: coarse)').matches;
@@ -193,7 +193,7 @@ function layoutOf(xTitle, xaxis, yTitle, yaxis, more = {}) {
   const title = (text, standoff) => ({text, standoff, font: {size: 12.5}});
   return {
     height: 270, margin: {l: 96, r: 14, t: 12, b: 42}, font: FONT, showlegend: false, hovermode: false,
-    separators: `.${THIN_SPACE}`, dragmode: TOUCH ? false : 'zoom', paper_bgcolor: '#fff', plot_bgcolor: '#fff',
+    separators: `.${THIN_SPACE}`, dragmode: TOUCH ? false : 'zoom', paper_bgcolor: PAPER, plot_bgcolor: PAPER,
     xaxis: {...AXIS, zeroline: false, ...xaxis, title: title(xTitle, 6)},
     yaxis: {...AXIS, ...yaxis, title: title(yTitle, 8)}, ...more};
 }
@@ -313,11 +313,11 @@ class TimePlot extends Drawing {
 
   layout() {
     const shapes = [], notes = [];
-    const bands = (spans, fillcolor) => shapes.push(...spans.map(([begun, ended]) => ({
+    const bands = (spans, role) => shapes.push(...spans.map(([begun, ended]) => ({
       type: 'rect', layer: 'below', xref: 'x', yref: 'paper', x0: begun, x1: ended === null ? report.end : ended,
-      y0: 0, y1: 1, line: {width: 0}, fillcolor})));
-    bands(report.warnings, 'rgba(240, 170, 40, 0.22)');
-    bands(this.spec.contacts ? report.contacts : [], 'rgba(130, 90, 190, 0.2)');
+      y0: 0, y1: 1, line: {width: 0}, fillcolor: color(role), opacity: 0.22})));
+    bands(report.warnings, 'warning');
+    bands(this.spec.contacts ? report.contacts : [], 'contact');
     for (const when of report.crossings) {
       shapes.push({type: 'line', layer: 'below', xref: 'x', yref: 'paper', x0: when, x1: when, y0: 0,
         y1: 1, line: {color: color('singular'), width: 1.2, dash: 'dot'}});
@@ -502,20 +502,25 @@ class SpectrumPlot extends TimePlot {
 
 // ---- the hexapod in three dimensions
 
-const NUMBERS = 24;  // position 3, rotation 9, lengths 6, forces 6
-const FORCE_COLORS = [[0, '#1f5fb4'], [0.25, '#86b0dc'], [0.5, '#c4c4c4'], [0.75, '#e79a7d'], [1, '#b2182b']];
+const FORCE_SCALE = report.forceColors.map((each, n, all) => [n / (all.length - 1), each]);
+const PLATFORM = color('platform'), PLATFORM_EDGE = color('platform-edge');
 
 const frames = {
   times: decode(report.frames.times, Float64Array), numbers: decode(report.frames.numbers, Float64Array)};
 
+const placesInFrame = Object.entries(report.frames.places);
+const NUMBERS = Math.max(...placesInFrame.map(([, [, end]]) => end));
+
+// Position, rotation, angles, lengths and forces.
 function frameAt(number) {
-  return frames.numbers.subarray(NUMBERS * number, NUMBERS * (number + 1));
+  return Object.fromEntries(placesInFrame.map(
+    ([name, [begin, end]]) => [name, frames.numbers.subarray(NUMBERS * number + begin, NUMBERS * number + end)]));
 }
 
 // Where the platform joints are in a frame, base axes.
 function platformJoints(frame) {
   return report.platformJoints.map(p => [0, 1, 2].map(
-    k => frame[k] + frame[3 + 3 * k] * p[0] + frame[4 + 3 * k] * p[1] + frame[5 + 3 * k] * p[2]));
+    k => frame.rotation.subarray(3 * k, 3 * k + 3).reduce((sum, r, n) => sum + r * p[n], frame.position[k])));
 }
 
 const column = (points, k) => points.map(point => point[k]);
@@ -538,7 +543,7 @@ function legLines(joints) {
 }
 
 function legColors(frame) {
-  return [...frame.subarray(18)].flatMap(force => Array(3).fill(Number.isFinite(force) ? force : 0));
+  return [...frame.forces].flatMap(force => Array(3).fill(Number.isFinite(force) ? force : 0));
 }
 
 // A narrow scene is seen from farther away.
@@ -553,7 +558,7 @@ function scene(numbers, width) {
   const pad = 0.06 * Math.max(...high.map((value, k) => value - low[k]), 1e-9);
   const far = distance(width);
   const axis = (name, k) => ({title: {text: `${name} [m]`}, range: [low[k] - pad, high[k] + pad],
-    gridcolor: color('line'), zerolinecolor: color('zero'), backgroundcolor: '#fff', showbackground: false,
+    gridcolor: color('line'), zerolinecolor: color('zero'), backgroundcolor: PAPER, showbackground: false,
     showspikes: false, tickfont: {size: 11}});
   return {xaxis: axis('X', 0), yaxis: axis('Y', 1), zaxis: axis('Z', 2), aspectmode: 'data',
     camera: {eye: {x: 1.15 * far, y: -1.35 * far, z: 0.62 * far}, center: {x: 0, y: 0, z: -0.12}}};
@@ -572,7 +577,7 @@ function besideBase() {
 
 function baseTraces() {
   return [
-    plate(report.baseJoints, '#98a2af', 0.35),
+    plate(report.baseJoints, color('faint'), 0.35),
     outline(report.baseJoints, {line: {color: color('soft'), width: 4}, marker: {size: 4, color: color('soft')}}),
     {type: 'scatter3d', mode: 'text', ...xyz(besideBase()), text: report.legs.map(name => plainText(shortened(name))),
       textposition: 'middle center', textfont: {size: 11, color: INK}, ...SILENT}];
@@ -583,14 +588,14 @@ function drawScene(canvas, traces, numbers, below = 0) {
   const height = Math.min(520, Math.max(300, Math.round(1.15 * canvas.clientWidth)));
   Plotly.newPlot(canvas, [...baseTraces(), ...traces], {height, margin: {l: 0, r: 0, t: 0, b: below}, font: FONT,
     showlegend: false, hovermode: false, separators: `.${THIN_SPACE}`, scene: scene(numbers, canvas.clientWidth),
-    paper_bgcolor: '#fff'}, CONFIG_3D);
+    paper_bgcolor: PAPER}, CONFIG_3D);
 }
 
 // The force at the end of the color scale; a few spikes do not set it.
 function colorReach() {
   const sizes = [];
   for (let n = 0; n < frames.times.length; n++) {
-    for (const force of frameAt(n).subarray(18, 24)) if (Number.isFinite(force)) sizes.push(Math.abs(force));
+    for (const force of frameAt(n).forces) if (Number.isFinite(force)) sizes.push(Math.abs(force));
   }
   if (!sizes.length) return 1;
   sizes.sort((a, b) => a - b);
@@ -607,7 +612,7 @@ class Player extends Drawing {
     this.busy = false;
     this.reach = colorReach();
     this.legValues = listIn(this.readout, ['leg', 'force [N]', 'length [m]'],
-      report.legs.map((name, n) => [swatch(report.colors[n]), name]));
+      report.legs.map((name, n) => [swatch(color(`leg${n}`)), name]));
     this.poseValues = listIn(this.readout, ['platform', ''],
       ['X [m]', 'Y [m]', 'Z [m]', 'alpha [deg]', 'beta [deg]', 'gamma [deg]']);
     this.sample = element('p', {className: 'note'});
@@ -624,10 +629,10 @@ class Player extends Drawing {
     const narrow = this.canvas.clientWidth < NARROW;
     this.frame = 0;
     drawScene(this.canvas, [
-      plate(joints, '#3b7dbd', 0.45),
-      outline(joints, {line: {color: '#1b4f86', width: 5}, marker: {size: 4, color: '#1b4f86'}}),
+      plate(joints, PLATFORM, 0.45),
+      outline(joints, {line: {color: PLATFORM_EDGE, width: 5}, marker: {size: 4, color: PLATFORM_EDGE}}),
       {type: 'scatter3d', mode: 'lines', ...legLines(joints), ...SILENT, connectgaps: false,
-        line: {width: 13, color: legColors(frame), colorscale: FORCE_COLORS, cmin: -this.reach, cmax: this.reach,
+        line: {width: 13, color: legColors(frame), colorscale: FORCE_SCALE, cmin: -this.reach, cmax: this.reach,
           showscale: true, colorbar: {title: {text: narrow ? 'leg force [N], + pushes' : 'leg force [N]<br>+ pushes', side: 'top'},
             thickness: 14, outlinewidth: 0, separatethousands: true, exponentformat: 'none',
             ...(narrow ? {orientation: 'h', len: 0.9, nticks: 5, x: 0.5, y: 0, yanchor: 'top'} : {len: 0.7, x: 1})}}},
@@ -657,17 +662,16 @@ class Player extends Drawing {
     this.showValues(number);
     await Plotly.restyle(this.canvas, {
       x: places.map(each => each.x), y: places.map(each => each.y), z: places.map(each => each.z),
-      'line.color': [undefined, '#1b4f86', legColors(frame)]}, [3, 4, 5]);
+      'line.color': [undefined, PLATFORM_EDGE, legColors(frame)]}, [3, 4, 5]);
   }
 
   showValues(number) {
-    const frame = frameAt(number), r = frame.subarray(3, 12), degrees = 180 / Math.PI;
+    const frame = frameAt(number);
     this.legValues.forEach(([force, length], n) => {
-      force.textContent = Number.isFinite(frame[18 + n]) ? shown(frame[18 + n]) : 'none';
-      length.textContent = shown(frame[12 + n]);
+      force.textContent = Number.isFinite(frame.forces[n]) ? shown(frame.forces[n]) : 'none';
+      length.textContent = shown(frame.lengths[n]);
     });
-    const pose = [frame[0], frame[1], frame[2], degrees * Math.atan2(r[7], r[8]),
-      degrees * Math.atan2(-r[6], Math.hypot(r[0], r[3])), degrees * Math.atan2(r[3], r[0])];
+    const pose = [...frame.position, ...frame.angles];
     this.poseValues.forEach(([cell], n) => { cell.textContent = shown(pose[n]); });
     this.sample.textContent = `sample at t = ${grouped(frames.times[number], 3)} s`
       + (frames.times.length < report.samples ? `, one of ${grouped(frames.times.length)} shown` : '');
@@ -678,7 +682,7 @@ class InitialAndFinal extends Drawing {
   constructor(place) {
     super(place, {className: 'canvas tall', id: 'plot_ends'},
       titled('Platform at initial and final position', 16));
-    this.ends = [[0, FAINT, 4, 'initial'], [frames.times.length - 1, report.colors[1], 5, 'final']];
+    this.ends = [[0, FAINT, 4, 'initial'], [frames.times.length - 1, color('leg1'), 5, 'final']];
     listIn(this.readout, [], this.ends.map(
       ([number, of, , name]) => [swatch(of), `${name}, t = ${grouped(frames.times[number], 3)} s`]));
   }
@@ -785,14 +789,14 @@ document.addEventListener('click', event => {
 });
 
 // For printing all plots are drawn, in the width of the paper.
-const PAPER = 500;  // [px], beside the values in 186
+const PAPER_WIDTH = 500;  // [px], beside the values in 186
 const FAR = 1.44;  // of a scene of this width, with a color bar
 window.addEventListener('beforeprint', () => {
   for (const drawing of byCanvas.values()) {
     inView.add(drawing);
     const far = Math.max(1, FAR / distance(drawing.canvas.clientWidth));
     drawing.appear();
-    Plotly.relayout(drawing.canvas, {width: PAPER, ...seenFrom(drawing, far)});
+    Plotly.relayout(drawing.canvas, {width: PAPER_WIDTH, ...seenFrom(drawing, far)});
     drawing.back = 1 / far;
   }
 });

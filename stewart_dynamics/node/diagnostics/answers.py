@@ -1,0 +1,336 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The statuses of answers: ``timing``, ``singularity`` and ``limits``.
+
+Processing times and setpoints dropped for lack of time; distance from a singularity, cause of the
+warning and crossings; for each kind of limit a state, a line and a peak of its own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+import math
+from statistics import median
+
+from stewart_dynamics.arrays import NANOSECOND, SECOND
+from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
+from stewart_dynamics.mechanics.limits import (
+    ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, OF_MOTORS,
+    QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
+from stewart_dynamics.mechanics.singularity_warning import Cause
+from stewart_dynamics.node.diagnostics.levels import (
+    ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
+from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
+from stewart_dynamics.parameters.tolerances import HYSTERESIS
+from stewart_dynamics.setpoints.motor_step import DEMANDED_TORQUES, RISES, SPEEDS
+from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
+from stewart_dynamics.setpoints.step import Output
+
+_CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singularity
+# Where the values of limits are in a row of motors.
+_OF_MOTORS = {SPEED_MAX: SPEEDS, TORQUE_MAX: DEMANDED_TORQUES, TEMPERATURE_RISE_MAX: RISES}
+_DEMANDED = FORCE_MAX, TORQUE_MAX
+_LIMITS = *LIMITS, *OF_MOTORS, JUMP
+# Factor by which legs exceed their maximum length if positions are in mm instead of m.
+_MILLIMETRES = 1000.0
+
+
+@dataclass
+class Second:
+    """Answers of at least one second, which ends with a report."""
+
+    begin: float
+    times: list[float] = field(default_factory=list)  # from the last message to the answer [s]
+    condition: float = 1.0  # the largest condition number
+
+
+class Answers:
+    """Answered setpoints: their number, the last two outputs, and the last two seconds."""
+
+    def __init__(self, parameters: Parameters, now: float) -> None:
+        self.parameters = parameters  # may be replaced at any time
+        self.number = 0
+        self.at = now  # time of the last one
+        self.output: Output | None = None
+        self.output_before: Output | None = None
+        self.second, self.second_before = Second(now), Second(now)
+        self._timeout: float = parameters['setpoint.timeout']
+
+    def add(self, output: Output, seconds: float, now: float) -> None:
+        """Note an answer, and its processing time."""
+        self.number += 1
+        self.at = now
+        self.output_before, self.output = self.output, output
+        self.second.times.append(seconds)
+        if output.condition > self.second.condition:
+            self.second.condition = output.condition
+
+    def end_second(self, now: float) -> None:
+        """End the present second after a report: reports may be much less than one apart."""
+        if now - self.second.begin >= 1.0:
+            self.second_before, self.second = self.second, Second(now)
+
+    def stale(self, now: float) -> bool:
+        """Return whether there is no recent answer."""
+        return not self.number or now - self.at > self._timeout
+
+    def state(self, state: Level, otherwise: str, now: float) -> Level:
+        """Return a state of the answers: with another message if empty, with the age if stale."""
+        if not self.number:
+            return Level(state.level, state.message or 'no setpoint yet')
+        age = f' (of the last setpoint, {now - self.at:.1f} s ago)' if self.stale(now) else ''
+        return Level(state.level, (state.message or otherwise) + age)
+
+
+class TimingDiagnostics(StatusPart):
+    """The processing times of the last one or two seconds; dropped setpoints are a warning."""
+
+    name = 'timing'
+
+    def __init__(self, answers: Answers, of_setpoints: Counter[Rejection]) -> None:
+        super().__init__(REJECTED)
+        self._answers = answers
+        self._of_setpoints = of_setpoints
+
+    def status(self, now: float) -> Status:
+        """Return the status."""
+        values = []
+        if times := self._answers.second_before.times + self._answers.second.times:
+            values = [('processing time, median (us)', f'{median(times) * 1e6:.0f}'),
+                      ('processing time, largest (us)', f'{max(times) * 1e6:.0f}')]
+        for key, reason in (('dropped', DROPPED), ('incomplete', NOT_JOINED)):
+            values.append((key, str(sum(n for rejection, n in self._of_setpoints.items()
+                                        if rejection.reason == reason))))
+        return Status(self.name, *self._answers.state(self.held.at(now), 'on time', now), values)
+
+
+def singularity_state(output: Output, parameters: Parameters) -> Level:
+    """Return the level of one output, and its cause with the numbers of the output."""
+    if not output.solvable:
+        return Level(ERROR, 'J_inv cannot be solved: no forces')
+    state = output.singularity
+    if state.stopped:
+        is_suppressed = output.demanded_forces is not None and (
+            parameters['singularity.action'] == SUPPRESS_FORCES)
+        suppressed = ': forces suppressed' if is_suppressed else ''
+        return Level(ERROR, f'inside stop_condition{suppressed}: '
+                     + _condition(output, parameters, 'stop_condition'))
+    if not state.warning:
+        return OK_LEVEL
+    if state.cause is Cause.CROSSED:
+        return Level(ERROR, 'det(J) crossed zero since the last setpoint')
+    if state.cause is Cause.CONDITION:
+        return Level(WARN, _condition(output, parameters, 'warn_condition'))
+    time, bound = state.time_to_crossing, parameters['singularity.warn_time']
+    ends = '' if time < bound else f' (the warning ends above {bound / HYSTERESIS:g} s)'
+    return Level(WARN, f'crossing of det(J) = 0 predicted in {time:.3g} s, singularity.warn_time '
+                 f'is {bound:g} s{ends}')
+
+
+def _condition(output: Output, parameters: Parameters, threshold: str) -> str:
+    bound, condition = parameters[f'singularity.{threshold}'], output.condition
+    if condition >= bound:
+        return f'condition number {condition:.4g} exceeds singularity.{threshold}, {bound:g}'
+    return (f'condition number {condition:.4g} has exceeded singularity.{threshold}, {bound:g}, '
+            f'and is not yet below {HYSTERESIS * bound:g}')
+
+
+class SingularityDiagnostics(StatusPart):
+    """Notes the distance of setpoints from a singularity."""
+
+    name = 'singularity'
+
+    def __init__(self, answers: Answers) -> None:
+        super().__init__(_CROSSING, _NEARNESS)
+        self._answers = answers
+        self._at_home, self._other_side = determinant_at_home(answers.parameters), ''
+        self._crossed = False  # with the last setpoint
+        self._crossings: list[str] = []  # since the last report
+        self._crossing_logged_at = -PERIOD
+        self._largest = 1.0
+
+    def answered(self, output: Output, now: float) -> bool:
+        """Note an output; return whether it must be reported at once, at any level."""
+        before = self._answers.output_before
+        if before is None:
+            self._other_side = other_side(output.determinant, self._at_home)
+        if output.condition > self._largest:
+            self._largest = output.condition
+        state = singularity_state(output, self._answers.parameters)
+        if state.level == OK and self._other_side:
+            state = Level(WARN, self._other_side)
+        if output.singularity.cause is not Cause.CROSSED:
+            self.held.see(state, now, _NEARNESS)
+            if self._crossed:
+                self.held.see(OK_LEVEL, now, _CROSSING)
+                self._crossed = False
+            return False
+        self._crossed, self._other_side = True, ''
+        crossing = Level(ERROR, _crossing(before, output))
+        self._crossings.append(crossing.message)
+        self.held.see(crossing, now, _CROSSING)
+        stopped = output.singularity.stopped or not output.solvable
+        self.held.see(state if stopped else OK_LEVEL, now, _NEARNESS)
+        return now - self._crossing_logged_at >= PERIOD
+
+    def status(self, now: float) -> Status:
+        """Return the status."""
+        answers, output, values = self._answers, self._answers.output, []
+        if output is not None:
+            forces = output.unit_load_forces
+            worst = max(range(6), key=forces.__getitem__)
+            crossing = output.singularity.time_to_crossing
+            of_the_last_second = max(
+                output.condition, answers.second.condition, answers.second_before.condition)
+            values = [
+                ('det(J) (m^3)', f'{output.determinant:.9g}'),
+                ('d(det(J))/dt (m^3/s)', f'{output.determinant_rate:.9g}'),
+                ('time to crossing (s)', f'{crossing:.3f}' if crossing < 1e6 else 'none'),
+                ('crossings', str(output.singularity.crossings)),
+                ('condition number', f'{output.condition:.6g}'),
+                ('worst condition number of the last second', f'{of_the_last_second:.6g}'),
+                ('worst condition number since activation', f'{self._largest:.6g}'),
+                ('largest leg force under a unit load', f'{forces[worst]:.6g}'),
+                ('its leg', answers.parameters['joints'][worst])]
+        return Status(self.name, *answers.state(self.held.at(now), 'clear', now), values)
+
+    def log_lines(self, status: Status, now: float) -> list[LogLine]:
+        """Return the crossing since the last report, and the change of level besides."""
+        lines = []
+        if self._crossings:
+            count = len(self._crossings)
+            how_many = f' (the last of {count} crossings)' if count > 1 else ''
+            lines = [LogLine(ERROR, f'{self.name}: {self._crossings[-1]}{how_many}')]
+            self._crossings = []
+            self._crossing_logged_at = now
+        level, message = self.held.of(_NEARNESS, now)
+        return lines + self._changed(level, message or 'clear')
+
+
+def _crossing(before: Output | None, output: Output) -> str:
+    """Return when det(J) crossed zero, on a straight line between two outputs."""
+    seconds, nanoseconds = divmod(output.stamp, SECOND)
+    stamp = f'stamp {seconds}.{nanoseconds:09d} s'
+    passed = 0 if before is None else output.stamp - before.stamp
+    if before is None or passed <= 0:
+        return f'det(J) crossed zero before {stamp}'
+    now, then = abs(output.determinant), abs(before.determinant)
+    return f'det(J) crossed zero {passed * NANOSECOND * now / (now + then):.3g} s before {stamp}'
+
+
+class LimitsDiagnostics(StatusPart):
+    """Notes which limits setpoints exceed, and the largest force demanded."""
+
+    name = 'limits'
+
+    def __init__(self, answers: Answers) -> None:
+        super().__init__(*_LIMITS)
+        self._answers = answers
+        self._joints: tuple[str, ...] = answers.parameters['joints']
+        self._setpoints = Counter[str]()  # that exceed each limit
+        self._worst: dict[str, Exceedance] = {}
+        self._suppressed = 0
+        self._exceeding = False
+        self._largest_force, self._its_leg = 0.0, 0
+
+    def answered(self, output: Output, now: float) -> None:
+        """Note an output."""
+        forces = output.demanded_forces
+        if forces is not None:
+            largest = abs(self._largest_force)
+            # These two take less time than abs of each.
+            if max(forces) > largest or min(forces) < -largest:
+                self._largest_force = max(forces, key=abs)
+                self._its_leg = forces.index(self._largest_force)
+        if output.exceedances or self._exceeding:
+            self._exceeding = bool(output.exceedances)
+            self._note_exceedances(output, now)
+
+    def _note_exceedances(self, output: Output, now: float) -> None:
+        suppressed = output.forces is None and output.demanded_forces is not None and (
+            self._answers.parameters['limits.action'] == SUPPRESS_FORCES)
+        self._suppressed += suppressed
+        mistake = self._mistake(output)
+        for name in _LIMITS:
+            exceeded = [each for each in output.exceedances if each.limit == name]
+            if not exceeded:
+                self.held.see(OK_LEVEL, now, name)
+                continue
+            words = ', '.join(map(self._words, exceeded))
+            if suppressed and name not in CLIPPED:
+                words += '; forces suppressed'
+            if name in (LENGTH_MAX, JUMP):
+                words += mistake
+            self.held.see(Level(ERROR, words), now, name)
+            self._setpoints[name] += 1
+            self._worst[name] = max(*exceeded, self._worst.get(name, exceeded[0]),
+                                    key=lambda each: each.excess)
+
+    def status(self, now: float) -> Status:
+        """Return the status, with all causes of its level."""
+        values = []
+        if self._answers.output is not None:
+            values = [(f'{leg}: {quantity}', f'{number:.6g}')
+                      for quantity, numbers in self._of_legs(self._answers.output)
+                      for leg, number in zip(self._joints, numbers, strict=False)
+                      if not math.isnan(number)]
+        if self._largest_force:
+            values += [
+                ('largest force demanded since activation (N)', f'{self._largest_force:.6g}'),
+                ('leg of the largest force demanded', self._joints[self._its_leg])]
+        for name in (each for each in _LIMITS if each in self._worst):
+            values += [('jumps' if name == JUMP else f'setpoints that exceed {name}',
+                        str(self._setpoints[name])),
+                       (f'worst since activation, {name}', self._words(self._worst[name]))]
+        if self._suppressed:
+            values.append(('setpoints without forces, by limits.action', str(self._suppressed)))
+        return Status(self.name, *self._answers.state(self.held.at(now), 'all held', now), values)
+
+    def _of_legs(self, output: Output) -> list[tuple[str, Sequence[float]]]:
+        """Return each quantity with its unit, and six numbers, where they are computed or not."""
+        numbers: dict[str, Sequence[float]] = {
+            LENGTH_MAX: output.lengths, VELOCITY_MAX: output.rates,
+            FORCE_MAX: output.demanded_forces or (),
+            **{limit: output.joint_angles[where] for limit, where in ANGLES.items()},
+            CLEARANCE_MIN: output.clearances,
+            **{limit: output.motors[where] for limit, where in _OF_MOTORS.items()}}
+        return [(f'{QUANTITIES[limit].name}{" demanded" * (limit in _DEMANDED)} '
+                 f'({QUANTITIES[limit].unit})', each) for limit, each in numbers.items()]
+
+    def log_lines(self, status: Status, now: float) -> list[LogLine]:
+        """Return the changes of each kind of limit."""
+        lines = []
+        for name, worst in self._worst.items():
+            level, message = self.held.of(name, now)
+            lines += self._changed(level, message or (
+                f'{name}: no longer exceeded; {self._setpoints[name]} setpoints since activation, '
+                f'worst: {self._words(worst)}'), name)
+        return lines
+
+    def _mistake(self, output: Output) -> str:
+        """Return the likely mistake where legs are too long, as words to append."""
+        longest = self._answers.parameters['limits.length_max']
+        reference = output.state.lengths if longest is None else longest.tolist()
+        if reference and all(0.3 < length / (_MILLIMETRES * most) < 1.5 for length, most in zip(
+                output.lengths, reference, strict=True)):
+            return '; likely mistake: position in mm'
+        return ''
+
+    def _words(self, exceedance: Exceedance) -> str:
+        clipped = ', clipped' if exceedance.limit in CLIPPED else ''
+        return exceedance.words(self._joints) + clipped
