@@ -398,33 +398,46 @@ def row() -> NDArray[np.float64]:
     return result
 
 
-@pytest.mark.parametrize('limit', (*OF_RESULTS, *OF_JOINTS))
+@pytest.mark.parametrize('limit', OF_RESULTS)
 @pytest.mark.parametrize('leg', range(6))
 def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: int) -> None:
-    limits = Limits(PARAMETERS.replaced(GIVEN))
+    limits = Limits(symmetric_parameters().replaced(GIVEN))
     bound = float(limits.bounds[limit][leg])
     outward = -1.0 if limit == LENGTH_MIN else 1.0
-    for sign in (1.0, -1.0) if limit in (VELOCITY_MAX, FORCE_MAX) else (1.0,):
-        for excess, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
-                                 (2.0 * TOLERANCE, True), (0.1, True)):
-            result, angles = row(), np.zeros(12)
-            values = {**{name: result[place] for name, place in PLACES.items()},
-                      **{name: angles[place] for name, place in ANGLES.items()}}
-            values[limit][leg] = value = sign * bound * (1.0 + excess * outward)
+    signs = (1.0, -1.0) if limit in (VELOCITY_MAX, FORCE_MAX) else (1.0,)
+    for excess, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
+                             (2.0 * TOLERANCE, True), (0.1, True)):
+        for sign in signs:
+            result = row()
+            result[PLACES[limit].start + leg] = value = sign * bound * (1.0 + excess * outward)
             assert any_exceeded(limits.thresholds[:4].ravel(), result) == (
-                exceeded and limit in PLACES and limit != FORCE_MAX,
-                exceeded and limit == FORCE_MAX)
-            for other in (*OF_RESULTS, *OF_JOINTS):
+                exceeded and limit != FORCE_MAX, exceeded and limit == FORCE_MAX)
+            for other in OF_RESULTS:
                 expected = [exceeded and other == limit and n == leg for n in range(6)]
-                assert limits.exceeds(other, values[other]).tolist() == expected
+                assert limits.exceeds(other, result[PLACES[other]]).tolist() == expected
             of_sample = (tuple(result[at].tolist()) for at in (LENGTHS, RATES, FORCES))
-            assert (*limits.exceeded(*of_sample),
-                    *limits.exceeded_angles(tuple(angles.tolist()))) == (
+            assert limits.exceeded(*of_sample) == (
                 (Exceedance(limit, leg, value, bound),) if exceeded else ())
 
 
+@pytest.mark.parametrize('limit', OF_JOINTS)
+@pytest.mark.parametrize('leg', range(6))
+def test_sample_and_array_agree_on_the_angle_of_each_joint(limit: str, leg: int) -> None:
+    limits = Limits(symmetric_parameters().replaced(GIVEN))
+    bound = float(limits.bounds[limit][leg])
+    for excess, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
+                             (2.0 * TOLERANCE, True), (0.1, True)):
+        angles = np.zeros(12)
+        angles[ANGLES[limit].start + leg] = value = bound * (1.0 + excess)
+        for other in OF_JOINTS:
+            expected = [exceeded and other == limit and n == leg for n in range(6)]
+            assert limits.exceeds(other, angles[ANGLES[other]]).tolist() == expected
+        assert limits.exceeded_angles(tuple(angles.tolist())) == (
+            (Exceedance(limit, leg, value, bound),) if exceeded else ())
+
+
 def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
-    limits = Limits(PARAMETERS)
+    limits = Limits(symmetric_parameters())
     huge = rng().choice([-1e300, 1e300], (5, 6))
     assert not any(limits.exceeds(limit, huge).any() for limit in LIMITS)
     assert limits.exceeded((1e300,) * 6, (-1e300,) * 6, (1e300,) * 6) == ()
@@ -433,7 +446,7 @@ def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
 
 
 def test_unknown_forces_exceed_no_limit() -> None:
-    limits = Limits(PARAMETERS.replaced({FORCE_MAX: 1.0}))
+    limits = Limits(symmetric_parameters().replaced({FORCE_MAX: 1.0}))
     result = row()
     result[FORCES] = np.nan
     assert any_exceeded(limits.thresholds[:4].ravel(), result) == (False, False)
