@@ -21,7 +21,7 @@ Nothing here uses the package's equations; only Parameters and Motion, which car
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 from functools import cache
 from io import StringIO
@@ -324,15 +324,19 @@ def printed_uncompiled(code: str) -> str:
     return str(printed)
 
 
-def uncompiled(code: str, given: Mapping[str, Array]) -> dict[str, Array]:
-    """Return what becomes of arrays, the dict ``given``, where code runs with no compiler."""
+def assert_uncompiled_gives_the_same(function: Any, *arrays: Array) -> None:
+    """Call a compiled function, and the same without a compiler: all arrays must be equal."""
+    module, name = function.__module__, function.function.__name__
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'arrays.npz'
-        np.savez(path, **given)
-        printed_uncompiled(f'import numpy as np\ngiven = dict(np.load({str(path)!r}))\n'
-                           f'{code}np.savez({str(path)!r}, **given)\n')
-        with np.load(path) as arrays:
-            return dict(arrays)
+        np.savez(path, *arrays)
+        printed_uncompiled(f'import numpy as np\nfrom {module} import {name}\n'
+                           f'arrays = [*np.load({str(path)!r}).values()]\n{name}(*arrays)\n'
+                           f'np.savez({str(path)!r}, *arrays)\n')
+        function(*arrays)
+        with np.load(path) as plain:
+            for array, other in zip(arrays, plain.values(), strict=True):
+                np.testing.assert_array_equal(array, other)
 
 
 def printed_compiled_and_not(code: str) -> set[str]:

@@ -142,7 +142,7 @@ def test_a_pose_written_by_hand_is_read_in_both_orders() -> None:
 def test_a_malformed_head_is_rejected(kind: str) -> None:
     good = valid(kind)
     assert good[20] == 0  # behind 'base'
-    bad = [(bytes.fromhex(head) + good[2:], '') for head in (
+    bad = [(bytes.fromhex(head) + good[2:], '.') for head in (
         '0002', '0003', '0006', '0007', '000a', '0100', '0101', 'ffff')]
     bad += [(good[:8] + nanosec.to_bytes(4, 'little') + good[12:], f'stamp of {nanosec} ns')
             for nanosec in (SECOND, 2 ** 32 - 1)]

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import (
-    Array, random_direction, random_motion, random_parameters, rng, rotation_about,
+    Array, energies, random_direction, random_motion, random_parameters, rng, rotation_about,
     symmetric_parameters)
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -32,6 +32,7 @@ from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions
+from stewart_dynamics.mechanics.rows import ACCELERATION, TWIST
 
 HEXAPOD = symmetric_parameters().replaced({'geometry.zero_length': 1.1})
 PUBLISHED = {'actuator.screw_lead': 0.005, 'drive.gear_ratio': 3.0,
@@ -80,8 +81,7 @@ def test_the_published_machine() -> None:
 def expected_torques(p: Parameters, motion: Motion, forces: Array) -> Array:
     """Return torques of a guided screw by the formulas of a textbook, away from standstill."""
     j_inv = StewartPlatform(p).inverse_jacobian(motion)
-    twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)
-    acc = np.concatenate([motion.linear_acceleration, motion.angular_acceleration], axis=-1)
+    twist, acc = motion.rows[..., TWIST], motion.rows[..., ACCELERATION]
     j_rate = StewartPlatform(p).inverse_jacobian_rate(motion)
     rates = np.einsum('...ij,...j->...i', j_inv, twist)
     accelerations = (np.einsum('...ij,...j->...i', j_inv, acc)
@@ -112,19 +112,6 @@ def test_torques_and_currents_are_those_of_the_formulas(seed: int) -> None:
     assert motors.power == pytest.approx(motors.torques * motors.speeds + motors.copper_heat)
     one = platform.motors(motion[3], wrench)
     assert all((a == b[3]).all() for a, b in zip(one, motors, strict=True))
-
-
-def potential(p: Parameters, motion: Motion) -> Array:
-    """Return the potential energy of platform and legs [J]."""
-    legs = (motion.position[..., None, :] + p['geometry.platform_joints']
-            @ np.swapaxes(motion.rotation, -1, -2) - p['geometry.base_joints'])
-    s = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
-    joints = p['geometry.base_joints'] + legs
-    platform = motion.position + motion.rotation @ p['platform.center_of_mass']
-    return -(p['platform.mass'] * platform + np.sum(
-        (p['legs.cylinder.mass'] * p['legs.cylinder.center_of_mass'])[:, None] * s
-        + p['legs.piston.mass'][:, None] * (
-            joints - p['legs.piston.center_of_mass'][:, None] * s), axis=-2)) @ p['gravity']
 
 
 @pytest.mark.parametrize('seed', range(5))
@@ -176,9 +163,7 @@ def test_work_less_losses_is_the_change_of_energy(seed: int) -> None:
     work, lost, _, _ = of(times.ravel())
     weight = (half[:, None] * weights).ravel()
     ends = motion_at(np.array([begin, end]))
-    twist = np.concatenate([ends.linear_velocity, ends.angular_velocity], axis=-1)
-    kinetic = 0.5 * np.einsum('ni,nij,nj->n', twist, platform.mass_matrix(ends), twist)
-    change = np.diff(kinetic + potential(p, ends))[0]
+    change = np.diff(np.sum(energies(p, ends), axis=0))[0]
     scale = weight @ np.abs(work)
     assert lost.min() >= 0.0 and weight @ lost > 1e-3 * scale
     assert abs(weight @ work - weight @ lost - change) < 1e-9 * scale

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    QUARTER_TURN, random_direction, random_motion, random_parameters, rng, ROOT,
-    rotation_about, size_of, symmetric_parameters, uncompiled)
+    assert_uncompiled_gives_the_same, QUARTER_TURN, random_direction, random_motion,
+    random_parameters, rng, ROOT, rotation_about, size_of, symmetric_parameters)
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import (
@@ -233,20 +233,6 @@ def test_a_guess_is_a_motion_or_a_pose(hexapod: StewartPlatform) -> None:
                          - truth.position)) < 1e-15
 
 
-def test_leading_shapes_broadcast(hexapod: StewartPlatform) -> None:
-    poses = legal_poses(hexapod.parameters, rng(), 12)
-    lengths = hexapod.inverse_kinematics(poses)
-    one_by_one = [hexapod.forward_kinematics(each, AT_HOME) for each in lengths]
-    shaped = hexapod.forward_kinematics(lengths.reshape(3, 4, 6), AT_HOME)
-    assert shaped.position.shape == (3, 4, 3)
-    assert shaped.rotation.shape == (3, 4, 3, 3)
-    assert np.array_equal(shaped.position.reshape(12, 3), [each.position for each in one_by_one])
-    guesses = Pose(np.tile(HOME, (12, 1)), np.eye(3))
-    assert hexapod.forward_kinematics(lengths[0], guesses).position.shape == (12, 3)
-    assert hexapod.twist(shaped, np.ones(6)).shape == (3, 4, 6)
-    assert hexapod.twist(AT_HOME, np.ones((5, 6))).shape == (5, 6)
-
-
 def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     platform, random = StewartPlatform(symmetric_parameters()), rng()
     motion = random_motion(platform.parameters, random, 10)
@@ -256,18 +242,8 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     rows = Motion.from_pose(away(motion, random, 0.1, 0.1)).rows.copy()
     rows[4, 3:12] = QUARTER_TURN.ravel()
     codes, steps, residuals = np.empty(10, dtype=int), np.empty(10, dtype=int), np.empty(10)
-    given = {'constants': platform.constants, 'lengths': lengths, 'rates': rates,
-             'rows': rows.copy(), 'codes': codes.copy(), 'steps': steps.copy(),
-             'residuals': residuals.copy()}
-    plain = uncompiled(
-        'from stewart_dynamics.mechanics.kinematics.forward_kinematics import poses, twists\n'
-        "poses(given['constants'], given['lengths'], given['rows'], given['codes'],\n"
-        "      given['steps'], given['residuals'])\n"
-        "twists(given['constants'], given['rates'], given['rows'])\n", given)
-    forward_kinematics.poses(platform.constants, lengths, rows, codes, steps, residuals)
-    forward_kinematics.twists(platform.constants, rates, rows)
+    assert_uncompiled_gives_the_same(
+        forward_kinematics.poses, platform.constants, lengths, rows, codes, steps, residuals)
     assert codes[3] != FOUND
     assert codes[4] == SINGULAR
-    for name, value in (('rows', rows), ('codes', codes), ('steps', steps),
-                        ('residuals', residuals)):
-        assert np.array_equal(plain[name], value), name
+    assert_uncompiled_gives_the_same(forward_kinematics.twists, platform.constants, rates, rows)

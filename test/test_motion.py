@@ -103,13 +103,6 @@ def test_quaternions_of_half_turns_lose_no_digits(axis: Array, short_of: float) 
     assert abs(np.dot(quaternion[:3], axis)) == pytest.approx(np.cos(short_of / 2), abs=1e-15)
 
 
-def test_exact_half_turns_have_exact_quaternions() -> None:
-    for axis in np.eye(3):
-        turn = 2.0 * np.outer(axis, axis) - np.eye(3)
-        assert np.array_equal(to_quaternion(turn), [*axis, 0.0])
-    assert np.array_equal(to_quaternion(np.eye(3)), [0.0, 0.0, 0.0, 1.0])
-
-
 def test_the_quaternion_of_one_matrix_is_that_of_many() -> None:
     random = rng()
     turns = [rotation_about(random_direction(random), angle)
@@ -119,9 +112,11 @@ def test_the_quaternion_of_one_matrix_is_that_of_many() -> None:
     for turn in turns:
         assert np.allclose(quaternion_of(turn.ravel().tolist()), to_quaternion(turn),
                            rtol=0.0, atol=4e-16)
-    for axis in np.eye(3):
-        exact = quaternion_of((2.0 * np.outer(axis, axis) - np.eye(3)).ravel().tolist())
-        assert np.array_equal(np.abs(exact), [*axis, 0.0])
+    for axis in np.eye(3):  # exact half turns
+        turn = 2.0 * np.outer(axis, axis) - np.eye(3)
+        assert np.array_equal(to_quaternion(turn), [*axis, 0.0])
+        assert np.array_equal(np.abs(quaternion_of(turn.ravel().tolist())), [*axis, 0.0])
+    assert np.array_equal(to_quaternion(np.eye(3)), [0.0, 0.0, 0.0, 1.0])
 
 
 def test_rotations_take_any_leading_shape() -> None:
@@ -146,6 +141,7 @@ def test_parts_are_as_given_and_zero_by_default() -> None:
     assert np.array_equal(motion.linear_acceleration, np.zeros(3))
     assert np.array_equal(motion.angular_acceleration, np.zeros(3))
     assert repr(motion) == '<Motion: position [1, 2, 3] m, quaternion [0, 0, 0, 1]>'
+    assert repr(motion.pose) == '<Pose: position [1, 2, 3] m, quaternion [0, 0, 0, 1]>'
 
 
 def test_leading_shapes_broadcast() -> None:
@@ -169,30 +165,6 @@ def test_arrays_are_copied_and_their_views_read_only() -> None:
             getattr(motion, name)[...] = 1.0
 
 
-@pytest.mark.parametrize(('arguments', 'texts'), [
-    (([0.0, 0.0], UPRIGHT), ['position: shape (2,)', 'must end in (3,)']),
-    ((np.zeros(3), np.zeros(9)), ['rotation: shape (9,)', 'must end in (3, 3)']),
-    (([0.0, np.nan, 0.0], UPRIGHT), ['position[1]: nan', 'must be finite']),
-    ((np.zeros(3), UPRIGHT, [[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]]),
-     ['linear_velocity[1, 2]: inf', 'must be finite']),
-    ((np.zeros(3), -UPRIGHT), ['rotation: [[-1.0', 'is a reflection: its determinant is -1']),
-    ((np.zeros(3), 1.001 * UPRIGHT), ['rotation: ', 'not a rotation', '0.002', '1e-06']),
-    ((np.zeros(3), 1e200 * UPRIGHT), ['rotation: ', 'not a rotation']),
-    ((np.zeros(3), [UPRIGHT, UPRIGHT, np.zeros((3, 3))]), ['rotation[2]: ', 'not a rotation']),
-    ((np.zeros((2, 3)), UPRIGHT, np.zeros((3, 3))),
-     ['do not fit', 'position (2,)', 'linear_velocity (3,)']),
-    ((['a', 'b', 'c'], UPRIGHT), ['position: a value of type list: not an array of real numbers']),
-    (([0.0, 0.0, 1.0 + 2.0j], UPRIGHT), ['position: ', 'real numbers', 'complex128']),
-    (([0.0, 0.0, 1.0], UPRIGHT, {'x': 1.0}), ['linear_velocity: a value of type dict: ']),
-])
-def test_bad_arguments_are_rejected_with_index_and_rule(
-        arguments: Any, texts: list[str]) -> None:
-    with pytest.raises(MotionError) as caught:
-        Motion(*arguments)
-    for text in texts:
-        assert text in str(caught.value)
-
-
 def test_a_rotation_rounded_as_in_messages_is_accepted() -> None:
     rounded = rotation_about(X, 0.3).astype(np.float32)
     assert Motion(np.zeros(3), rounded).shape == ()
@@ -201,6 +173,7 @@ def test_a_rotation_rounded_as_in_messages_is_accepted() -> None:
 # Poses: their constructors, and poses and motions as sequences of samples
 
 POSITION = [1.0, 2.0, 3.0]
+ORIGIN = np.zeros(3)  # arrays of one sample are checked faster than others
 
 
 def random_poses(many: int) -> Pose:
@@ -252,31 +225,47 @@ def test_constructors_take_any_leading_shape() -> None:
     assert Pose(np.zeros((0, 3)), UPRIGHT).shape == (0,)
 
 
-@pytest.mark.parametrize(('make', 'text'), [
-    (lambda: Pose(POSITION, np.diag([1.0, 1.0, -1.0])),
-     'is a reflection: its determinant is -1, must be +1 (is an axis mirrored, or are two '
-     'columns exchanged?)'),
-    (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 0.0, 1.01]), 'length 1.01, must be'),
-    (lambda: Pose.from_quaternion(POSITION, [0.0] * 4), 'length 0, must be within 0.001 of 1'),
-    (lambda: Pose.from_quaternion(POSITION, [1e308] * 4), 'length inf, must be'),
-    (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 1.0]), 'quaternion: shape (3,)'),
-    (lambda: Pose.from_matrix(np.eye(3)), 'matrix: shape (3, 3): must end in (4, 4)'),
+@pytest.mark.parametrize(('make', 'texts'), [
+    (lambda: Motion([0.0, 0.0], UPRIGHT), ['position: shape (2,): must end in (3,)']),
+    (lambda: Motion(ORIGIN, UPRIGHT.ravel()), ['rotation: shape (9,): must end in (3, 3)']),
+    (lambda: Motion([0.0, np.nan, 0.0], UPRIGHT), ['position[1]: nan: must be finite']),
+    (lambda: Motion(ORIGIN, UPRIGHT, [[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]]),
+     ['linear_velocity[1, 2]: inf: must be finite']),
+    (lambda: Motion(ORIGIN, -UPRIGHT), [
+        'rotation: [[-1.0', 'is a reflection: its determinant is -1, must be +1 (is an axis '
+        'mirrored, or are two columns exchanged?)']),
+    (lambda: Motion(ORIGIN, 1.001 * UPRIGHT), ['not a rotation', '0.002', '1e-06']),
+    (lambda: Motion(ORIGIN, 1e200 * UPRIGHT), ['rotation: ', 'not a rotation']),
+    (lambda: Motion(ORIGIN, [UPRIGHT, UPRIGHT, np.zeros((3, 3))]), [
+        'rotation[2]: ', 'not a rotation']),
+    (lambda: Motion(np.zeros((2, 3)), UPRIGHT, np.zeros((3, 3))), [
+        'do not fit', 'position (2,)', 'linear_velocity (3,)']),
+    (lambda: Motion(['a', 'b', 'c'], UPRIGHT), [
+        'position: a value of type list: not an array of real numbers']),
+    (lambda: Motion(None, UPRIGHT), ['position: None: not an array of real numbers']),
+    (lambda: Motion([0.0, 0.0, 1.0 + 2.0j], UPRIGHT), [
+        'position: ', 'real numbers', 'complex128']),
+    (lambda: Motion(ORIGIN, UPRIGHT, {'x': 1.0}), ['linear_velocity: a value of type dict: ']),
+    (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 0.0, 1.01]), ['length 1.01, must be']),
+    (lambda: Pose.from_quaternion(POSITION, [0.0] * 4), [
+        'length 0, must be within 0.001 of 1']),
+    (lambda: Pose.from_quaternion(POSITION, [1e308] * 4), ['length inf, must be']),
+    (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 1.0]), ['quaternion: shape (3,)']),
+    (lambda: Pose.from_matrix(np.eye(3)), ['matrix: shape (3, 3): must end in (4, 4)']),
     (lambda: Pose.from_matrix([np.eye(4), np.ones((4, 4))]),
-     'matrix[1]: its last row is [1.0, 1.0, 1.0, 1.0]: must be [0, 0, 0, 1]'),
-    (lambda: Pose.from_euler(POSITION, None), 'angles: None: not an array of real numbers'),
-    (lambda: Motion.from_euler(POSITION, [0.0, 0.0], None, None), 'angles: shape (2,)'),
+     ['matrix[1]: its last row is [1.0, 1.0, 1.0, 1.0]: must be [0, 0, 0, 1]']),
+    (lambda: Motion.from_euler(POSITION, [0.0, 0.0], None, None), ['angles: shape (2,)']),
     (lambda: Motion.from_euler(POSITION, [0.0] * 3, None, [0.0, np.inf, 0.0]),
-     'angle_rates[1]: inf'),
-    (lambda: Motion.from_pose(POSITION), 'pose: a value of type list: must be a Pose or a Motion'),
+     ['angle_rates[1]: inf']),
+    (lambda: Motion.from_pose(POSITION), [
+        'pose: a value of type list: must be a Pose or a Motion']),
 ])
-def test_bad_arguments_are_rejected_in_one_line(make: Any, text: str) -> None:
+def test_bad_arguments_are_rejected_in_one_line(make: Any, texts: list[str]) -> None:
     with pytest.raises(MotionError) as caught:
         make()
-    assert text in str(caught.value)
+    assert [text for text in texts if text not in str(caught.value)] == []
     assert '\n' not in str(caught.value)
 
-
-# Poses and motions as sequences of samples
 
 def batches() -> list[Any]:
     """Return a batch of poses and one of motions, both of shape (4, 5)."""
@@ -323,15 +312,6 @@ def test_equality_is_that_of_all_numbers(batch: Any) -> None:
     assert batches()[0] != batches()[1]
     with pytest.raises(TypeError, match='unhashable'):
         hash(batch)
-
-
-def test_representations_are_short() -> None:
-    motion, poses = batches()
-    assert repr(motion) == '<Motion of shape (4, 5)>'
-    assert repr(poses[0]) == '<Pose of shape (5,)>'
-    assert repr(Pose(POSITION, UPRIGHT)) == (
-        '<Pose: position [1, 2, 3] m, quaternion [0, 0, 0, 1]>')
-    assert len(repr(motion[0, 0])) < 150
 
 
 def test_angles_may_be_in_degrees() -> None:

@@ -54,9 +54,9 @@ import stewart_dynamics
 from stewart_dynamics import BagError, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.model import JOINT_STATES, TF
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.frames.motion import motion_rows
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
-from stewart_dynamics.mechanics.platform_arguments import motion_rows
 from stewart_dynamics.program import BAD_INPUT, DONE, INTERRUPTED, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed

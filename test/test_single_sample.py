@@ -63,7 +63,8 @@ def test_one_sample_is_the_batch_bit_for_bit(
     guess = Pose(motion.position + 1e-3, motion.rotation)
     poses = platform.forward_kinematics(lengths, guess)
     for n in range(MANY):
-        assert np.array_equal(single.inverse_dynamics(motion[n], wrench[n], None), batch.rows[n])
+        assert np.array_equal(
+            single.inverse_dynamics(motion[n], None, wrench[n], None), batch.rows[n])
         assert np.array_equal(
             single.forward_dynamics(
                 motion[n], batch.forces[n], wrench[n], None), back.rows[n])

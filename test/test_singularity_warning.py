@@ -29,7 +29,7 @@ from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatfor
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import (
-    Cause, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
+    advance, Cause, Singularity, thresholds, time_to_crossing, UNSOLVABLE_CONDITION)
 from stewart_dynamics.parameters.tolerances import HYSTERESIS
 
 PARAMETERS = symmetric_parameters().replaced({
@@ -37,11 +37,18 @@ PARAMETERS = symmetric_parameters().replaced({
     'singularity.warn_time': 0.5})
 
 
+def advanced(state: Singularity, parameters: Parameters, *sample: float) -> Singularity:
+    """Return the state after one more sample: det, its rate, condition number."""
+    numbers = np.array(state, dtype=float)
+    advance(numbers, thresholds(parameters), *sample)
+    return Singularity.of(numbers.tolist())
+
+
 def after(*samples: tuple[float, float, float], start: Singularity | None = None) -> Singularity:
     """Return the state after samples of (det, its rate, condition number)."""
     state = start or Singularity()
-    for det, rate, condition in samples:
-        state = state.after(PARAMETERS, det, rate, condition)
+    for sample in samples:
+        state = advanced(state, PARAMETERS, *sample)
     return state
 
 
@@ -54,8 +61,7 @@ def turning(parameters: Parameters, axis: np.ndarray, rate: float, time: float) 
 def state_after(state: Singularity, platform: StewartPlatform, motion: Motion) -> Singularity:
     """Return the state after a sample of a motion."""
     row = platform.solve(motion.rows.reshape(1, MOTION))[0]
-    return state.after(platform.parameters, float(row[DETERMINANT]),
-                       float(row[DETERMINANT_RATE]), float(row[CONDITION]))
+    return advanced(state, platform.parameters, *row[[DETERMINANT, DETERMINANT_RATE, CONDITION]])
 
 
 def test_the_first_state_has_no_warning() -> None:

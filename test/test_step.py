@@ -17,12 +17,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 import math
 from typing import Any
 
 from hypothesis import strategies as st
 import numpy as np
-from numpy.typing import NDArray
 import pytest
 from referees import (
     QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, relative,
@@ -31,9 +31,9 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, any_exceeded, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JITTER, JUMP,
-    LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, OF_JOINTS, OF_RESULTS, PLATFORM_ANGLE_MAX, TOLERANCE,
-    VELOCITY_MAX)
+    angle_values, any_exceeded, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JITTER, JUMP,
+    LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA, OF_RESULTS, PLATFORM_ANGLE_MAX, result_values,
+    TOLERANCE, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, NO_BASE, RATES, RESULT
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import LEG_SHAPE
@@ -387,70 +387,61 @@ def test_at_rest_it_is_the_weight_also_where_the_forces_cannot_be_solved(
 
 GIVEN = {LENGTH_MIN: [0.9, 0.91, 0.92, 0.93, 0.94, 0.95], LENGTH_MAX: 1.5, VELOCITY_MAX: 0.5,
          FORCE_MAX: 6000.0, BASE_ANGLE_MAX: 0.5,
-         PLATFORM_ANGLE_MAX: [0.3, 0.4, 0.5, 0.6, 0.7, 0.8]}
-PLACES = {LENGTH_MIN: LENGTHS, LENGTH_MAX: LENGTHS, VELOCITY_MAX: RATES, FORCE_MAX: FORCES}
+         PLATFORM_ANGLE_MAX: [0.3, 0.4, 0.5, 0.6, 0.7, 0.8], CLEARANCE_MIN: 0.05,
+         **dict.fromkeys(LEG_SHAPE, 0.01)}
+WITHIN = {LENGTH_MIN: 1.2, LENGTH_MAX: 1.2, CLEARANCE_MIN: 0.1}  # others 0.0
 
 
-def row() -> NDArray[np.float64]:
-    """Return a result within all limits of GIVEN."""
-    result = np.zeros(RESULT)
-    result[LENGTHS] = 1.2
-    return result
-
-
-@pytest.mark.parametrize('limit', OF_RESULTS)
+@pytest.mark.parametrize('limit', LIMITS)
 @pytest.mark.parametrize('leg', range(6))
 def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: int) -> None:
     limits = Limits(symmetric_parameters().replaced(GIVEN))
     bound = float(limits.bounds[limit][leg])
-    outward = -1.0 if limit == LENGTH_MIN else 1.0
+    outward = -1.0 if limit in MINIMA else 1.0
     signs = (1.0, -1.0) if limit in (VELOCITY_MAX, FORCE_MAX) else (1.0,)
-    for excess, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
-                             (2.0 * TOLERANCE, True), (0.1, True)):
-        for sign in signs:
-            result = row()
-            result[PLACES[limit].start + leg] = value = sign * bound * (1.0 + excess * outward)
-            assert any_exceeded(limits.thresholds[:4].ravel(), result) == (
-                exceeded and limit != FORCE_MAX, exceeded and limit == FORCE_MAX)
-            for other in OF_RESULTS:
-                expected = [exceeded and other == limit and n == leg for n in range(6)]
-                assert limits.exceeds(other, result[PLACES[other]]).tolist() == expected
-            of_sample = (tuple(result[at].tolist()) for at in (LENGTHS, RATES, FORCES))
-            assert limits.exceeded(*of_sample) == (
-                (Exceedance(limit, leg, value, bound),) if exceeded else ())
+    for (excess, exceeded), sign in product((
+            (0.0, False), (0.5 * TOLERANCE, False), (-0.01, False), (2.0 * TOLERANCE, True),
+            (0.1, True)), signs):
+        values = {name: np.full(6, WITHIN.get(name, 0.0)) for name in LIMITS}
+        values[limit][leg] = value = sign * bound * (1.0 + excess * outward)
+        if limit in (LENGTH_MIN, LENGTH_MAX):
+            values[LENGTH_MIN] = values[LENGTH_MAX] = values[limit]
+        for name in LIMITS:
+            expected = [exceeded and name == limit and n == leg for n in range(6)]
+            assert limits.exceeds(name, values[name]).tolist() == expected
+        other = (1, 2, 3, 4, 5, 0)[leg] if limit == CLEARANCE_MIN else -1
+        assert limits.exceeded({name: tuple(each.tolist()) for name, each in values.items()},
+                               (1, 2, 3, 4, 5, 0)) == (
+            (Exceedance(limit, leg, value, bound, other),) if exceeded else ())
+        result = np.zeros(RESULT)
+        result[LENGTHS], result[RATES], result[FORCES] = (
+            values[name] for name in (LENGTH_MAX, VELOCITY_MAX, FORCE_MAX))
+        assert any_exceeded(limits.thresholds[:4].ravel(), result) == (
+            exceeded and limit in OF_RESULTS[:3], exceeded and limit == FORCE_MAX)
 
 
-@pytest.mark.parametrize('limit', OF_JOINTS)
-@pytest.mark.parametrize('leg', range(6))
-def test_sample_and_array_agree_on_the_angle_of_each_joint(limit: str, leg: int) -> None:
-    limits = Limits(symmetric_parameters().replaced(GIVEN))
-    bound = float(limits.bounds[limit][leg])
-    for excess, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
-                             (2.0 * TOLERANCE, True), (0.1, True)):
-        angles = np.zeros(12)
-        angles[ANGLES[limit].start + leg] = value = bound * (1.0 + excess)
-        for other in OF_JOINTS:
-            expected = [exceeded and other == limit and n == leg for n in range(6)]
-            assert limits.exceeds(other, angles[ANGLES[other]]).tolist() == expected
-        assert limits.exceeded_angles(tuple(angles.tolist())) == (
-            (Exceedance(limit, leg, value, bound),) if exceeded else ())
+def test_values_of_a_sample_are_those_of_their_limits() -> None:
+    a, b, c = (0.1,) * 6, (0.2,) * 6, (0.3,) * 6
+    assert result_values(a, b, c) == {
+        LENGTH_MIN: a, LENGTH_MAX: a, VELOCITY_MAX: b, FORCE_MAX: c}
+    assert angle_values(a + b) == {BASE_ANGLE_MAX: a, PLATFORM_ANGLE_MAX: b}
 
 
 def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
     limits = Limits(symmetric_parameters())
     huge = rng().choice([-1e300, 1e300], (5, 6))
     assert not any(limits.exceeds(limit, huge).any() for limit in LIMITS)
-    assert limits.exceeded((1e300,) * 6, (-1e300,) * 6, (1e300,) * 6) == ()
-    assert limits.exceeded_angles((3.14,) * 12) == ()
+    for value in (1e300, -1e300):
+        assert limits.exceeded(dict.fromkeys(LIMITS, (value,) * 6)) == ()
     assert np.isinf(limits.force_max).all() and not limits.bounds
 
 
 def test_unknown_forces_exceed_no_limit() -> None:
     limits = Limits(symmetric_parameters().replaced({FORCE_MAX: 1.0}))
-    result = row()
-    result[FORCES] = np.nan
+    result = np.zeros(RESULT)
+    result[LENGTHS], result[FORCES] = 1.2, np.nan
     assert any_exceeded(limits.thresholds[:4].ravel(), result) == (False, False)
-    assert limits.exceeded((1.2,) * 6, (0.0,) * 6, None) == ()
+    assert limits.exceeded(result_values((1.2,) * 6, (0.0,) * 6, None)) == ()
 
 
 @pytest.mark.parametrize(('exceedance', 'words'), [

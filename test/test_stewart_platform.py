@@ -27,12 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    QUARTER_TURN, random_motion, random_parameters, random_wrench, relative, rng,
-    ROOT, rotation_about, symmetric_parameters)
+    QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, relative,
+    rng, ROOT, rotation_about, symmetric_parameters)
 
 from stewart_dynamics import (
-    BaseMotion, check_planned_trajectory, ForceBreakdown, Motion, MotionError, ParameterError,
-    Parameters, Pose, SingularityError, StewartError, StewartPlatform)
+    BaseMotion, check_planned_trajectory, ForceBreakdown, InverseDynamics, Motion, MotionError,
+    ParameterError, Parameters, Pose, SingularityError, StewartError, StewartPlatform)
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
@@ -273,6 +273,57 @@ CALLS = {name: call for name, call in inspect.getmembers(StewartPlatform, inspec
              'check', 'home_pose')}
 DRIVES = {'actuator.screw_lead': 0.01, 'drive.motor_inertia': 1e-5, 'drive.efficiency': 0.9,
           'drive.torque_max': 2.0, 'drive.torque_constant': 0.5, 'drive.resistance': 1.0}
+DRIVEN = StewartPlatform(symmetric_parameters().replaced(
+    {**DRIVES, 'geometry.zero_length': 1.1}))
+
+
+def numbers_of(result: Any) -> list[Array]:
+    """Return all arrays of a result."""
+    if isinstance(result, InverseDynamics):
+        return [getattr(result, name) for name in (
+            'lengths', 'rates', 'forces', 'unit_load_forces', 'determinant', 'determinant_rate',
+            'condition_number', 'time_to_crossing')]
+    if isinstance(result, Regressor):
+        return [result.matrix]
+    return [*result] if isinstance(result, tuple) else [
+        result.rows if isinstance(result, Pose | Motion) else result]
+
+
+@pytest.mark.parametrize('name', CALLS)
+def test_any_leading_shape_gives_the_same_samples(name: str) -> None:
+    p, random = DRIVEN.parameters, rng()
+    motion = random_motion(p, random, 12)
+    result = DRIVEN.inverse_dynamics(motion)
+    samples: dict[str, Any] = {
+        'motion': motion, 'pose': motion.pose, 'guess': motion.pose, 'lengths': result.lengths,
+        'rates': result.rates, 'forces': result.forces, 'wrench': random_wrench(p, random, 12),
+        'base': random_base_motion(p, random, 12),
+        'leg_stiffness': random.uniform(1e6, 1e8, (12, 6))}
+    given = {each: samples[each] for each in inspect.signature(CALLS[name]).parameters
+             if each in samples}
+    # Where numpy multiplies matrices, the last digits depend on how many there are.
+    off = {'natural_modes': 1e-9}.get(name, 1e-13 if name.endswith((
+        'matrix', 'vector', 'jacobian', 'jacobian_rate', 'stiffness')) else 0.0)
+
+    def call(**changes: Any) -> list[Array]:
+        return numbers_of(CALLS[name](DRIVEN, **{**given, **changes}))
+
+    def check(found: list[Array], truth: list[Array]) -> None:
+        for a, b in zip(found, truth, strict=True):
+            np.testing.assert_allclose(a, b, rtol=0.0, atol=off and off * np.abs(b).max())
+
+    whole = call()
+    check(call(**{each: value.reshape(3, 4, 6) if isinstance(value, np.ndarray)
+                  else value.of_rows(value.rows.reshape(3, 4, -1))
+                  for each, value in given.items()}),
+          [many.reshape(3, 4, *many.shape[1:]) for many in whole])
+    check(call(**{each: value[7] for each, value in given.items()}), [many[7] for many in whole])
+    for one in given if len(given) > 1 else ():
+        mixed = call(**{one: given[one][7]})
+        assert {len(many) for many in mixed} == {12}
+        check([many[7] for many in mixed], [many[7] for many in whole])
+
+
 NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(), st.sampled_from(
     [0.0, 1e-300, 1e155, 1e300, -1e308, 5e-324]))
 ARRAYS = st.sampled_from([(), (3,), (6,), (2, 6), (3, 6), (0, 6), (5,)]).flatmap(
@@ -326,9 +377,8 @@ def test_any_arguments_give_finite_numbers_or_one_line(name: str, data: st.DataO
             assert '\n' not in str(exc)
             assert 10 < len(str(exc)) < 1000
             return
-    parts = result[:1] if isinstance(result, Regressor) else result if isinstance(
-        result, tuple) else [result.rows if isinstance(result, Pose | Motion) else result]
-    assert all(np.isfinite(part).all() for part in parts)
+    assert all(np.isfinite(part).all() for part in (
+        [result.rows] if isinstance(result, InverseDynamics) else numbers_of(result)))
 
 
 # Results as text, as a table and as a figure
@@ -337,6 +387,7 @@ def test_one_result_shows_its_numbers() -> None:
     platform = StewartPlatform(EXAMPLE)
     result = platform.inverse_dynamics(Motion.from_pose(platform.home_pose()))
     text = repr(result)
+    assert isinstance(result.determinant, float)
     assert f'forces [{result.forces[0]:.6g}, ' in text
     assert f'condition number {result.condition_number:.6g}>' in text
     assert text.startswith(f'<InverseDynamics: lengths [{result.lengths[0]:.6g}, ')

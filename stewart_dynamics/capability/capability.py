@@ -37,18 +37,17 @@ from stewart_dynamics.capability.workspace import InBox, Section, section, small
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import (
-    as_array, check_finite, common_shape, wrong_type)
+    as_array, check_finite, common_shape, copies, wrong_type)
 from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, PLATFORM
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import (
     clearance_to_check, LegClearance)
-from stewart_dynamics.mechanics.platform_arguments import check_kind, copies, motion_rows
 from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, TWIST
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -187,14 +186,9 @@ class Capability:
         rows = motion_rows(pose, shape)
         values = np.empty(len(rows))
         codes, legs = (np.empty(len(rows), dtype=np.int64) for _ in range(2))
-
-        stop = self.platform.parameters['singularity.stop_condition']
-
-        def solve(constants: Array, *arrays: Any) -> None:
-            travel.travels(constants, self._axes, self._bounds, self._shapes, *self._plates,
-                           stop, *arrays)
-
-        in_parts(solve, self.platform.constants, rows, copies(directions, shape),
+        constants = (self.platform.constants, self._axes, self._bounds, self._shapes,
+                     *self._plates, self.platform.parameters['singularity.stop_condition'])
+        in_parts(travel.travels, constants, rows, copies(directions, shape),
                  copies(pivots, shape), values, codes, legs,
                  scratch=travel.memory_of(self._plates))
         if np.isnan(values).any():

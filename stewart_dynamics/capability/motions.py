@@ -27,9 +27,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.mechanics.platform_arguments import check_kind
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
     POSITION, ROTATION, TWIST)

@@ -35,6 +35,7 @@ from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import characteristic_length_of
 from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector
 from stewart_dynamics.mechanics.limits import SINGULARITY, TOLERANCE
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
@@ -206,11 +207,7 @@ class Boxes:
     def poses(self, points: Array) -> Pose:
         """Return the poses of translations and rotation vectors (..., 6)."""
         start = Pose.of_rows(self._row[POSE].copy())
-        angle = np.linalg.norm(points[..., 3:], axis=-1, keepdims=True)
-        quaternions = np.concatenate([0.5 * np.sinc(angle / (2.0 * math.pi)) * points[..., 3:],
-                                      np.cos(0.5 * angle)], axis=-1)
-        turn = Pose.from_quaternion(points[..., :3], quaternions).rotation
-        rotation = turn @ start.rotation
+        rotation = from_rotation_vector(points[..., 3:]) @ start.rotation
         return Pose(start.position + start.rotation @ self._pivot + points[..., :3]
                     - rotation @ self._pivot, rotation)
 

@@ -26,9 +26,10 @@ from stewart_dynamics.capability.reachable import Reachable
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
-from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
-from stewart_dynamics.mechanics.limits import LIMITS, Limits
+from stewart_dynamics.mechanics.limits import (
+    angle_values, CLEARANCE_MIN, LIMITS, Limits, result_values)
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import (
@@ -111,14 +112,7 @@ class RatedHexapod:
 
     def moved_by(self, direction: Array, by: float = 1.0) -> Pose:
         """Return the pose after a translation and a rotation vector (6,), base axes."""
-        turn = by * direction[3:]
-        angle = float(np.linalg.norm(turn))
-        rotation = self.pose.rotation
-        if angle > 0.0:
-            x, y, z = turn / angle
-            k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-            rotation = (np.eye(3) + np.sin(angle) * k
-                        + (1.0 - np.cos(angle)) * k @ k) @ rotation
+        rotation = from_rotation_vector(by * direction[3:]) @ self.pose.rotation
         return Pose(self.pose.position + by * direction[:3], rotation)
 
     def clearance(self) -> float | None:
@@ -143,15 +137,15 @@ class RatedHexapod:
                 f'pose: singular: the condition number of J_inv is {result.condition_number:.6g}, '
                 f'must be less than singularity.stop_condition, {stop:g}')
         limits = Limits(self.given)
-        found: Any = limits.exceeded(*(tuple(each.tolist()) for each in (
-            result.lengths, result.rates, result.forces)))
+        found: Any = limits.exceeded(result_values(*(tuple(each.tolist()) for each in (
+            result.lengths, result.rates, result.forces))))
         if not found and limits.of_joints:
-            found = limits.exceeded_angles(np.concatenate(whole.joint_angles(pose)).tolist())
+            found = limits.exceeded(angle_values(np.concatenate(
+                whole.joint_angles(pose)).tolist()))
         clearances = clearance_to_check(self.given)
         if not found and clearances is not None:
-            found = limits.exceeded_clearance(*(
-                each[0].tolist() for each in clearances.nearest(
-                    Motion.from_pose(pose).rows[None])))
+            distances, nearest = clearances.nearest(Motion.from_pose(pose).rows[None])
+            found = limits.exceeded({CLEARANCE_MIN: distances[0].tolist()}, nearest[0].tolist())
         if found:
             raise PoseError(f'pose: {found[0].words(self.joints)}')
 

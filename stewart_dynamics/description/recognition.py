@@ -39,7 +39,7 @@ from stewart_dynamics.description.read_urdf import read_urdf
 from stewart_dynamics.description.topology import Chain, LegJoint, Topology, topology_of
 from stewart_dynamics.description.xml_text import LIMITS, NOT_CHECKED
 from stewart_dynamics.errors import one_line, shown
-from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
+from stewart_dynamics.mechanics.kinematics.home_pose import home_of
 from stewart_dynamics.parameters.table import (
     NEGATIVE, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
 from stewart_dynamics.whole_file import read_text
@@ -268,11 +268,11 @@ def _gravity(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[
 
 def _with_side(p: Parameters, found: Topology) -> Parameters:
     """Return parameters whose home pose is on the side of the base where the platform is."""
-    shape = shape_of(p)
+    home = home_of(p)
     middle = found.base.placement.inside(found.platform.placement.point(
         p['geometry.platform_joints'].mean(axis=0))) - p['geometry.base_joints'].mean(axis=0)
-    height = float(shape.axes[2] @ middle)
-    if abs(height) < _FLAT * shape.radius or height * reach_of(p, shape).side > 0.0:
+    height = float(home.shape.axes[2] @ middle)
+    if abs(height) < _FLAT * home.shape.radius or height * home.side > 0.0:
         return p
     return p.replaced({'geometry.platform_side': POSITIVE if height > 0.0 else NEGATIVE})
 

@@ -46,7 +46,7 @@ from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
-from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
+from stewart_dynamics.mechanics.kinematics.home_pose import home_of
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import FIXED, NEGATIVE, Parameters
@@ -262,7 +262,7 @@ class Identification:
         both, but weight and inertia have opposite signs on the wrong one.
         """
         parameters, platform = self.parameters, self.platform
-        if reach_of(parameters, shape_of(parameters)).certain:
+        if home_of(parameters).certain:
             return False
         _, misfit = self._lag(self._extraction(window), window)
         self.parameters = parameters.replaced({'geometry.platform_side': NEGATIVE})

@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Checks of array arguments: real, finite, of the right shape; else MotionError."""
+"""Array arguments: checked (real, finite, of the right shape; else MotionError), as rows."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.errors import MotionError
 
 
@@ -39,9 +39,15 @@ def as_array(name: str, value: ArrayLike, tail: tuple[int, ...]) -> Array:
         raise MotionError(f'{name}: shape {array.shape}: must end in {tail}')
     finite = np.isfinite(array)
     if not finite.all():
-        at = tuple(map(int, np.argwhere(~finite)[0]))
-        raise MotionError(f'{name}{list(at)}: {array[at]}: must be finite')
+        at, name = first_of(name, ~finite)
+        raise MotionError(f'{name}: {array[at]}: must be finite')
     return array
+
+
+def first_of(name: str, wrong: Flags) -> tuple[tuple[int, ...], str]:
+    """Return the first index where an argument is wrong, and the argument's name with it."""
+    at = tuple(map(int, np.argwhere(wrong)[0]))
+    return at, f'{name}{list(at) if at else ""}'
 
 
 def optional_array(name: str, value: ArrayLike | None, tail: tuple[int, ...]) -> Array:
@@ -78,3 +84,18 @@ def _shown(value: object) -> str:
     if isinstance(value, str | bool | int | float | complex) and len(f'{value!r}') < 40:
         return f'{value!r}'
     return 'None' if value is None else f'a value of type {type(value).__name__}'
+
+
+def copies(array: Array, shape: tuple[int, ...]) -> Array:
+    """Return a copy as rows (N, ...) of an array that is broadcast to a leading shape."""
+    last = array.shape[-1]
+    if array.shape[:-1] != shape:
+        array = np.broadcast_to(array, (*shape, last))
+    return np.array(array, order='C').reshape(-1, last)
+
+
+def place(at: int, shape: tuple[int, ...]) -> str:
+    """Return the index of a sample in the leading shape, as text."""
+    if len(shape) < 2:
+        return str(at)
+    return str(list(map(int, np.unravel_index(at, shape))))

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Results and leg lengths of batches; large batches are divided among all processors.
+Batches: arguments as rows, results and leg lengths; all processors share large ones.
 
 Leg lengths alone (1) are computed in plain numpy: nothing has to be compiled for them.
 """
@@ -26,13 +26,20 @@ import os
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.compilation.machine_code import COMPILED
+from stewart_dynamics.errors import SingularityError
+from stewart_dynamics.mechanics.arguments import (
+    common_shape, copies, optional_array, place, wrong_type)
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import joints_of
-from stewart_dynamics.mechanics.rows import NO_BASE, POSE, RESULT, WRENCH
+from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
+from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, MOTION, NO_BASE, POSE, POSITION, RESULT, WRENCH)
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.vectors import add, dot, rotate, subtract
 
 # Samples for one thread at least: a millisecond of work, far more than the start of a thread.
@@ -42,6 +49,22 @@ _CPUS = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os
 
 _NO_WRENCH = np.zeros((1, WRENCH))
 _NO_BASE: Array = np.array([NO_BASE])
+
+
+def loaded(motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
+           ) -> tuple[Array, Array, Array, tuple[int, ...]]:
+    """Return rows of motion, of wrenches and of the base (one if for all), and the shape."""
+    check_kind(motion, Motion)
+    if isinstance(wrench, BaseMotion):
+        raise wrong_type('wrench', wrench, "six numbers; a base's motion is the argument base")
+    load = optional_array('wrench', wrench, (WRENCH,))
+    bases = base_rows(base)
+    shape = common_shape(motion=motion.shape, wrench=load.shape[:-1], base=bases.shape[:-1])
+    rows = (copies(motion.rows, shape) if shape != motion.shape
+            else motion.rows.reshape(-1, MOTION))
+    load, bases = (array.reshape(1, -1) if array.ndim == 1 else copies(array, shape)
+                   for array in (load, bases))
+    return rows, load, bases, shape
 
 
 def solve(constants: Array, motions: Array, wrenches: Array | None = None,
@@ -62,9 +85,25 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None,
     bases = _NO_BASE if bases is None else compact(bases)
     results = np.empty((len(motions), RESULT))
     sound = np.empty(len(motions) if condition else 0, dtype=bool)
-    in_parts(inverse_dynamics.solve, constants, motions, wrenches, bases, results, sound,
+    in_parts(inverse_dynamics.solve, (constants,), motions, wrenches, bases, results, sound,
              scratch=(inverse_dynamics.TILE,))
     return results
+
+
+def find_unsolvable(
+        rows: Array, results: Array, shape: tuple[int, ...], singular: str) -> Integers:
+    """Return the samples where J_inv cannot be solved; SingularityError if that is to raise."""
+    if singular not in ('raise', 'nan'):
+        raise wrong_type('singular', singular, "'raise' or 'nan'")
+    condition = results[:, CONDITION]
+    unsolvable: Integers = (condition >= UNSOLVABLE_CONDITION).nonzero()[0]
+    if singular == 'raise' and len(unsolvable):
+        at = int(unsolvable[0])
+        raise SingularityError(
+            f'sample {place(at, shape)}: J_inv cannot be solved: its condition number is '
+            f'{condition[at]:.3g}, must be less than {UNSOLVABLE_CONDITION:g}; position '
+            f'{rows[at, POSITION].tolist()} m')
+    return unsolvable
 
 
 def leg_lengths(constants: Array, poses: Array) -> Array:
@@ -82,7 +121,7 @@ def leg_lengths(constants: Array, poses: Array) -> Array:
     return lengths
 
 
-def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[Any],
+def in_parts(compute: Callable[..., object], constants: tuple[Any, ...], *arrays: NDArray[Any],
              scratch: tuple[int, ...] = ()) -> None:
     """
     Call a function with constants and rows of arrays; large batches in parts on all processors.
@@ -91,7 +130,7 @@ def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[
     Each call gets scratch memory of a shape as its last argument, if it needs any.
     """
     def call(*rows: NDArray[Any]) -> None:
-        compute(constants, *rows, *([np.empty(scratch)] if scratch else []))
+        compute(*constants, *rows, *([np.empty(scratch)] if scratch else []))
 
     samples = len(arrays[0])
     threads = min(_CPUS, samples // _SAMPLES_FOR_A_THREAD) if COMPILED else 1

@@ -23,7 +23,7 @@ telescope on cables of 300 m; a value outside is a warning, not an error.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import combinations, permutations
 import math
 
@@ -32,9 +32,10 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.drives import likely_mistakes as drives
 from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
-    HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
+    HEIGHTS, Home, home_of, is_too_long, poses_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -43,6 +44,7 @@ from stewart_dynamics.parameters.table import (
 
 # Digits of the position of a joint in a message.
 _DIGITS = 5
+_listed = partial(listed, digits=3)
 
 # The largest known, the six cables of a radio telescope's cabin, hang from towers on a circle
 # of 300 m, and the circle of the cabin's joints is 90 times smaller.
@@ -120,16 +122,16 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
                  *_reflected_mass(parameters, shape), *drives.likely_mistakes(parameters),
                  *_others(parameters, shape), *_clearance(parameters)]
         if geometry:
-            reach = reach_of(parameters, shape)
-            found += _legs(parameters, shape, reach, bool(sizes))
+            home = home_of(parameters)
+            found += _legs(parameters, home, bool(sizes))
             if not sizes:
-                found += _frames(parameters, shape, reach)
+                found += _frames(parameters, home)
             odd = tuple(_symmetry(parameters))
             if len(odd) == 1:
                 found += odd
             elif not sizes:  # else what follows from a wrong unit
-                found += (tuple(_singular(parameters, shape, reach)) or odd
-                          or _order(parameters, shape, reach))
+                found += (tuple(_singular(parameters, home)) or odd
+                          or _order(parameters, home))
                 found += joint_angles.likely_mistakes(parameters)
     return tuple(found)
 
@@ -176,28 +178,28 @@ def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
                f'{away:.3g} m from the middle of the platform joints, but {size}: in mm?')
 
 
-def _frames(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
+def _frames(p: Parameters, home: Home) -> Iterator[str]:
     """Yield values that seem to be in the frame of the other body, or on the other side."""
-    away = shape.axes[2] * reach.side  # from the base to the platform
+    shape = home.shape
+    away = shape.axes[2] * home.side  # from the base to the platform
     if shape.platform_radius > _LARGEST_PLATFORM_RATIO * shape.base_radius:
         yield (f'geometry.platform_joints: {shape.platform_radius:.3g} m from their center, the '
                f'base joints only {shape.base_radius:.3g} m: base and platform exchanged?')
     size = float(np.linalg.norm(p['gravity']))
-    if not reach.certain and p['base.source'] == FIXED and (
+    if not home.certain and p['base.source'] == FIXED and (
             p['gravity'] @ away > _HANGING * size > 0.0):
         yield (f'gravity: {_listed(p["gravity"])} m/s^2 pulls the platform away from the base: a '
                'sign? For a hexapod that hangs, or whose axes point down, set '
                'geometry.platform_side')
     center = p['platform.center_of_mass']
     middle = p['geometry.platform_joints'].mean(axis=0)
-    home = home_of(p, shape, reach)
     height = abs(float(home.heights[0]))
     from_base = p['geometry.base_joints'].mean(axis=0) + height * away
     if home.length is None:
         return  # heights are guesses
     if np.linalg.norm(middle - from_base) < _AT_HOME * height and (
             np.linalg.norm(center) < 0.5 * np.linalg.norm(center - middle)):
-        yield (f'geometry.platform_joints: {_listed(middle.round(9) + 0.0)} m is their center, '
+        yield (f'geometry.platform_joints: {_listed(middle.round(9))} m is their center, '
                'where it is at home in the base frame, but platform.center_of_mass is '
                f'{np.linalg.norm(center - middle):.3g} m away from it: are the joints given in '
                'the base frame?')
@@ -287,14 +289,15 @@ def _clearance(p: Parameters) -> Iterator[str]:
                 return
 
 
-def _legs(p: Parameters, shape: Shape, reach: Reach, wrong_size: bool) -> Iterator[str]:
+def _legs(p: Parameters, home: Home, wrong_size: bool) -> Iterator[str]:
     """Yield mistakes of the legs; where joints or lengths have a wrong unit, no others of them."""
+    shape, longest = home.shape, home.longest
     low, high = p['limits.length_min'], p['limits.length_max']
     if low is not None and high is not None and np.any(low < _SMALLEST_LENGTH_RATIO * high):
         yield (f'limits.length_min: {_listed(np.unique(low))} m, limits.length_max: '
                f'{_listed(np.unique(high))} m: strokes? They are lengths from joint to joint')
         return  # the limits are used below
-    if reach.yaw is None:
+    if not home.reachable:
         limits = ' and '.join(f'{name}: {_listed(np.unique(p[name]))} m' for name in (
             'limits.length_min', 'limits.length_max') if p[name] is not None)
         yield (f'{limits}: no level pose has all legs within them; the base joints are '
@@ -309,7 +312,6 @@ def _legs(p: Parameters, shape: Shape, reach: Reach, wrong_size: bool) -> Iterat
                f'{_listed(np.unique(p["geometry.zero_length"]))} m: a stroke? It is the length '
                'from joint to joint')
         return
-    longest = reach.longest
     for part, joint in (('cylinder', 'base'), ('piston', 'platform')):
         name = f'legs.{part}.center_of_mass'
         masses, centers = p[f'legs.{part}.mass'], p[name]
@@ -336,11 +338,10 @@ def _legs(p: Parameters, shape: Shape, reach: Reach, wrong_size: bool) -> Iterat
                    'in g?')
 
 
-def _order(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
+def _order(p: Parameters, home: Home) -> Iterator[str]:
     """Yield that other pairs of joints give shorter legs at home, as in all hexapods known."""
-    home = home_of(p, shape, reach)
-    turned = shape.platform @ turns_about(2, np.array([home.yaw]))[0].T
-    squares = ((shape.base[:, None, :2] - turned[:, :2]) ** 2).sum(axis=-1)
+    turned = home.shape.platform @ home.turns[0].T
+    squares = ((home.shape.base[:, None, :2] - turned[:, :2]) ** 2).sum(axis=-1)
     orders = np.array(list(permutations(range(6))))
     sums = squares[np.arange(6), orders].sum(axis=1)
     best = int(np.argmin(sums))
@@ -359,37 +360,31 @@ def _symmetry(p: Parameters) -> Iterator[str]:
                      if n != odd.joint and np.array_equal(joints[n], joints[odd.joint])]
             same = f', the same as {twins[0]}' if twins else ''
             yield (f'geometry.{name}: {p["joints"][odd.joint]}: '
-                   f'{_listed(joints[odd.joint], _DIGITS)} m'
+                   f'{listed(joints[odd.joint], _DIGITS)} m'
                    f'{same}: the other five {odd.symmetry}, as all six would with '
-                   f'{_listed(odd.expected, _DIGITS)} m: a sign or a digit?')
+                   f'{listed(odd.expected, _DIGITS)} m: a sign or a digit?')
 
 
-def _singular(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
+def _singular(p: Parameters, home: Home) -> Iterator[str]:
+    shape = home.shape
     tried = [(height * side * shape.radius, math.radians(yaw), tilt)
              for height in HEIGHTS for side in (1.0, -1.0)
              for yaw in (0.0, 20.0, -20.0, 45.0, -45.0) for tilt in (0.0, _TILT, -_TILT)]
     heights, angles, tilts = np.array(tried).T
     turned = turns_about(2, angles) @ turns_about(0, tilts) @ turns_about(1, 0.5 * tilts)
-    anywhere = _conditions(p, shape, heights, turned)
     stop = p['singularity.stop_condition']
-    best = float(anywhere.min())
-    if best >= stop:
-        yield (f'geometry: {_kind(best)} at every pose of {len(tried)} tried: the condition '
-               f'number is at least {best:.3g}, singularity.stop_condition is {stop:g}: are base '
-               'and platform joints similar hexagons, two legs the same, or the joints in '
-               'another order?')
-        return
-    home = home_of(p, shape, reach)
-    turned = turns_about(2, np.full(len(home.heights), home.yaw))
-    at_home = float(_conditions(p, shape, home.heights, turned).min())
-    if at_home >= stop:
-        yield (f'geometry: {_kind(at_home)} at home ({home.text}): the condition number is '
-               f'{at_home:.3g}, singularity.stop_condition is {stop:g}: is the platform turned '
-               'against the base there, or the joints in another order?')
-
-
-def _kind(condition: float) -> str:
-    return 'singular' if condition >= UNSOLVABLE_CONDITION else 'nearly singular'
+    for where, at, turns, suspected in (
+            (f'every pose of {len(tried)} tried: the condition number is at least',
+             heights, turned,
+             'are base and platform joints similar hexagons, two legs the same,'),
+            (f'home ({home.text}): the condition number is', home.heights, home.turns,
+             'is the platform turned against the base there,')):
+        best = float(_conditions(p, shape, at, turns).min())
+        if best >= stop:
+            kind = 'singular' if best >= UNSOLVABLE_CONDITION else 'nearly singular'
+            yield (f'geometry: {kind} at {where} {best:.3g}, singularity.stop_condition is '
+                   f'{stop:g}: {suspected} or the joints in another order?')
+            return
 
 
 def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -> Array:
@@ -406,7 +401,3 @@ def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -
     values = np.linalg.svd(matrices, compute_uv=False)
     conditions: Array = np.where(values[:, 5] > 0.0, values[:, 0] / values[:, 5], np.inf)
     return conditions
-
-
-def _listed(values: Array, digits: int = 3) -> str:
-    return '[' + ', '.join(f'{value:.{digits}g}' for value in values) + ']'

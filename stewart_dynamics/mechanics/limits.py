@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import math
 from typing import Any, NamedTuple
 
@@ -86,6 +86,16 @@ def short_name(limit: str) -> str:
     return limit.rpartition('.')[2]
 
 
+def result_values(lengths: Six, rates: Six, forces: Six | None) -> dict[str, Six | None]:
+    """Return the values of OF_RESULTS of one sample."""
+    return {LENGTH_MIN: lengths, LENGTH_MAX: lengths, VELOCITY_MAX: rates, FORCE_MAX: forces}
+
+
+def angle_values(angles: Sequence[float]) -> dict[str, Sequence[float]]:
+    """Return the values of OF_JOINTS of one sample's joint angles (JOINT_ANGLES,)."""
+    return {limit: angles[where] for limit, where in ANGLES.items()}
+
+
 class Exceedance(NamedTuple):
     """A limit that a leg exceeds."""
 
@@ -134,59 +144,37 @@ class Limits:
                 1.0 - TOLERANCE if name in MINIMA else 1.0 + TOLERANCE) for name in LIMITS])
         self.of_joints = tuple(name for name in OF_JOINTS if name in self.bounds)
         self.force_max: Array = self.bounds.get(FORCE_MAX, np.full(6, math.inf))
-        self._of_samples = [
-            (name, self.bounds[name].tolist(), self.thresholds[n].tolist())
-            for n, name in enumerate(OF_RESULTS) if name in self.bounds]
-        self._of_angles = [
-            (name, ANGLES[name], self.bounds[name].tolist(),
-             self.thresholds[LIMITS.index(name)].tolist()) for name in self.of_joints]
+        self._of_samples = {name: (self.bounds[name].tolist(), self.thresholds[n].tolist())
+                            for n, name in enumerate(LIMITS) if name in self.bounds}
 
     def exceeds(self, limit: str, values: Array) -> Flags:
         """Return where values (..., 6) of its quantity exceed a limit; nan never does."""
         exceeding: Flags = _exceeds(limit, values, self.thresholds[LIMITS.index(limit)])
         return exceeding
 
-    def exceeded(self, lengths: Six, rates: Six, forces: Six | None) -> tuple[Exceedance, ...]:
-        """Return all of OF_RESULTS that one sample exceeds; unknown forces (None) exceed none."""
+    def exceeded(self, values: Mapping[str, Sequence[float] | None],
+                 nearest: Sequence[int] = ()) -> tuple[Exceedance, ...]:
+        """
+        Return the limits that one sample exceeds.
+
+        values: of each limit to check, the six of its quantity; None exceeds none.
+        nearest: of CLEARANCE_MIN, the nearest leg or plate of each leg, see ``leg_clearance``.
+        """
         found: list[Exceedance] = []
-        for limit, bounds, thresholds in self._of_samples:
-            values = (rates if limit == VELOCITY_MAX else forces if limit == FORCE_MAX
-                      else lengths)
-            if values is None:
-                continue
-            _add_exceeding(found, limit, values, bounds, thresholds)
+        for limit, (bounds, thresholds) in self._of_samples.items():
+            for leg, value in enumerate(values.get(limit) or ()):
+                if _exceeds(limit, value, thresholds[leg]):
+                    other = nearest[leg] if limit == CLEARANCE_MIN else -1
+                    found.append(Exceedance(limit, leg, value, bounds[leg], other))
         return tuple(found)
 
     def jumps(self, lengths: Six, followed: Six, elapsed: float) -> tuple[Exceedance, ...]:
         """Return the legs that cannot move from one length to another within a time [s]."""
-        bounds = self.bounds[VELOCITY_MAX].tolist()
-        thresholds = self.thresholds[LIMITS.index(VELOCITY_MAX)].tolist()
+        bounds, thresholds = self._of_samples[VELOCITY_MAX]
         return tuple(
             Exceedance(JUMP, leg, (new - old) / elapsed, bounds[leg])
             for leg, (new, old) in enumerate(zip(lengths, followed, strict=True))
             if abs(new - old) > thresholds[leg] * elapsed)
-
-    def exceeded_angles(self, angles: Sequence[float]) -> tuple[Exceedance, ...]:
-        """Return all of OF_JOINTS that the joint angles (JOINT_ANGLES,) of one sample exceed."""
-        found: list[Exceedance] = []
-        for limit, where, bounds, thresholds in self._of_angles:
-            _add_exceeding(found, limit, angles[where], bounds, thresholds)
-        return tuple(found)
-
-    def exceeded_clearance(self, clearances: Sequence[float], nearest: Sequence[int],
-                           ) -> tuple[Exceedance, ...]:
-        """Return the legs whose clearance (6,) is below CLEARANCE_MIN, which is given."""
-        found: list[Exceedance] = []
-        _add_exceeding(found, CLEARANCE_MIN, clearances, self.bounds[CLEARANCE_MIN].tolist(),
-                       self.thresholds[LIMITS.index(CLEARANCE_MIN)].tolist())
-        return tuple(each._replace(other=nearest[each.leg]) for each in found)
-
-
-def _add_exceeding(found: list[Exceedance], limit: str, values: Sequence[float],
-                   bounds: Sequence[float], thresholds: Sequence[float]) -> None:
-    for leg, value in enumerate(values):
-        if _exceeds(limit, value, thresholds[leg]):
-            found.append(Exceedance(limit, leg, value, bounds[leg]))
 
 
 def _exceeds(limit: str, value: Any, threshold: Any) -> Any:

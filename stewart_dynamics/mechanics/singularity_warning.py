@@ -83,11 +83,8 @@ def time_to_crossing(determinant: ArrayLike, determinant_rate: ArrayLike) -> NDA
 
 def thresholds(parameters: Parameters) -> Array:
     """Return the thresholds that parameters give, (THRESHOLDS,)."""
-    values = np.empty(THRESHOLDS)
-    values[WARN_CONDITION] = parameters['singularity.warn_condition']
-    values[STOP_CONDITION] = parameters['singularity.stop_condition']
-    values[WARN_TIME] = parameters['singularity.warn_time']
-    return values
+    return np.array([parameters[f'singularity.{name}'] for name in (
+        'warn_condition', 'stop_condition', 'warn_time')])
 
 
 @inlined
@@ -127,7 +124,11 @@ def advance(state: Array, limits: Array, determinant: float, determinant_rate: f
 
 
 class Singularity(NamedTuple):
-    """The state of the warning after a sample; the first sample follows Singularity()."""
+    """
+    The state of the warning after a sample, in the order of an array (STATE,).
+
+    The first sample follows Singularity().
+    """
 
     cause: Cause = Cause.NONE
     stopped: bool = False  # inside stop_condition
@@ -145,18 +146,6 @@ class Singularity(NamedTuple):
         """Return the state of an array (STATE,)."""
         cause, stopped, determinant, time, crossings = numbers
         return cls(_CAUSES[int(cause)], stopped > 0.0, determinant, time, int(crossings))
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Return the state as numbers, in the order of an array (STATE,)."""
-        return self.cause, self.stopped, self.determinant, self.time_to_crossing, self.crossings
-
-    def after(self, parameters: Parameters, determinant: float, determinant_rate: float,
-              condition: float) -> Singularity:
-        """Return the state after one more sample."""
-        state = np.array(self.numbers, dtype=float)
-        advance(state, thresholds(parameters), determinant, determinant_rate, condition)
-        return Singularity.of(state.tolist())
 
 
 _CAUSES = tuple(Cause)  # far faster to look up by number than Cause(number)

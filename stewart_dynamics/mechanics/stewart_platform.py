@@ -27,7 +27,7 @@ from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.mechanics import batch, stiffness
 from stewart_dynamics.mechanics.arguments import (
-    as_array, check_finite, common_shape, optional_array, wrong_type)
+    as_array, check_finite, common_shape, copies, optional_array, place, wrong_type)
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL, MOTORS, Motors
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, lagrange, regressor
 from stewart_dynamics.mechanics.dynamics.force_breakdown import (
@@ -37,13 +37,11 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     LINEAR, linear_parameters, names_of)
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
-from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
+from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
-from stewart_dynamics.mechanics.platform_arguments import (
-    base_rows, check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
     FORCES, GRAVITY, JOINT_ANGLES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
@@ -145,7 +143,7 @@ class StewartPlatform:
 
         """
         known = singular in ('raise', 'nan')
-        result = self._single.inverse_dynamics(motion, wrench, base) if known else None
+        result = self._single.inverse_dynamics(motion, None, wrench, base) if known else None
         if result is not None:
             return InverseDynamics(result)
         _, _, results, unsolvable, shape = self._solved(motion, wrench, base, singular)
@@ -156,11 +154,11 @@ class StewartPlatform:
             self, motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
             singular: str) -> tuple[Array, tuple[Array, Array], Array, Integers, tuple[int, ...]]:
         """Return rows of motion, of wrenches and base, of results; the unsolvable; the shape."""
-        rows, wrenches, bases, shape = loaded(motion, wrench, base)
+        rows, wrenches, bases, shape = batch.loaded(motion, wrench, base)
         results = self.solve(rows, wrenches, bases)
         check_finite('motion', results.reshape(*shape, RESULT), len(shape))
-        return (rows, (wrenches, bases), results, find_unsolvable(rows, results, shape, singular),
-                shape)
+        unsolvable = batch.find_unsolvable(rows, results, shape, singular)
+        return rows, (wrenches, bases), results, unsolvable, shape
 
     def force_breakdown(
             self, motion: Motion, wrench: ArrayLike | None = None,
@@ -228,7 +226,7 @@ class StewartPlatform:
         """Return ``regressor`` (N, 6, LINEAR) of rows of motion, unchecked, see ``solve``."""
         bases = np.array([NO_BASE]) if bases is None else bases
         matrices = np.empty((len(rows), 6, LINEAR))
-        batch.in_parts(regressor.regressors, self.constants, *map(
+        batch.in_parts(regressor.regressors, (self.constants,), *map(
             batch.compact, (rows, bases)), matrices, scratch=regressor.WORK)
         return matrices
 
@@ -255,10 +253,10 @@ class StewartPlatform:
         singular poses are allowed.
         """
         base = self._still if base is None else base
-        result = self._single.base_wrench(motion, wrench, base)
+        result = self._single.base_wrench(motion, None, wrench, base)
         if result is not None:
             return result
-        rows, wrenches, bases, shape = loaded(motion, wrench, base)
+        rows, wrenches, bases, shape = batch.loaded(motion, wrench, base)
         results = self.base_wrenches(rows, wrenches, bases)
         return check_finite('motion', results.reshape(*shape, WRENCH), len(shape))
 
@@ -266,7 +264,7 @@ class StewartPlatform:
         """Return rows (N, 6) of ``base_wrench`` of rows of motion, unchecked, see ``solve``."""
         bases = self._still.rows[None] if bases is None else bases
         results = np.empty((len(rows), WRENCH))
-        batch.in_parts(base_wrench.base_wrenches, self.constants, *map(
+        batch.in_parts(base_wrench.base_wrenches, (self.constants,), *map(
             batch.compact, (rows, wrenches, bases)), results)
         return results
 
@@ -302,7 +300,7 @@ class StewartPlatform:
                              wrench=load.shape[:-1], base=bases.shape[:-1])
         rows, pushes, load, bases = (
             copies(array, shape) for array in (motion.rows, pushes, load, bases))
-        batch.in_parts(forward_dynamics.solve, self.constants, rows, pushes, load, bases,
+        batch.in_parts(forward_dynamics.solve, (self.constants,), rows, pushes, load, bases,
                        scratch=forward_dynamics.WORK)
         rows = check_finite('accelerations', rows.reshape(*shape, MOTION), len(shape))
         return Motion.of_rows(rows)
@@ -348,7 +346,7 @@ class StewartPlatform:
         wanted, rows = copies(wanted, shape), motion_rows(guess, shape)
         codes, steps = np.empty(len(rows), dtype=np.int64), np.empty(len(rows), dtype=np.int64)
         residuals = np.empty(len(rows))
-        batch.in_parts(forward_kinematics.poses, self.constants, wanted, rows, codes, steps,
+        batch.in_parts(forward_kinematics.poses, (self.constants,), wanted, rows, codes, steps,
                        residuals)
         if codes.any():
             at = int(np.argmax(codes > 0))
@@ -376,7 +374,7 @@ class StewartPlatform:
         given = as_array('rates', rates, (6,))
         shape = common_shape(pose=pose.shape, rates=given.shape[:-1])
         given, rows = copies(given, shape), motion_rows(pose, shape)
-        find_unsolvable(rows, self.solve(rows), shape, 'raise')
+        batch.find_unsolvable(rows, self.solve(rows), shape, 'raise')
         forward_kinematics.twists(self.constants, given, rows)
         return check_finite('twist', rows[:, TWIST].reshape(*shape, 6).copy(), len(shape))
 
@@ -480,7 +478,7 @@ class StewartPlatform:
             ``J_inv^T k J_inv`` in [N/m], [N] and [N m/rad]; see ``mechanics.stiffness``.
 
         """
-        legs = leg_stiffnesses(leg_stiffness)
+        legs = stiffness.leg_stiffnesses(leg_stiffness)
         j_inv = self.inverse_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):
@@ -494,7 +492,7 @@ class StewartPlatform:
         ``actuator.reflected_mass``, as for compliance in the position control; for compliance
         between held actuators and the platform, set it to zero (``parameters.replaced``).
         """
-        legs = leg_stiffnesses(leg_stiffness)
+        legs = stiffness.leg_stiffnesses(leg_stiffness)
         mass, j_inv = self.mass_matrix(pose), self.inverse_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):

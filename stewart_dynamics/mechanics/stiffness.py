@@ -27,9 +27,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.dynamics.lagrange import Legs, skew
 
 
@@ -58,6 +60,16 @@ class NaturalModes(NamedTuple):
         return f'<NaturalModes: {listed} Hz>'
 
 
+def leg_stiffnesses(value: ArrayLike) -> Array:
+    """Return stiffnesses (..., 6) [N/m]; MotionError where one is not positive."""
+    is_number = np.isscalar(value) or getattr(value, 'shape', None) == ()
+    legs = as_array('leg_stiffness', value, () if is_number else (6,))
+    legs = np.full(6, legs) if is_number else legs
+    if not (legs > 0.0).all():
+        raise MotionError(f'leg_stiffness: {legs.min():g} N/m: must be more than 0')
+    return legs
+
+
 def platform_stiffness(inverse_jacobian: Array, leg_stiffness: Array) -> Array:
     """Return K (..., 6, 6) [N/m, N, N m/rad] of J_inv (..., 6, 6) and legs (..., 6) [N/m]."""
     stiffness: Array = np.swapaxes(inverse_jacobian, -1, -2) @ (
@@ -69,15 +81,7 @@ def geometric_stiffness(legs: Legs, forces: Array) -> Array:
     """
     Return the part (..., 6, 6) of K that is due to the forces of the legs.
 
-    It is symmetric if the moment of all forces about the platform's origin is zero.
-
-    Parameters
-    ----------
-    legs : Legs
-        Legs at poses (...).
-    forces : (..., 6)
-        Their forces [N], + pushes.
-
+    It is symmetric if the moment of all forces (..., 6) [N] about the platform's origin is zero.
     """
     s, arm = skew(legs.directions), skew(legs.arms)
     across = s @ s / legs.lengths[..., None, None]  # -(1 - s s^T) / L

@@ -31,10 +31,9 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import optional_array, wrong_type
-from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
+from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.limits import FORCE_MAX, VELOCITY_MAX
-from stewart_dynamics.mechanics.platform_arguments import base_rows
 from stewart_dynamics.mechanics.rows import MOTION, POSE, RATES, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.interpolation import Interpolation

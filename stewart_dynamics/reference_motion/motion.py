@@ -100,9 +100,9 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
         change = final - initial
         return _euler_motion(initial + s * change, ds * change, dds * change)
     start, end = rotations.from_euler(initial[3:]), rotations.from_euler(final[3:])
-    turn = _rotation_vector(end @ start.T)
+    turn = rotations.to_rotation_vector(end @ start.T)
     change = final[:3] - initial[:3]
-    return Motion(initial[:3] + s * change, _rotation_about(turn, s[..., 0]) @ start,
+    return Motion(initial[:3] + s * change, rotations.from_rotation_vector(s * turn) @ start,
                   ds * change, ds * turn, dds * change, dds * turn)
 
 
@@ -162,23 +162,3 @@ def quintic(u: Array) -> tuple[Array, Array, Array]:
     """Return 10 u^3 - 15 u^4 + 6 u^5 for u (...) from 0 to 1, and its first two derivatives."""
     return (u ** 3 * (10.0 + u * (6.0 * u - 15.0)), 30.0 * (u * (1.0 - u)) ** 2,
             60.0 * u * (1.0 - u) * (1.0 - 2.0 * u))
-
-
-def _rotation_vector(rotation: Array) -> Array:
-    """Return axis times angle (3,) [rad] of a rotation, the angle at most pi."""
-    quaternion = rotations.to_quaternion(rotation)
-    sine = float(np.linalg.norm(quaternion[:3]))
-    if sine == 0.0:
-        return np.zeros(3)
-    vector: Array = quaternion[:3] / sine * (2.0 * math.atan2(sine, quaternion[3]))
-    return vector
-
-
-def _rotation_about(vector: Array, part: Array) -> Array:
-    """Return the rotations (..., 3, 3) by a part (...) of a rotation vector (Rodrigues)."""
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector / angle if angle else vector
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turned = (part * angle)[..., None, None]
-    rotation: Array = np.eye(3) + np.sin(turned) * k + (1.0 - np.cos(turned)) * (k @ k)
-    return rotation

@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, JITTER, Limits, OF_RESULTS)
+    angle_values, ANGLES, CLEARANCE_MIN, Exceedance, JITTER, Limits, OF_RESULTS, result_values)
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
     RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
@@ -295,7 +295,7 @@ class Step:
             elapsed = since + (self._slack if setpoint.stamped else self._slack_of_arrival)
         _GIVEN.pack_into(
             self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
-            *(setpoint.base or NO_BASE), *(before.singularity or _FIRST).numbers,
+            *(setpoint.base or NO_BASE), *(before.singularity or _FIRST),
             *(before.lengths or _NO_LENGTHS), elapsed, setpoint.restart,
             -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
         self._solve()
@@ -306,7 +306,7 @@ class Step:
         demanded = None if math.isnan(written[FORCES.start]) else written[FORCES]
         forces = None if math.isnan(written[_FORCES.start]) else written[_FORCES]
         singularity, jumped = Singularity.of(written[_AFTER]), written[_JUMPED.start] > 0.0
-        exceedances = (self._limits.exceeded(lengths, rates, demanded)
+        exceedances = (self._limits.exceeded(result_values(lengths, rates, demanded))
                        if written[_EXCEEDING.start] else ())
         if jumped and before.lengths:
             exceedances += self._limits.jumps(lengths, before.lengths, elapsed)
@@ -315,11 +315,11 @@ class Step:
         angles: tuple[float, ...] = ()
         if self._angles_of_one is not None:
             angles = self._angles_of_one()
-            of_pose = self._limits.exceeded_angles(angles)
+            of_pose = self._limits.exceeded(angle_values(angles))
         clearances: tuple[float, ...] = ()
         if self._clearance_of_one is not None:
             clearances, nearest = self._clearance_of_one()
-            of_pose += self._limits.exceeded_clearance(clearances, nearest)
+            of_pose += self._limits.exceeded({CLEARANCE_MIN: clearances}, nearest)
         motors, of_motors, windings = self._motors(since, before.windings) if (
             self._motors is not None) else ((), (), before.windings)
         if self._limits_suppress and (of_pose or of_motors and motors[RUNNING.start]):
@@ -370,7 +370,7 @@ class Step:
         results = self._platform.solve(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
         number = len(results)
-        state = np.array((before.singularity or _FIRST).numbers)
+        state = np.array(before.singularity or _FIRST)
         followed_at = np.array([before.stamp])
         followed = np.array(before.lengths or _NO_LENGTHS)
         forces, states = np.empty((number, 6)), np.empty((number, STATE))

@@ -40,7 +40,7 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
 from stewart_dynamics.mechanics.dynamics.forward_dynamics import WORK
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
-from stewart_dynamics.mechanics.limits import Limits
+from stewart_dynamics.mechanics.limits import Limits, result_values
 from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
@@ -249,6 +249,7 @@ class Plant:
         if self.fault:
             raise ParameterError(
                 f'initial_pose: {pose}: a leg would have no length, or one that overflows')
-        for exceedance in self._limits.exceeded(self.state.lengths, NO_WRENCH, None):
+        for exceedance in self._limits.exceeded(result_values(
+                self.state.lengths, NO_WRENCH, None)):
             raise ParameterError(
                 f'initial_pose: {pose}: {exceedance.words(self.parameters["joints"])}')

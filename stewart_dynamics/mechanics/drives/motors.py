@@ -284,23 +284,12 @@ def motor_rows(constants: Array, drives: Array, torque_max: Array, curve: Array,
     """
     Write the motors of each motion.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-    drives : (6, 15)
-        Constants of the drives, see ``Drives``.
-    torque_max : (6,)
-        [N m]
-    curve : (n, 2)
-        Speed and torque at the points of the torque-speed curve [rad/s, N m].
-    motions, results : (N, MOTION), (N, RESULT)
-        Motions, and their results of ``inverse_dynamics``.
-    forces : (N, 6)
-        Forces of the legs for which commands are written [N].
-    rows : (N, MOTORS)
-        Written.
-
+    constants (CONSTANTS,), drives (6, 15): constants of the hexapod, and of the drives.
+    torque_max (6,): [N m]
+    curve (n, 2): speed and torque at the points of the torque-speed curve [rad/s, N m].
+    motions (N, MOTION), results (N, RESULT): motions, their results of ``inverse_dynamics``.
+    forces (N, 6): forces of the legs for which commands are written [N].
+    rows (N, MOTORS): written.
     """
     for n in range(len(motions)):
         put_motors(constants, drives, torque_max, curve, motions[n], results[n, FORCES],
@@ -311,11 +300,7 @@ class Drives:
     """
     The motors of a hexapod: rows of motions and of their results to rows of motors.
 
-    Attributes
-    ----------
-    arguments : tuple
-        First arguments of ``motor_rows``: constants of hexapod and drives, limits of torque.
-
+    arguments: the first of ``motor_rows``: constants of hexapod and drives, limits of torque.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -328,12 +313,9 @@ class Drives:
     def __call__(self, motions: Array, results: Array) -> Array:
         """Return rows (N, MOTORS) for rows of motion and results, unchecked."""
         rows = np.empty((len(motions), MOTORS))
-        batch.in_parts(self._compute, self.arguments[0], *map(batch.compact, (
+        batch.in_parts(motor_rows, self.arguments, *map(batch.compact, (
             motions, results, results[:, FORCES])), rows)
         return rows
-
-    def _compute(self, _: Array, *rows: Array) -> None:
-        motor_rows(*self.arguments, *rows)
 
 
 def motor_ratio(parameters: Parameters) -> Array:

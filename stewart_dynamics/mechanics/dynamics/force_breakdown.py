@@ -118,16 +118,11 @@ class ForceBreakdownRows:
         They sum to the demanded forces. nan where J_inv cannot be solved, or the base's motion is
         not known.
 
-        Parameters
-        ----------
-        motions : (N, MOTION)
-            Rows of motion, laid out as ``rows`` says.
-        wrenches : (N, WRENCH) or (1, WRENCH)
-            External wrenches at the platform's origin, base axes [N, N m]; one row for all.
-        bases : (N, BASE) or (1, BASE), optional
-            Rows of the base's motion; one row for all; one of nan: it is not known. By default
-            the base is still.
-
+        motions (N, MOTION): rows of motion.
+        wrenches (N, WRENCH) or (1, WRENCH): external wrenches at the platform's origin, base axes
+            [N, N m]; one row for all.
+        bases (N, BASE) or (1, BASE): rows of the base's motion; one row for all; nan: not known.
+            By default the base is still.
         """
         forces = np.empty((len(motions), len(SOURCES), 6))
         loads = wrenches if wrenches.any() else None

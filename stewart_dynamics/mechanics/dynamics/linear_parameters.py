@@ -45,18 +45,23 @@ LINEAR = OFFSET.stop  # the number of parameters
 # Indices of the ten parameters of the platform.
 MASS, FIRST_MOMENT, INERTIA = 0, slice(1, 4), slice(4, 10)
 
-_PLATFORM_NAMES = (
-    'platform.mass', *(f'platform.first_moment.{axis}' for axis in 'xyz'),
-    *(f'platform.inertia_about_origin.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')))
-_LEG_KINDS = (
-    'legs.cylinder.mass', 'legs.cylinder.first_moment', 'legs.cylinder.second_moment',
-    'legs.piston.mass', 'legs.piston.first_moment', 'legs.piston.second_moment',
-    'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction',
-    'effort_offset')
-_PLATFORM_UNITS = ('kg', *3 * ['kg m'], *6 * ['kg m^2'])
-_LEG_UNITS = ('kg', 'kg m', 'kg m^2', 'kg', 'kg m', 'kg m^2', 'kg', 'N s/m', 'N', 'N')
+_OF_PLATFORM = {  # names and units
+    'platform.mass': 'kg', **{f'platform.first_moment.{axis}': 'kg m' for axis in 'xyz'},
+    **{f'platform.inertia_about_origin.{axes}': 'kg m^2'
+       for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')}}
+_OF_LEGS = {
+    **{f'legs.{part}.{name}': unit for part in ('cylinder', 'piston') for name, unit in (
+        ('mass', 'kg'), ('first_moment', 'kg m'), ('second_moment', 'kg m^2'))},
+    'actuator.reflected_mass': 'kg', 'actuator.viscous_friction': 'N s/m',
+    'actuator.coulomb_friction': 'N', 'effort_offset': 'N'}
+_PARTS = (('cylinder', CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND),
+          ('piston', PISTON_MASS, PISTON_FIRST, PISTON_SECOND))
+_OF_ACTUATORS = {'actuator.reflected_mass': REFLECTED_MASS,
+                 'actuator.viscous_friction': VISCOUS_FRICTION,
+                 'actuator.coulomb_friction': COULOMB_FRICTION}
 
-UNITS = (*_PLATFORM_UNITS, *(unit for unit in _LEG_UNITS for _ in range(6)))  # of each parameter
+# The unit of each parameter.
+UNITS = (*_OF_PLATFORM.values(), *(unit for unit in _OF_LEGS.values() for _ in range(6)))
 
 # A moment of inertia that rounding made negative is taken as zero, by the second moment.
 _ROUNDING = 1e-9
@@ -64,7 +69,7 @@ _ROUNDING = 1e-9
 
 def names_of(p: Parameters) -> tuple[str, ...]:
     """Return the names of the parameters; names of leg parameters end with the leg's name."""
-    return (*_PLATFORM_NAMES, *(f'{kind}.{leg}' for kind in _LEG_KINDS for leg in p['joints']))
+    return (*_OF_PLATFORM, *(f'{kind}.{leg}' for kind in _OF_LEGS for leg in p['joints']))
 
 
 def linear_parameters(p: Parameters) -> Array:
@@ -72,16 +77,13 @@ def linear_parameters(p: Parameters) -> Array:
     theta = np.zeros(LINEAR)
     mass, center = p['platform.mass'], p['platform.center_of_mass']
     theta[:10] = mass, *(mass * center), *about_origin(mass, center, p['platform.inertia'])
-    for part, of_mass, first, second in (
-            ('cylinder', CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND),
-            ('piston', PISTON_MASS, PISTON_FIRST, PISTON_SECOND)):
+    for part, of_mass, first, second in _PARTS:
         masses, distances, inertias = (
             p[f'legs.{part}.{name}'] for name in ('mass', 'center_of_mass', 'inertia'))
         theta[of_mass], theta[first] = masses, masses * distances
         theta[second] = inertias + masses * distances ** 2
-    theta[REFLECTED_MASS] = p['actuator.reflected_mass']
-    theta[VISCOUS_FRICTION] = p['actuator.viscous_friction']
-    theta[COULOMB_FRICTION] = p['actuator.coulomb_friction']
+    for name, where in _OF_ACTUATORS.items():
+        theta[where] = p[name]
     return theta
 
 
@@ -101,9 +103,7 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
     values: dict[str, Any] = {
         'platform.mass': mass, 'platform.center_of_mass': center,
         'platform.inertia': theta[INERTIA] - about_origin(mass, center, np.zeros(6))}
-    for part, of_mass, first, second in (
-            ('cylinder', CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND),
-            ('piston', PISTON_MASS, PISTON_FIRST, PISTON_SECOND)):
+    for part, of_mass, first, second in _PARTS:
         masses, firsts, seconds = theta[of_mass], theta[first], theta[second]
         massless = masses == 0.0
         wrong = (masses < 0.0) | (massless & (firsts != 0.0))
@@ -117,13 +117,9 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
             raise ParameterError(
                 f'legs.{part} of {p["joints"][leg]}: mass {masses[leg]:g} kg, first moment '
                 f'{firsts[leg]:g} kg m, second moment {seconds[leg]:g} kg m^2: no body has these')
-        values[f'legs.{part}.mass'] = masses.copy()
-        values[f'legs.{part}.center_of_mass'] = distances
-        values[f'legs.{part}.inertia'] = inertias
-    values['actuator.reflected_mass'] = theta[REFLECTED_MASS].copy()
-    values['actuator.viscous_friction'] = theta[VISCOUS_FRICTION].copy()
-    values['actuator.coulomb_friction'] = theta[COULOMB_FRICTION].copy()
-    return values
+        values |= {f'legs.{part}.mass': masses.copy(),
+                   f'legs.{part}.center_of_mass': distances, f'legs.{part}.inertia': inertias}
+    return values | {name: theta[where].copy() for name, where in _OF_ACTUATORS.items()}
 
 
 def about_origin(mass: float, center: Array, inertia: Array) -> Array:

@@ -223,21 +223,12 @@ def regressors(constants: Array, motions: Array, bases: Array, results: Array, w
     """
     Write the regressor of each motion.
 
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``; its masses and friction forces are
-        not used.
-    motions : (N, MOTION)
-        Rows of motion, SI units, base axes.
-    bases : (N, BASE) or (1, BASE)
-        Rows of the base's motion; one row for all. A row of nan: base at rest, with the
-        parameter's gravity.
-    results : (N, 6, LINEAR)
-        Written [N per unit of each parameter].
-    work : WORK
-        Scratch memory.
-
+    constants (CONSTANTS,): constants of the hexapod; its masses and friction forces are not used.
+    motions (N, MOTION): rows of motion, SI units, base axes.
+    bases (N, BASE) or (1, BASE): rows of the base's motion; one row for all. A row of nan: base at
+        rest, with the parameter's gravity.
+    results (N, 6, LINEAR): written [N per unit of each parameter].
+    work (WORK): scratch memory.
     """
     one_base = len(bases) == 1
     size = characteristic_length_of(constants)

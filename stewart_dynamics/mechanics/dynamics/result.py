@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +31,14 @@ from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def _column(where: slice | int, text: str) -> Any:
+    """Return a property: six numbers of each row as a view, or one number of each row."""
+    if isinstance(where, slice):
+        return property(lambda result: result.rows[..., where], doc=text)
+    # [()] makes a number of an array without a shape.
+    return property(lambda result: result.rows[..., where][()], doc=text)
 
 
 class InverseDynamics:
@@ -66,42 +74,14 @@ class InverseDynamics:
     def __init__(self, rows: Array) -> None:
         self.rows = rows
 
-    @property
-    def lengths(self) -> Array:
-        """Return the lengths [m], (..., 6)."""
-        return self.rows[..., LENGTHS]
-
-    @property
-    def rates(self) -> Array:
-        """Return the rates [m/s], (..., 6)."""
-        return self.rows[..., RATES]
-
-    @property
-    def forces(self) -> Array:
-        """Return the forces [N], (..., 6)."""
-        return self.rows[..., FORCES]
-
-    @property
-    def unit_load_forces(self) -> Array:
-        """Return the largest forces under a unit load (..., 6)."""
-        return self.rows[..., UNIT_LOAD_FORCES]
-
-    # [()] makes a number of an array without a shape.
-
-    @property
-    def determinant(self) -> Array:
-        """Return det(J) (...) [m^3]."""
-        return self.rows[..., DETERMINANT][()]
-
-    @property
-    def determinant_rate(self) -> Array:
-        """Return d(det(J))/dt (...) [m^3/s]."""
-        return self.rows[..., DETERMINANT_RATE][()]
-
-    @property
-    def condition_number(self) -> Array:
-        """Return the condition number of J_inv (...)."""
-        return self.rows[..., CONDITION][()]
+    lengths: Array = _column(LENGTHS, 'Lengths [m], (..., 6).')
+    rates: Array = _column(RATES, 'Time derivatives of the lengths [m/s], (..., 6).')
+    forces: Array = _column(FORCES, 'Forces of the actuators [N], (..., 6).')
+    unit_load_forces: Array = _column(
+        UNIT_LOAD_FORCES, 'Largest forces under a unit load, (..., 6).')
+    determinant: Array = _column(DETERMINANT, 'det(J) [m^3], (...).')
+    determinant_rate: Array = _column(DETERMINANT_RATE, 'd(det(J))/dt [m^3/s], (...).')
+    condition_number: Array = _column(CONDITION, 'Condition number of J_inv, (...).')
 
     @property
     def time_to_crossing(self) -> Array:

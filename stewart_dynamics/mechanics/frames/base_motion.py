@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,11 @@ from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.dynamics.base_load import carried
 from stewart_dynamics.mechanics.frames.motion import (
-    as_rotation, Field, listed, Motion, Pose, row_by_row, RowSamples)
+    as_rotation, check_kind, Field, listed, Motion, Pose, row_by_row, RowSamples)
 from stewart_dynamics.mechanics.rows import (
-    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
-    BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, ROTATION)
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
+    BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, NO_BASE,
+    ROTATION)
 from stewart_dynamics.mechanics.vectors import Matrix3, rotate, rotate_back, subtract, Vector3
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
@@ -80,8 +82,7 @@ class BaseMotion(RowSamples):
             self, gravity: ArrayLike, linear_acceleration: ArrayLike | None = None,
             angular_velocity: ArrayLike | None = None,
             angular_acceleration: ArrayLike | None = None) -> None:
-        self._fill(BASE, gravity=gravity, linear_acceleration=linear_acceleration,
-                   angular_velocity=angular_velocity, angular_acceleration=angular_acceleration)
+        self._fill(gravity, linear_acceleration, angular_velocity, angular_acceleration)
 
     @classmethod
     def from_pose(cls, pose: Pose | Motion, gravity: ArrayLike = STANDARD_GRAVITY) -> BaseMotion:
@@ -96,13 +97,9 @@ class BaseMotion(RowSamples):
             World axes [m/s^2].
 
         """
-        if not isinstance(pose, Pose | Motion):
-            raise wrong_type('pose', pose, 'a Pose or a Motion')
-        free_fall = as_array('gravity', gravity, (3,))
-        common_shape(pose=pose.shape, gravity=free_fall.shape[:-1])
-        with np.errstate(all='ignore'):
-            return cls.of_rows(_stacked(row_of_pose(
-                _columns(pose.rows[..., ROTATION]), _columns(free_fall))))
+        check_kind(pose, Pose, Motion)
+        return cls._of_columns(row_of_pose, pose=pose.rows[..., ROTATION],
+                               gravity=as_array('gravity', gravity, (3,)))
 
     @classmethod
     def from_motion(cls, motion: Motion, gravity: ArrayLike = STANDARD_GRAVITY) -> BaseMotion:
@@ -117,16 +114,12 @@ class BaseMotion(RowSamples):
             World axes [m/s^2].
 
         """
-        if not isinstance(motion, Motion):
-            raise wrong_type('motion', motion, 'a Motion')
-        free_fall = as_array('gravity', gravity, (3,))
-        common_shape(motion=motion.shape, gravity=free_fall.shape[:-1])
-        rotation, acceleration, spin, spin_rate = (
-            _columns(motion.rows[..., part]) for part in (
-                ROTATION, LINEAR_ACCELERATION, ANGULAR_VELOCITY, ANGULAR_ACCELERATION))
-        with np.errstate(all='ignore'):
-            return cls.of_rows(_stacked(
-                row_of_motion(rotation, acceleration, spin, spin_rate, _columns(free_fall))))
+        check_kind(motion, Motion)
+        rotation, acceleration, spin, spin_rate = (motion.rows[..., part] for part in (
+            ROTATION, LINEAR_ACCELERATION, ANGULAR_VELOCITY, ANGULAR_ACCELERATION))
+        return cls._of_columns(row_of_motion, motion=rotation, acceleration=acceleration,
+                               spin=spin, spin_rate=spin_rate,
+                               gravity=as_array('gravity', gravity, (3,)))
 
     @classmethod
     def from_imu(
@@ -155,24 +148,38 @@ class BaseMotion(RowSamples):
             IMU axes to base axes; the same axes by default.
 
         """
-        force = as_array('specific_force', specific_force, (3,))
-        spin = as_array('angular_velocity', angular_velocity, (3,))
-        spin_rate = optional_array('angular_acceleration', angular_acceleration, (3,))
-        arm = as_array('position', position, (3,))
-        turn = np.eye(3) if rotation is None else as_rotation(rotation)
-        common_shape(specific_force=force.shape[:-1], angular_velocity=spin.shape[:-1],
-                     angular_acceleration=spin_rate.shape[:-1], position=arm.shape[:-1],
-                     rotation=turn.shape[:-2])
+        return cls._of_columns(
+            row_of_imu, specific_force=as_array('specific_force', specific_force, (3,)),
+            angular_velocity=as_array('angular_velocity', angular_velocity, (3,)),
+            angular_acceleration=optional_array(
+                'angular_acceleration', angular_acceleration, (3,)),
+            position=as_array('position', position, (3,)),
+            rotation=row_by_row(np.eye(3) if rotation is None else as_rotation(rotation)))
+
+    @classmethod
+    def _of_columns(cls, row: Callable[..., tuple[Any, ...]], **given: Array) -> BaseMotion:
+        """Return samples (...) of a function of vectors and matrices, each given as (..., n)."""
+        common_shape(**{name: array.shape[:-1] for name, array in given.items()})
         with np.errstate(all='ignore'):
-            return cls.of_rows(_stacked(row_of_imu(
-                _columns(force), _columns(spin), _columns(spin_rate), _columns(arm),
-                _columns(row_by_row(turn)))))
+            columns = row(*(tuple(np.moveaxis(array, -1, 0)) for array in given.values()))
+        rows = np.stack(np.broadcast_arrays(*columns), axis=-1)
+        return cls.of_rows(check_finite('base motion', rows, rows.ndim - 1))
 
     def _in_words(self) -> str:
         return (f'gravity {listed(self.gravity)} m/s^2, acceleration '
                 f'{listed(self.linear_acceleration)} m/s^2, turning '
                 f'{listed(self.angular_velocity)} rad/s, {listed(self.angular_acceleration)} '
                 'rad/s^2')
+
+
+def base_rows(base: BaseMotion | None) -> Array:
+    """Return the rows (..., BASE) of the base's motion; a row of nan for None."""
+    if base is None:
+        return np.array(NO_BASE)
+    if not isinstance(base, BaseMotion):
+        raise wrong_type('base', base, 'a BaseMotion')
+    # A row of nan would stand for a still base.
+    return check_finite('base', base.rows, len(base.shape))
 
 
 # The same for one sample and for many: each number is a float, or an array of samples.
@@ -198,13 +205,3 @@ def row_of_imu(specific_force: Vector3, spin: Vector3, spin_rate: Vector3, posit
     spin, spin_rate = rotate(rotation, spin), rotate(rotation, spin_rate)
     gravity = subtract(carried(spin, spin_rate, position), rotate(rotation, specific_force))
     return (*gravity, *_STILL, *spin, *spin_rate)
-
-
-def _columns(array: Array) -> Any:
-    """Return the numbers of a vector or matrix, each as an array of samples."""
-    return tuple(np.moveaxis(array, -1, 0))
-
-
-def _stacked(row: tuple[Any, ...]) -> Array:
-    rows = np.stack(np.broadcast_arrays(*row), axis=-1)
-    return check_finite('base motion', rows, rows.ndim - 1)

@@ -24,7 +24,8 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
-from stewart_dynamics.mechanics.arguments import as_array, common_shape, optional_array, wrong_type
+from stewart_dynamics.mechanics.arguments import (
+    as_array, common_shape, first_of, optional_array, wrong_type)
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
@@ -38,20 +39,18 @@ class Field:
     """
     A quantity in each sample's row, as an attribute: a read-only view (..., 3) or (..., 3, 3).
 
-    Parameters
-    ----------
-    where : slice
-        Its numbers in a row, three, or the nine of a rotation.
-    text : str
-        Docstring of the attribute.
-    required : bool
-        Whether it must be given; others are zero by default.
-
+    where: its three numbers in a row, or the nine of a rotation.
+    text: docstring of the attribute.
+    required: whether it must be given; others are zero by default.
     """
 
     def __init__(self, where: slice, text: str, *, required: bool = False) -> None:
         self.where, self.__doc__, self.required = where, text, required
         self._is_rotation = where.stop - where.start == 9
+
+    def __set_name__(self, kind: type, name: str) -> None:
+        """Keep the name, which errors begin with."""
+        self.name = name
 
     def __get__(self, samples: RowSamples | None, kind: type[RowSamples]) -> Array:
         """Return the view; of a class the field itself."""
@@ -65,26 +64,28 @@ class Field:
         """Raise AttributeError: samples are immutable."""
         raise AttributeError(f'a {type(samples).__name__} cannot be changed')
 
-    def checked(self, name: str, value: Any) -> Array:
+    def checked(self, value: Any) -> Array:
         """Return a given value as parts of rows (..., n); MotionError if it is wrong."""
-        return row_by_row(as_rotation(value)) if self._is_rotation else as_array(name, value, (3,))
+        return (row_by_row(as_rotation(value)) if self._is_rotation
+                else as_array(self.name, value, (3,)))
 
 
 class RowSamples:
     """
-    Samples of any leading shape.
+    Samples of any leading shape (...), () for one.
 
-    Attributes
-    ----------
-    rows : (..., n)
-        All numbers of each sample in a row, SI units, base axes.
-    shape : tuple of int
-        The leading shape; () for one sample.
-
+    rows (..., n): all numbers of each sample, SI units, base axes.
     """
 
     rows: Array
     shape: tuple[int, ...]
+    _fields: tuple[Field, ...]  # in the order of a row, and of the arguments
+    _size: int
+
+    def __init_subclass__(cls) -> None:
+        cls._fields = tuple(field for kind in reversed(cls.__mro__)
+                            for field in vars(kind).values() if isinstance(field, Field))
+        cls._size = max(field.where.stop for field in cls._fields)
 
     @classmethod
     def of_rows(cls: type[Self], rows: Array) -> Self:
@@ -93,19 +94,15 @@ class RowSamples:
         samples.rows, samples.shape = rows, rows.shape[:-1]
         return samples
 
-    def _fill(self, size: int, **given: Any) -> None:
-        """
-        Make the rows (..., size) from values by the names of their fields.
-
-        MotionError names a wrong value, and values whose shapes do not fit.
-        """
-        fields = {name: getattr(type(self), name) for name in given}
-        parts = {name: fields[name].checked(name, value) for name, value in given.items()
-                 if value is not None or fields[name].required}
-        self.shape = common_shape(**{name: part.shape[:-1] for name, part in parts.items()})
-        self.rows = np.zeros((*self.shape, size))
-        for name, part in parts.items():
-            self.rows[..., fields[name].where] = part
+    def _fill(self, *values: Any) -> None:
+        """Make the rows of the fields' values; MotionError names wrong values and shapes."""
+        parts = {field: field.checked(value)
+                 for field, value in zip(self._fields, values, strict=True)
+                 if value is not None or field.required}
+        self.shape = common_shape(**{field.name: part.shape[:-1] for field, part in parts.items()})
+        self.rows = np.zeros((*self.shape, self._size))
+        for field, part in parts.items():
+            self.rows[..., field.where] = part
 
     def __len__(self) -> int:
         """Return the number of samples along the first axis; TypeError for a single sample."""
@@ -140,9 +137,9 @@ class RowSamples:
         raise NotImplementedError
 
 
-def listed(numbers: Array) -> str:
+def listed(numbers: Array, digits: int = 6) -> str:
     """Return a vector as text."""
-    return '[' + ', '.join(f'{number + 0.0:.6g}' for number in numbers) + ']'
+    return '[' + ', '.join(f'{number + 0.0:.{digits}g}' for number in numbers) + ']'
 
 
 # A rotation matrix further from orthogonal than this is rejected.
@@ -162,6 +159,35 @@ class Posed(RowSamples):
     def quaternion(self) -> Array:
         """Return the rotation as unit quaternions x y z w, (..., 4), w >= 0."""
         return rotations.to_quaternion(self.rotation)
+
+    def _fill_posed(self, position: Any, rotation: Any, *others: tuple[slice, Any]) -> None:
+        """
+        Make the rows, of one sample in a tenth of the time that samples of any shape take.
+
+        Its arguments must be arrays of floats and well within the rules; others take the long way.
+        """
+        row = np.zeros(self._size)
+        numbers = row.data
+        try:
+            numbers[POSITION] = position
+            numbers[ROTATION] = rotation.reshape(9)
+            for where, value in others:
+                if value is not None:
+                    numbers[where] = value
+        except Exception:  # an arbitrary object may raise any; the check of all kinds names it
+            self._fill(position, rotation, *(value for _, value in others))
+            return
+        sample = row.tolist()
+        a, b, c, d, e, f, g, h, i = sample[ROTATION]
+        if (abs(a * a + d * d + g * g - 1.0) < _WELL and abs(b * b + e * e + h * h - 1.0) < _WELL
+                and abs(c * c + f * f + i * i - 1.0) < _WELL
+                and abs(a * b + d * e + g * h) < _WELL and abs(a * c + d * f + g * i) < _WELL
+                and abs(b * c + e * f + h * i) < _WELL
+                and a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0.0
+                and math.isfinite(sum(sample)) and rotation.shape == (3, 3)):
+            self.rows, self.shape = row, ()
+        else:
+            self._fill(position, rotation, *(value for _, value in others))
 
     def _in_words(self) -> str:
         return f'position {listed(self.position)} m, quaternion {listed(self.quaternion)}'
@@ -198,11 +224,7 @@ class Pose(Posed):
     """
 
     def __init__(self, position: ArrayLike, rotation: ArrayLike) -> None:
-        row = row_of_one(POSE.stop, position, rotation)
-        if row is not None:
-            self.rows, self.shape = row, ()
-            return
-        self._fill(POSE.stop, position=position, rotation=rotation)
+        self._fill_posed(position, rotation)
 
     @classmethod
     def from_euler(cls, position: ArrayLike, angles: ArrayLike, *, degrees: bool = False) -> Pose:
@@ -244,39 +266,9 @@ class Pose(Posed):
         last = given[..., 3, :]
         off = np.abs(last - [0.0, 0.0, 0.0, 1.0]).max(axis=-1) > ORTHOGONALITY
         if off.any():
-            at = tuple(map(int, np.argwhere(off)[0]))
-            raise MotionError(f'matrix{list(at) if at else ""}: its last row is '
-                              f'{last[at].tolist()}: must be [0, 0, 0, 1]')
+            at, name = first_of('matrix', off)
+            raise MotionError(f'{name}: its last row is {last[at].tolist()}: must be [0, 0, 0, 1]')
         return cls(given[..., :3, 3], given[..., :3, :3])
-
-
-def row_of_one(size: int, position: Any, rotation: Any, *parts: tuple[slice, Any],
-               ) -> Array | None:
-    """
-    Return the row of one sample whose arguments are arrays of floats and well within the rules.
-
-    This takes a tenth of the time that arguments of any kind and shape take; for these, and for
-    wrong ones, it returns None. Parts of the row that are None are zero.
-    """
-    row = np.zeros(size)
-    numbers = row.data
-    try:
-        numbers[POSITION] = position
-        numbers[ROTATION] = rotation.reshape(9)
-        for where, part in parts:
-            if part is not None:
-                numbers[where] = part
-    except Exception:  # an arbitrary object may raise any; the check of all kinds names it
-        return None
-    values = row.tolist()
-    a, b, c, d, e, f, g, h, i = values[ROTATION]
-    if (abs(a * a + d * d + g * g - 1.0) < _WELL and abs(b * b + e * e + h * h - 1.0) < _WELL
-            and abs(c * c + f * f + i * i - 1.0) < _WELL and abs(a * b + d * e + g * h) < _WELL
-            and abs(a * c + d * f + g * i) < _WELL and abs(b * c + e * f + h * i) < _WELL
-            and a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0.0
-            and math.isfinite(sum(values)) and rotation.shape == (3, 3)):
-        return row
-    return None
 
 
 def as_rotation(rotation: ArrayLike) -> Array:
@@ -287,12 +279,12 @@ def as_rotation(rotation: ArrayLike) -> Array:
         orthogonal, determinant = error <= ORTHOGONALITY, np.linalg.det(r)
         good = orthogonal & (determinant > 0.0)
     if not good.all():
-        at = tuple(map(int, np.argwhere(~good)[0]))
+        at, name = first_of('rotation', ~good)
         what = ('is a reflection: its determinant is -1, must be +1 (is an axis mirrored, or are '
                 'two columns exchanged?)' if orthogonal[at] else
                 f'is not a rotation: R^T R is {error[at]:.3g} off the identity, must be at most '
                 f'{ORTHOGONALITY:g}')
-        raise MotionError(f'rotation{list(at) if at else ""}: {r[at].tolist()} {what}')
+        raise MotionError(f'{name}: {r[at].tolist()} {what}')
     return r
 
 
@@ -308,9 +300,8 @@ def matrix_of_quaternion(quaternion: ArrayLike) -> Array:
         length = np.asarray(rotations.quaternion_length(*np.moveaxis(q, -1, 0)))
     off = ~np.asarray(is_unit(length))
     if off.any():
-        at = tuple(map(int, np.argwhere(off)[0]))
-        raise MotionError(
-            f'quaternion{list(at) if at else ""}: {q[at].tolist()}: {unit_rule(length[at])}')
+        at, name = first_of('quaternion', off)
+        raise MotionError(f'{name}: {q[at].tolist()}: {unit_rule(length[at])}')
     x, y, z, w = np.moveaxis(q / length[..., None], -1, 0)
     return np.stack(rotations.from_quaternion(x, y, z, w), axis=-1).reshape(*q.shape[:-1], 3, 3)
 
@@ -365,44 +356,31 @@ class Motion(Posed):
 
     def __init__(
             self, position: ArrayLike, rotation: ArrayLike,
-            linear_velocity: ArrayLike | None = None,
-            angular_velocity: ArrayLike | None = None,
+            linear_velocity: ArrayLike | None = None, angular_velocity: ArrayLike | None = None,
             linear_acceleration: ArrayLike | None = None,
-            angular_acceleration: ArrayLike | None = None,
-    ) -> None:
-        row = row_of_one(
-            MOTION, position, rotation, (LINEAR_VELOCITY, linear_velocity),
+            angular_acceleration: ArrayLike | None = None) -> None:
+        self._fill_posed(
+            position, rotation, (LINEAR_VELOCITY, linear_velocity),
             (ANGULAR_VELOCITY, angular_velocity), (LINEAR_ACCELERATION, linear_acceleration),
             (ANGULAR_ACCELERATION, angular_acceleration))
-        if row is not None:
-            self.rows, self.shape = row, ()
-            return
-        self._fill(
-            MOTION, position=position, rotation=rotation, linear_velocity=linear_velocity,
-            angular_velocity=angular_velocity, linear_acceleration=linear_acceleration,
-            angular_acceleration=angular_acceleration)
 
     @classmethod
     def from_pose(
             cls, pose: Pose | Motion, linear_velocity: ArrayLike | None = None,
             angular_velocity: ArrayLike | None = None,
             linear_acceleration: ArrayLike | None = None,
-            angular_acceleration: ArrayLike | None = None,
-    ) -> Motion:
+            angular_acceleration: ArrayLike | None = None) -> Motion:
         """Return the motion at a pose, by default at rest; other arguments are as in Motion."""
-        if not isinstance(pose, Pose | Motion):
-            raise wrong_type('pose', pose, 'a Pose or a Motion')
+        check_kind(pose, Pose, Motion)
         return cls(pose.position, pose.rotation, linear_velocity, angular_velocity,
                    linear_acceleration, angular_acceleration)
 
     @classmethod
     def from_quaternion(
             cls, position: ArrayLike, quaternion: ArrayLike,
-            linear_velocity: ArrayLike | None = None,
-            angular_velocity: ArrayLike | None = None,
+            linear_velocity: ArrayLike | None = None, angular_velocity: ArrayLike | None = None,
             linear_acceleration: ArrayLike | None = None,
-            angular_acceleration: ArrayLike | None = None,
-    ) -> Motion:
+            angular_acceleration: ArrayLike | None = None) -> Motion:
         """Return the motion with a quaternion x y z w (..., 4), see Pose.from_quaternion."""
         return cls(position, matrix_of_quaternion(quaternion), linear_velocity,
                    angular_velocity, linear_acceleration, angular_acceleration)
@@ -412,8 +390,7 @@ class Motion(Posed):
             cls, position: ArrayLike, angles: ArrayLike,
             linear_velocity: ArrayLike | None = None, angle_rates: ArrayLike | None = None,
             linear_acceleration: ArrayLike | None = None,
-            angle_accelerations: ArrayLike | None = None, *, degrees: bool = False,
-    ) -> Motion:
+            angle_accelerations: ArrayLike | None = None, *, degrees: bool = False) -> Motion:
         """
         Return the motion given by the paper's angles and their derivatives, converted exactly.
 
@@ -447,6 +424,23 @@ class Motion(Posed):
     def pose(self) -> Pose:
         """Return the pose alone; it shares the motion's memory."""
         return Pose.of_rows(self.rows[..., POSE])
+
+
+def check_kind(value: object, *kinds: type[Pose] | type[Motion], name: str = '') -> None:
+    """Raise MotionError if an argument is not of one of these types."""
+    if isinstance(value, kinds):
+        return
+    name = name or ('pose' if Pose in kinds else 'motion')
+    hint = '; Motion.from_pose makes one at rest' if isinstance(value, Pose) else ''
+    raise wrong_type(name, value, ' or '.join(f'a {kind.__name__}' for kind in kinds) + hint)
+
+
+def motion_rows(pose: Pose | Motion, shape: tuple[int, ...] | None = None) -> Array:
+    """Return rows of motion (N, MOTION) at rest in a pose that is broadcast to a leading shape."""
+    check_kind(pose, Pose, Motion)
+    rows = np.zeros((*(pose.shape if shape is None else shape), MOTION))
+    rows[..., POSE] = pose.rows[..., POSE]
+    return rows.reshape(-1, MOTION)
 
 
 def _apply(matrix: Array, vector: Array) -> Array:

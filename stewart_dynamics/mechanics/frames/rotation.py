@@ -127,6 +127,24 @@ def to_quaternion(rotation: ArrayLike) -> Array:
     return unit
 
 
+def from_rotation_vector(vectors: ArrayLike) -> Array:
+    """Return the rotations (..., 3, 3) by rotation vectors (..., 3), axis times angle [rad]."""
+    v = np.asarray(vectors, dtype=float)
+    angle = np.linalg.norm(v, axis=-1)
+    x, y, z = np.moveaxis(0.5 * np.sinc(angle / (2.0 * np.pi))[..., None] * v, -1, 0)
+    rows = from_quaternion(x, y, z, np.cos(0.5 * angle))
+    return np.stack(rows, axis=-1).reshape(*angle.shape, 3, 3)
+
+
+def to_rotation_vector(rotation: ArrayLike) -> Array:
+    """Return rotation vectors (..., 3) [rad] of rotations (..., 3, 3), of at most half a turn."""
+    q = to_quaternion(rotation)
+    sine = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[..., 3:])
+    scale = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 0.0)
+    return np.asarray(scale * q[..., :3], dtype=float)
+
+
 def quaternion_product(first: Array, second: Array) -> Array:
     """Return the quaternions (..., 4) of Ra Rb, for those of Ra and Rb; x, y, z, w."""
     (ax, ay, az, aw), (bx, by, bz, bw) = np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0)

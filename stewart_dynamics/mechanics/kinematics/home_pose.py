@@ -64,22 +64,27 @@ class Shape(NamedTuple):
         return max(self.base_radius, self.platform_radius)
 
 
-class Reach(NamedTuple):
-    """The level poses within the limits of length."""
+class Home(NamedTuple):
+    """The level poses within the limits of length, and which of them may be home."""
 
-    yaw: float | None
-    """The angle nearest to 0 at which all legs are within them at some height; else None."""
+    shape: Shape
+    reachable: bool  # all legs are within their limits at some turn and height
+    yaw: float  # the turn about the normal nearest to 0 at which they are; else 0 [rad]
     longest: float  # the longest leg to be expected [m]
     side: float  # 1 where the platform is where the normal points, else -1
     certain: bool  # the parameters give the side; otherwise it is assumed
-
-
-class Home(NamedTuple):
-    """The height of the platform at home."""
-
     heights: Array  # along the normal from the base joints' center, the most likely first (N,) [m]
-    yaw: float  # turn about the normal [rad]
     length: float | None  # of the mean leg [m]; None if the parameters do not give it
+
+    @property
+    def turns(self) -> Array:
+        """Return the rotation at each of the heights (N, 3, 3), in the shape's axes."""
+        return turns_about(2, np.full(len(self.heights), self.yaw))
+
+    def poses(self, parameters: Parameters) -> tuple[Array, Array]:
+        """Return positions (N, 3) [m] and rotations (N, 3, 3) at the heights."""
+        with np.errstate(all='ignore'):
+            return poses_of(parameters, self.shape, self.heights, self.turns)
 
     @property
     def text(self) -> str:
@@ -97,19 +102,16 @@ def home_pose(parameters: Parameters) -> Pose:
     Raises ParameterError: neither both limits of length nor a zero length that level legs can have
         give its height.
     """
-    with np.errstate(all='ignore'):
-        shape = shape_of(parameters)
-        reach = reach_of(parameters, shape)
-        home = home_of(parameters, shape, reach)
-        if reach.yaw is None:
-            raise ParameterError('home pose: no level pose has all legs between '
-                                 'limits.length_min and limits.length_max on the '
-                                 f'{POSITIVE if reach.side > 0.0 else NEGATIVE} side of the base')
-        if home.length is None:
-            raise ParameterError(
-                'home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
-                'must give a length that the legs can have in a level pose')
-        positions, rotations = _poses_at(parameters, shape, home)
+    home = home_of(parameters)
+    if not home.reachable:
+        raise ParameterError('home pose: no level pose has all legs between limits.length_min and '
+                             'limits.length_max on the '
+                             f'{POSITIVE if home.side > 0.0 else NEGATIVE} side of the base')
+    if home.length is None:
+        raise ParameterError(
+            'home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
+            'must give a length that the legs can have in a level pose')
+    positions, rotations = home.poses(parameters)
     return Pose(positions[0], rotations[0])
 
 
@@ -139,15 +141,7 @@ def homes(parameters: Parameters) -> tuple[Array, Array]:
     Positions (N, 3) [m] and rotations (N, 3, 3). Half of them are on the other side of the base;
     if the parameters do not give the height, there are several on each.
     """
-    with np.errstate(all='ignore'):
-        shape = shape_of(parameters)
-        return _poses_at(parameters, shape, home_of(
-            parameters, shape, reach_of(parameters, shape)))
-
-
-def _poses_at(p: Parameters, shape: Shape, home: Home) -> tuple[Array, Array]:
-    turns = turns_about(2, np.full(len(home.heights), home.yaw))
-    return poses_of(p, shape, home.heights, turns)
+    return home_of(parameters).poses(parameters)
 
 
 def shape_of(p: Parameters) -> Shape:
@@ -180,44 +174,48 @@ def is_too_long(p: Parameters, name: str, shape: Shape) -> bool:
     return p[name] is not None and bool(np.max(p[name]) > _LENGTH_RATIO * shape.radius)
 
 
-def reach_of(p: Parameters, shape: Shape) -> Reach:
-    shortest, longest = p['limits.length_min'], p['limits.length_max']
-    low = np.zeros(6) if shortest is None else shortest
-    high = np.full(6, np.inf) if longest is None else longest
-    turned = turns_about(2, _YAWS) @ shape.platform.T  # (yaws, 3, 6)
-    offset = turned.swapaxes(-1, -2) - shape.base
-    along = offset[..., 2]
-    across = np.linalg.norm(offset[..., :2], axis=-1)
-    reached_on: dict[float, Flags] = {}
-    for side in (1.0, -1.0):
-        # The height of a leg is that of the platform plus the platform joint's own.
-        least = np.sqrt(np.maximum(low ** 2 - across ** 2, 0.0)) - side * along
-        most = np.where(high >= across, np.sqrt(np.abs(high ** 2 - across ** 2)), -np.inf)
-        reached_on[side] = least.max(axis=-1) <= (most - side * along).min(axis=-1)
-    given = p['geometry.platform_side']
-    certain = given != AUTO or bool(reached_on[1.0].any() != reached_on[-1.0].any())
-    side = -1.0 if given == NEGATIVE or (
-        given == AUTO and certain and reached_on[-1.0].any()) else 1.0
-    reached = reached_on[side]
-    angles = np.abs((_YAWS + np.pi) % (2.0 * np.pi) - np.pi)
-    yaw = float(_YAWS[np.argmin(np.where(reached, angles, np.inf))]) if reached.any() else None
-    if longest is not None and not is_too_long(p, 'limits.length_max', shape):
-        return Reach(yaw, float(longest.max()), side, certain)
-    return Reach(yaw, math.hypot(HEIGHTS[-1] * shape.radius, float(across.max())), side, certain)
+def home_of(p: Parameters) -> Home:
+    """Return the level poses within the limits of length, and the possible heights at home."""
+    with np.errstate(all='ignore'):
+        shape = shape_of(p)
+        offsets = (turns_about(2, _YAWS) @ shape.platform.T).swapaxes(-1, -2) - shape.base
+        above, below = (_reached(p, offsets, side) for side in (1.0, -1.0))
+        given = p['geometry.platform_side']
+        certain = given != AUTO or bool(above.any() != below.any())
+        side = -1.0 if given == NEGATIVE or given == AUTO and certain and below.any() else 1.0
+        reached = above if side > 0.0 else below
+        angles = np.abs((_YAWS + np.pi) % (2.0 * np.pi) - np.pi)
+        yaw = float(_YAWS[np.argmin(np.where(reached, angles, np.inf))]) if reached.any() else 0.0
+        across = float(np.linalg.norm(offsets[..., :2], axis=-1).max())
+        longest = math.hypot(HEIGHTS[-1] * shape.radius, across)
+        low, high = p['limits.length_min'], p['limits.length_max']
+        if high is not None and not is_too_long(p, 'limits.length_max', shape):
+            longest = float(high.max())
+        length = float(np.mean(p['geometry.zero_length'] if low is None or high is None
+                               else 0.5 * (low + high)))
+        legs = shape.platform @ turns_about(2, np.array([yaw]))[0].T - shape.base  # at no height
+        known = mean_norm(legs) < length < _LENGTH_RATIO * shape.radius
+        heights = [each * _height(shape, each, legs, length) for each in (side, -side)] if (
+            known) else [each * height * shape.radius
+                         for each in (side, -side) for height in HEIGHTS]
+    return Home(shape, bool(reached.any()), yaw, longest, side, certain, np.array(heights),
+                length if known else None)
 
 
-def home_of(p: Parameters, shape: Shape, reach: Reach) -> Home:
-    """Return the possible heights of the platform at home."""
-    yaw, sides = reach.yaw or 0.0, (reach.side, -reach.side)
+def _reached(p: Parameters, offsets: Array, side: float) -> Flags:
+    """
+    Return at which turns all legs are within their limits at some height, on one side.
+
+    offsets (turns, 6, 3): the legs while the center of the platform is at that of the base [m].
+    """
     low, high = p['limits.length_min'], p['limits.length_max']
-    length = float(np.mean(p['geometry.zero_length'] if low is None or high is None
-                           else 0.5 * (low + high)))
-    legs = shape.platform @ turns_about(2, np.array([yaw]))[0].T - shape.base  # at no height
-    if mean_norm(legs) < length < _LENGTH_RATIO * shape.radius:
-        heights = [side * _height(shape, side, legs, length) for side in sides]
-        return Home(np.array(heights), yaw, length)
-    heights = [side * height * shape.radius for side in sides for height in HEIGHTS]
-    return Home(np.array(heights), yaw, None)
+    low, high = 0.0 if low is None else low, np.inf if high is None else high
+    across, along = np.linalg.norm(offsets[..., :2], axis=-1), side * offsets[..., 2]
+    # The height of a leg is that of the platform plus the platform joint's own.
+    least = np.sqrt(np.maximum(low ** 2 - across ** 2, 0.0)) - along
+    most = np.where(high >= across, np.sqrt(np.abs(high ** 2 - across ** 2)), -np.inf) - along
+    reached: Flags = least.max(axis=-1) <= most.min(axis=-1)
+    return reached
 
 
 def _height(shape: Shape, side: float, legs: Array, length: float) -> float:

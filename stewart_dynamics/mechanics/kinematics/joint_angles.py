@@ -135,7 +135,7 @@ class JointAngles:
     def __call__(self, motions: Array) -> Array:
         """Return the angles (N, JOINT_ANGLES) [rad] in motions (N, MOTION)."""
         angles = np.empty((len(motions), JOINT_ANGLES))
-        batch.in_parts(self._angles, self._constants, batch.compact(motions), angles)
+        batch.in_parts(joint_angles, (self._constants, self.axes), batch.compact(motions), angles)
         return angles
 
     def of_one(self, motion: Array) -> Callable[[], tuple[float, ...]]:
@@ -155,9 +155,6 @@ class JointAngles:
         values, rates = (np.empty((len(motions), JOINT_ANGLES)) for _ in range(2))
         joint_haversines(self._constants, self.axes, batch.compact(motions), values, rates)
         return values, rates
-
-    def _angles(self, constants: Array, motions: Array, angles: Array) -> None:
-        joint_angles(constants, self.axes, motions, angles)
 
 
 def angles_to_check(parameters: Parameters, limits: Sequence[str]) -> JointAngles | None:

@@ -35,7 +35,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import math
-from typing import Any
 
 import numpy as np
 
@@ -237,13 +236,13 @@ class LegClearance:
         if missing:
             raise ParameterError(f'parameters: {", ".join(missing)}: not set: needed by the '
                                  'clearance of the legs')
-        self._constants = hexapod_constants(parameters)
         self.shapes = np.column_stack([parameters[name] for name in LEG_SHAPE])
         self.base, self.platform = (
             np.empty((0, 3)) if parameters[name] is None else parameters[name].copy()
             for name in (BASE_OUTLINE, PLATFORM_OUTLINE))
         self.reach = float(np.linalg.norm(np.concatenate([
             parameters['geometry.platform_joints'], self.platform]), axis=1).max())
+        self._constants = hexapod_constants(parameters), self.shapes, self.base, self.platform
 
     def __call__(self, motions: Array) -> Array:
         """Return the clearance of each leg (N, 6) [m] in motions (N, MOTION)."""
@@ -252,7 +251,7 @@ class LegClearance:
     def nearest(self, motions: Array) -> tuple[Array, Integers]:
         """Return the clearance of each leg (N, 6) [m], and number of the leg or plate."""
         clearances, nearest = np.empty((len(motions), 6)), np.empty((len(motions), 6), np.int64)
-        batch.in_parts(self._clearances, self._constants, batch.compact(motions), clearances,
+        batch.in_parts(leg_clearances, self._constants, batch.compact(motions), clearances,
                        nearest, scratch=(6, _AXIS))
         return clearances, nearest
 
@@ -260,17 +259,14 @@ class LegClearance:
         """Return a function that gives ``nearest`` (6,) of a row's current values."""
         clearances, nearest = np.empty((1, 6)), np.empty((1, 6), np.int64)
         compute = leg_clearances.bound(
-            self._constants, self.shapes, self.base, self.platform,
-            motion.reshape(1, len(motion)), clearances, nearest, np.empty((6, _AXIS)))
+            *self._constants, motion.reshape(1, len(motion)), clearances, nearest,
+            np.empty((6, _AXIS)))
 
         def of_row() -> tuple[tuple[float, ...], tuple[int, ...]]:
             compute()
             return tuple(clearances[0].tolist()), tuple(nearest[0].tolist())
 
         return of_row
-
-    def _clearances(self, constants: Array, *arrays: Any) -> None:
-        leg_clearances(constants, self.shapes, self.base, self.platform, *arrays)
 
 
 def clearance_to_check(parameters: Parameters) -> LegClearance | None:
