@@ -16,11 +16,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
+
+from stewart_dynamics import Parameters
+from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.setpoints.inputs import WRENCH as WRENCH_TOPIC
+from stewart_dynamics.setpoints.joining import Setpoints
+from stewart_dynamics.setpoints.rejections import Rejection
+from stewart_dynamics.setpoints.step import Setpoint
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
@@ -34,6 +43,71 @@ COMBINED = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
 HOME = (0.0, 0.0, 1.1)
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 REST = (0.0,) * 6
+NOW = 1_700_000_000_000_000_000  # [ns]
+
+
+class Feed:
+    """Setpoints that take messages; their rejections and notices are kept."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.said: list[tuple[Rejection, str]] = []
+        self.notices: list[str] = []
+        self.setpoints = Setpoints(
+            parameters, lambda rejection, details: self.said.append((rejection, details)),
+            self.notices.append)
+
+    def __call__(self, topic: str, data: bytes, now: int = NOW) -> Setpoint | None:
+        """Take one message as the node does, at a time [ns]."""
+        if topic in self.setpoints.base.topics:
+            self.setpoints.base.take(topic, data, lambda: now)
+        elif topic == WRENCH_TOPIC:
+            self.setpoints.take_wrench(data)
+        elif (setpoint := self.setpoints.take(topic, data, lambda: now)) is not None:
+            return self.setpoints.on_base(setpoint)
+        return None
+
+    @property
+    def counts(self) -> dict[tuple[str, str], int]:
+        """Return the rejections; the callback must have got each."""
+        assert Counter(rejection for rejection, _ in self.said) == self.setpoints.counts
+        return {(topic, reason): n for (topic, reason), n in self.setpoints.counts.items()}
+
+
+def together(given: Sequence[tuple[str, bytes]], topics: Sequence[str]) -> Messages:
+    """Return messages as a bag has them, recorded a microsecond apart from NOW on."""
+    sizes = np.array([len(data) for _, data in given], dtype=np.int64)
+    return Messages(
+        tuple(topics), np.array([topics.index(topic) for topic, _ in given], dtype=np.int64),
+        NOW + 1000 * np.arange(len(given)),
+        np.frombuffer(b'?' + b''.join(data for _, data in given), dtype=np.uint8),
+        1 + np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64), sizes)
+
+
+def check_many(one: Feed, many: Feed, given: Sequence[tuple[str, bytes]], topics: Sequence[str],
+               cuts: Sequence[int]) -> int:
+    """Check that messages give the same bits together and one by one; count the setpoints."""
+    times = range(NOW, NOW + 1000 * len(given), 1000)
+    expected = [(setpoint, time) for (topic, data), time in zip(given, times, strict=True)
+                if (setpoint := one(topic, data, time)) is not None]
+    found: list[tuple[Setpoint, int]] = []
+    whole = together(given, topics)
+    for first, end in pairwise([0, *sorted(cut for cut in cuts if cut < len(given)), len(given)]):
+        batch = many.setpoints.take_many(whole.chosen(slice(first, end)))
+        number = len(batch.stamps)
+        assert batch.motions.shape == (number, 24)
+        assert batch.wrenches.shape == (number, 6)
+        assert (batch.bases is None) == (not many.setpoints.base.topics)
+        bases = [None] * number if batch.bases is None else map(tuple, batch.bases.tolist())
+        stamped = [True] * number if batch.stamped is None else batch.stamped.tolist()
+        found += [(Setpoint(stamp, tuple(motion), tuple(wrench), restart, base, known), time)
+                  for stamp, motion, wrench, restart, time, base, known in zip(
+                      *(part.tolist() for part in batch[:5]), bases, stamped, strict=True)]
+    assert list(map(repr, found)) == list(map(repr, expected))
+    assert many.notices == one.notices
+    for feed in (one, many):
+        feed.setpoints.end('the bag ends')
+    assert many.counts == one.counts
+    return len(found)
 
 
 def _new(kind: str, *fields: Any) -> Any:
@@ -88,6 +162,14 @@ def imu(stamp: int, spin: Sequence[float] = REST[:3],
         IMU, _header(stamp, frame), _new('geometry_msgs/msg/Quaternion', *orientation), unknown,
         _new('geometry_msgs/msg/Vector3', *spin), of_spin,
         _new('geometry_msgs/msg/Vector3', *force), of_force), little_endian)
+
+
+def joint_state(stamp: int, names: Sequence[str], position: Any, velocity: Any, effort: Any,
+                frame: str = '', little_endian: bool = True) -> bytes:
+    """Return a JointState."""
+    return _bytes(_new('sensor_msgs/msg/JointState', _header(stamp, frame), list(names), *(
+        np.array(numbers, dtype=float) for numbers in (position, velocity, effort))),
+        little_endian)
 
 
 def combined(

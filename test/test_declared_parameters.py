@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-import gc
+from contextlib import closing, ExitStack
 import math
 from pathlib import Path
 import sys
@@ -31,12 +31,12 @@ from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValu
 from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, SetParameters, SetParametersAtomically)
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from referees import ROOT, symmetric_parameters
 from rosgraph_msgs.msg import Clock
+from running import Inside, Peer, SERVICES
 
 from stewart_dynamics import ParameterError, Parameters
 from stewart_dynamics.parameters.parameter_set import ParameterSet
@@ -46,63 +46,38 @@ from stewart_dynamics.reference_motion.parameters import (
 from stewart_dynamics.ros.declared_parameters import declare_parameters, log_changes
 from stewart_dynamics.ros.rclpy_workarounds import reject_impossible_times
 
-SECONDS = 30.0
-
 # Calls a node's service over ROS.
 Ask = Callable[[str, Any], Any]
 
 
 @pytest.fixture
-def declared(domain: int, monkeypatch: pytest.MonkeyPatch,
-             ) -> Iterator[Callable[..., Ask]]:
-    """Return a function that makes a node with declared parameters, and how to call it."""
-    monkeypatch.setenv('ROS_DOMAIN_ID', f'{domain}')
-    context = rclpy.Context()
-    made: list[Any] = []  # the executor, then the nodes
+def declared(domain: int) -> Iterator[Callable[..., Ask]]:
+    """Return a function that makes a node with declared parameters, and returns how to call it."""
+    with ExitStack() as stack:
+        def make(kind: type[Node], parameters: type[ParameterSet], file: str,
+                 *overrides: str) -> Ask:
+            def node() -> Node:
+                made = kind(parameters.node, allow_undeclared_parameters=True,
+                            automatically_declare_parameters_from_overrides=True)
+                declare_parameters(made, parameters)
+                return made
 
-    def make(kind: type[Node], parameters: type[ParameterSet], file: str,
-             *overrides: str, name: str = '') -> Ask:
-        arguments = ['--ros-args', '--params-file', str(ROOT / 'config' / file)]
-        arguments += [each for override in overrides for each in ('-p', override)]
-        monkeypatch.setattr(sys, 'argv', [parameters.node, *arguments])
-        rclpy.init(args=arguments, context=context)
-        executor = SingleThreadedExecutor(context=context)
-        node = kind(name or parameters.node, context=context, allow_undeclared_parameters=True,
-                    automatically_declare_parameters_from_overrides=True)
-        made.extend((executor, node))
-        declare_parameters(node, parameters)
-        asker = Node('asker', context=context, use_global_arguments=False)
-        made.append(asker)
-        executor.add_node(node)
-        executor.add_node(asker)
+            arguments = ['--ros-args', '--params-file', str(ROOT / 'config' / file)]
+            arguments += [each for override in overrides for each in ('-p', override)]
+            stack.callback(Inside(node, arguments, domain).kill)
+            peer = stack.enter_context(closing(Peer(domain)))
 
-        def ask(service: str, request: Any) -> Any:
-            client = asker.create_client(
-                SERVICES[service], f'/{parameters.node}/{service}')
-            assert client.wait_for_service(timeout_sec=SECONDS)
-            future = client.call_async(request)
-            executor.spin_until_future_complete(future, SECONDS)
-            assert future.done()
-            return future.result()
+            def ask(service: str, request: Any) -> Any:
+                client = peer.node.create_client(
+                    SERVICES[service], f'/{parameters.node}/{service}')
+                peer.until(client.service_is_ready, f'{service} is there')
+                future = client.call_async(request)
+                peer.until(future.done, f'{service} answers')
+                return future.result()
 
-        return ask
+            return ask
 
-    yield make
-    if made:
-        executor, *nodes = made
-        executor.shutdown()
-        for node in nodes:
-            node.destroy_node()
-    context.try_shutdown()
-    # Others see the nodes until the last that refers to them is gone.
-    made.clear()
-    context.destroy()
-    gc.collect()
-
-
-SERVICES = {'describe_parameters': DescribeParameters, 'get_parameters': GetParameters,
-            'set_parameters': SetParameters,
-            'set_parameters_atomically': SetParametersAtomically}
+        yield make
 
 
 def described(ask: Ask, *names: str) -> list[ParameterDescriptor]:
@@ -110,11 +85,19 @@ def described(ask: Ask, *names: str) -> list[ParameterDescriptor]:
     return list(ask('describe_parameters', DescribeParameters.Request(names=names)).descriptors)
 
 
-def set_to(ask: Ask, name: str, value: Any) -> tuple[bool, str]:
-    """Return whether a node takes a value, and why not."""
-    (result,) = ask('set_parameters', SetParameters.Request(
-        parameters=[RosParameter(name, value=value).to_parameter_msg()])).results
-    return result.successful, result.reason
+def message(name: str, value: Any) -> ParameterMessage:
+    """Return the message that sets a parameter."""
+    return RosParameter(name, value=value).to_parameter_msg()
+
+
+def set_to(ask: Ask, *messages: ParameterMessage) -> tuple[bool, str]:
+    """Return whether a node takes messages together, by either service, and why not."""
+    several = ask('set_parameters', SetParameters.Request(parameters=messages)).results
+    assert len(several) == len(messages)
+    once = ask('set_parameters_atomically',
+               SetParametersAtomically.Request(parameters=messages)).result
+    assert all(each == once for each in several)
+    return once.successful, once.reason
 
 
 def bounds(descriptor: ParameterDescriptor) -> list[tuple[float, float, float]]:
@@ -145,8 +128,8 @@ def test_the_node_describes_each_parameter(declared: Any) -> None:
 def test_a_value_out_of_range_is_left_to_the_node_s_own_check(declared: Any) -> None:
     # This node has no check: rclpy's would reject these two, with its own text.
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
-    assert set_to(ask, 'platform.mass', -1.0) == (True, '')
-    assert set_to(ask, 'platform.mass', 'heavy') == (True, '')
+    for value in (-1.0, 'heavy'):
+        assert set_to(ask, message('platform.mass', value)) == (True, '')
 
 
 def test_a_value_that_ros_drops_silently_is_rejected(declared: Any) -> None:
@@ -209,22 +192,11 @@ def test_the_trajectory_s_parameters_are_read_once(declared: Any) -> None:
     assert bounds(rate) == [(1e-3, 1e4, 0.0)]
     assert rate.additional_constraints == (
         'at least 0.001, at most 10000; set only when the node starts')
-    assert set_to(ask, 'rate', 50.0) == (
-        False, 'rate: only read when the node starts: restart it')
-    successful, reason = set_to(ask, 'rates', 50.0)
-    assert not successful
-    assert reason == 'parameters: rates: unknown parameter; do you mean rate?'
-    assert set_to(ask, 'use_sim_time', True) == (True, '')
-
-
-def set_messages(ask: Ask, *messages: ParameterMessage) -> tuple[bool, str]:
-    """Return whether a node takes messages together, by either service, and why not."""
-    several = ask('set_parameters', SetParameters.Request(parameters=messages)).results
-    assert len(several) == len(messages)
-    once = ask('set_parameters_atomically',
-               SetParametersAtomically.Request(parameters=messages)).result
-    assert all(each == once for each in several)
-    return once.successful, once.reason
+    for name, value, expected in (
+            ('rate', 50.0, (False, 'rate: only read when the node starts: restart it')),
+            ('rates', 50.0, (False, 'parameters: rates: unknown parameter; do you mean rate?')),
+            ('use_sim_time', True, (True, ''))):
+        assert set_to(ask, message(name, value)) == expected
 
 
 NODES = pytest.mark.parametrize('kind, parameters, file, name, value', [
@@ -238,7 +210,7 @@ def test_a_parameter_type_that_does_not_exist_is_rejected(
         declared: Any, kind: Any, parameters: Any, file: str, name: str, value: float) -> None:
     ask = declared(kind, parameters, file)
     for number in (10, 77, 255):
-        assert set_messages(ask, ParameterMessage(
+        assert set_to(ask, ParameterMessage(
             name=name, value=ParameterValue(type=number))) == (
                 False, f'{name}: parameter type {number} does not exist')
 
@@ -247,15 +219,13 @@ def test_a_parameter_type_that_does_not_exist_is_rejected(
 def test_a_value_equal_to_the_present_one_is_no_change(
         declared: Any, kind: Any, parameters: Any, file: str, name: str, value: float) -> None:
     ask = declared(kind, parameters, file)
-    same = [RosParameter(name, value=value).to_parameter_msg(),
-            RosParameter('use_sim_time', value=False).to_parameter_msg(),
+    same = [message(name, value), message('use_sim_time', False),
             # Read-only, and of ROS itself.
-            RosParameter('start_type_description_service', value=True).to_parameter_msg(),
+            message('start_type_description_service', True),
             # As `ros2 param load` sends them.
-            RosParameter(name, value=f'{value:.5e}').to_parameter_msg()]
-    assert set_messages(ask, *same) == (True, '')
-    other = RosParameter('start_type_description_service', value=False).to_parameter_msg()
-    successful, reason = set_messages(ask, *same, other)
+            message(name, f'{value:.5e}')]
+    assert set_to(ask, *same) == (True, '')
+    successful, reason = set_to(ask, *same, message('start_type_description_service', False))
     assert not successful
     assert 'read-only' in reason
 
@@ -263,12 +233,10 @@ def test_a_value_equal_to_the_present_one_is_no_change(
 def test_a_dump_can_be_loaded_again(declared: Any) -> None:
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
     # `ros2 param load` sends None for the null that `ros2 param dump` has written.
-    unset = RosParameter('external_wrench.force_max', value='None').to_parameter_msg()
     inertia = [1e-5, 0.0, 0.0, 1e-5, 0.0, 1e-5]
-    texts = RosParameter('platform.inertia', value=f'{inertia}').to_parameter_msg()
-    assert set_messages(ask, unset, texts) == (True, '')
-    assert set_messages(ask, RosParameter(
-        'platform.inertia', value=inertia).to_parameter_msg()) == (True, '')
+    assert set_to(ask, message('external_wrench.force_max', 'None'),
+                  message('platform.inertia', f'{inertia}')) == (True, '')
+    assert set_to(ask, message('platform.inertia', inertia)) == (True, '')
 
 
 @pytest.mark.parametrize('sec, nanosec', [(-5, 0), (2 ** 31 - 1, 2 ** 32 - 1), (5, 10 ** 9)])

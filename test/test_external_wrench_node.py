@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 import math
 from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from lifecycle_msgs.msg import Transition
+from messages import joint_state
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
@@ -29,15 +30,15 @@ from referees import rng
 from running import DynamicsNode, LATCHED, log_lines, nanoseconds, NODE
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from stewart_dynamics import StewartPlatform
+from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.external_wrench.estimate import ExternalWrench, Measurement
+from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench, Measurement
 from stewart_dynamics.external_wrench.measured_legs import LegHistory, MeasuredLegs
 from stewart_dynamics.external_wrench.payload import identify, numbers_of, PayloadOutcome
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from test_external_wrench import (
-    BEGIN, HEXAPOD, HOME as AT_HOME, joint_state, JOINTS, LOAD, measured, message_of, MILLISECOND,
-    resting, six, swing, times, ZERO_LENGTHS)
+    BEGIN, HEXAPOD, HOME as AT_HOME, JOINTS, LOAD, measured, message_of, MILLISECOND, resting, six,
+    swing, times, ZERO_LENGTHS)
 from test_payload import excited, LOADED
 
 Start = Callable[..., DynamicsNode]
@@ -117,8 +118,10 @@ def begin(fresh: Start) -> Callable[..., Felt]:
 
 @pytest.fixture
 def felt(begin: Callable[..., Felt]) -> Iterator[Felt]:
-    """Return a node for this alone; it must be at work afterwards."""
+    """Return a node that has published a wrench; it must be at work afterwards."""
     each = begin('external_wrench.cutoff:=1000.0')
+    each.rest()
+    each.until_answered(each.rest())
     yield each
     assert np.all(np.isfinite(values(each.received())))
     each.node.state_of(each.node.send())
@@ -131,6 +134,17 @@ def values(messages: list[WrenchStamped]) -> Any:
                      for each in messages]).reshape(-1, 6)
 
 
+def taken(messages: list[bytes], parameters: Parameters = HEXAPOD,
+          history: LegHistory | None = None) -> list[Estimate]:
+    """Return what the library estimates from messages; it rejects none."""
+    def failed(*said: object) -> None:
+        pytest.fail(f'{said}')
+
+    legs = MeasuredLegs(parameters, ExternalWrench(parameters), failed, failed, history)
+    found = [legs.take(each, NO_WRENCH, None) for each in messages]
+    return [each for each in found if each is not None]
+
+
 def test_published_wrenches_have_the_librarys_bits(begin: Callable[..., Felt]) -> None:
     """Messages of a hexapod in motion, measured with noise at irregular times."""
     felt = begin()
@@ -141,18 +155,10 @@ def test_published_wrenches_have_the_librarys_bits(begin: Callable[..., Felt]) -
                                    six(each.rates + 1e-4 * random.normal(size=6)),
                                    six(each.forces + 5.0 * random.normal(size=6))))
             for each in measured(HEXAPOD, motion, LOAD, stamps)]
-    rejected: list[object] = []
-    messages = OutputMessages(HEXAPOD)
-    legs = MeasuredLegs(HEXAPOD, ExternalWrench(HEXAPOD), lambda *said: rejected.append(said),
-                        rejected.append)
-    expected = []
-    for each in data:
-        estimate = legs.take(each, NO_WRENCH, None)
-        assert estimate is not None
-        if estimate.wrench is not None:
-            expected.append(messages.of_wrench(estimate.stamp, estimate.wrench))
-        felt.publish(each)
-    assert not rejected
+    expected = [OutputMessages(HEXAPOD).of_wrench(each.stamp, each.wrench)
+                for each in taken(data) if each.wrench is not None]
+    for message in data:
+        felt.publish(message)
     felt.node.until(lambda: len(felt.raw) >= len(expected), 'all wrenches have come')
     assert felt.raw == expected
     assert felt.received()[0].header.frame_id == 'base'
@@ -179,14 +185,12 @@ def test_thresholds_are_checked_and_can_be_changed_while_it_is_active(felt: Felt
 
 
 def test_names_in_another_order_after_the_hexapod_is_connected_again(felt: Felt) -> None:
-    last = felt.rest()
-    felt.until_answered(last := felt.rest())
     felt.disconnect()
     felt.node.until_status(STATUS, STALE, 'no wrench: measured_legs silent for ')
     felt.connect()
     felt.until_connected()
     names = ['gripper', *reversed(JOINTS)]
-    stamps = [last + n * MILLISECOND for n in range(1, 50)]
+    stamps = [felt.stamp + n * MILLISECOND for n in range(1, 50)]
     for at in resting(HEXAPOD, AT_HOME, LOAD, stamps):
         felt.publish(joint_state(at.stamp, names, *(
             [math.nan, *reversed(np.asarray(numbers).tolist())]
@@ -198,8 +202,6 @@ def test_names_in_another_order_after_the_hexapod_is_connected_again(felt: Felt)
 # Faults, as docs/faults.md has them
 
 def test_measured_legs_without_a_stamp_or_late_are_rejected(felt: Felt) -> None:
-    felt.rest()
-    felt.until_answered(felt.rest())
     many = len(felt.raw)
     for step, reason in ((-felt.stamp, 'without a stamp'), (0, 'same stamp twice'),
                          (-MILLISECOND, 'older than the last used')):
@@ -218,8 +220,6 @@ def test_measured_legs_without_a_stamp_or_late_are_rejected(felt: Felt) -> None:
 
 
 def test_measured_legs_that_stop_or_are_too_far_apart_are_reported(felt: Felt) -> None:
-    felt.rest()
-    felt.until_answered(felt.rest())
     felt.node.until_status(STATUS, STALE, 'no wrench: measured_legs silent for ')
     many = len(felt.raw)
 
@@ -235,8 +235,6 @@ def test_measured_legs_that_stop_or_are_too_far_apart_are_reported(felt: Felt) -
 
 
 def test_measured_legs_are_forgotten_at_a_deactivation(felt: Felt) -> None:
-    felt.rest()
-    felt.until_answered(felt.rest())
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
         assert felt.node.change(transition)
     many = len(felt.raw)
@@ -254,28 +252,24 @@ TIMEOUT = 60.0
 TIMES = [2.0 + n / 100.0 for n in range(600)]
 
 
-class Carried:
+class Carried(Felt):
     """A node, and a hexapod with a payload whose legs are measured."""
 
     def __init__(self, node: DynamicsNode) -> None:
-        self.node = node
-        self.raw = node.peer.listen(f'{NODE}/payload', InertiaStamped, LATCHED)
-        self._writer = node.peer.writer(f'{NODE}/measured_legs', JointState)
+        super().__init__(node)
+        self.payloads = node.peer.listen(f'{NODE}/payload', InertiaStamped, LATCHED)
         self._client = node.peer.node.create_client(Trigger, f'{NODE}/identify_payload')
-        stamps = [BEGIN + round(time * 1e9) for time in TIMES]
         self.messages = [message_of(each) for each in measured(
-            LOADED, excited(TIMES), NO_WRENCH, stamps)]
-        node.until_active()
-        node.until(self._writer.get_subscription_count, 'the node hears measured legs')
+            LOADED, excited(TIMES), NO_WRENCH, [BEGIN + round(time * 1e9) for time in TIMES])]
+        self.until_heard()
         node.until(self._client.service_is_ready, 'the service is there')
 
-    def move(self, messages: Sequence[bytes] = ()) -> None:
-        """Publish measurements, by default those of the motion, and wait until they are used."""
-        messages = messages or self.messages
-        for message in messages:
-            self._writer.publish(message)
-        self.node.until(lambda: self.node.values('external wrench').get('wrenches') == str(
-            len(messages) - 1), 'all measurements are used')
+    def move(self) -> None:
+        """Publish the measurements of the motion, and wait until they are used."""
+        for message in self.messages:
+            self.publish(message)
+        self.node.until(lambda: self.node.values(STATUS).get('wrenches') == str(
+            len(self.messages) - 1), 'all measurements are used')
 
     def begin(self) -> Any:
         """Send a request, and return its future."""
@@ -299,10 +293,7 @@ def carried(fresh: Start) -> Iterator[Carried]:
 def expected(messages: list[bytes]) -> PayloadOutcome:
     """Return what the library gives for these messages."""
     parameters, history = HEXAPOD.replaced({'setpoint.timeout': TIMEOUT}), LegHistory(10.0)
-    legs = MeasuredLegs(parameters, ExternalWrench(parameters), lambda *_: None,
-                        lambda _: None, history)
-    for each in messages:
-        assert legs.take(each, NO_WRENCH, None) is not None
+    taken(messages, parameters, history)
     *_, outcome = identify(history, StewartPlatform(parameters))
     assert outcome is not None
     return outcome
@@ -317,8 +308,8 @@ def test_the_answer_has_the_librarys_numbers_and_sets_no_parameter(carried: Carr
     assert answer.success
     assert answer.message == outcome.message
     node = carried.node
-    node.until(lambda: carried.raw, 'the payload is published')
-    message = deserialize_message(carried.raw[-1], InertiaStamped)
+    node.until(lambda: carried.payloads, 'the payload is published')
+    message = deserialize_message(carried.payloads[-1], InertiaStamped)
     assert message.header.frame_id == 'platform'
     assert nanoseconds(message.header.stamp) == outcome.payload.stamp
     inertia = message.inertia
@@ -332,9 +323,9 @@ def test_the_answer_has_the_librarys_numbers_and_sets_no_parameter(carried: Carr
     # The forces are still those of the file.
     node.answer()
     # It is latched: who comes later has it, too.
-    assert len(carried.raw) == 1
+    assert len(carried.payloads) == 1
     late = node.peer.listen(f'{NODE}/payload', InertiaStamped, LATCHED)
-    node.until(lambda: late == carried.raw, 'the payload comes to a late subscriber')
+    node.until(lambda: late == carried.payloads, 'the payload comes to a late subscriber')
 
 
 def test_setpoints_are_answered_meanwhile_and_all_requests_are(carried: Carried) -> None:
@@ -345,21 +336,6 @@ def test_setpoints_are_answered_meanwhile_and_all_requests_are(carried: Carried)
     carried.node.until(lambda: all(each.done() for each in futures), 'all are answered')
     assert len({each.result().message for each in futures}) == 1
     assert all(each.result().success for each in futures)
-
-
-def test_numbers_not_identifiable_at_rest_keep_their_values(carried: Carried) -> None:
-    stamps = [BEGIN + round(time * 1e9) for time in TIMES]
-    carried.move([message_of(each) for each in resting(LOADED, AT_HOME, NO_WRENCH, stamps)])
-    answer = carried.identify()
-    assert answer.success
-    unknown, _, given = answer.message.partition('; not identified, as in the parameters: ')[
-        2].partition('; ')
-    assert unknown == ('center of mass z, inertia ixx, inertia ixy, inertia ixz, inertia iyy, '
-                       'inertia iyz, inertia izz')
-    assert ', 0.12], inertia: [13.0, 0.3, -0.4, 14.0, 0.2, 22.0]' in given
-    carried.node.until_status(PAYLOAD, OK, 'identified')
-    values = carried.node.values(PAYLOAD)
-    assert values['inertia izz, half of the 95 % interval (kg m^2)'] == 'not identified'
 
 
 def test_a_request_is_answered_when_the_node_is_deactivated(carried: Carried) -> None:

@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -66,17 +67,26 @@ def written(path: Path, text: str) -> Path:
     return file
 
 
-def rejection(path: Path, text: str) -> str:
-    """Return the error of a parameter file with this text."""
+def assert_rejected(path: Path, text: str, said: str,
+                    read: Callable[[Path], object] = Parameters.from_yaml) -> None:
+    """Check that a file with this text is rejected in one short line that begins so."""
     with pytest.raises(ParameterError) as caught:
-        Parameters.from_yaml(written(path, text))
-    return str(caught.value)
+        read(written(path, text))
+    message = str(caught.value)
+    assert message.startswith(f'{path / "hexapod.yaml"}: {said}')
+    assert message.isprintable()
+    assert len(message) < 450 + len(str(path))
+
+
+@pytest.fixture
+def p(tmp_path: Path) -> Parameters:
+    """Return the parameters of the valid file."""
+    return Parameters.from_yaml(written(tmp_path, GOOD))
 
 
 # Valid files
 
-def test_a_valid_file_gives_its_values(tmp_path: Path) -> None:
-    p = Parameters.from_yaml(written(tmp_path, GOOD))
+def test_a_valid_file_gives_its_values(p: Parameters) -> None:
     assert set(p) == set(PARAMETERS)
     assert len(p) == len(PARAMETERS)
     assert p['joints'] == ('a', 'b', 'c', 'd', 'e', 'f')
@@ -88,27 +98,15 @@ def test_a_valid_file_gives_its_values(tmp_path: Path) -> None:
     assert p['visualization_rate'] == 25.0
 
 
-def test_omitted_parameters_have_their_defaults(tmp_path: Path) -> None:
-    p = Parameters.from_yaml(written(tmp_path, GOOD))
-    assert np.array_equal(p['gravity'], [0.0, 0.0, -9.80665])
-    assert p['base_frame'] == 'base'
-    assert p['limits.force_max'] is None
-    assert p['singularity.action'] == 'warn'
-    assert p['autostart'] is True
-
-
-def test_one_value_holds_for_all_legs(tmp_path: Path) -> None:
-    p = Parameters.from_yaml(written(tmp_path, GOOD))
+def test_one_value_holds_for_all_legs(p: Parameters) -> None:
     assert np.array_equal(p['legs.cylinder.mass'], np.full(6, 12.0))
     assert np.array_equal(p['limits.length_min'], np.full(6, 0.8))
     assert np.array_equal(p['actuator.reflected_mass'], np.zeros(6))
-    in_brackets = Parameters.from_yaml(written(tmp_path, GOOD.replace('mass: 12.0',
-                                                                      'mass: [12.0]')))
+    in_brackets = p.replaced({'legs.cylinder.mass': [12.0]})
     assert np.array_equal(in_brackets['legs.cylinder.mass'], np.full(6, 12.0))
 
 
-def test_arrays_are_read_only(tmp_path: Path) -> None:
-    p = Parameters.from_yaml(written(tmp_path, GOOD))
+def test_arrays_are_read_only(p: Parameters) -> None:
     arrays = [value for value in p.values() if isinstance(value, np.ndarray)]
     assert len(arrays) > 10
     for array in arrays:
@@ -117,17 +115,18 @@ def test_arrays_are_read_only(tmp_path: Path) -> None:
 
 
 def test_the_characteristic_length_is_the_mean_distance_of_the_platform_joints(
-        tmp_path: Path) -> None:
-    p = Parameters.from_yaml(written(tmp_path, GOOD))
+        p: Parameters) -> None:
     joints = p['geometry.platform_joints']
     distances = np.linalg.norm(joints - joints.mean(axis=0), axis=1)
     assert p['singularity.characteristic_length'] == pytest.approx(distances.mean(), rel=1e-15)
+    twice = p.replaced({'geometry.platform_joints': 2.0 * joints.ravel()})
+    assert twice['singularity.characteristic_length'] == pytest.approx(
+        2.0 * distances.mean(), rel=1e-15)
     given_one = p.replaced({'singularity.characteristic_length': 0.25})
     assert given_one['singularity.characteristic_length'] == 0.25
 
 
-def test_replaced_changes_these_alone_and_checks_the_whole(tmp_path: Path) -> None:
-    p = Parameters.from_yaml(written(tmp_path, GOOD))
+def test_replaced_changes_these_alone_and_checks_the_whole(p: Parameters) -> None:
     heavier = p.replaced({'platform.mass': 200.0})
     assert heavier['platform.mass'] == 200.0
     assert p['platform.mass'] == 150.0
@@ -137,13 +136,6 @@ def test_replaced_changes_these_alone_and_checks_the_whole(tmp_path: Path) -> No
         p.replaced({'limits.length_max': 0.7})
     with pytest.raises(ParameterError, match=r'^a node: platform\.mass: -1\.0 kg: '):
         p.replaced({'platform.mass': -1.0}, 'a node')
-
-
-def test_replaced_geometry_takes_its_own_characteristic_length(tmp_path: Path) -> None:
-    p = Parameters.from_yaml(written(tmp_path, GOOD))
-    twice = p.replaced({'geometry.platform_joints': 2.0 * p['geometry.platform_joints'].ravel()})
-    assert twice['singularity.characteristic_length'] == pytest.approx(
-        2.0 * p['singularity.characteristic_length'], rel=1e-15)
 
 
 def test_a_later_section_overrides_an_earlier_one_and_other_nodes_are_ignored(
@@ -157,106 +149,99 @@ other_node:
     assert Parameters.from_yaml(written(tmp_path, GOOD + later))['platform.mass'] == 160.0
 
 
-# Invalid files: the line that is changed, its new text, and the words of the error
+# Invalid files: the part of the valid file that is changed, its new text, and the error
 
-BAD = {
-    'missing required value': ('      mass: 150.0\n', '', ['platform.mass', 'missing']),
-    'unknown name': ('visualization_rate', 'visualisation_rate', [
-        'visualisation_rate', 'unknown parameter', 'do you mean visualization_rate?']),
-    'unknown name in a group': ('warn_condition', 'warn_conditions', [
-        'singularity.warn_conditions', 'unknown', 'do you mean singularity.warn_condition?']),
-    'unknown name of which there are two': ('visualization_rate: 25.0', 'limits.angle_max: 0.5', [
-        'limits.angle_max: unknown parameter; do you mean limits.base_joint_angle_max or '
-        'limits.platform_joint_angle_max?']),
-    'unknown name like no other': ('visualization_rate: 25.0', 'qqq: 25.0', [
-        'qqq: unknown parameter']),
-    'integer for a double': ('mass: 150.0', 'mass: 150', [
-        'platform.mass', '150', 'is an integer, must be a double', 'write 150.0']),
-    'integer in an array': ('[20.0, 1.0,', '[20.0, 1,', [
-        'platform.inertia', ' 1:', 'is an integer', 'write 1.0']),
-    'string for a number': ('mass: 150.0', "mass: '150.0'", [
-        'platform.mass', "'150.0'", 'must be a double']),
-    'number for a string': ('joints: [a,', 'joints: [1,', ['joints', '1', 'must be a string']),
-    'a joint that no message can name': (
-        'joints: [a,', 'joints: ["a\\e",', ['joints', 'printable']),
-    'a zero byte': ('joints: [a,', 'joints: ["a\\0",', ['joints', 'printable']),
-    'number for a bool': ('visualization_rate: 25.0', 'autostart: 1', [
-        'autostart', '1', 'must be a bool']),
-    'array for a single value': ('mass: 150.0', 'mass: [150.0, 1.0]', [
-        'platform.mass', '[150.0, 1.0]', 'must be a single double']),
-    'single value for an array': ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: 0.1', [
-        'platform.center_of_mass', '0.1', 'must be an array of 3']),
-    'wrong length': ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: [0.01, 0.1]', [
-        'platform.center_of_mass', '[0.01, 0.1]', 'must have 3 entries, has 2']),
-    'wrong length of joints': ('1.0, -0.4, 0.0]', '1.0, -0.4]', [
-        'geometry.base_joints', 'must have 18 entries, has 17']),
-    'empty array': ('[6.0, 6.1, 6.2, 6.3, 6.4, 6.5]', '[]', [
-        'legs.piston.mass: []: ROS accepts no empty list: leave the name out']),
-    'group for a value': ('mass: 150.0', 'mass: {kg: 150.0}', [
-        'platform.mass.kg', 'unknown parameter', 'do you mean platform.mass?']),
-    'value for a group': ('limits: {length_min: 0.8, length_max: 1.4}', 'limits: 0.8', [
-        'limits', 'unknown parameter']),
-    'bad choice': ('warn_condition: 40.0', 'warn_condition: 40.0, action: stop', [
-        'singularity.action', "'stop'", 'must be one of warn, suppress_forces']),
-    'inertia of no body': (
-        '[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]', [
-            'platform.inertia', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]', 'positive definite',
-            '-1 kg m^2', 'ixx ixy ixz iyy iyz izz']),
-    'shortest not below longest': ('length_max: 1.4', 'length_max: 0.8', [
-        'limits.length_min', '0.8', 'must be less than limits.length_max', '0.8']),
-    'one leg shortest above longest': (
-        'length_max: 1.4', 'length_max: [1.4, 1.4, 1.4, 0.7, 1.4, 1.4]', [
-            'limits.length_min', 'must be less than limits.length_max', '0.7']),
-    'stop before warn': ('stop_condition: 400.0', 'stop_condition: 39.0', [
-        'singularity.stop_condition', '39.0', 'must be at least singularity.warn_condition',
-        '40.0']),
-    'not a number': ('mass: 150.0', 'mass: .nan', ['platform.mass', 'nan kg', 'must be finite']),
-    'too large to be finite': ('mass: 150.0', 'mass: 1.0e400', [
-        'platform.mass', 'inf kg', 'must be finite']),
-    'two legs of one name': ('[a, b, c, d, e, f]', '[a, b, c, d, e, a]', [
-        'joints', "['a', 'b', 'c', 'd', 'e', 'a']", 'six different names']),
-    'a platform that is one point': (
-        'platform_joints: [0.4, 0.4, 0.0,  0.2, 0.5, 0.0,  -0.6, 0.1, 0.0,\n'
-        '                        -0.6, -0.1, 0.0,  0.2, -0.5, 0.0,  0.4, -0.4, 0.0]',
-        f'platform_joints: {[0.5] * 18}', ['geometry.platform_joints', 'one point']),
-    'not yaml': ('mass: 150.0', 'mass: [150.0', ['not YAML', 'line']),
-    'a tab': ('      mass: 150.0', '\tmass: 150.0', [
-        'not YAML: line 10', 'line 10 is indented with a tab: use spaces']),
-    'no space': ('      mass: 150.0', '      mass:150.0', [
-        'not YAML: line 11', 'line 10: a space is missing after the colon of mass']),
-    'no space in a group': ('{mass: 12.0,', '{mass:12.0,', [
-        'legs.cylinder.mass:12.0: has no value',
-        'space is missing after the colon of legs.cylinder.mass']),
-    'lists in a list': ('[0.01, 0.0, 0.1]', '[[0.01, 0.0, 0.1]]', [
-        'platform.center_of_mass: [[0.01, 0.0, 0.1]]', 'one after the other']),
-    'null': ('mass: 150.0', 'mass: null', ['platform.mass: missing, it has no default']),
-    'a truth for a text': ('visualization_rate: 25.0', 'base_frame: on', [
-        'base_frame', 'True', 'must be a string: put it in quotes']),
-    'a tag': ('mass: 150.0', 'mass: !!float 150', [
-        'line 10, column 13', "a tag, 'tag:yaml.org,2002:float'"]),
-    'a tag of Python': ('mass: 150.0', 'mass: !!python/object:os.system {}', ['a tag']),
-    'a tag of ours': ('mass: 150.0', 'mass: !plain 150.0', ['line 10', "a tag, '!plain'"]),
-    'a merge of mappings': ('mass: 150.0', '<<: *m', ['alias']),
-    'a list for a name': ('mass: 150.0', '? [a]\n      : 150.0', [
-        'not YAML: line 10, column 9: a list, a group or an alias in place of a name']),
-    'given twice in two spellings': ('visualization_rate: 25.0', 'platform.mass: 25.0', [
-        'platform.mass: given twice under /**']),
-    'a list in a list of another node': ('/**:', 'a: {ros__parameters: {b: [[1]]}}\n/**:', [
-        'b: [[1]]', 'one after the other']),
-    'a name of two lines': ('visualization_rate', '"two\\nlines\\e[31m"', [
-        "'two\\nlines\\x1b[31m': unknown"]),
-    'duplicate keys': ('      mass: 150.0\n', '      mass: 150.0\n      mass: 160.0\n', [
-        'not YAML', 'duplicate key', 'mass', 'line']),
-    'an alias, which ROS rejects': (
-        'mass: 150.0', 'mass: *m', ['alias', 'write the value out']),
-    'a name without a value': ('mass: 150.0', 'mass:', ['platform.mass', 'has no value']),
-    'two documents': ('/**:', 'a: 1\n---\n/**:', [
-        'not YAML: line 2, column 1: expected a single document in the stream, but found ano']),
-    'no section of ours': ('/**:', 'other_node:', [
-        'holds other_node', "no parameters under '/**:' or 'stewart_dynamics:'"]),
-    'no ros__parameters': ('ros__parameters:', 'parameters:', [
-        '/**', "must hold 'ros__parameters:'"]),
-}
+BAD = [
+    ('      mass: 150.0\n', '', 'platform.mass: missing, it has no default'),
+    ('mass: 150.0', 'mass: null', 'platform.mass: missing, it has no default'),
+    ('mass: 150.0', 'mass:', 'platform.mass: has no value'),
+    # names
+    ('warn_condition', 'warn_conditions', 'singularity.warn_conditions: unknown parameter; '
+     'do you mean singularity.warn_condition?'),
+    ('visualization_rate: 25.0', 'limits.angle_max: 0.5', 'limits.angle_max: unknown parameter; '
+     'do you mean limits.base_joint_angle_max or limits.platform_joint_angle_max?'),
+    ('visualization_rate: 25.0', 'qqq: 25.0', 'qqq: unknown parameter'),
+    ('visualization_rate', '"two\\nlines\\e[31m"', r"'two\nlines\x1b[31m': unknown parameter"),
+    ('mass: 150.0', 'mass: {kg: 150.0}',
+     'platform.mass.kg: unknown parameter; do you mean platform.mass?'),
+    ('limits: {length_min: 0.8, length_max: 1.4}', 'limits: 0.8', 'limits: unknown parameter'),
+    ('visualization_rate: 25.0', 'platform.mass: 25.0', 'platform.mass: given twice under /**'),
+    # types
+    ('mass: 150.0', 'mass: 150',
+     'platform.mass: 150: is an integer, must be a double: write 150.0'),
+    ('[20.0, 1.0,', '[20.0, 1,',
+     'platform.inertia: 1: is an integer, must be a double: write 1.0'),
+    ('mass: 150.0', "mass: '150.0'", "platform.mass: '150.0': must be a double"),
+    ('joints: [a,', 'joints: [1,', 'joints: 1: must be a string: put it in quotes'),
+    ('visualization_rate: 25.0', 'base_frame: on',
+     'base_frame: True: must be a string: put it in quotes'),
+    ('joints: [a,', 'joints: ["a\\e",', r"joints: 'a\x1b': must be printable text"),
+    ('visualization_rate: 25.0', 'autostart: 1', 'autostart: 1: must be a bool'),
+    # sizes
+    ('mass: 150.0', 'mass: [150.0, 1.0]',
+     'platform.mass: [150.0, 1.0]: must be a single double'),
+    ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: 0.1',
+     'platform.center_of_mass: 0.1 m: must be an array of 3'),
+    ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: [0.01, 0.1]',
+     'platform.center_of_mass: [0.01, 0.1]: must have 3 entries, has 2'),
+    ('[6.0, 6.1, 6.2, 6.3, 6.4, 6.5]', '[]',
+     'legs.piston.mass: []: ROS accepts no empty list: leave the name out'),
+    ('[0.01, 0.0, 0.1]', '[[0.01, 0.0, 0.1]]', 'platform.center_of_mass: [[0.01, 0.0, 0.1]]: '
+     'has a list or a group in the list: write the numbers one after the other'),
+    ('/**:', 'a: {ros__parameters: {b: [[1]]}}\n/**:', 'b: [[1]]: has a list or a group in the '),
+    # values
+    ('warn_condition: 40.0', 'warn_condition: 40.0, action: stop',
+     "singularity.action: 'stop': must be one of warn, suppress_forces"),
+    ('[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]',
+     'platform.inertia: [20.0, 0.0, 0.0, 20.0, 0.0, -1.0]: must be positive definite, but its '
+     'smallest principal moment is -1 kg m^2 (the order is ixx ixy ixz iyy iyz izz)'),
+    ('length_max: 1.4', 'length_max: 0.8', 'limits.length_min: [0.8, 0.8, 0.8, 0.8, 0.8, 0.8]: '
+     'must be less than limits.length_max, [0.8, 0.8, 0.8, 0.8, 0.8, 0.8]'),
+    ('length_max: 1.4', 'length_max: [1.4, 1.4, 1.4, 0.7, 1.4, 1.4]',
+     'limits.length_min: [0.8, 0.8, 0.8, 0.8, 0.8, 0.8]: must be less than limits.length_max, '),
+    ('stop_condition: 400.0', 'stop_condition: 39.0', 'singularity.stop_condition: 39.0: '
+     'must be at least singularity.warn_condition, 40.0'),
+    ('mass: 150.0', 'mass: .nan', 'platform.mass: nan kg: must be finite'),
+    ('[a, b, c, d, e, f]', '[a, b, c, d, e, a]',
+     "joints: ['a', 'b', 'c', 'd', 'e', 'a']: six different names needed"),
+    ('platform_joints: [0.4, 0.4, 0.0,  0.2, 0.5, 0.0,  -0.6, 0.1, 0.0,\n'
+     '                        -0.6, -0.1, 0.0,  0.2, -0.5, 0.0,  0.4, -0.4, 0.0]',
+     f'platform_joints: {[0.5] * 18}', 'geometry.platform_joints: all six are at one point'),
+    # YAML
+    ('mass: 150.0', 'mass: [150.0', 'not YAML: line 11, column 21: '),
+    ('      mass: 150.0', '\tmass: 150.0', 'not YAML: line 10, column 1: found character that '
+     'cannot start any token; line 10 is indented with a tab: use spaces'),
+    ('      mass: 150.0', '      mass:150.0', 'not YAML: line 11, column 21: mapping values are '
+     'not allowed in this context; line 10: a space is missing after the colon of mass'),
+    ('{mass: 12.0,', '{mass:12.0,', 'legs.cylinder.mass:12.0: has no value; '
+     'a space is missing after the colon of legs.cylinder.mass'),
+    ('mass: 150.0', 'mass: !!float 150',
+     "not YAML: line 10, column 13: a tag, 'tag:yaml.org,2002:float': ROS ignores it, "),
+    ('mass: 150.0', '? [a]\n      : 150.0',
+     'not YAML: line 10, column 9: a list, a group or an alias in place of a name'),
+    ('      mass: 150.0\n', '      mass: 150.0\n      mass: 160.0\n',
+     "not YAML: line 11, column 7: duplicate key 'mass'"),
+    ('mass: 150.0', 'mass: *m',
+     'not YAML: line 10, column 13: has a YAML alias (*): write the value out'),
+    # sections
+    ('/**:', 'a: 1\n---\n/**:',
+     'not YAML: line 2, column 1: expected a single document in the stream, but found another'),
+    ('/**:', 'other_node:',
+     "holds other_node, but no parameters under '/**:' or 'stewart_dynamics:'"),
+    ('ros__parameters:', 'parameters:', "/**: must hold 'ros__parameters:'"),
+    (GOOD, '', "must begin with '/**:' or a node's name"),
+    (GOOD, 'just words\n', "must begin with '/**:' or a node's name"),
+    (GOOD, '/**: {ros__parameters: [1, 2]}\n',
+     'ros__parameters: [1, 2]: must hold names and values'),
+    (GOOD, '/**: {ros__parameters: }\n', 'holds /**, but no parameters under '),
+    (GOOD, '/**: \x07\n', 'not YAML: line 1: control characters are not allowed')]
+
+
+@pytest.mark.parametrize(('old', 'new', 'said'), BAD, ids=[said[:60] for _, _, said in BAD])
+def test_the_error_of_a_bad_file_names_parameter_value_and_rule(
+        tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert GOOD.count(old) == 1
+    assert_rejected(tmp_path, GOOD.replace(old, new), said)
 
 
 @pytest.mark.parametrize(('name', 'value', 'rule'), [
@@ -285,37 +270,6 @@ def test_a_value_that_breaks_a_rule_is_rejected(name: str, value: Any, rule: str
     assert rule in str(caught.value)
 
 
-@pytest.mark.parametrize('case', BAD)
-def test_the_error_of_a_bad_file_names_parameter_value_and_rule(
-        tmp_path: Path, case: str) -> None:
-    old, new, words = BAD[case]
-    assert GOOD.count(old) == 1
-    message = rejection(tmp_path, GOOD.replace(old, new))
-    assert message.startswith(f'{tmp_path / "hexapod.yaml"}: ')
-    for word in words:
-        assert word in message
-    assert message.isprintable()
-
-
-@pytest.mark.parametrize(('text', 'words'), [
-    ('', ["must begin with '/**:' or a node's name"]),
-    ('[1.0, 2.0]\n', ['must begin with']),
-    ('just words\n', ['must begin with']),
-    ('/**: 3\n', ['/**', "must hold 'ros__parameters:'"]),
-    ('/**:\n', ['/**', "must hold 'ros__parameters:'"]),
-    ('/**: {ros__parameters: [1, 2]}\n', ['ros__parameters', '[1, 2]', 'names and values']),
-    ('/**: {ros__parameters: }\n', ['no parameters']),
-    ('{' * 1500, ['not YAML']),
-    ('/**: \x07\n', ['not YAML: line 1', 'control characters']),
-])
-def test_the_error_of_a_file_with_another_root_says_what_it_must_be(
-        tmp_path: Path, text: str, words: list[str]) -> None:
-    message = rejection(tmp_path, text)
-    assert message.startswith(f'{tmp_path / "hexapod.yaml"}: ')
-    for word in words:
-        assert word in message
-
-
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r'nowhere\.yaml: cannot be read: No such file'):
         Parameters.from_yaml(tmp_path / 'nowhere.yaml')
@@ -327,11 +281,11 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
     lambda text: '\ufeff' + text, lambda text: text.replace('\n', '\r\n'),
     lambda text: '%YAML 1.2\n---\n' + text, lambda text: text.replace('150.0', '&a 150.0')],
     ids=['byte order mark', 'CRLF', 'version', 'anchor'])
-def test_sections_that_ros_ignores_change_nothing(tmp_path: Path, change: Any) -> None:
-    given = Parameters.from_yaml(written(tmp_path, GOOD))
-    path = tmp_path / 'hexapod.yaml'
+def test_sections_that_ros_ignores_change_nothing(
+        tmp_path: Path, p: Parameters, change: Any) -> None:
+    path = tmp_path / 'other.yaml'
     path.write_bytes(change(GOOD).encode())
-    assert Parameters.from_yaml(path) == given
+    assert Parameters.from_yaml(path) == p
 
 
 def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
@@ -345,30 +299,27 @@ def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
 
 
 @pytest.mark.parametrize('text, said', [
-    ('x: &a {b: *a}', 'alias'),
-    ('a: ' + '{a: ' * 30, 'line 3, column 76: nests deeper than 20'),
-    ('a: ' + '[' * 3000, 'nests deeper'), ('- ' * 3000, 'nests deeper'),
-    ('a: !!bool foo', 'a tag'), (f'a: {"9" * 90000}x', 'unknown parameter'),
-    (f'{"a" * 1000}: 1.0', 'unknown parameter'),
-    (f'platform.mass: {"9" * 90000}', 'must be finite'),
-    ('platform: {mass: 0x' + 'f' * 5000 + '}', 'platform.mass')])
+    ('x: &a {b: *a}', 'not YAML: line 3, column 15: has a YAML alias (*): write the value out'),
+    ('a: ' + '{a: ' * 30, 'not YAML: line 3, column 76: nests deeper than 20'),
+    (f'{"a" * 1000}: 1.0', f'{"a" * 77}...: unknown parameter'),
+    (f'platform.mass: {"9" * 90000}', 'platform.mass: inf kg: must be finite'),
+    ('platform: {mass: 0x' + 'f' * 5000 + '}', "platform.mass: '0xfff")])
 def test_difficult_yaml_is_rejected_in_one_short_line(
         tmp_path: Path, text: str, said: str) -> None:
-    path = tmp_path / 'hexapod.yaml'
-    path.write_text(f'/**:\n  ros__parameters:\n    {text}\n')
-    with pytest.raises(ParameterError, match=said) as caught:
-        Parameters.check_file(path)
-    assert str(path) in str(caught.value)
-    assert '\n' not in str(caught.value)
-    assert len(str(caught.value)) < 400 + len(str(path))
+    assert_rejected(tmp_path, f'/**:\n  ros__parameters:\n    {text}\n', said,
+                    Parameters.check_file)
 
 
-def test_null_takes_the_default() -> None:
+def test_null_and_omitted_parameters_have_their_defaults() -> None:
     parameters = Parameters({**GIVEN, 'gravity': None, 'joints': None,
                              'singularity.warn_condition': None, 'limits.force_max': None})
     assert set(parameters.given) == set(GIVEN)
     assert parameters['gravity'].tolist() == [0.0, 0.0, -9.80665]
     assert parameters['joints'] == tuple(f'leg_{n}' for n in range(1, 7))
+    assert parameters['base_frame'] == 'base'
+    assert parameters['limits.force_max'] is None
+    assert parameters['singularity.action'] == 'warn'
+    assert parameters['autostart'] is True
 
 
 # Arbitrary input
@@ -409,13 +360,15 @@ def check_any(file: Path) -> None:
             continue
         for name, value in (parameters or {}).items():
             known = PARAMETERS[name]
-            if isinstance(value, np.ndarray):
-                assert value.size in (3, 4, 6, 18)
             if known.kind == 'double' and value is not None:
-                assert np.all(np.isfinite(value))
-                assert np.all(value >= known.minimum)
-                assert np.all(value <= known.maximum)
-                assert not known.above or np.all(value > known.minimum)
+                assert np.size(value) in (1, 3, 4, 6, 18)
+                assert np.all(np.isfinite(value) & (value <= known.maximum) & (
+                    value > known.minimum if known.above else value >= known.minimum))
+
+
+def encoded(text: str) -> bytes:
+    """Return the bytes of a text, with surrogates in it."""
+    return text.encode(errors='surrogatepass')
 
 
 # A place in the valid file, the number of characters removed there, and the text inserted.
@@ -427,24 +380,16 @@ scalars = st.sampled_from([
     '"\\0"'])
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
 @given(st.one_of(
-    st.text(max_size=60), st.text(alphabet=f'/*:rosparmet_{SPECIAL}', max_size=60),
+    st.text(max_size=60).map(encoded),
+    st.text(alphabet=f'/*:rosparmet_{SPECIAL}', max_size=60).map(encoded),
     st.tuples(cuts, st.text(alphabet=SPECIAL, max_size=6)).map(
-        lambda cut: GOOD[:cut[0][0]] + cut[1] + GOOD[sum(cut[0]):])))
-@np.errstate(all='ignore')
-def test_any_text_is_accepted_or_rejected_in_one_line(tmp_path: Path, text: str) -> None:
-    file = tmp_path / 'any.yaml'
-    file.write_text(text, encoding='utf-8', errors='surrogatepass')
-    check_any(file)
-
-
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.one_of(
+        lambda cut: encoded(GOOD[:cut[0][0]] + cut[1] + GOOD[sum(cut[0]):])),
     st.binary(max_size=60), st.tuples(cuts, st.binary(max_size=4)).map(
         lambda cut: GOOD.encode()[:cut[0][0]] + cut[1] + GOOD.encode()[sum(cut[0]):])))
 @np.errstate(all='ignore')
-def test_any_bytes_are_accepted_or_rejected_in_one_line(tmp_path: Path, data: bytes) -> None:
+def test_any_file_is_accepted_or_rejected_in_one_line(tmp_path: Path, data: bytes) -> None:
     file = tmp_path / 'any.yaml'
     file.write_bytes(data)
     check_any(file)
@@ -472,8 +417,7 @@ def test_any_values_in_a_file_are_accepted_or_rejected_in_one_line(
     'use_sim_time: false',
     'qos_overrides: {/a/setpoint/pose: {subscription: {reliability: best_effort}}}'])
 def test_parameters_that_ros_declares_are_ignored(tmp_path: Path, name: str) -> None:
-    path = tmp_path / 'hexapod.yaml'
-    path.write_text(f'/**:\n  ros__parameters:\n    platform.mass: 3.0\n    {name}\n')
+    path = written(tmp_path, f'/**:\n  ros__parameters:\n    platform.mass: 3.0\n    {name}\n')
     assert read_yaml(path, 'stewart_dynamics') == {'platform.mass': 3.0}
     Parameters.check_file(path)
 
@@ -481,11 +425,8 @@ def test_parameters_that_ros_declares_are_ignored(tmp_path: Path, name: str) -> 
 @pytest.mark.parametrize('name, text, said', [
     ('platform.mass', '150', 'platform.mass: 150: is an integer, must be a double: write 150.0'),
     ('platform.mass', '0,5', "platform.mass: '0,5': must be a double"),
-    ('platform.mas', '1.0', 'platform.mas: unknown parameter; do you mean platform.mass?'),
     ('gravity', '[]', 'gravity: []: ROS accepts no empty list'),
-    ('gravity', '[[0.0, 0.0, 1.0]]', 'gravity: [[0.0, 0.0, 1.0]]: has a list'),
     ('gravity', '', 'gravity: has no value'), ('gravity', '~', 'gravity: has no value'),
-    ('gravity', '{x: 1.0}', 'gravity: 1.0 m/s^2: must be an array of 3'),
     ('gravity', '[', 'gravity: not YAML: line '), ('gravity', '\udcff', 'gravity: not YAML'),
     ('use_sim_time', '1', 'use_sim_time: 1: must be a bool')])
 def test_a_bad_value_on_a_command_line_is_rejected(name: str, text: str, said: str) -> None:
@@ -515,8 +456,8 @@ def test_a_value_that_ros_would_ignore_is_rejected(tmp_path: Path, value: str, r
     ('/**' * 10000 + '/x', '/a/b', False)])
 def test_sections_are_matched_as_ros_matches_them(
         tmp_path: Path, section: str, node: str, meant: bool) -> None:
-    path = tmp_path / 'hexapod.yaml'
-    path.write_text(f"? '{section}'\n: {{ros__parameters: {{platform: {{mass: 7.0}}}}}}\n")
+    path = written(
+        tmp_path, f"? '{section}'\n: {{ros__parameters: {{platform: {{mass: 7.0}}}}}}\n")
     if meant:
         assert read_yaml(path, node or Parameters.node) == {'platform.mass': 7.0}
     else:
@@ -605,8 +546,8 @@ def test_a_whole_file_is_written_that_reads_back_equal(tmp_path: Path, file: str
     assert read == parameters
 
 
-def test_a_written_file_has_units_and_short_lines(tmp_path: Path) -> None:
-    parameters = Parameters.from_yaml(written(tmp_path, GOOD)).replaced({
+def test_a_written_file_has_units_and_short_lines(tmp_path: Path, p: Parameters) -> None:
+    parameters = p.replaced({
         'platform.mass': 1e-5, 'base_frame': "on 'deck'", 'platform_frame': 'y',
         'legs.cylinder.inertia': 1e17})
     parameters.to_yaml(tmp_path / 'out.yaml')
@@ -642,9 +583,7 @@ def test_written_values_read_back_equal(
     assert Parameters.from_yaml(tmp_path / 'out.yaml') == parameters
 
 
-def test_a_file_for_another_node_is_named(tmp_path: Path) -> None:
-    message = rejection(tmp_path, GOOD.replace('/**:', 'stewart_dynamic:'))
-    assert 'holds stewart_dynamic, but no parameters under' in message
+def test_other_nodes_of_a_file_are_named(tmp_path: Path) -> None:
     file = written(tmp_path, 'a: {b: {ros__parameters: {x: 1.0}}}\nc: {ros__parameters: {}}\n')
     assert other_nodes(file, '/stewart_dynamics') == 'a/b, c'
     assert other_nodes(file, '/a/b') == ''

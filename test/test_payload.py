@@ -33,6 +33,7 @@ from stewart_dynamics.external_wrench.payload import (
     identify, NAMES, numbers_of, Payload, PayloadOutcome)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin
 from stewart_dynamics.mechanics.rows import NO_BASE
+from stewart_dynamics.node.diagnostics.outcomes import PayloadDiagnostics
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
@@ -51,10 +52,8 @@ HOME = Motion([0.0, 0.0, 1.1], np.eye(3))
 class Noise(NamedTuple):
     """Standard deviations of the measurements."""
 
-    rate: float = 0.0
-    """[m/s]"""
-    force: float = 0.0
-    """[N]"""
+    rate: float = 0.0  # [m/s]
+    force: float = 0.0  # [N]
 
 
 SENSORS = Noise(1e-3, 5.0)
@@ -75,22 +74,10 @@ def at_rest(seconds: Any) -> Motion:
 def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Noise = SENSORS,
              seed: int = 1, true: Parameters = LOADED, **more: Any) -> LegHistory:
     """
-    Return measurements of a hexapod in motion, with the forces of its own parameters.
+    Return measurements of a hexapod that moves so, with the forces of the true parameters.
 
-    Parameters
-    ----------
-    moves : callable
-        Gives the motion at times [s]; the forces are those of the middle between two samples.
-    seconds, rate
-        How long, and how often.
-    noise, seed
-        Noise and seed of the measurements.
-    true : Parameters
-        Parameters of the hexapod.
-    more
-        ``wrench`` on the platform, of which ``known`` is known; ``base`` at times [s], ``offset``
-        of the forces and their largest, ``clip`` [N].
-
+    The forces are those of the middle between two samples. ``more``: ``wrench`` on the platform,
+    of which ``known`` is known; ``base`` at times [s]; ``offset`` and largest ``clip`` [N].
     """
     random = rng(seed)
     times = 2.0 + np.arange(round(seconds * rate) + 1) / rate
@@ -113,6 +100,14 @@ def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Nois
             strict=True):
         history.add(tuple(force), Estimate(stamp, tuple(row), None, None, of_base),
                     more.get('known', NO_WRENCH))
+    return history
+
+
+def add_again(history: LegHistory, measurements: LegHistory, factor: float = 1.0) -> LegHistory:
+    """Return a history to which measurements are added, their forces times a factor."""
+    for row in measurements.rows(0, measurements.count):
+        history.add(tuple(factor * row[19:25]), Estimate(
+            int(row[:1].view(np.int64)[0]), tuple(row[1:19]), None, None), NO_WRENCH)
     return history
 
 
@@ -189,14 +184,21 @@ def test_noise_in_the_rates_makes_no_inertia_smaller() -> None:
 
 
 def test_only_mass_and_horizontal_center_are_identified_at_rest() -> None:
-    payload = payload_of(recorded(at_rest))
+    outcome = outcome_of(recorded(at_rest))
+    payload, diagnostics = outcome.payload, PayloadDiagnostics()
+    assert payload is not None
     assert known(payload) == ['mass', 'center of mass x', 'center of mass y']
     body, given = payload.fitted.body, payload.given
     assert body.center[2] == given.center[2]
     assert body.inertia.tolist() == given.inertia.tolist()
     assert np.abs(errors(payload)[:3]).max() < 1.0
-    message = outcome_of(recorded(at_rest)).message
-    assert 'not identified, as in the parameters: center of mass z, inertia ixx, ' in message
+    assert f'; not identified, as in the parameters: {", ".join(NAMES[3:])}; ' in outcome.message
+    assert ', 0.12], inertia: [13.0, 0.3, -0.4, 14.0, 0.2, 22.0]' in outcome.message
+    diagnostics.done(outcome, 0.1)
+    status = diagnostics.status(0.0)
+    assert status is not None
+    assert dict(status.values)[
+        'inertia izz, half of the 95 % interval (kg m^2)'] == 'not identified'
 
 
 def test_at_rest_the_interval_has_what_coulomb_friction_can_hold() -> None:
@@ -204,8 +206,7 @@ def test_at_rest_the_interval_has_what_coulomb_friction_can_hold() -> None:
     friction = HEXAPOD['actuator.coulomb_friction']
     for sign in (-1.0, 1.0):
         payload = payload_of(recorded(at_rest, noise=Noise(), offset=0.7 * sign * friction))
-        error = payload.fitted.body.mass - TRUE[0]
-        assert abs(error) > 5.0
+        assert abs(payload.fitted.body.mass - TRUE[0]) > 5.0
         assert abs(errors(payload)[0]) < 2.0
     without = HEXAPOD.replaced({'actuator.coulomb_friction': 0.0})
     of_none = payload_of(recorded(at_rest, noise=Noise()), without)
@@ -296,38 +297,22 @@ def test_too_few_measurements_are_rejected_with_the_reason() -> None:
         assert outcome.message.startswith(said)
 
 
-def test_forces_of_the_wrong_sign_are_named() -> None:
-    history, wrong = recorded(excited), LegHistory(10.0)
-    for row in history.rows(0, history.count):
-        wrong.add(tuple(-row[19:25]), Estimate(
-            int(row[:1].view(np.int64)[0]), tuple(row[1:19]), None, None), NO_WRENCH)
-    outcome = outcome_of(wrong)
-    assert outcome.payload is None
-    assert outcome.message.startswith('the measured forces are -1.')
-    assert outcome.message.endswith('likely they have another sign')
-
-
-@pytest.mark.parametrize(('factor', 'said'), [
-    (1e-3, 'the measured forces are 0.001'), (1e200, 'the measured forces are 1.'),
-    (1e304, 'numbers overflow'),
-    (5.0, 'the mass is not identifiable from the measured forces: residual '),
-])
-def test_forces_of_another_size_are_named(factor: float, said: str) -> None:
-    history, wrong = recorded(excited, seconds=4.0, rate=200.0), LegHistory(10.0)
-    for row in history.rows(0, history.count):
-        wrong.add(tuple(factor * row[19:25]), Estimate(
-            int(row[:1].view(np.int64)[0]), tuple(row[1:19]), None, None), NO_WRENCH)
-    outcome = outcome_of(wrong)
+@pytest.mark.parametrize(('factor', 'said', 'cause'), [
+    (-1.0, 'the measured forces are -1.', 'likely they have another sign'),
+    (1e-3, 'the measured forces are 0.001', ''), (1e200, 'the measured forces are 1.', ''),
+    (1e304, 'numbers overflow', ''),
+    (5.0, 'the mass is not identifiable from the measured forces: residual ', '')])
+def test_forces_of_another_size_are_named(factor: float, said: str, cause: str) -> None:
+    outcome = outcome_of(add_again(
+        LegHistory(10.0), recorded(excited, seconds=4.0, rate=200.0), factor))
     assert outcome.payload is None
     assert outcome.message.startswith(said)
+    assert outcome.message.endswith(cause)
 
 
 def test_after_a_restart_only_what_follows_counts() -> None:
-    history = recorded(excited, true=HEXAPOD)
-    for row in recorded(excited, seconds=4.0).rows(0, 2001):
-        history.add(tuple(row[19:25]), Estimate(
-            int(row[:1].view(np.int64)[0]), tuple(row[1:19]), None, None), NO_WRENCH)
-    payload = payload_of(history)
+    payload = payload_of(add_again(
+        recorded(excited, true=HEXAPOD), recorded(excited, seconds=4.0)))
     assert payload.seconds == 4.0
     assert abs(payload.fitted.body.mass - TRUE[0]) < 0.5
 

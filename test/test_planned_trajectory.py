@@ -26,9 +26,8 @@ from referees import (
     derivative, random_direction, random_parameters, rng, rotation_about, scaled, size_of)
 from scipy.interpolate import CubicHermiteSpline
 from simulated import simulated, UNLIMITED
-from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
+from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import MotionError, ParameterError
-from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES)
@@ -38,7 +37,7 @@ from stewart_dynamics.planned.trajectory import check_planned_trajectory, Planne
 from stewart_dynamics.setpoints.step import Setpoint, Step
 from stewart_dynamics.simulator.plant import Plant
 from trajectories import (
-    Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
+    Array, counted, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
 
 Trajectory = tuple[Sequence[int], Array]  # times [ns], and rows as in trajectories
 
@@ -88,7 +87,9 @@ def test_at_the_points_the_legs_are_those_of_inverse_dynamics() -> None:
     ({'motion': Motion([0.0, 0.0, 1.1], np.eye(3))}, 'motion: shape (): must be (N,)'),
     ({'motion': np.zeros((4, 24))}, 'motion: a value of type ndarray: must be a Motion'),
     ({'wrench': np.zeros((4, 6))}, 'wrench: shape (4, 6): must be (6,)'),
-    ({'wrench': np.zeros(5)}, 'wrench: shape (5,)')], ids=str)
+    ({'wrench': np.zeros(5)}, 'wrench: shape (5,)'),
+    ({'base': np.zeros(12)}, 'must be a BaseMotion'),
+    ({'base': BaseMotion(np.zeros((3, 3)))}, 'base: shape (3,): must be () or (4,)')], ids=str)
 def test_arguments_that_do_not_fit_are_errors(change: dict[str, object], said: str) -> None:
     arguments = {'times': [0.0, 1.0, 2.0, 3.0], 'wrench': None,
                  'motion': Motion(np.tile([0.0, 0.0, 1.1], (4, 1)), np.eye(3)), **change}
@@ -99,20 +100,16 @@ def test_arguments_that_do_not_fit_are_errors(change: dict[str, object], said: s
 
 # Rejected
 
-def legs_of(parameters: Parameters, rows: Array) -> Array:
-    """Return results of rows of motion."""
-    return StewartPlatform(parameters).solve(rows)
-
-
 def between_points(times: Sequence[int], rows: Array, count: int = 4001) -> tuple[Array, Array]:
-    """Return times and rows of the motion of the platform, sampled densely between points."""
+    """Return times [s], dense between points, and the results of the platform's motion there."""
     seconds = np.array(times) * 1e-9
     motion = motion_of(rows)
     between = Interpolation(np.diff(seconds), motion.rows)
     part = np.linspace(0.0, 1.0, count)
     both = [(begin + part * (end - begin), between.at(np.full(len(part), n), part))
             for n, (begin, end) in enumerate(pairwise(seconds))]
-    return np.concatenate([each[0] for each in both]), np.concatenate([each[1] for each in both])
+    return np.concatenate([each[0] for each in both]), StewartPlatform(FREE).solve(
+        np.concatenate([each[1] for each in both]))
 
 
 def cubic_between(times: Sequence[int], rows: Array) -> tuple[Array, Array, Array]:
@@ -138,55 +135,34 @@ TIMES = [0, SECOND]
 # up and back down: a controller's cubic goes rate / 4 high; the platform 5 / 16 rate higher at
 # no acceleration, and half of that less at one that brakes harder than it must
 LEAPS = {'platform': heave(0.0, 0.3, 0.0, -0.3, 0.0), 'legs': heave(0.0, 0.3, -1.2, -0.3, -1.2)}
+STEPS = {'platform': heave(0.15), 'legs': heave(0.15, 0.0, 1.2, 0.0, -1.2)}
 
 
 @pytest.mark.parametrize('whose', ['platform', 'legs'])
-@pytest.mark.parametrize(('limit', 'sign'), [('limits.length_max', 1.0),
-                                             ('limits.length_min', -1.0)])
-def test_a_length_exceeded_between_points_alone_is_found(
-        whose: str, limit: str, sign: float) -> None:
-    rows = LEAPS[whose].copy()
+@pytest.mark.parametrize(('limit', 'sign', 'of', 'words'), [
+    ('limits.length_max', 1.0, LEAPS, 'length'), ('limits.length_min', -1.0, LEAPS, 'length'),
+    ('limits.velocity_max', 1.0, STEPS, 'rate')])
+def test_a_limit_exceeded_between_points_alone_is_found(
+        whose: str, limit: str, sign: float, of: dict[str, Array], words: str) -> None:
+    rows = of[whose].copy()
     rows[:, 7:] *= sign
-    dense, motions = between_points(TIMES, rows)
-    of_platform = legs_of(FREE, motions)[:, LENGTHS]
-    cubic_dense, of_legs, _ = cubic_between(TIMES, rows)
-    extremes = {'platform': (sign * of_platform).max(), 'legs': (sign * of_legs).max()}
-    other = {'platform': 'legs', 'legs': 'platform'}[whose]
-    assert extremes[whose] > extremes[other] + 1e-3
-    bound = sign * 0.5 * (extremes[whose] + extremes[other])
-    result = check((TIMES, rows), FREE.replaced({limit: [bound]}))
+    dense, results = between_points(TIMES, rows)
+    cubic_dense, lengths, rates = cubic_between(TIMES, rows)
+    values = {'platform': sign * results[:, RATES if words == 'rate' else LENGTHS],
+              'legs': sign * (rates if words == 'rate' else lengths)}
+    highest, other = sorted((each.max() for each in values.values()), reverse=True)
+    assert values[whose].max() == highest > other + 1e-3
+    bound = 0.5 * (highest + other)
+    result = check((TIMES, rows), FREE.replaced({limit: [sign * bound]}))
     assert result.reason == LIMIT
     time, leg = result.time, result.leg
-    times, lengths = (dense, of_platform) if whose == 'platform' else (cubic_dense, of_legs)
-    broken = times[(sign * lengths[:, leg] > sign * bound)]
-    assert broken[0] - 1e-3 <= time <= broken[-1]
-    assert f'at {time:.3f} s leg_{leg + 1}: length ' in result.message
+    broken = {'platform': dense, 'legs': cubic_dense}[whose][values[whose][:, leg] > bound]
+    assert broken[0] - (1e-3 if words == 'length' else 0.0) <= time <= broken[-1]
+    assert f'at {time:.3f} s leg_{leg + 1}: {words} ' in result.message
     assert f' {limit}' in result.message
     # A limit that neither exceeds.
-    wide = bound + 2.0 * sign * abs(extremes[whose] - extremes[other])
+    wide = sign * (highest + min(0.01 * abs(highest), highest - other))
     assert check((TIMES, rows), FREE.replaced({limit: [wide]})).accepted
-
-
-@pytest.mark.parametrize(('whose', 'acceleration'), [('platform', 0.0), ('legs', 1.2)])
-def test_a_rate_exceeded_between_points_alone_is_found(whose: str, acceleration: float) -> None:
-    rows = heave(0.15, 0.0, acceleration, 0.0, -acceleration)
-    dense, motions = between_points(TIMES, rows)
-    of_platform = legs_of(FREE, motions)[:, RATES]
-    cubic_dense, _, of_legs = cubic_between(TIMES, rows)
-    extremes = {'platform': of_platform.max(), 'legs': of_legs.max()}
-    other = {'platform': 'legs', 'legs': 'platform'}[whose]
-    assert extremes[whose] > extremes[other] + 1e-3
-    bound = 0.5 * (extremes[whose] + extremes[other])
-    result = check((TIMES, rows), FREE.replaced({'limits.velocity_max': [bound]}))
-    assert result.reason == LIMIT
-    time, leg = result.time, result.leg
-    times, rates = (dense, of_platform) if whose == 'platform' else (cubic_dense, of_legs)
-    broken = times[rates[:, leg] > bound]
-    assert broken[0] <= time <= broken[-1]
-    assert f'leg_{leg + 1}: rate ' in result.message
-    assert ' limits.velocity_max' in result.message
-    assert check((TIMES, rows), FREE.replaced(
-        {'limits.velocity_max': [1.01 * extremes[whose]]})).accepted
 
 
 def random_trajectory(parameters: Parameters, random: np.random.Generator) -> tuple[Array, Motion]:
@@ -247,8 +223,8 @@ def test_a_force_exceeded_between_points_alone_is_found(duration: int) -> None:
     """At rest at both ends, 10 cm or 0.2 mm apart: what moves it lies between."""
     times = [0, duration]
     rows = heave(0.1 if duration == SECOND else 2e-4)
-    dense, motions = between_points(times, rows)
-    forces = np.abs(legs_of(FREE, motions)[:, FORCES])
+    dense, results = between_points(times, rows)
+    forces = np.abs(results[:, FORCES])
     points = forces[[0, -1]].max()
     assert forces.max() > 1.2 * points
     bound = 0.5 * (forces.max() + points)
@@ -259,8 +235,8 @@ def test_a_force_exceeded_between_points_alone_is_found(duration: int) -> None:
     assert broken[0] <= time <= broken[-1]
     assert ' limits.force_max' in result.message
     assert 'clipped' not in result.message
-    wide = FREE.replaced({'limits.force_max': [1.001 * forces.max()]})
-    assert check((times, rows), wide).accepted
+    assert check((times, rows), FREE.replaced(
+        {'limits.force_max': [1.001 * forces.max()]})).accepted
 
 
 def test_a_limit_at_a_point_is_found_with_its_leg() -> None:
@@ -292,11 +268,9 @@ def test_the_clear_trajectory_is_accepted(step: int) -> None:
 
 @pytest.mark.parametrize('step', [SECOND // 1000, SECOND // 10, SECOND])
 def test_the_singular_trajectory_is_rejected(step: int) -> None:
-    times, rows = sampled('singular', step)
-    data = (times, rows)
+    data = times, rows = sampled('singular', step)
     every = max(1, SECOND // 10 // step)
-    fine, motions = between_points(times[::every], rows[::every], 401 if step < SECOND else 4001)
-    results = legs_of(FREE, motions)
+    fine, results = between_points(times[::every], rows[::every], 401 if step < SECOND else 4001)
     crossing = fine[np.argmax(results[:, DETERMINANT] * results[0, DETERMINANT] < 0.0)]
     forces = fine[np.argmax(np.abs(results[:, FORCES]).max(axis=1) > 6000.0)]
     stop = fine[np.argmax(results[:, CONDITION] >= 100.0)]
@@ -340,9 +314,8 @@ def test_a_double_crossing_between_two_points_is_found(
 
     def leap(top: float) -> tuple[Trajectory, Array, Array]:
         times, rows = parabola(start, top, duration, 1)
-        dense, motions = between_points(times, rows)
-        return ((times, rows), dense,
-                legs_of(UNBOUND, motions)[:, DETERMINANT])
+        dense, results = between_points(times, rows)
+        return (times, rows), dense, results[:, DETERMINANT]
 
     # The singularity is not at 90 degrees to the last digit: the joints are rounded.
     data, dense, det = leap(highest)
@@ -352,8 +325,7 @@ def test_a_double_crossing_between_two_points_is_found(
     result = check(data, UNBOUND)
     assert result.reason == SINGULAR
     assert 'det(J) crosses zero' in result.message
-    time = result.time
-    assert time == pytest.approx(dense[np.argmax(crossed)], abs=1e-3 * seconds)
+    assert result.time == pytest.approx(dense[np.argmax(crossed)], abs=1e-3 * seconds)
     short_of = 90.0 - 2.0 * (highest - 90.0)
     data, _, det = leap(short_of)
     assert np.all(det * det[0] > 0.0)
@@ -368,8 +340,7 @@ def test_a_singularity_of_the_legs_on_a_wide_way_is_found() -> None:
                                [[-0.5036, 0.3398, 0.2156], [-0.5072, 0.5726, -1.1678]])
     rows = np.column_stack([motion.position, to_quaternion(motion.rotation), np.zeros((2, 12))])
     times = [0, 20 * SECOND]
-    conditions = legs_of(FREE, between_points(times, rows)[1])[:, CONDITION]
-    assert conditions.max() < 16.0
+    assert between_points(times, rows)[1][:, CONDITION].max() < 16.0
     result = check((times, rows), FREE)
     assert result.reason == SINGULAR
     assert result.time == pytest.approx(10.1, abs=0.1)
@@ -411,9 +382,7 @@ def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded() -> Non
 
 
 def test_a_singularity_is_reported_before_exceeded_limits() -> None:
-    rows = np.array([[0.0, 0.0, 0.0, *HOME[3:], *REST, *REST]])
-    result = check(([0], rows))
-    assert result.reason == SINGULAR
+    assert check(([0], np.array([[0.0, 0.0, 0.0, *HOME[3:], *REST, *REST]]))).reason == SINGULAR
 
 
 def test_a_singularity_on_the_way_of_the_legs_is_found() -> None:
@@ -424,8 +393,7 @@ def test_a_singularity_on_the_way_of_the_legs_is_found() -> None:
     between that there are only beyond the singularity: for no pose at all on this side.
     """
     times, rows = parabola(80.0, 89.0, SECOND, 1)
-    motions = between_points(times, rows)[1]
-    determinants = legs_of(UNBOUND, motions)[:, DETERMINANT]
+    determinants = between_points(times, rows)[1][:, DETERMINANT]
     assert np.all(determinants * determinants[0] > 0.0)
     squares = cubic_between(times, rows)[1] ** 2
     apart = np.abs(squares[:, ::2].sum(axis=1) - squares[:, 1::2].sum(axis=1))
@@ -435,14 +403,13 @@ def test_a_singularity_on_the_way_of_the_legs_is_found() -> None:
     result = check((times, rows), UNBOUND)
     assert result.reason == SINGULAR
     assert "the legs' cubics lead to" in result.message
-    dense = parabola(80.0, 89.0, SECOND, 20)
-    assert check(dense, UNBOUND).accepted
+    assert check(parabola(80.0, 89.0, SECOND, 20), UNBOUND).accepted
 
 
 def test_stop_condition_met_between_two_points_alone_is_found() -> None:
     times, rows = parabola(80.0, 89.0, SECOND, 20)
-    dense, motions = between_points(times, rows)
-    condition = legs_of(FREE, motions)[:, CONDITION]
+    dense, results = between_points(times, rows)
+    condition = results[:, CONDITION]
     highest = condition.max()
     assert condition[0] < 0.5 * highest
     for stop, rejected in ((0.99 * highest, True), (1.01 * highest, False)):
@@ -451,9 +418,8 @@ def test_stop_condition_met_between_two_points_alone_is_found() -> None:
         result = check((times, rows), parameters)
         assert result.accepted != rejected
         if rejected:
-            time = result.time
             inside = dense[condition >= stop]
-            assert inside[0] <= time <= inside[-1]
+            assert inside[0] <= result.time <= inside[-1]
             assert 'reaches singularity.stop_condition' in result.message
         else:
             assert result.warning
@@ -472,26 +438,10 @@ def dipping(gap: float, depth: float, extra: float) -> Trajectory:
         yaw(90.0 - gap, rate, acceleration), yaw(90.0 - gap, -rate, acceleration)])
 
 
-def solved_rows(trajectory: Trajectory, monkeypatch: pytest.MonkeyPatch) -> tuple[bool, int]:
-    """Return whether a trajectory is accepted, and for how many samples the legs are computed."""
-    rows_solved: list[int] = []
-    solve = batch.solve
-
-    def counted(constants: Array, rows: Array, *loads: Array | None) -> Array:
-        rows_solved.append(len(rows))
-        return solve(constants, rows, *loads)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(batch, 'solve', counted)
-        accepted = check(trajectory, UNBOUND).accepted
-    return accepted, sum(rows_solved)
-
-
 def test_a_crossing_within_a_dip_of_the_determinant_is_found() -> None:
     """No sample is needed between the two points, and their cubic of det(J) stays clear."""
     trajectory = dipping(0.1, 0.5, 0.6)
-    dense, motions = between_points(*trajectory)
-    results = legs_of(UNBOUND, motions)
+    dense, results = between_points(*trajectory)
     determinants = results[:, DETERMINANT]
     crossed = determinants * determinants[0] < 0.0
     assert crossed.any()
@@ -507,9 +457,9 @@ def test_a_crossing_within_a_dip_of_the_determinant_is_found() -> None:
 @pytest.mark.parametrize(('depth', 'closer'), [(0.002, False), (0.05, True), (0.15, True)])
 def test_samples_are_made_closer_where_the_determinant_dips(
         monkeypatch: pytest.MonkeyPatch, depth: float, closer: bool) -> None:
-    accepted, samples = solved_rows(dipping(0.1, depth, 0.0), monkeypatch)
-    assert accepted
-    assert (samples > 16) if closer else (samples == 2)
+    solved = counted(monkeypatch)
+    assert check(dipping(0.1, depth, 0.0), UNBOUND).accepted
+    assert (sum(solved) > 16) if closer else (solved == [2])
 
 
 # The motion between points: its ends, its derivatives, and the bounds of its path

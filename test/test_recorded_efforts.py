@@ -22,6 +22,7 @@ import math
 
 from hypothesis import given
 from hypothesis import strategies as st
+import messages as of_ros
 from messages import STORE
 import numpy as np
 import pytest
@@ -36,15 +37,9 @@ JOINTS = [f'leg_{n}' for n in range(1, 7)]
 
 def joint_state(stamp: int, names: Sequence[str], effort: Sequence[float], frame: str = '',
                 positions: int = 0, velocities: int = 0, little_endian: bool = True) -> bytes:
-    """Return a JointState, serialized by rosbags."""
-    sec, nanosec = divmod(stamp, SECOND)
-    kind = 'sensor_msgs/msg/JointState'
-    header = STORE.types['std_msgs/msg/Header'](
-        STORE.types['builtin_interfaces/msg/Time'](sec, nanosec), frame)
-    message = STORE.types[kind](
-        header, list(names), np.arange(float(positions)), np.arange(float(velocities)),
-        np.array(effort, dtype=float))
-    return bytes(STORE.serialize_cdr(message, kind, little_endian=little_endian))
+    """Return a JointState with these numbers of positions and velocities."""
+    return of_ros.joint_state(
+        stamp, names, np.arange(positions), np.arange(velocities), effort, frame, little_endian)
 
 
 def joined(messages: Sequence[bytes]) -> tuple[bytes, list[int], list[int]]:

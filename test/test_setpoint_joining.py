@@ -26,14 +26,13 @@ from typing import Any
 from hypothesis import example, given
 from hypothesis import strategies as st
 import messages
-from messages import HOME, REST, UPRIGHT
+from messages import HOME, NOW, REST, UPRIGHT
 import numpy as np
 import pytest
 from referees import rng, symmetric_parameters
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.setpoints.inputs import (
     ACCEL, COMBINED, POSE, SampleReader, TWIST, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints
@@ -45,6 +44,7 @@ from stewart_dynamics.setpoints.step import Setpoint
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)
+INPUTS = (*TOPICS, COMBINED, WRENCH)
 ORDERS = list(permutations(TOPICS))
 WRITERS: dict[str, Callable[..., bytes]] = {
     POSE: messages.pose, TWIST: messages.twist, ACCEL: messages.accel,
@@ -52,30 +52,31 @@ WRITERS: dict[str, Callable[..., bytes]] = {
 
 MS = 1_000_000
 SECOND = 1000 * MS
-NOW = 1_700_000_000 * SECOND
 NAN, INF = math.nan, math.inf
 
 
-class Feed:
-    """Setpoints with given parameters; messages and callbacks are recorded."""
+def good(topic: str, stamp: int, mark: float = 0.0) -> bytes:
+    """Return a good message of a topic, the mark in its first number."""
+    values = HOME if topic in (POSE, COMBINED) else REST
+    return WRITERS[topic](stamp, (mark, *values[1:]))
+
+
+class Feed(messages.Feed):
+    """Setpoints with given parameters; the number of messages on each topic is kept, too."""
 
     def __init__(self, **given: object) -> None:
-        self.said: list[tuple[Rejection, str]] = []
-        self.notices: list[str] = []
+        super().__init__(
+            PARAMETERS.replaced({f'setpoint.{name}': value for name, value in given.items()}))
         self.given: Counter[str] = Counter()
-        self.setpoints = Setpoints(
-            PARAMETERS.replaced({f'setpoint.{name}': value for name, value in given.items()}),
-            lambda rejection, details: self.said.append((rejection, details)), self.notices.append)
 
-    def __call__(self, topic: str, data: bytes) -> Setpoint | None:
+    def __call__(self, topic: str, data: bytes, now: int = NOW) -> Setpoint | None:
         """Take one message."""
         self.given[topic] += 1
-        return self.setpoints.take(topic, data, lambda: NOW)
+        return super().__call__(topic, data, now)
 
     def sample(self, topic: str, stamp: int, mark: float = 0.0) -> Setpoint | None:
         """Take a good message of a topic, the mark in its first number."""
-        values = HOME if topic in (POSE, COMBINED) else REST
-        return self(topic, WRITERS[topic](stamp, (mark, *values[1:])))
+        return self(topic, good(topic, stamp, mark))
 
     def whole(self, stamp: int, mark: float = 0.0) -> Setpoint | None:
         """Take good messages of all topics; the last one must be what completes it."""
@@ -83,22 +84,28 @@ class Feed:
         assert answers[:-1] == [None] * (len(answers) - 1)
         return answers[-1]
 
-    @property
-    def counts(self) -> dict[tuple[str, str], int]:
-        """Return the rejections; the callback must have got each."""
-        assert Counter(rejection for rejection, _ in self.said) == self.setpoints.counts
-        return {tuple(rejection): n for rejection, n in self.setpoints.counts.items()}
+    def used(self, samples: Sequence[tuple[str, float]]) -> list[float]:
+        """Take samples without stamps, topics and marks; return the mark of each setpoint."""
+        found = []
+        for topic, mark in samples:
+            if (setpoint := self.sample(topic, 0, mark)) is not None:
+                assert setpoint.stamp == NOW
+                assert setpoint.motion[0] == setpoint.motion[12] == setpoint.motion[18]
+                found.append(setpoint.motion[0])
+        return found
 
 
 # Joining
 
+@pytest.mark.parametrize('apart', [0, MS])
 @pytest.mark.parametrize('order', ORDERS)
-def test_topics_are_joined_in_any_order(order: Sequence[str]) -> None:
+def test_topics_are_joined_in_any_order_within_the_tolerance(
+        order: Sequence[str], apart: int) -> None:
     half = math.sqrt(0.5)
     data = {POSE: messages.pose(SECOND, (0.1, 0.2, 1.3), (0.0, 0.0, half, half)),
-            TWIST: messages.twist(SECOND, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)),
-            ACCEL: messages.accel(SECOND, (7.0, 8.0, 9.0, 10.0, 11.0, 12.0))}
-    feed = Feed()
+            TWIST: messages.twist(SECOND + 2 * apart, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)),
+            ACCEL: messages.accel(SECOND + apart, (7.0, 8.0, 9.0, 10.0, 11.0, 12.0))}
+    feed = Feed(sync_tolerance=2e-9 * apart)
     assert feed(order[0], data[order[0]]) is None
     assert feed(order[1], data[order[1]]) is None
     setpoint = feed(order[2], data[order[2]])
@@ -109,18 +116,6 @@ def test_topics_are_joined_in_any_order(order: Sequence[str]) -> None:
     assert setpoint.motion[12:] == tuple(range(1, 13))
     assert not feed.counts
     assert not feed.notices
-
-
-@pytest.mark.parametrize('order', ORDERS)
-def test_stamps_within_the_tolerance_are_joined(order: Sequence[str]) -> None:
-    feed = Feed(sync_tolerance=0.002)
-    stamps = {POSE: SECOND, TWIST: SECOND + 2 * MS, ACCEL: SECOND + MS}
-    for topic in order[:2]:
-        assert feed.sample(topic, stamps[topic]) is None
-    setpoint = feed.sample(order[2], stamps[order[2]])
-    assert setpoint is not None
-    assert setpoint.stamp == stamps[POSE]
-    assert not feed.counts
 
 
 @pytest.mark.parametrize('apart', [-2 * MS, -1, 0, 1, 2 * MS])
@@ -162,8 +157,6 @@ def test_a_combined_message_is_a_setpoint() -> None:
         SECOND, (0.1, 0.2, 1.3), UPRIGHT, (1, 2, 3, 4, 5, 6), (7, 8, 9, 10, 11, 12)))
     assert setpoint == Setpoint(
         SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13)), NO_WRENCH)
-    assert feed.sample(COMBINED, SECOND) is None
-    assert feed.counts == {(COMBINED, TWICE): 1}
 
 
 def test_a_pose_alone_stands_still() -> None:
@@ -174,33 +167,47 @@ def test_a_pose_alone_stands_still() -> None:
         SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12, NO_WRENCH)
 
 
+@pytest.mark.parametrize('source', ['combined', 'pose'])
+def test_a_single_topic_needs_no_stamp_and_each_stamp_is_used_once(source: str) -> None:
+    feed = Feed(source=source)
+    topic, = feed.setpoints.topics
+    for _ in range(3):
+        setpoint = feed.sample(topic, 0)
+        assert setpoint is not None
+        assert setpoint.stamp == NOW
+    assert len(feed.notices) == 1
+    assert feed.sample(topic, SECOND)
+    assert feed.sample(topic, SECOND) is None
+    assert feed.counts == {(topic, TWICE): 1}
+
+
 # Rejecting
+
+NUMBERS: dict[str, Callable[[list[float]], bytes]] = {
+    POSE: lambda of: messages.pose(SECOND, of[:3], of[3:7]),
+    TWIST: lambda of: messages.twist(SECOND, of[:6]),
+    ACCEL: lambda of: messages.accel(SECOND, of[:6]),
+    COMBINED: lambda of: messages.combined(SECOND, of[:3], of[3:7], of[7:13], of[13:]),
+    WRENCH: lambda of: messages.wrench(SECOND, of[:6])}
+
 
 def _spoilt() -> list[tuple[str, bytes, str, str]]:
     found = []
-    for topic, numbers in ((POSE, 7), (TWIST, 6), (ACCEL, 6), (COMBINED, 19), (WRENCH, 6)):
-        good = WRITERS[topic](SECOND)
-        first = len(good) - 8 * numbers - (8 if topic == COMBINED else 0)
-        for at in range(numbers):
-            if topic == COMBINED:
-                # its three parts stand apart, each behind a count
-                at_byte = first - 16 + 8 * at + (0 if at < 7 else 8 if at < 13 else 16)
-            else:
-                at_byte = first + 8 * at
-            value = np.float64((NAN, INF, -INF)[at % 3])
-            bad = good[:at_byte] + value.tobytes() + good[at_byte + 8:]
-            found.append((topic, bad, NOT_FINITE, 'nan|inf'))
+    for topic, number in ((POSE, 7), (TWIST, 6), (ACCEL, 6), (COMBINED, 19), (WRENCH, 6)):
+        for at in range(number):
+            values = [*HOME, *UPRIGHT, *REST, *REST]
+            values[at] = (NAN, INF, -INF)[at % 3]
+            found.append((topic, NUMBERS[topic](values), NOT_FINITE, 'nan|inf'))
+        found += [(topic, WRITERS[topic](SECOND, frame=frame), WRONG_FRAME, f"'{frame}'.*'base'")
+                  for frame in ('map', '/base', 'Base')]
+        whole = good(topic, SECOND)
+        found += [(topic, whole[:-1], MALFORMED, f'{len(whole) - 1} bytes'),
+                  (topic, b'', MALFORMED, '0 bytes')]
+    for topic in (POSE, COMBINED):
         for length in (1 - 1.1e-3, 1 + 1.1e-3, 0.0, 2.0, 1e150):
-            if topic in (POSE, COMBINED):
-                quaternion = (0.0, 0.0, 0.6 * length, 0.8 * length)
-                found.append((topic, WRITERS[topic](SECOND, HOME, quaternion), NOT_UNIT,
-                              re.escape(f'{length:.6g}')))
-        found += [
-            (topic, WRITERS[topic](SECOND, frame='map'), WRONG_FRAME, "'map'.*'base'"),
-            (topic, WRITERS[topic](SECOND, frame='/base'), WRONG_FRAME, "'/base'"),
-            (topic, WRITERS[topic](SECOND, frame='Base'), WRONG_FRAME, "'Base'"),
-            (topic, good[:-1], MALFORMED, f'{len(good) - 1} bytes'),
-            (topic, b'', MALFORMED, '0 bytes')]
+            quaternion = (0.0, 0.0, 0.6 * length, 0.8 * length)
+            found.append((topic, WRITERS[topic](SECOND, HOME, quaternion), NOT_UNIT,
+                          re.escape(f'{length:.6g}')))
     return found
 
 
@@ -208,15 +215,12 @@ def _spoilt() -> list[tuple[str, bytes, str, str]]:
 def test_a_bad_message_is_rejected_and_the_good_one_used(
         topic: str, data: bytes, reason: str, words: str) -> None:
     feed = Feed(source='combined' if topic == COMBINED else 'separate')
-    if topic == WRENCH:
-        feed.setpoints.take_wrench(messages.wrench(0, (1, 2, 3, 4, 5, 6)))
-        feed.setpoints.take_wrench(data)
-        assert feed.setpoints.wrench == (1, 2, 3, 4, 5, 6)
-    else:
-        for other in feed.setpoints.topics:
-            if other != topic:
-                feed.sample(other, SECOND)
-        assert feed(topic, data) is None
+    feed(WRENCH, messages.wrench(0, (1, 2, 3, 4, 5, 6)))
+    for other in feed.setpoints.topics:
+        if other != topic:
+            feed.sample(other, SECOND)
+    assert feed(topic, data) is None
+    assert feed.setpoints.wrench == (1, 2, 3, 4, 5, 6)
     assert feed.counts == {(topic, reason): 1}
     assert re.search(words, feed.said[0][1])
     assert topic == WRENCH or feed.sample(topic, SECOND)
@@ -226,11 +230,7 @@ def test_a_bad_message_is_rejected_and_the_good_one_used(
 @pytest.mark.parametrize('topic', [*TOPICS, COMBINED, WRENCH])
 def test_the_base_frame_and_an_empty_one_are_accepted(topic: str, frame: str) -> None:
     feed = Feed(source='combined' if topic == COMBINED else 'separate')
-    data = WRITERS[topic](SECOND, frame=frame)
-    if topic == WRENCH:
-        feed.setpoints.take_wrench(data)
-    else:
-        feed(topic, data)
+    feed(topic, WRITERS[topic](SECOND, frame=frame))
     assert not feed.counts
 
 
@@ -296,23 +296,17 @@ def test_a_jump_back_that_exceeds_the_timeout_is_followed_and_logged_once_each_t
         for n in range(12):  # a bag that loops: 110 ms back each time
             assert feed.whole(10 * SECOND + n * 10 * MS)
             assert len(feed.notices) == lap
-    assert not feed.counts
-    feed = Feed()
-    assert feed.whole(10 * SECOND)
-    for lap in range(1, 4):
-        for n in range(5):
-            assert feed.whole((10 - lap) * SECOND + n * 10 * MS)
-            assert len(feed.notices) == lap
-    assert 'restart' in feed.notices[0]
-    assert '1 s' in feed.notices[0]
+    assert 'jumped back by 0.11 s: followed as a restart' in feed.notices[0]
     assert not feed.counts
 
 
-def test_a_jump_back_that_exceeds_the_timeout_by_a_nanosecond_is_a_restart() -> None:
+def test_a_setpoint_after_a_jump_back_is_a_restart() -> None:
     feed = Feed()
-    assert feed.whole(SECOND)
-    assert feed.whole(SECOND - 100 * MS - 1)
-    assert len(feed.notices) == 1
+    stamps = (SECOND, SECOND - 100 * MS - 1, 2 * SECOND, SECOND, SECOND + MS)
+    setpoints = [feed.whole(stamp) for stamp in stamps]
+    assert [setpoint.restart for setpoint in setpoints if setpoint] == [
+        False, True, False, True, False]
+    assert len(feed.notices) == 2
     assert not feed.counts
 
 
@@ -338,27 +332,18 @@ def test_a_restart_drops_samples_waiting_from_before_it() -> None:
     assert feed.whole(SECOND + 10 * MS)
 
 
-def test_negative_stamps_are_stamps() -> None:
-    feed = Feed()
-    for stamp in (-2 ** 31 * SECOND, -SECOND, -1, 1, 2 ** 31 * SECOND - 1):
-        setpoint = feed.whole(stamp)
-        assert setpoint is not None
-        assert setpoint.stamp == stamp
-    assert not feed.counts
-
-
 # Without stamps
+
+def without_stamps(marks: Sequence[float], topics: Sequence[str] = TOPICS,
+                   ) -> list[tuple[str, float]]:
+    """Return topics and marks, all topics of a mark before the next."""
+    return [(topic, mark) for mark in marks for topic in topics]
+
 
 @pytest.mark.parametrize('order', ORDERS)
 def test_samples_without_stamps_are_joined_in_order_of_arrival(order: Sequence[str]) -> None:
     feed = Feed()
-    for mark in (1.0, 2.0, 3.0):
-        for topic in order[:2]:
-            assert feed.sample(topic, 0, mark) is None
-        setpoint = feed.sample(order[2], 0, mark)
-        assert setpoint is not None
-        assert setpoint.stamp == NOW
-        assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (mark,) * 3
+    assert feed.used(without_stamps((1.0, 2.0, 3.0), order)) == [1.0, 2.0, 3.0]
     assert not feed.counts
     assert len(feed.notices) == 1
     assert 'zero' in feed.notices[0]
@@ -367,45 +352,25 @@ def test_samples_without_stamps_are_joined_in_order_of_arrival(order: Sequence[s
 @pytest.mark.parametrize('order', ORDERS)
 def test_a_topic_that_arrives_earlier_is_not_joined_late(order: Sequence[str]) -> None:
     feed = Feed()
-    early, last = order[:2], order[2]
-    for mark in (1.0, 2.0, 3.0):
-        for topic in early:
-            assert feed.sample(topic, 0, mark) is None
-    setpoint = feed.sample(last, 0, 3.0)
-    assert setpoint is not None
-    assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (3.0,) * 3
-    assert feed.counts == {(topic, NOT_JOINED): 2 for topic in early}
+    assert feed.used([*without_stamps((1.0, 2.0, 3.0), order[:2]), (order[2], 3.0)]) == [3.0]
+    assert feed.counts == {(topic, NOT_JOINED): 2 for topic in order[:2]}
 
 
-@pytest.mark.parametrize(('spoilt', 'arrives'), [
-    (POSE, False), (TWIST, False), (ACCEL, False), (POSE, True), (TWIST, True), (ACCEL, True)])
+@pytest.mark.parametrize('instead', [[], [math.nan]], ids=['lost', 'rejected'])
+@pytest.mark.parametrize('spoilt', TOPICS)
 def test_a_lost_or_rejected_sample_without_a_stamp_costs_its_setpoint_and_no_other(
-        spoilt: str, arrives: bool) -> None:
-    feed = Feed()
-    used = []
-    for n in range(1, 9):
-        for topic in TOPICS:
-            if n == 4 and topic == spoilt:
-                if arrives:
-                    assert feed.sample(topic, 0, math.nan) is None
-                continue
-            if (setpoint := feed.sample(topic, 0, float(n))) is not None:
-                marks = {setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]}
-                assert len(marks) == 1, marks
-                used += marks
-    assert used == [1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0]
+        spoilt: str, instead: list[float]) -> None:
+    sequence = without_stamps([float(n) for n in range(1, 9)])
+    at = sequence.index((spoilt, 4.0))
+    sequence[at:at + 1] = [(spoilt, mark) for mark in instead]
+    assert Feed().used(sequence) == [1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0]
 
 
 def test_samples_without_stamps_that_come_in_bunches_are_lost_but_never_mixed() -> None:
     feed = Feed()
-    assert feed.whole(0, 1.0) is not None
-    for topic in TOPICS:
-        for mark in (2.0, 3.0, 4.0):
-            assert feed.sample(topic, 0, mark) is None
-    for mark in (5.0, 6.0, 7.0):
-        setpoint = feed.whole(0, mark)
-        assert setpoint is not None
-        assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (mark,) * 3
+    bunches = [(topic, mark) for topic in TOPICS for mark in (2.0, 3.0, 4.0)]
+    assert feed.used([*without_stamps([1.0]), *bunches, *without_stamps((5.0, 6.0, 7.0))]) == [
+        1.0, 5.0, 6.0, 7.0]
     assert feed.counts == {(topic, NOT_JOINED): 3 for topic in TOPICS}
 
 
@@ -417,12 +382,6 @@ def test_a_zero_stamp_among_others_is_a_time() -> None:
     assert feed.sample(POSE, 0) is None
     assert feed.counts == {(POSE, NOT_JOINED): 1, (POSE, TOO_OLD): 1}
     assert not feed.notices[1:]
-
-
-def test_a_setpoint_after_a_jump_back_is_a_restart() -> None:
-    feed = Feed()
-    setpoints = [feed.whole(stamp) for stamp in (SECOND, 2 * SECOND, SECOND, SECOND + MS)]
-    assert [setpoint.restart for setpoint in setpoints if setpoint] == [False, False, True, False]
 
 
 def test_stamps_of_a_setpoint_lie_within_the_tolerance_of_each_other() -> None:
@@ -444,16 +403,6 @@ def test_a_sample_used_within_the_tolerance_is_not_used_again() -> None:
     assert feed.sample(TWIST, 1003 * MS) is None
     assert feed.counts == {(TWIST, TWICE): 1, (TWIST, TOO_OLD): 1}
     assert feed.sample(TWIST, 1012 * MS) is not None
-
-
-@pytest.mark.parametrize('source', ['combined', 'pose'])
-def test_a_single_topic_needs_no_stamp(source: str) -> None:
-    feed = Feed(source=source)
-    for _ in range(3):
-        setpoint = feed.sample(feed.setpoints.topics[0], 0)
-        assert setpoint is not None
-        assert setpoint.stamp == NOW
-    assert len(feed.notices) == 1
 
 
 # Bounds
@@ -496,31 +445,25 @@ def test_a_quaternion_is_brought_to_unit_length(
 
 # Any input at all
 
-def _garbage(random: np.random.Generator, good: bytes) -> bytes:
-    spoiled = bytearray(good)
-    for at in random.integers(0, len(good), 4):
+def _garbage(data: bytes) -> bytes:
+    random = rng(int.from_bytes(data[4:12], 'little'))
+    spoiled = bytearray(data)
+    for at in random.integers(0, len(data), 4):
         spoiled[at] = random.integers(0, 256)
-    return bytes(spoiled[:random.integers(0, len(good) + 1)])
+    return bytes(spoiled[:random.integers(0, len(data) + 1)])
 
 
-_FAULTS: dict[str, Callable[[str, int], bytes]] = {
-    'good': lambda topic, stamp: WRITERS[topic](stamp, _marked(topic, stamp)),
-    'nan': lambda topic, stamp: WRITERS[topic](stamp, (NAN, 0, 0, 0, 0, 0)[:_width(topic)]),
-    'frame': lambda topic, stamp: WRITERS[topic](stamp, frame='elsewhere'),
-    'quaternion': lambda topic, stamp: messages.pose(stamp, HOME, (1, 1, 1, 1)),
-    'cut': lambda topic, stamp: WRITERS[topic](stamp)[:-3],
-    'garbage': lambda topic, stamp: _garbage(rng(abs(stamp)), WRITERS[topic](stamp)),
-    'another type': lambda topic, stamp: messages.combined(stamp),
-}
-
-
-def _width(topic: str) -> int:
-    return 3 if topic in (POSE, COMBINED) else 6
-
-
-def _marked(topic: str, stamp: int) -> tuple[float, ...]:
-    """Return numbers of which the first is the stamp."""
-    return (float(stamp), *(HOME if topic in (POSE, COMBINED) else REST)[1:])
+FAULTS: dict[str, Callable[[bytes], bytes]] = {
+    'none': lambda data: data,
+    'nan': lambda data: data[:-8] + np.array(NAN).tobytes(),
+    'quaternion': lambda data: data[:-8] + np.array(1.5).tobytes(),  # of a pose
+    'frame': lambda data: data.replace(b'base', b'besa'),
+    'cut': lambda data: data[:-5],
+    'garbage': _garbage,
+    'another type': lambda data: messages.combined(SECOND)}
+STAMPS: dict[str, Callable[[bytes], bytes]] = {
+    'zero': lambda data: data[:4] + bytes(8) + data[12:],
+    'back': lambda data: data[:4] + bytes(7) + b'\1' + data[12:]}
 
 
 samples = st.lists(st.tuples(
@@ -528,7 +471,7 @@ samples = st.lists(st.tuples(
     # steps of 10 ms around zero, many of them twice; a few jumps that exceed the timeout
     st.integers(-3, 25).map(lambda n: n * 10 * MS) | st.integers(-500, 500).map(
         lambda n: n * 7 * MS),
-    st.sampled_from(['good'] * 12 + list(_FAULTS))), max_size=80)
+    st.sampled_from(['none'] * 12 + list(FAULTS))), max_size=80)
 
 
 def _drained(feed: Feed, answers: list[Setpoint]) -> None:
@@ -545,7 +488,7 @@ def test_every_message_is_answered_or_counted(
     feed = Feed(sync_tolerance=tolerance)
     answers: list[Setpoint] = []
     for topic, stamp, fault in sequence:
-        if (answer := feed(topic, _FAULTS[fault](topic, stamp))) is not None:
+        if (answer := feed(topic, FAULTS[fault](good(topic, stamp)))) is not None:
             answers.append(answer)
         waiting = {t: feed.given[t] - len(answers) - sum(
             n for (of, _), n in feed.counts.items() if of == t) for t in TOPICS}
@@ -569,7 +512,7 @@ def test_only_stamps_within_the_tolerance_are_joined(
         sequence: list[tuple[str, int, str]], tolerance: int) -> None:
     feed = Feed(sync_tolerance=tolerance * 1e-3)
     for topic, stamp, _ in sequence:
-        answer = feed(topic, _FAULTS['good'](topic, stamp))
+        answer = feed.sample(topic, stamp, float(stamp))
         if answer is not None:
             marks = [answer.motion[0], answer.motion[12], answer.motion[18]]
             assert answer.stamp in (NOW, *marks)
@@ -579,50 +522,9 @@ def test_only_stamps_within_the_tolerance_are_joined(
 
 # Many at once
 
-def together(given: Sequence[tuple[str, bytes]]) -> Messages:
-    """Return messages as a bag has them: one behind the other, recorded a microsecond apart."""
-    topics = (*TOPICS, COMBINED, WRENCH)
-    sizes = np.array([len(data) for _, data in given], dtype=np.int64)
-    return Messages(
-        topics, np.array([topics.index(topic) for topic, _ in given], dtype=np.int64),
-        NOW + 1000 * np.arange(len(given)), np.frombuffer(b'?' + b''.join(
-            data for _, data in given), dtype=np.uint8),
-        1 + np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64), sizes)
-
-
 def check_many(given: Sequence[tuple[str, bytes]], cuts: Sequence[int], **options: object) -> int:
     """Check that messages give the same together and one by one; return their number."""
-    one, many = Feed(**options), Feed(**options)
-    expected, times = [], []
-    for n, (topic, data) in enumerate(given):
-        if topic == WRENCH:
-            one.setpoints.take_wrench(data)
-            continue
-        setpoint = one.setpoints.take(topic, data, lambda n=n: NOW + 1000 * n)
-        if setpoint is not None:
-            expected.append(setpoint)
-            times.append(NOW + 1000 * n)
-    found, found_times = [], []
-    edges = [0, *sorted(cut for cut in cuts if cut < len(given)), len(given)]
-    whole = together(given)
-    for first, end in zip(edges[:-1], edges[1:], strict=True):
-        batch = many.setpoints.take_many(whole.chosen(slice(first, end)))
-        assert batch.motions.shape == (len(batch.stamps), 24)
-        assert batch.wrenches.shape == (len(batch.stamps), 6)
-        stamped = np.ones(len(batch.stamps), dtype=bool) if batch.stamped is None else (
-            batch.stamped)
-        found += [Setpoint(stamp, tuple(motion), tuple(wrench), restart, stamped=known)
-                  for stamp, motion, wrench, restart, known in zip(
-                      *(part.tolist() for part in (*batch[:4], stamped)), strict=True)]
-        found_times += batch.times.tolist()
-    # repr: the very same bits
-    assert list(map(repr, found)) == list(map(repr, expected))
-    assert found_times == times
-    assert many.notices == one.notices
-    for feed in (one, many):
-        feed.setpoints.end('the bag ends')
-    assert many.counts == one.counts
-    return len(found)
+    return messages.check_many(Feed(**options), Feed(**options), given, INPUTS, cuts)
 
 
 def stream(number: int, step: int = MS) -> list[tuple[str, bytes]]:
@@ -646,6 +548,7 @@ def test_many_in_order_are_what_they_are_one_by_one(cuts: Sequence[int]) -> None
     assert check_many([(topic, data) for topic, data in stream(100) if topic == POSE], cuts,
                       source='pose') == 100
     assert check_many(stream(100), cuts, sync_tolerance=1e-4) == 100
+    assert check_many([(topic, good(topic, 0)) for _ in range(3) for topic in TOPICS], cuts) == 3
 
 
 def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -654,7 +557,7 @@ def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPa
     monkeypatch.delattr(SampleReader, 'read')
     given = stream(50)
     for part in (given[:61], given[61:]):
-        feed.setpoints.take_many(together(part))
+        feed.setpoints.take_many(messages.together(part, INPUTS))
     assert not feed.counts
 
 
@@ -676,8 +579,7 @@ def test_many_combined_are_what_they_are_one_by_one() -> None:
     assert check_many(given, (20, 40, 80), source='combined') == 99
 
 
-FATES = ['as it is'] * 12 + [
-    'lost', 'twice', 'late', 'nan', 'cut', 'zero', 'frame', 'back', 'big-endian', 'quaternion']
+FATES = [*['none'] * 12, 'lost', 'twice', 'late', 'big-endian', *FAULTS, *STAMPS]
 
 
 @given(st.lists(st.sampled_from(FATES), max_size=90), st.lists(st.integers(0, 90), max_size=6),
@@ -697,20 +599,9 @@ def test_many_of_any_kind_are_what_they_are_one_by_one(
         if fate == 'late':
             late.append((topic, data))
             continue
-        if fate == 'nan':
-            data = data[:-8] + np.array(NAN).tobytes()
-        elif fate == 'cut':
-            data = data[:-5]
-        elif fate == 'zero':
-            data = data[:4] + bytes(8) + data[12:]
-        elif fate == 'back':
-            data = data[:4] + bytes(7) + b'\1' + data[12:]
-        elif fate == 'frame':
-            data = data.replace(b'base', b'besa')
-        elif fate == 'quaternion' and topic == POSE:
-            data = data[:-8] + np.array(1.5).tobytes()
-        elif fate == 'big-endian' and topic == POSE:
+        if fate == 'big-endian' and topic == POSE:
             data = messages.pose(20 * MS + random.randrange(20 * MS), little_endian=False)
+        data = {**FAULTS, **STAMPS}.get(fate, FAULTS['none'])(data)
         found += [(topic, data)] * {'lost': 0, 'twice': 2}.get(fate, 1)
         if late and random.random() < 0.5:
             found.append(late.pop())

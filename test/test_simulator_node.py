@@ -18,12 +18,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from functools import partial
-import gc
+from contextlib import closing, ExitStack
+from itertools import count
 import math
 from pathlib import Path
-import re
 import signal
 import time
 from typing import Any
@@ -31,8 +29,6 @@ from typing import Any
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
 import numpy as np
 import pytest
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.parameter import Parameter as RosParameter
 from rclpy.serialization import deserialize_message
 from referees import rng
 from rosgraph_msgs.msg import Clock
@@ -42,7 +38,7 @@ from running import (
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
-from stewart_dynamics import BaseMotion, Motion, Pose, StewartError, StewartPlatform
+from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.messages import (
@@ -51,6 +47,7 @@ from stewart_dynamics.simulator.moving_base import GeneratedBase, GeneratedBaseM
 from stewart_dynamics.simulator.node import SimulatorNode
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
+from trajectories import FREE
 
 SIMULATOR = '/stewart_simulator'
 FILE = ROOT / 'config' / 'simulator.yaml'
@@ -74,6 +71,7 @@ class Simulator:
     def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = (),
                  inside: bool = False) -> None:
         self.peer = Peer(domain)
+        self.until = self.peer.until
         self.raw = {topic: self.peer.listen(f'{SIMULATOR}/{topic}', kind)
                     for topic, kind in TYPES.items()}
         self.raw['clock'] = self.peer.listen('/clock', Clock)
@@ -84,22 +82,14 @@ class Simulator:
             part for override in ('command_timeout:=1.0e+6', *overrides)
             for part in ('-p', override))]
         self._stepped = STEPPED in overrides
-        try:
-            self.program: Any = Inside(SimulatorNode, arguments, domain) if inside else (
-                Program([executable('stewart_simulator'), *arguments], domain, folder))
-        except StewartError:
-            self.peer.close()
-            raise
+        self.program: Any = Inside(SimulatorNode, arguments, domain) if inside else (
+            Program([executable('stewart_simulator'), *arguments], domain, folder))
         self.peer.watched = self.program
-
-    def until(self, condition: Callable[[], Any], what: str) -> None:
-        """Take messages until a condition holds."""
-        self.peer.until(condition, what)
 
     def until_there(self) -> None:
         """Wait until both directions are connected."""
-        topics = {*TYPES, 'clock'} if self._stepped else set(TYPES)
-        self.until(lambda: all(self.raw[topic] for topic in topics)
+        self.until(lambda: all(self.raw[topic] for topic in TYPES)
+                   and (self.raw['clock'] or not self._stepped)
                    and self._commands.get_subscription_count()
                    and self._wrench.get_subscription_count(), 'the simulator is there')
 
@@ -190,61 +180,35 @@ Start = Callable[..., Simulator]
 @pytest.fixture
 def start(domain: int, tmp_path: Path) -> Iterator[Start]:
     """Return a function that starts a simulator in a process of its own, one after the other."""
-    with one_after_the_other(partial(Simulator, domain), tmp_path) as begin:
-        yield begin
+    with ExitStack() as stack:
+        def started(*overrides: str) -> Simulator:
+            stack.pop_all().close()
+            return stack.enter_context(closing(
+                Simulator(domain, tmp_path / str(next(numbers)), *overrides)))
+
+        numbers = count()
+        yield started
 
 
 @pytest.fixture
 def begin(domain: int, tmp_path: Path) -> Iterator[Start]:
     """Return a function that makes a simulator in this process; in the end it must be at work."""
-    begun: list[Simulator] = []
-    make = partial(Simulator, domain, inside=True)
-    with one_after_the_other(make, tmp_path) as start:
+    with ExitStack() as stack:
         def started(*overrides: str, **options: Any) -> Simulator:
-            begun.append(start(*overrides, **options))
-            begun[-1].until_there()
-            return begun[-1]
+            simulator = stack.enter_context(closing(
+                Simulator(domain, tmp_path, *overrides, inside=True, **options)))
+            simulator.until_there()
+            stack.callback(simulator.at_work)
+            return simulator
 
         yield started
-        begun[-1].at_work()
-
-
-@contextmanager
-def one_after_the_other(make: Callable[..., Simulator], folder: Path) -> Iterator[Start]:
-    """Give a function that makes a simulator, and ends the one before; the last ends with this."""
-    started: list[Simulator] = []
-
-    def begin(*overrides: str, **options: Any) -> Simulator:
-        if started:
-            started[-1].close()
-        started.append(make(folder / str(len(started)), *overrides, **options))
-        return started[-1]
-
-    try:
-        yield begin
-    finally:
-        if started:
-            started[-1].close()
-
-
-@pytest.fixture
-def unlimited(tmp_path: Path) -> Path:
-    """Return the file of a hexapod without limits."""
-    text = PLATFORM.read_text(encoding='utf-8')
-    before, _, rest = text.partition('    limits:\n')
-    file = tmp_path / 'unlimited.yaml'
-    file.write_text(before + '    # ' + rest.partition('\n\n')[0].replace('\n', '\n    # ')
-                    + '\n\n' + rest.partition('\n\n')[2], encoding='utf-8')
-    return file
 
 
 def holding() -> list[float]:
     """Return the forces that hold the hexapod in its initial pose."""
-    plant = Plant(SimulatorParameters(GIVEN))
-    platform = StewartPlatform(plant.parameters)
-    pose = Pose(plant.state.pose[:3], np.eye(3))
-    forces: list[float] = np.linalg.solve(
-        platform.inverse_jacobian(pose).T, platform.gravity_vector(pose)).tolist()
+    home = Motion(GIVEN['initial_pose'][:3], np.eye(3))
+    forces: list[float] = StewartPlatform(SimulatorParameters(GIVEN)).inverse_dynamics(
+        home).forces.tolist()
     return forces
 
 
@@ -407,8 +371,9 @@ def test_forces_above_their_limit_saturate(begin: Start) -> None:
     assert 'commands: leg_6: 1e+300 N exceeds limits.force_max, clipped to 6000 N' in line
 
 
-def test_the_hexapod_rests_if_a_step_cannot_be_computed(begin: Start, unlimited: Path) -> None:
-    simulator = begin(STEPPED, files=(unlimited, FILE))
+def test_the_hexapod_rests_if_a_step_cannot_be_computed(begin: Start, tmp_path: Path) -> None:
+    FREE.to_yaml(tmp_path / 'unlimited.yaml')
+    simulator = begin(STEPPED, files=(tmp_path / 'unlimited.yaml', FILE))
     assert simulator.step([1e300] * 6) == FIRST + PERIOD
     simulator.until_said('ERROR', 'motion cannot be computed')
     for n in (2, 3):
@@ -448,37 +413,14 @@ def test_a_signal_ends_it(start: Start) -> None:
         simulator.stop(number)
 
 
-# Rules of values are in test_plant.py; one of them, and one of names.
-CANNOT = (('initial_pose:=[0.0, 0.0, 1.6, 0.0, 0.0, 0.0]', 'leg_1: length 1.6'),
-          ('noise.lenght:=0.1', 'noise.lenght: unknown parameter; do you mean noise.length?'))
-
-
-def test_unsupported_parameters_are_reported_in_one_line(
-        domain: int, tmp_path: Path, start: Start) -> None:
-    for override, words in CANNOT:
-        with pytest.raises(StewartError, match=re.escape(words)):
-            Simulator(domain, tmp_path / 'inside', override, inside=True)
-    gc.collect()  # what these leave
-    override, words = CANNOT[0]
-    program = start(override).program
+# The rules are in test_plant.py and test_parameters.py.
+def test_unsupported_parameters_are_reported_in_one_line(domain: int, start: Start) -> None:
+    program = start('initial_pose:=[0.0, 0.0, 1.6, 0.0, 0.0, 0.0]').program
     assert program.wait() == 1, program.stderr
     assert participants(domain) == 1, 'it did not leave; the one is in this process'
     line, = (line for line in program.stderr.splitlines() if not line.startswith('[WARN]'))
     assert line.startswith('stewart_simulator: ')
-    assert words in line
-
-
-def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
-    simulator = begin()
-    client = simulator.peer.node.create_client(
-        SetParametersAtomically, f'{SIMULATOR}/set_parameters_atomically')
-    simulator.until(client.service_is_ready, 'the service is there')
-    future = client.call_async(SetParametersAtomically.Request(parameters=[
-        RosParameter('platform.mass', value=200.0).to_parameter_msg()]))
-    simulator.until(future.done, 'it answers')
-    assert not future.result().result.successful
-    assert future.result().result.reason == (
-        'platform.mass: only read when the node starts: restart it')
+    assert 'leg_1: length 1.6' in line
 
 
 def test_topics_and_messages_have_the_same_types() -> None:

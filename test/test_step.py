@@ -76,10 +76,7 @@ def test_the_step_gives_the_librarys_bits() -> None:
         parameters = random_parameters(random)
         step, platform = Step(parameters), StewartPlatform(parameters)
         for setpoint, wrench in rows(parameters, 20):
-            m = setpoint.motion
-            result = platform.inverse_dynamics(Motion(
-                m[0:3], np.reshape(m[3:12], (3, 3)), m[12:15], m[15:18], m[18:21], m[21:24]),
-                wrench)
+            result = platform.inverse_dynamics(Motion.of_rows(np.array(setpoint.motion)), wrench)
             output = answered(step, setpoint, wrench)
             assert output.stamp == setpoint.stamp
             assert output.lengths == tuple(result.lengths.tolist())
@@ -120,21 +117,6 @@ def test_forces_are_clipped_and_reported() -> None:
         assert output.exceedances == tuple(
             Exceedance('limits.force_max', leg, free.demanded_forces[leg], bounds[leg])
             for leg in (1, 3, 5))
-
-
-@pytest.mark.parametrize(('limit', 'factor'), [
-    ('limits.length_min', 1.0), ('limits.length_max', 1.0), ('limits.velocity_max', 1.0),
-    ('limits.length_min', 1.01), ('limits.length_max', 0.99), ('limits.velocity_max', 0.99)])
-def test_every_limit_that_is_exceeded_is_listed_and_no_other(limit: str, factor: float) -> None:
-    for setpoint, wrench in rows(PARAMETERS, 20):
-        free = answered(STEP, setpoint, wrench)
-        values = free.rates if limit == 'limits.velocity_max' else free.lengths
-        bounds = [abs(value) * (factor if leg in (0, 4) else 1.0)
-                  for leg, value in enumerate(values)]
-        output = answered(Step(PARAMETERS.replaced({limit: bounds})), setpoint, wrench)
-        assert output._replace(exceedances=()) == free
-        assert output.exceedances == (() if factor == 1.0 else tuple(
-            Exceedance(limit, leg, values[leg], bounds[leg]) for leg in (0, 4)))
 
 
 # Actions on limits, and jumps
@@ -307,19 +289,16 @@ def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Setp
     Setpoint(STAMP, (0.0, 0.0, 1e308, *UPRIGHT, *REST)),
     Setpoint(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 3, *(1e200,) * 3, *(0.0,) * 6)),
     Setpoint(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 6, *(1e308,) * 6)),
+    HOME._replace(wrench=(1e308,) * 6),
     HOME._replace(stamp=2 ** 31 * 10 ** 9), HOME._replace(stamp=-2 ** 63)],
-    ids=['far', 'farther', 'turning', 'accelerated', 'after 2038', 'before 1901'])
+    ids=['far', 'farther', 'turning', 'accelerated', 'loaded', 'after 2038', 'before 1901'])
 def test_a_setpoint_that_overflows_gives_nothing(setpoint: Setpoint) -> None:
     assert STEP(setpoint, None) is None
     assert STEP(HOME, None) is not None
 
 
-def test_a_wrench_that_overflows_gives_nothing() -> None:
-    assert STEP(HOME._replace(wrench=(1e308,) * 6), None) is None
-
-
-huge = st.floats(allow_nan=False, allow_infinity=False)
-sizes = huge | st.floats(-3.0, 3.0) | st.sampled_from([0.0, 1e100, -1e150, 1e154, 1e-320, 1e300])
+sizes = st.floats(allow_nan=False, allow_infinity=False) | st.floats(-3.0, 3.0) | st.sampled_from(
+    [0.0, 1e100, -1e150, 1e154, 1e-320, 1e300])
 rotations = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(
     lambda q: math.hypot(*q) > 1e-3).map(
         lambda q: from_quaternion(*(number / math.hypot(*q) for number in q))) | st.sampled_from(
@@ -374,25 +353,17 @@ def test_the_base_wrench_is_the_librarys_bit_for_bit(moving: bool) -> None:
         assert_alike(found, BaseWrench(parameters), batch)
 
 
-def test_an_unknown_base_has_no_base_wrench() -> None:
+def test_an_unknown_base_and_overflowing_numbers_have_no_base_wrench() -> None:
     random = rng()
-    motion = random_motion(PARAMETERS, random, MANY)
+    motions = random_motion(PARAMETERS, random, MANY).rows.copy()
     bases = random_base_motion(PARAMETERS, random, MANY).rows.copy()
     bases[10:20] = NO_BASE
-    batch = batch_of(motion.rows, random_wrench(PARAMETERS, random, MANY), bases)
+    motions[20:25, 18:21] = 1e308
+    batch = batch_of(motions, random_wrench(PARAMETERS, random, MANY), bases)
     found = BaseWrench(PARAMETERS).many(batch)
-    unknown = np.zeros(MANY, dtype=bool)
-    unknown[10:20] = True
-    assert np.array_equal(np.isnan(found), np.repeat(unknown[:, None], 6, axis=1))
+    assert np.flatnonzero(np.isnan(found).all(axis=1)).tolist() == list(range(10, 25))
+    assert np.isnan(found).sum() == 15 * 6
     assert_alike(found, BaseWrench(PARAMETERS), batch)
-
-
-def test_overflowing_numbers_have_no_base_wrench() -> None:
-    motions = np.array([HOME.motion] * 3)
-    motions[1, 18:21] = 1e308
-    found = BaseWrench(PARAMETERS).many(batch_of(motions, np.zeros((3, 6)), None))
-    assert np.isnan(found).all(axis=1).tolist() == [False, True, False]
-    assert_alike(found, BaseWrench(PARAMETERS), batch_of(motions, np.zeros((3, 6)), None))
 
 
 def weight_of(parameters: Parameters) -> float:

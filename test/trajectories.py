@@ -18,9 +18,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+import pytest
 from referees import rng, ROOT
 
 from stewart_dynamics import Motion, Parameters
+from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
@@ -36,6 +38,19 @@ STAMP = 1_700_000_000_123_456_789
 SECOND = 1_000_000_000
 REST = (0.0,) * 6
 HOME = (0.0, 0.0, 1.1, 0.0, 0.0, 0.0, 1.0)
+
+
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return a list that gets the number of samples for which the legs are computed."""
+    solved: list[int] = []
+    solve = batch.solve
+
+    def counting(constants: Array, rows: Array, *loads: Array | None) -> Array:
+        solved.append(len(rows))
+        return solve(constants, rows, *loads)
+
+    monkeypatch.setattr(batch, 'solve', counting)
+    return solved
 
 
 def rows_of(motion: Motion) -> Array:
