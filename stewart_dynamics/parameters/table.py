@@ -272,7 +272,7 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'a joint_trajectory_controller without an effort command interface rejects points '
               'with effort', default=True),
     Parameter('trajectory.approach', 'string', 'where ~/platform_trajectory may start: anywhere; '
-              f'check: where the measured legs are, to {START_TOLERANCE:.0%} of '
+              f'check: where the measured legs are, to {100.0 * START_TOLERANCE:g} % of '
               'singularity.characteristic_length; '
               'prepend: a motion from rest there to the first point is put before it', '',
               IGNORE, choices=(IGNORE, CHECK, PREPEND)),
