@@ -239,13 +239,13 @@ def folder(text: str) -> Path:
 
 def add_parameters(parser: argparse._ActionsContainer, more: str = '',
                    required: bool = True) -> None:
-    """Add the option of the parameter file, and what it is besides."""
+    """Add the option of the parameter file; ``more`` follows its help."""
     parser.add_argument('--params', required=required, type=Path, metavar='FILE',
                         help=f'parameters of the hexapod, the file that the node takes{more}')
 
 
 def add_node(parser: argparse._ActionsContainer, more: str = '') -> None:
-    """Add the option of the node's name, and what it is besides."""
+    """Add the option of the node's name; ``more`` follows its help."""
     parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
                         help=f'node whose parameters are read{more} (default: {NODE})')
 

@@ -645,7 +645,7 @@ def test_a_level_lasts_as_long_as_the_output_that_caused_it() -> None:
 # The log lines of repeated events
 
 class Log:
-    """A log at chosen times, and what it has written."""
+    """A log at chosen times, and its lines."""
 
     def __init__(self) -> None:
         self.now = 0.0

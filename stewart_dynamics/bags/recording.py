@@ -116,7 +116,7 @@ class Recording:
                       if other == kind and name not in left_out)
 
     def checked_topic(self, name: str, kind: str) -> str:
-        """Return a topic; raise BagError if there is none of that name, or of another type."""
+        """Return a topic; raise BagError if the bag has no such topic, or one of another type."""
         if name not in self.topics:
             raise BagError(f'{self.path}: has no topic {name}; it contains {self.contents}')
         if self.topics[name] != kind:
@@ -125,7 +125,7 @@ class Recording:
 
     @property
     def contents(self) -> str:
-        """Return the topics with their types, and what could not be read."""
+        """Return the topics with their types, and the parts that could not be read."""
         held = joined([f'{name} ({kind})' for name, kind in sorted(
             self.topics.items())]) or 'no topics'
         damage = listed(self.damage)

@@ -41,7 +41,7 @@ _OF_VELOCITY = TORQUE_SPEED, SPEED_MAX
 
 
 class Need(NamedTuple):
-    """What a motor must bear at least: the key of that load, its name and its unit."""
+    """A load that a motor must bear at least: its key in a leg of summary.json, name and unit."""
 
     load: str
     name: str

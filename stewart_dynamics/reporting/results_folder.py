@@ -41,7 +41,7 @@ IDENTIFICATION, DATASHEET, CALIBRATION = (
     'identification.json', 'datasheet.json', 'calibration.json')
 DESIGNED_MOTION, DESIGNED_POSES = 'trajectory.yaml', 'poses.csv'  # the same of designs
 
-# What else the programs write there.
+# Other files that the programs write there.
 DATASHEET_PAGE, REPORT_PAGE = 'datasheet.html', 'report.html'
 LEGS_CSV, LEGS_PARQUET, WORKSPACE = 'legs.csv', 'legs.parquet', 'workspace.csv'
 IDENTIFIED_PARAMETERS, CALIBRATED_PARAMETERS = 'identified.yaml', 'calibrated.yaml'

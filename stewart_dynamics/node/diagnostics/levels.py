@@ -155,7 +155,7 @@ class StatusPart:
         raise NotImplementedError
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
-        """Return log lines for what has changed since the last report."""
+        """Return log lines for changes since the last report."""
         return self._changed(status.level, status.message)
 
     def _changed(self, level: int, message: str, cause: str = '') -> list[LogLine]:
