@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import datetime, timezone
 import errno
 import json
 import os
@@ -102,6 +103,11 @@ def write_files(files: Mapping[Path, str | bytes]) -> None:
     finally:
         for left in partial.values():
             left.unlink(missing_ok=True)
+
+
+def now() -> str:
+    """Return the present time, UTC, as files of results have it."""
+    return datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ')
 
 
 def write_json(path: Path, document: Any) -> None:

@@ -45,8 +45,8 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = 'stewart_dynamics'
 
-# Test modules that are left out: with ROS or a browser.
-_NEEDS = re.compile('from running import|import rclpy|playwright')
+# Test modules that are left out: with ROS, a browser, or processes that outlive a test.
+_NEEDS = re.compile('from running import|import rclpy|playwright|many_bags')
 _NO_TESTS = 5  # an exit code of pytest
 
 _ARITHMETIC = {ast.Add: ('+', '-'), ast.Sub: ('-', '+'), ast.Mult: ('*', '/'),

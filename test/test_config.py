@@ -29,7 +29,7 @@ from rosbags.highlevel import AnyReader
 from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.program import DONE
 from stewart_dynamics.replay import main
-from stewart_dynamics.replay.output import MODEL_TYPES, ROBOT_DESCRIPTION
+from stewart_dynamics.replay.output import RECORDED_TYPES, ROBOT_DESCRIPTION
 import yaml
 
 CONFIG = ROOT / 'config'
@@ -87,7 +87,7 @@ def topics_of_foxglove(layout: str = LIVE) -> dict[str, str]:
     for name, panel in foxglove(layout)['configById'].items():
         kind = name.partition('!')[0]
         if kind == '3D':
-            found.update({topic: MODEL_TYPES.get(topic, MARKERS) for topic in panel['topics']})
+            found.update({topic: RECORDED_TYPES.get(topic, MARKERS) for topic in panel['topics']})
             assert ROBOT_DESCRIPTION in found
         elif kind in ('DiagnosticSummary', 'DiagnosticStatusPanel'):
             found[panel['topicToRender']] = DIAGNOSTICS

@@ -25,10 +25,9 @@ from referees import Array, random_motion, random_parameters, rng
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
+from stewart_dynamics.description.model import JOINT_STATES, MODEL_TYPES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.leg_joints import mounts
-from stewart_dynamics.replay.output import MODEL_TYPES
 
 STAMP = 1_700_000_000_123_456_789
 

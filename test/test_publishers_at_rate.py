@@ -31,8 +31,7 @@ from referees import rng
 from running import DynamicsNode, executable, NODE, NodeProcess, Program, ROOT, Sample
 from sensor_msgs.msg import JointState
 from stewart_dynamics import Motion, Pose
-from stewart_dynamics.description.model import JOINT_STATES, TF
-from stewart_dynamics.replay.output import MODEL_TYPES
+from stewart_dynamics.description.model import JOINT_STATES, MODEL_TYPES, TF
 from test_external_wrench import HEXAPOD, LOAD, MILLISECOND, resting
 from test_external_wrench import message_of
 from test_external_wrench_node import Felt

@@ -29,7 +29,7 @@ from stewart_dynamics import Parameters
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.replay.output import (
-    MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
+    RECORDED_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 
 STAMP = 1_700_000_000_123_456_789
 SAMPLES = 20
@@ -38,8 +38,8 @@ CLOSED = 1e-12  # [m], of machines of 0.3 to 3 m
 
 def read(topic: str, data: Any) -> Any:
     """Return a message, of which every byte has been read."""
-    message = STORE.deserialize_cdr(data.tobytes(), MODEL_TYPES[topic])
-    assert STORE.serialize_cdr(message, MODEL_TYPES[topic]).tobytes() == data.tobytes()
+    message = STORE.deserialize_cdr(data.tobytes(), RECORDED_TYPES[topic])
+    assert STORE.serialize_cdr(message, RECORDED_TYPES[topic]).tobytes() == data.tobytes()
     return message
 
 
@@ -141,7 +141,7 @@ def test_the_joints_are_those_of_the_node(recorded: Recorded) -> None:
                                 recorded.rows[JOINT_STATES], strict=True):
         ours = read(JOINT_STATES, data)
         of_node = STORE.deserialize_cdr(
-            messages.joint_states(stamp, row), MODEL_TYPES[JOINT_STATES])
+            messages.joint_states(stamp, row), RECORDED_TYPES[JOINT_STATES])
         assert (ours.header, ours.name) == (of_node.header, of_node.name)
         np.testing.assert_allclose(ours.position, of_node.position, rtol=0.0, atol=2e-15)
 

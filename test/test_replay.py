@@ -61,7 +61,7 @@ from stewart_dynamics.program import BAD_INPUT, DONE, INTERRUPTED, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
 from stewart_dynamics.replay.output import (
-    MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
+    RECORDED_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.setpoints.inputs import ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH
@@ -210,7 +210,7 @@ def test_the_bag_has_the_topics_and_types_of_the_node(
         assert {c.topic: c.msgtype for c in reader.connections} == {
             **{f'{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()},
             **{topic if topic.startswith('/') else f'{NODE}/{topic}': kind
-               for topic, kind in MODEL_TYPES.items()}}
+               for topic, kind in RECORDED_TYPES.items()}}
     assert not list(replayed[name].folder.parent.glob('.*'))
 
 

@@ -231,10 +231,15 @@ def _checked(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion
     pose = poses.pose if isinstance(poses, Motion) else poses
     if given.ndim != 2 or pose.shape != given.shape[:1]:
         raise MotionError(f'lengths {given.shape}, poses {pose.shape}: must be (N, 6) and (N,)')
-    if len(given) < FEWEST:
-        raise StewartError(f'{len(given)} poses: at least {FEWEST} are needed, each leg has 7 '
-                           'unknowns; 40 are advisable')
+    check_number(len(given))
     return Equations(given, pose)
+
+
+def check_number(poses: int) -> None:
+    """Raise StewartError if these are too few poses."""
+    if poses < FEWEST:
+        raise StewartError(f'{poses} poses: at least {FEWEST} are needed, each leg has 7 '
+                           'unknowns; 40 are advisable')
 
 
 def _with_frames(equations: Equations, unknowns: Unknowns) -> Array:

@@ -30,6 +30,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.calibration.calibrate import check_number
 from stewart_dynamics.calibration.equations import Equations, GEOMETRY, names_of, values_of
 from stewart_dynamics.calibration.fit import Unknowns
 from stewart_dynamics.calibration.measured_poses import POSITION, QUATERNION
@@ -68,8 +69,9 @@ def design_poses(platform: StewartPlatform, count: int, noise: Noise = NOISE, se
     Return poses from which the geometry is identifiable, and its predicted intervals.
 
     Raises ParameterError: a limit of length is missing, or home is not within the limits.
-    Raises StewartError: too few poses are within the limits.
+    Raises StewartError: too few poses are asked for, or within the limits.
     """
+    check_number(count)
     random = np.random.default_rng(seed)
     p = platform.parameters
     candidates = _within_limits(platform, random, max(_CANDIDATES, 3 * count))
@@ -128,7 +130,7 @@ def _within_limits(platform: StewartPlatform, random: np.random.Generator, count
         sound &= ~known.exceeds(limits.FORCE_MAX, np.abs(result.forces)).any(axis=1)
     clearances = clearance_to_check(p)
     if clearances is not None:
-        sound &= clearances(poses.rows).min(axis=-1) > p[limits.CLEARANCE_MIN]
+        sound &= ~known.exceeds(limits.CLEARANCE_MIN, clearances(poses.rows)).any(axis=-1)
     return poses[sound]
 
 

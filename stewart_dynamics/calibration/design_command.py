@@ -27,7 +27,7 @@ from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_POSES, 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that only a design has."""
     group = parser.add_argument_group('design of poses (--design)')
-    group.add_argument('--design', type=whole(8, 500), metavar='N',
+    group.add_argument('--design', type=whole(1, 500), metavar='N',
                        help='calibrate nothing, but choose the N poses within the limits that '
                             f'identify best: DIR/{DESIGNED_POSES}, and DIR/{WAY_THROUGH_POSES} '
                             f'that visits them (default DIR: {DESIGNED})')

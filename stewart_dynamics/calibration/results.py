@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import datetime, timezone
 import math
 import textwrap
 from typing import Any
@@ -32,6 +31,7 @@ from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.estimates import (
     combined, estimate, FIXED, IDENTIFIED, NOT_IDENTIFIABLE, not_identifiable_lines, table_lines)
+from stewart_dynamics.whole_file import now
 
 # Version of calibration.json; increased when the meaning of a key changes.
 VERSION = 1
@@ -45,7 +45,7 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
     units = ['m'] * len(found.names)
     return {
         'version': VERSION, 'software': SOFTWARE,
-        'date': datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ'),
+        'date': now(),
         'poses': {'source': source, 'read': len(measured.names), 'used': found.poses},
         'options': dict(options),
         'parameters': [

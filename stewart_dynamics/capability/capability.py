@@ -32,7 +32,7 @@ from stewart_dynamics.capability.motions import (
     constant, Deviations, faster, timed)
 from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
-from stewart_dynamics.capability.travel import ENDS
+from stewart_dynamics.capability.travel import ENDS, LIMITS
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
@@ -54,6 +54,8 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, NaturalModes
 
 _ENDS = np.array(ENDS)
+# Bounds where a minimum is not given.
+_UNLIMITED = {limits.LENGTH_MIN: 0.0, limits.CLEARANCE_MIN: -math.inf}
 # Rounds in which the least tilt between two azimuths is found.
 _ZOOMS = 6
 # Step of a numerical derivative by the pose [m, rad].
@@ -140,10 +142,7 @@ class Capability:
         self._limits = limits.Limits(platform.parameters)
         bounds = self._limits.bounds
         self._bounds = np.array([
-            bounds.get(name, np.full(6, unlimited)) for name, unlimited in (
-                (limits.LENGTH_MIN, 0.0), (limits.LENGTH_MAX, math.inf),
-                *((name, math.inf) for name in limits.OF_JOINTS),
-                (limits.CLEARANCE_MIN, -math.inf))])
+            bounds.get(name, np.full(6, _UNLIMITED.get(name, math.inf))) for name in LIMITS])
         clearance = clearance_to_check(platform.parameters)
         none = np.empty((0, 3))
         self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes

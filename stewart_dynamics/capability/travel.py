@@ -39,10 +39,9 @@ from stewart_dynamics.mechanics.vectors import norm, put3
 
 CLEARANCE_MIN, SINGULARITY, NOTHING = 4, 5, 6
 """Codes of the limit that ends a travel, behind those of ``travel_legs``."""
-ENDS = (*(limits.short_name(limit) for limit in (
-    limits.LENGTH_MIN, limits.LENGTH_MAX, *limits.OF_JOINTS, limits.CLEARANCE_MIN)),
-    limits.SINGULARITY, '')
-"""Names of the limits by their codes."""
+LIMITS = (limits.LENGTH_MIN, limits.LENGTH_MAX, *limits.OF_JOINTS, limits.CLEARANCE_MIN)
+ENDS = (*map(limits.short_name, LIMITS), limits.SINGULARITY, '')
+"""Limits that end a travel, and names of all ends, by their codes."""
 
 
 def memory_of(plates: Sequence[Array]) -> tuple[int, int]:

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from datetime import date
 import math
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -42,7 +41,7 @@ from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import (
     DATASHEET, DATASHEET_PAGE, whole_folder, WORKSPACE)
-from stewart_dynamics.whole_file import write_files, write_json
+from stewart_dynamics.whole_file import now, write_files, write_json
 
 VERSION = 1  # version of datasheet.json; increased when the meaning of a key changes
 
@@ -139,7 +138,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
 
 def _head(hexapod: RatedHexapod, order: Order) -> dict[str, Any]:
     return {
-        'version': VERSION, 'software': SOFTWARE, 'date': date.today().isoformat(),
+        'version': VERSION, 'software': SOFTWARE, 'date': now(),
         'name': order.name,
         'pose': {'position': hexapod.pose.position.tolist(),
                  'angles': to_euler(hexapod.pose.rotation).tolist(),

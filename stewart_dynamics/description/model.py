@@ -35,12 +35,14 @@ from stewart_dynamics.mechanics.frames.rotation import (
     quaternion_of, quaternion_product, to_quaternion)
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import joint_state_layout
 from stewart_dynamics.messages.standard import transforms
 from stewart_dynamics.parameters.table import Parameters
 
 JOINT_STATES = 'joint_states'  # under the node's name
 TF = '/tf'
+MODEL_TYPES = {JOINT_STATES: type_names.JOINT_STATE, TF: type_names.TF_MESSAGE}
 
 
 class ModelMessages:

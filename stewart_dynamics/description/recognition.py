@@ -37,9 +37,10 @@ from stewart_dynamics.description.read_mjcf import read_mjcf
 from stewart_dynamics.description.read_sdf import read_sdf
 from stewart_dynamics.description.read_urdf import read_urdf
 from stewart_dynamics.description.topology import Chain, LegJoint, Topology, topology_of
-from stewart_dynamics.description.xml_text import LIMITS, NOT_CHECKED
+from stewart_dynamics.description.xml_text import NOT_CHECKED
 from stewart_dynamics.errors import one_line, shown
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of
+from stewart_dynamics.mechanics.limits import OF_RESULTS
 from stewart_dynamics.parameters.table import (
     NEGATIVE, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
 from stewart_dynamics.whole_file import read_text
@@ -155,7 +156,7 @@ def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
         'geometry.zero_length': max(zero, 0.0),
         'actuator.reflected_mass': slide.armature, 'actuator.viscous_friction': slide.damping,
         'actuator.coulomb_friction': slide.friction}
-    for name, value in zip(LIMITS, [*ends, slide.velocity_max, slide.force_max], strict=True):
+    for name, value in zip(OF_RESULTS, [*ends, slide.velocity_max, slide.force_max], strict=True):
         least = 0.0 if name == 'limits.length_min' else np.finfo(float).tiny
         if value is not None and value < least:
             said.append(f'{name}: {value:.3g}: cannot be: left out')
@@ -299,7 +300,7 @@ def _carried(mechanism: Mechanism) -> dict[str, Any]:
 
 def _missing(given: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
     """Return one line for each value that is not in the file."""
-    said = [f'{name}: not in the file: unlimited' for name in LIMITS
+    said = [f'{name}: not in the file: unlimited' for name in OF_RESULTS
             if name not in {**given, **mechanism.carried}]
     if not (mechanism.carried or np.any(given['actuator.reflected_mass'])):
         said.append('actuator.reflected_mass: not in the file: 0 kg')

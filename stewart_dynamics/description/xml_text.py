@@ -25,18 +25,17 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.description.hexapod import RigidBody
+from stewart_dynamics.mechanics.limits import OF_RESULTS
 from stewart_dynamics.parameters.table import INERTIA, Parameters
 
 CARRIED = 'stewart_dynamics'
 """Name of the block, or prefix of the elements, of parameters without an own element."""
-LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
-"""Limits that joints have in URDF and SDFormat."""
 LEG_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',
               'legs.piston.inertia')
 _GROUPS = ('actuator.', 'drive.', 'geometry.', 'legs.', 'limits.')
 # Parameters of these groups that formats have elements for.
 _IN_ELEMENTS = frozenset((
-    *LIMITS, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
+    *OF_RESULTS, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
     'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
     'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'))
 NOT_CHECKED = 'none'  # value there of a limit that is not checked
@@ -76,7 +75,7 @@ def carried(parameters: Parameters, names: Iterable[str]) -> Mapping[str, str]:
     These are the given ones that no format has elements for, those named, and limits that are not
     set.
     """
-    names = [*names, *(name for name in LIMITS if parameters[name] is None),
+    names = [*names, *(name for name in OF_RESULTS if parameters[name] is None),
              *(name for name in parameters.given
                if name.startswith(_GROUPS) and name not in _IN_ELEMENTS)]
     return {name: _text(parameters[name]) for name in names}

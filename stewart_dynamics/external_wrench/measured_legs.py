@@ -35,7 +35,8 @@ from stewart_dynamics.messages.joint_state import JointStateError, JointStateRea
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import (
-    BASE_NOT_KNOWN, MALFORMED, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
+    BASE_NOT_KNOWN, jumped_back, MALFORMED, OUT_OF_RANGE, Rejection, stamp_words, TOO_OLD, too_old,
+    TWICE)
 
 # A row: the stamp [ns, an integer], pose and twist as in a row of motion, the forces that acted
 # since the measurement before [N], the known load, the motion of the base.
@@ -144,7 +145,7 @@ class MeasuredLegs:
             return None
         row = (base.at(measurement.stamp) if base else None) or NO_BASE
         if base and base.topics and row[0] != row[0]:
-            self._reject(BASE_NOT_KNOWN, f'stamp {measurement.stamp} ns')
+            self._reject(BASE_NOT_KNOWN, stamp_words(measurement.stamp))
             return None
         try:
             self._last = self.step(measurement, self._last, known, target, row)
@@ -180,11 +181,9 @@ class MeasuredLegs:
         """Return whether a measurement may still be used, or reject it."""
         back = self._last.stamp - stamp if self._last else -1
         if back > self._timeout:
-            self._noticed(f'{MEASURED_LEGS}: stamps jumped back by {back / SECOND:g} s: followed '
-                          'as a restart')
+            self._noticed(f'{MEASURED_LEGS}: {jumped_back(back)}')
         elif back == 0:
-            self._reject(TWICE, f'stamp {stamp} ns')
+            self._reject(TWICE, stamp_words(stamp))
         elif back > 0:
-            self._reject(
-                TOO_OLD, f'stamp {stamp} ns is {back / SECOND:g} s older than the last used')
+            self._reject(TOO_OLD, too_old(stamp, back))
         return back < 0 or back > self._timeout

@@ -23,7 +23,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from datetime import datetime, timezone
 from pathlib import Path
 import textwrap
 from typing import Any
@@ -49,12 +48,12 @@ from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.estimates import (
     combined, estimate, IDENTIFIED, justified, NOT_IDENTIFIABLE, not_identifiable_lines,
-    page_values, states_of, table_lines)
+    page_values, states_of, table_lines, WITHOUT_VALUE)
 from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
 from stewart_dynamics.reporting.results_folder import (
     check_free, IDENTIFICATION, IDENTIFIED_PARAMETERS, remove_abandoned, REPORT_PAGE, whole_folder)
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
-from stewart_dynamics.whole_file import write_files, write_json
+from stewart_dynamics.whole_file import now, write_files, write_json
 from tqdm import tqdm
 
 # Version of identification.json; increased when the meaning of a key changes.
@@ -121,7 +120,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
             what.shares, strict=True)]
     return {
         'version': VERSION, 'software': SOFTWARE,
-        'date': datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ'),
+        'date': now(),
         'bags': [{
             **bag._asdict(), 'bag': str(bag.bag),
             'delay_s': float(delay + bag.delay_s) if error else None,
@@ -189,9 +188,10 @@ def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
             if name == 'gravity':  # the identified angle is not a value of the file
                 text = f'turned about {parts[1][-1]} by {each["value"]:.5f} {text} rad'
         else:
-            text = 'kept' if each['state'] == NOT_IDENTIFIABLE else 'only in a combination'
+            text = WITHOUT_VALUE[each['state']]
         texts.setdefault(name, []).append(text)
-    return {name: 'kept: not identifiable from the motion' if set(each) == {'kept'} else
+    kept = WITHOUT_VALUE[NOT_IDENTIFIABLE]
+    return {name: f'{kept} from the motion' if set(each) == {kept} else
             f'identified {result["date"][:10]}, 95 %: '
             + ', '.join(each if len(set(each)) > 1 else each[:1])
             for name, each in texts.items()}

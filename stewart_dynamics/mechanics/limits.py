@@ -147,9 +147,13 @@ class Limits:
         self._of_samples = {name: (self.bounds[name].tolist(), self.thresholds[n].tolist())
                             for n, name in enumerate(LIMITS) if name in self.bounds}
 
+    def threshold(self, limit: str) -> Array:
+        """Return the values (6,) above (or below) which a limit is exceeded."""
+        return np.asarray(self.thresholds[LIMITS.index(limit)], dtype=float)
+
     def exceeds(self, limit: str, values: Array) -> Flags:
         """Return where values (..., 6) of its quantity exceed a limit; nan never does."""
-        exceeding: Flags = _exceeds(limit, values, self.thresholds[LIMITS.index(limit)])
+        exceeding: Flags = _exceeds(limit, values, self.threshold(limit))
         return exceeding
 
     def exceeded(self, values: Mapping[str, Sequence[float] | None],

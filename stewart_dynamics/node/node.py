@@ -47,7 +47,7 @@ from stewart_dynamics.node.publishers_at_rate import (
 from stewart_dynamics.node.tasks import (
     inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)
 from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD, TRAVEL
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import AS_MEASURED, Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
 from stewart_dynamics.ros.declared_parameters import changed, declare_parameters, log_changes
@@ -62,7 +62,7 @@ from stewart_dynamics.setpoints.inputs import WRENCH
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import (
-    DROPPED, NOT_EXCLUSIVE, OUT_OF_RANGE, Rejection)
+    DROPPED, NOT_EXCLUSIVE, OUT_OF_RANGE, Rejection, stamp_words)
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 
 
@@ -164,7 +164,7 @@ class DynamicsNode(LifecycleNode):
             publishers.get(JOINT_STATES), rate, self._model_messages.joint_states)
         self._transforms_read = False  # they have a subscriber
         self._travel = TravelPublisher(parameters, publishers[TRAVEL], self._travel_code)
-        self._model_measured = parameters['joint_states.source'] == 'measured'
+        self._model_measured = parameters['joint_states.source'] == AS_MEASURED
         self._handled, self._rested = -math.inf, False
         self._active = True
         return TransitionCallbackReturn.SUCCESS
@@ -263,7 +263,7 @@ class DynamicsNode(LifecycleNode):
         """Drop and count all setpoints but the newest, which is a restart if one of them is."""
         *dropped, (newest, came) = waiting
         for setpoint, _ in dropped:
-            self._setpoints.reject('setpoint', DROPPED, f'stamp {setpoint.stamp} ns')
+            self._setpoints.reject('setpoint', DROPPED, stamp_words(setpoint.stamp))
         restart = any(setpoint.restart for setpoint, _ in waiting)
         return newest._replace(restart=restart), came
 
@@ -275,7 +275,7 @@ class DynamicsNode(LifecycleNode):
         output = self._models.step(setpoint, None if self._last is None else self._last.state)
         self._restarting = output is None and setpoint.restart
         if output is None:
-            self._setpoints.reject('setpoint', OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')
+            self._setpoints.reject('setpoint', OUT_OF_RANGE, stamp_words(setpoint.stamp))
             return
         publishers = self._topics.publishers
         for topic, message in self._messages.of_output(output):
@@ -469,7 +469,7 @@ class DynamicsNode(LifecycleNode):
 
 def _expects_measured_legs(parameters: Parameters) -> bool:
     """Return whether parameters announce measured legs."""
-    return (parameters['joint_states.source'] == 'measured'
+    return (parameters['joint_states.source'] == AS_MEASURED
             or parameters['external_wrench.force_max'] is not None
             or parameters['external_wrench.moment_max'] is not None)
 

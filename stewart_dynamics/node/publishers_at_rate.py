@@ -29,15 +29,14 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
 
 from stewart_dynamics.capability.capability import Capability
+from stewart_dynamics.capability.travel import LIMITS
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, OF_JOINTS)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.diagnostics.levels import OK, Status
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
-from stewart_dynamics.node.topics import DIAGNOSTICS, NodeTopics
+from stewart_dynamics.node.topics import DIAGNOSTICS, NodeTopics, TRAVEL_RATE
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import RepeatedLog
 from stewart_dynamics.setpoints.output_messages import LEG_FORCES, LEG_STATES
@@ -45,7 +44,6 @@ from stewart_dynamics.setpoints.output_messages import LEG_FORCES, LEG_STATES
 # The topics for controllers; diagnostics give the number of their subscribers.
 _READ = LEG_STATES, LEG_FORCES
 
-_TRAVEL_RATE = 10.0  # [Hz]
 # Directions in the order of the message: each of x y z rx ry rz to minus, then to plus.
 _DIRECTIONS = np.stack([-np.eye(6), np.eye(6)], axis=1).reshape(12, 6)
 # Values where nothing limits, since no output is infinite: the largest number [m]; one turn [rad].
@@ -53,8 +51,7 @@ _UNLIMITED = np.repeat([sys.float_info.max, 2.0 * math.pi], 6)
 _LAYOUT = MultiArrayLayout(dim=[
     MultiArrayDimension(label='x y z rx ry rz', size=6, stride=12),
     MultiArrayDimension(label='minus plus', size=2, stride=2)])
-_ENDING = LENGTH_MIN, LENGTH_MAX, *OF_JOINTS, CLEARANCE_MIN
-NO_LIMIT = (f'~/travel: none of {", ".join(_ENDING)} is set: it ends '
+NO_LIMIT = (f'~/travel: none of {", ".join(LIMITS)} is set: it ends '
             'at singularity.stop_condition alone')
 
 
@@ -99,7 +96,7 @@ class TravelPublisher(PublisherAtRate):
     """
 
     def __init__(self, parameters: Parameters, publisher: Any, code: Preparation) -> None:
-        super().__init__(publisher, _TRAVEL_RATE, self._message)
+        super().__init__(publisher, TRAVEL_RATE, self._message)
         self._code = code
         self._read = self._said = False
         self.use(parameters)
@@ -115,7 +112,7 @@ class TravelPublisher(PublisherAtRate):
         self._read = subscribed and self._code.begin()
         if not subscribed:
             return ''
-        unlimited = all(self._parameters[name] is None for name in _ENDING)
+        unlimited = all(self._parameters[name] is None for name in LIMITS)
         said, self._said = self._said, True
         return NO_LIMIT if unlimited and not said else ''
 

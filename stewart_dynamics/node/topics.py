@@ -32,7 +32,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from stewart_dynamics.description.model import JOINT_STATES, TF
+from stewart_dynamics.description.model import JOINT_STATES, MODEL_TYPES, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
@@ -50,6 +50,7 @@ from stewart_dynamics.setpoints.output_messages import (
 from stewart_dynamics.setpoints.sample_joining import WAITING
 
 DIAGNOSTICS, MARKERS, PAYLOAD, TRAVEL = '/diagnostics', 'markers', 'payload', 'travel'
+TRAVEL_RATE = 10.0  # highest rate of TRAVEL [Hz]
 
 
 class Topic(NamedTuple):
@@ -133,14 +134,14 @@ PUBLISHED = (
           depth=1, latched=True),
     Topic(TRAVEL, type_names.FLOAT64_MULTI_ARRAY, 'how far x, y, z and the rotations about them '
           'can go from the pose of the last setpoint, to minus and to plus, the others held: 6 x '
-          '2, m and rad', '; up to the first limit of lengths or joint angles or '
-          '`singularity.stop_condition`, about the origin of the platform; 0 where one is '
-          'exceeded, one turn or the largest number where nothing limits; at most 10 Hz, computed '
-          'while somebody subscribes', depth=1),
-    Topic(JOINT_STATES, type_names.JOINT_STATE, 'positions of all joints of the URDF',
+          '2, m and rad', '; up to the first limit of lengths, joint angles or clearance of the '
+          'legs, or `singularity.stop_condition`, about the origin of the platform; 0 where one '
+          'is exceeded, one turn or the largest number where nothing limits; at most '
+          f'{TRAVEL_RATE:g} Hz, computed while somebody subscribes', depth=1),
+    Topic(JOINT_STATES, MODEL_TYPES[JOINT_STATES], 'positions of all joints of the URDF',
           ', for [robot_state_publisher](visualization.md#as-a-model); at most '
           '`visualization_rate`, while somebody subscribes'),
-    Topic(TF, type_names.TF_MESSAGE, '`base_frame` to `platform_frame`',
+    Topic(TF, MODEL_TYPES[TF], '`base_frame` to `platform_frame`',
           parameter='publish_tf: true', depth=100),
     Topic(MARKERS, type_names.MARKER_ARRAY,
           '[visualization](visualization.md) for RViz and Foxglove',

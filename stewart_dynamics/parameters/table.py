@@ -111,6 +111,7 @@ MOTOR_INERTIA, SCREW_INERTIA = DRIVE_INERTIAS = 'drive.motor_inertia', 'drive.sc
 """Parameters from which actuator.reflected_mass follows, where one of them is given."""
 AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'  # values of geometry.platform_side
 IGNORE, CHECK, PREPEND = 'ignore', 'check', 'prepend'  # values of trajectory.approach
+OF_SETPOINTS, AS_MEASURED = 'setpoint', 'measured'  # values of joint_states.source
 WARN, SUPPRESS_FORCES = ACTIONS = 'warn', 'suppress_forces'  # of singularity.action, limits.action
 SEPARATE, COMBINED, POSES_ALONE = 'separate', 'combined', 'pose'  # values of setpoint.source
 FIXED, AT_REST, MOVING, BY_IMU = 'fixed', 'pose', 'motion', 'imu'  # values of base.source
@@ -293,8 +294,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('publish_tf', 'bool', 'publish the transform from base_frame to platform_frame on '
               '/tf, with every pose', default=False),
     Parameter('joint_states.source', 'string', 'whose poses ~/joint_states and /tf have: those of '
-              'setpoints, or of the measured legs (~/measured_legs)', '', 'setpoint',
-              choices=('setpoint', 'measured')),
+              'setpoints, or of the measured legs (~/measured_legs)', '', OF_SETPOINTS,
+              choices=(OF_SETPOINTS, AS_MEASURED)),
     Parameter('autostart', 'bool', 'configure and activate the node when it starts', default=True),
 )})
 

@@ -41,7 +41,7 @@ from stewart_dynamics.planned.trajectory import check_in_pieces
 
 # Points of a motion per second.
 RATE = 100.0
-_MOST_POINTS = 100_000
+MOST_POINTS = 100_000
 # Share of limits.velocity_max that an approach uses; without that limit, characteristic lengths
 # per second.
 _SPEED = 0.5
@@ -172,9 +172,9 @@ def _quintic(begin: Array, finish: Array, duration: float, rate: float) -> Timed
         if not (math.isfinite(value) and value > 0.0):
             raise MotionError(f'{name}: {value}: must be more than 0')
     intervals = max(math.ceil(duration * rate - 1e-9), 1)
-    if intervals >= _MOST_POINTS:
+    if intervals >= MOST_POINTS:
         raise MotionError(
-            f'duration: {duration:g} s at {rate:g} Hz: at most {_MOST_POINTS} points')
+            f'duration: {duration:g} s at {rate:g} Hz: at most {MOST_POINTS} points')
     part: Array = np.linspace(0.0, 1.0, intervals + 1, dtype=np.float64)
     rows = Interpolation(np.array([duration]), np.stack([begin, finish])).at(
         np.zeros(intervals + 1, dtype=np.int64), part)

@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.dynamics import friction
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits,
+    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits,
     SPEED_MAX, TEMPERATURE_RISE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
@@ -231,8 +231,7 @@ class Checks:
             lowest = 0.5 * (nearest[:-1] + nearest[1:]) - samples.ways
         self._check_limit(CLEARANCE_MIN, clearances, _of_legs(samples.times), others)
         bound = float(self._limits.bounds[CLEARANCE_MIN][0])
-        held = np.minimum(nearest[:-1], nearest[1:]) >= self._limits.thresholds[
-            LIMITS.index(CLEARANCE_MIN), 0]
+        held = np.minimum(nearest[:-1], nearest[1:]) >= self._limits.threshold(CLEARANCE_MIN)[0]
         unclear: list[int] = np.flatnonzero(
             samples.near & held & (lowest < bound - self._clearance_tolerance)).tolist()
         return unclear
@@ -307,7 +306,8 @@ class Checks:
         low, high = cubics.bounds()
         with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
             middle = np.abs(cubics.middle_rate() / durations[:, None])
-        shortest, longest, fastest = self._limits.thresholds[:3]
+        shortest, longest, fastest = map(
+            self._limits.threshold, (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX))
         suspect = np.flatnonzero(samples.joined & (
             (low < shortest) | (high > longest) | (middle > fastest)).any(axis=1))
         if not len(suspect):

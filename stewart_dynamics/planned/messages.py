@@ -41,7 +41,7 @@ from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
 from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
 from stewart_dynamics.parameters.tolerances import START_TOLERANCE, unit_rule
-from stewart_dynamics.planned.approach import approach_in_pieces
+from stewart_dynamics.planned.approach import approach_in_pieces, MOST_POINTS
 from stewart_dynamics.planned.trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
 from stewart_dynamics.setpoints.inputs import unit_quaternions
@@ -51,7 +51,6 @@ from stewart_dynamics.setpoints.rejections import (
 INPUT, INPUT_TYPE = 'platform_trajectory', type_names.MULTI_DOF_JOINT_TRAJECTORY
 OUTPUT, OUTPUT_TYPE = 'leg_trajectory', type_names.JOINT_TRAJECTORY
 
-MOST_POINTS = 100_000
 # Numbers of points read and written between two yields: some tenths of a millisecond of work.
 _READ = 2 * PIECE
 _WRITTEN = 8 * PIECE

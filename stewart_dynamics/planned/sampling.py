@@ -30,7 +30,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.drives.motor_limits import force_limits, rate_limits
-from stewart_dynamics.mechanics.limits import Limits
+from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX
 from stewart_dynamics.mechanics.rows import (
     BASE_ANGULAR_VELOCITY, CONDITION, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.parameters.table import Parameters
@@ -63,7 +63,7 @@ class Sampling:
         self._reflected = parameters['actuator.reflected_mass']
         self._parameters = parameters
         # Rates above which a leg or its motor may exceed a limit.
-        self._fastest = self._limits.thresholds[2]
+        self._fastest = self._limits.threshold(VELOCITY_MAX)
         if parameters.drives:
             self._fastest = np.minimum(self._fastest, rate_limits(parameters))
         # Largest speed of a platform joint at a speed |v| + arm |w| of the platform.
@@ -107,7 +107,7 @@ class Sampling:
         """Return in which intervals a length or a rate may exceed its limit (N,)."""
         square = durations ** 2 / 8.0
         length = bounds.position_deviation + square * bounds.speed ** 2 * inverse_radius
-        shortest, longest = self._limits.thresholds[:2]
+        shortest, longest = map(self._limits.threshold, (LENGTH_MIN, LENGTH_MAX))
         lengths, length_deviation = results[:, LENGTHS], self._lever * length[:, None]
         exceeding: Flags = (
             (_smaller(lengths) - length_deviation < shortest)

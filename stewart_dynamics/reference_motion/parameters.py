@@ -25,14 +25,15 @@ from types import MappingProxyType
 
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
-from stewart_dynamics.parameters.table import COMBINED, SEPARATE
+from stewart_dynamics.parameters.table import COMBINED, PARAMETERS, Parameters, SEPARATE
 
 _POSE = 'X Y Z alpha beta gamma'
 
 REFERENCE_MOTION_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('target', 'string', 'node that receives the setpoints, on <target>/setpoint/...',
-              default='stewart_dynamics'),
-    Parameter('base_frame', 'string', 'frame of the setpoints', default='base'),
+              default=Parameters.node),
+    Parameter('base_frame', 'string', 'frame of the setpoints',
+              default=PARAMETERS['base_frame'].default),
     Parameter('output', 'string', 'pose, twist and accel on three topics, or combined in one '
               'message', default=SEPARATE, choices=(SEPARATE, COMBINED)),
     Parameter('rate', 'double', 'rate of the setpoints', 'Hz', 100.0, minimum=1e-3, maximum=1e4),

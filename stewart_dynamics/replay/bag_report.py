@@ -27,7 +27,6 @@ from datetime import datetime, timezone
 import hashlib
 import itertools
 from pathlib import Path
-import re
 from typing import Any
 
 import numpy as np
@@ -55,6 +54,7 @@ from stewart_dynamics.reporting.plots import (
 from stewart_dynamics.reporting.results_folder import DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
+from stewart_dynamics.setpoints.rejections import stamp_of
 from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')
@@ -239,8 +239,7 @@ def share_plotly(folder: Path) -> Path:
 
 def rejections(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the rejected messages, with details that do not repeat the stamp."""
-    return [{**each, 'details': re.sub(r'^stamp \d+ ns(: | is )?', '', each['first'])}
-            for each in summary['rejected']]
+    return [{**each, 'details': stamp_of(each['first'])[1]} for each in summary['rejected']]
 
 
 def margin_columns(parameters: Parameters) -> list[tuple[Quantity, str, list[str]]]:

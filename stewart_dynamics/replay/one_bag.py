@@ -27,7 +27,6 @@ from contextlib import closing, ExitStack
 import hashlib
 import json
 from pathlib import Path
-import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,12 +53,11 @@ from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, w
 from stewart_dynamics.setpoints import base_wrench, inputs, step
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
+from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection, stamp_of
 from stewart_dynamics.setpoints.step import Batch, State, Step
 from stewart_dynamics.whole_file import write_json
 
 VERSION = 1  # version of summary.json; increased when the meaning of a key changes
-_STAMP = re.compile(r'stamp (\d+) ns')
 
 Progress = Callable[[int, int], None]
 
@@ -246,10 +244,8 @@ class _Run:
 
     def _rejected(self, rejection: Rejection, details: str) -> None:
         if rejection not in self._firsts:
-            found = _STAMP.match(details)
             self._firsts[rejection] = _First(
-                details, int(found[1]) if found else None,
-                self._setpoints.recorded if details else None)
+                details, stamp_of(details)[0], self._setpoints.recorded if details else None)
 
     def _rejected_at(self, first: _First, setpoints: Mapping[str, Any]) -> float | None:
         """Return when a message was rejected, since the first setpoint [s]; None: not known."""

@@ -41,7 +41,7 @@ from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.arrays import Array, Bytes, SECOND, Stamps
 from stewart_dynamics.bags.mcap_file import MAGIC
 from stewart_dynamics.description.hexapod import Hexapod
-from stewart_dynamics.description.model import JOINT_STATES, LinkTransforms, TF
+from stewart_dynamics.description.model import JOINT_STATES, LinkTransforms, MODEL_TYPES, TF
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
@@ -58,12 +58,8 @@ import yaml  # type: ignore[import-untyped]
 TF_STATIC = '/tf_static'
 ROBOT_DESCRIPTION = '/robot_description'
 
-MODEL_TYPES = {
-    JOINT_STATES: type_names.JOINT_STATE,
-    TF: type_names.TF_MESSAGE,
-    TF_STATIC: type_names.TF_MESSAGE,
-    ROBOT_DESCRIPTION: type_names.STRING,
-}
+RECORDED_TYPES = MODEL_TYPES | {
+    TF_STATIC: type_names.TF_MESSAGE, ROBOT_DESCRIPTION: type_names.STRING}
 
 _LIBRARY = 'stewart_dynamics'
 # Late subscribers get their last message, in `ros2 bag play`, too.
@@ -125,7 +121,7 @@ class OutputBag:
         self._messages, self._model = messages, model
         self._period = round(SECOND / rate) if rate else 0
         self._due: int | None = None  # when the model is written next
-        self._types = messages.types | (MODEL_TYPES if rate else {})
+        self._types = messages.types | (RECORDED_TYPES if rate else {})
         folder.mkdir()
         self._file = (folder / f'{folder.name}.mcap').open('wb')
         self._counts: Counter[int] = Counter()

@@ -34,8 +34,8 @@ IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE = 'identified', 'in_combination', '
 FIXED = 'fixed'  # held at the file's value by an option
 
 HOLD_OUT = 0.2  # share of the data that validates a fit to the rest, by default
-_WITHOUT_VALUE = {IN_COMBINATION: 'only in a combination', FIXED: 'fixed',
-                  NOT_IDENTIFIABLE: 'kept: not identifiable'}
+WITHOUT_VALUE = {IN_COMBINATION: 'only in a combination', FIXED: 'fixed',
+                 NOT_IDENTIFIABLE: 'kept: not identifiable'}
 # Numbers below _SMALL with more decimals have an exponent.
 _MOST_DECIMALS, _SMALL = 9, 1e-4
 
@@ -121,7 +121,7 @@ def table_lines(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
                 shown = shown[0], ' .. '.join(rounded(end, error) for end in each['interval'])
             remark = '  at its bound' if each['at_bound'] else ''
         else:
-            shown, remark = (f'{"-":>12}', _WITHOUT_VALUE[each['state']]), ''
+            shown, remark = (f'{"-":>12}', WITHOUT_VALUE[each['state']]), ''
         lines.append(f'{each["name"]:<{name_width}} {each["file"]:>10.5g} {shown[0]} '
                      f'{shown[1]:>28}  {each["unit"]}{remark}')
     return lines
@@ -190,6 +190,7 @@ def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
         return grouped([each['name'] for each in result['parameters'] if each['state'] == state])
 
     return {'parameters': [drawn(each) for each in result['parameters']],
+            'without_value': WITHOUT_VALUE,
             'combinations': [drawn(each) for each in result['combinations']],
             'identified': sum(each['state'] == IDENTIFIED for each in result['parameters']),
             'combined': named(IN_COMBINATION), 'not_identifiable': named(NOT_IDENTIFIABLE)}

@@ -26,6 +26,7 @@ import sys
 from typing import Any, NoReturn, TYPE_CHECKING
 
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros, parameters_of, read_document
 from stewart_dynamics.ros.signals import SIGNALS
 
@@ -91,7 +92,7 @@ def trajectory() -> int:
 
 def usage(kind: type[ParameterSet]) -> str:
     """Return what ``--help`` prints."""
-    compiles = kind.node == 'stewart_dynamics'
+    compiles = kind.node == Parameters.node
     return '\n'.join([
         f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]',
         *(['       stewart_dynamics --compile    compile all machine code now, and end']

@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.frames.base_motion import row_of_imu, row_of_mot
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import BASE, GRAVITY, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.parameters.table import BY_IMU, Parameters
+from stewart_dynamics.parameters.table import BY_IMU, MOVING, Parameters
 from stewart_dynamics.setpoints.inputs import BASE_SOURCES
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.setpoints.sample_joining import Joined, SampleJoining
@@ -75,7 +75,7 @@ class BaseInput:
 
         self._row_of: Callable[[int, _Row], _Row] = (
             _OfImu(parameters) if source == BY_IMU else
-            of_motion if source == 'motion' else of_pose)
+            of_motion if source == MOVING else of_pose)
         self._samples: deque[tuple[int, _Row]] = deque(maxlen=_KEPT)
 
     @property

@@ -18,8 +18,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+import re
 from typing import NamedTuple
 
+from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.messages.cdr import MALFORMED, NOT_FINITE
 
 __all__ = ['BASE_NOT_KNOWN', 'DROPPED', 'frame_details', 'MALFORMED', 'NOT_EXCLUSIVE',
@@ -50,6 +52,30 @@ class Rejection(NamedTuple):
         """Return the log line for a message."""
         how = '' if self.reason.startswith(_DROPPED) else 'rejected: '
         return f'{self.topic} {how}{self.reason}: {details}'
+
+
+_STAMP = re.compile(r'stamp (\d+) ns(: | is )?')
+
+
+def stamp_words(stamp: int) -> str:
+    """Return the beginning of the details of a message with a stamp [ns]."""
+    return f'stamp {stamp} ns'
+
+
+def stamp_of(details: str) -> tuple[int | None, str]:
+    """Return the stamp [ns] with which details begin, None without one, and the other words."""
+    found = _STAMP.match(details)
+    return (int(found[1]), details[found.end():]) if found else (None, details)
+
+
+def too_old(stamp: int, back: int) -> str:
+    """Return the details of a stamp that lies back by a time [ns]."""
+    return f'{stamp_words(stamp)} is {back / SECOND:g} s older than the last used'
+
+
+def jumped_back(back: int) -> str:
+    """Return the notice of a restart by a time [ns]."""
+    return f'stamps jumped back by {back / SECOND:g} s: followed as a restart'
 
 
 class Rejections:

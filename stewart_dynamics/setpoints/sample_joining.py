@@ -30,7 +30,8 @@ from stewart_dynamics.arrays import Array, Integers, SECOND, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.setpoints.inputs import SampleReader, TopicSamples
-from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejections, TOO_OLD, TWICE
+from stewart_dynamics.setpoints.rejections import (
+    jumped_back, NOT_JOINED, Rejections, stamp_words, TOO_OLD, too_old, TWICE)
 
 # Maximum number of samples of a topic that wait for samples of the other topics, and depth of the
 # queues in the middleware, which may deliver all messages of one topic before another topic's.
@@ -180,7 +181,7 @@ class SampleJoining:
         if len(waiting) > WAITING:
             oldest = next(iter(waiting))
             del waiting[oldest]
-            self._reject(topic, NOT_JOINED, f'stamp {oldest} ns')
+            self._reject(topic, NOT_JOINED, stamp_words(oldest))
         return self._join(stamp)
 
     def forget_layouts(self) -> None:
@@ -192,7 +193,7 @@ class SampleJoining:
         """Drop and count waiting samples: no more messages arrive."""
         for topic, waiting in self._waiting.items():
             for stamp in waiting:
-                self._reject(topic, NOT_JOINED, f'stamp {stamp} ns: {why}')
+                self._reject(topic, NOT_JOINED, f'{stamp_words(stamp)}: {why}')
             waiting.clear()
         self._drop_unstamped()
 
@@ -231,21 +232,20 @@ class SampleJoining:
             self._last = dict.fromkeys(self.topics, int(joined.stamps[-1]))
         for topic, dropped in joined.dropped.items():
             for stamp in dropped:
-                self._reject(topic, NOT_JOINED, f'stamp {stamp} ns')
+                self._reject(topic, NOT_JOINED, stamp_words(stamp))
 
     def _in_time(self, topic: str, stamp: int) -> bool:
         """Return whether a sample is in time; reject it otherwise."""
         if stamp in self._waiting[topic]:
-            self._reject(topic, TWICE, f'stamp {stamp} ns')
+            self._reject(topic, TWICE, stamp_words(stamp))
             return False
         last = self._last.get(topic)
         if last is None or not 0 <= last - stamp <= self._timeout:
             return True
         if stamp == last:
-            self._reject(topic, TWICE, f'stamp {stamp} ns')
+            self._reject(topic, TWICE, stamp_words(stamp))
         else:
-            self._reject(topic, TOO_OLD, f'stamp {stamp} ns is {(last - stamp) / SECOND:g} s '
-                         f'older than the last used')
+            self._reject(topic, TOO_OLD, too_old(stamp, last - stamp))
         return False
 
     def _join(self, stamp: int) -> JoinedSample | None:
@@ -285,7 +285,7 @@ class SampleJoining:
         first = self.topics[0]
         jump: int = self._last[first] - stamps[first] if self._last else 0
         if jump > self._timeout:
-            self._noticed(f'stamps jumped back by {jump / SECOND:g} s: followed as a restart')
+            self._noticed(jumped_back(jump))
         for topic, stamp in stamps.items():
             waiting = self._waiting[topic]
             if len(waiting) > 1:
@@ -295,7 +295,7 @@ class SampleJoining:
                 for other in [other for other in waiting if other != stamp and (
                         other < stamp or other > future)]:
                     del waiting[other]
-                    self._reject(topic, NOT_JOINED, f'stamp {other} ns')
+                    self._reject(topic, NOT_JOINED, stamp_words(other))
         self._last = stamps
         return bool(jump > self._timeout)
 

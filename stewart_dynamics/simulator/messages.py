@@ -29,7 +29,7 @@ from stewart_dynamics.setpoints.output_messages import (
 from stewart_dynamics.simulator.imu import ImuWriter, SimulatedImu
 from stewart_dynamics.simulator.moving_base import BasePeriod
 from stewart_dynamics.simulator.parameters import SimulatorParameters
-from stewart_dynamics.simulator.plant import PlantState
+from stewart_dynamics.simulator.plant import ANGLES, PlantState, SPEEDS, TORQUES
 
 # Under the node's name; those that it publishes in their order.
 INPUT_TYPES = {
@@ -63,8 +63,8 @@ class StateMessages:
         yield LEG_STATES, self._joint_state.write(
             stamp, map(sub, state.lengths, self._zero_lengths), state.rates, state.forces)
         if state.motors and self._motors is not None:
-            angles, speeds, torques = state.motors[:6], state.motors[6:12], state.motors[12:]
-            yield MOTOR_STATES, self._motors.write(stamp, angles, speeds, torques)
+            yield MOTOR_STATES, self._motors.write(
+                stamp, *(state.motors[part] for part in (ANGLES, SPEEDS, TORQUES)))
         yield 'pose', self._pose.write(stamp, state.pose)
         yield 'twist', self._six.write(stamp, state.twist)
         yield 'accel', self._six.write(stamp, state.acceleration)

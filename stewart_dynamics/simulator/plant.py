@@ -41,7 +41,7 @@ from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
 from stewart_dynamics.mechanics.dynamics.forward_dynamics import WORK
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.limits import Limits, result_values
-from stewart_dynamics.mechanics.rows import NO_BASE
+from stewart_dynamics.mechanics.rows import consecutive, NO_BASE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 from stewart_dynamics.simulator.end_stops import stiffness_and_damping, stops_of
@@ -125,8 +125,9 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
     return float(1.0 / (by_actuators + 1.0 / (of_legs @ mobility)))
 
 
-# With angles, speeds and torques of the motors.
-_OF_MOTORS = slice(RESULT_MOTORS.start, RESULT_MOTORS.start + 18)
+# In the numbers of the motors.
+ANGLES, SPEEDS, TORQUES = consecutive(6, 6, 6)
+_OF_MOTORS = slice(RESULT_MOTORS.start, RESULT_MOTORS.start + TORQUES.stop)
 _NUMBERS = Struct(f'{STATE + _OF_MOTORS.stop}d')
 
 
