@@ -389,8 +389,8 @@ def test_each_color_is_declared_once() -> None:
             assert not re.search('(?<!&)#[0-9a-f]{3,8}\\b', file.read_text()), file
 
 
-def test_every_section_with_tables_has_a_link(tmp_path: Path) -> None:
-    given = trajectory('clear')
+def test_every_section_with_tables_has_a_link_and_every_time_a_plot(tmp_path: Path) -> None:
+    given = trajectory('singular')
     for name, write in (('plain', given.write),
                         ('measured', functools.partial(write_measured, given))):
         write(tmp_path / name)
@@ -400,6 +400,8 @@ def test_every_section_with_tables_has_a_link(tmp_path: Path) -> None:
         assert links == sections - {'verdict', 'notices'}
         assert ('comparison' in links) is (name == 'measured')
         assert 'force_breakdown' in links
+        plots = {plot['key'] for plot in data_of(tmp_path / name)['plots']}
+        assert set(re.findall(r'data-plot="(\w+)"', page)) <= plots
 
 
 def test_a_contact_of_one_sample_has_no_end(tmp_path: Path) -> None:

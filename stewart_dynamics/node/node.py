@@ -369,9 +369,8 @@ class DynamicsNode(LifecycleNode):
             return payload.PayloadOutcome(
                 'the code for measured legs is being compiled, which takes seconds, once: move '
                 'the hexapod for payload.window after that, and ask again')
-        silence = time.monotonic() - self._diagnostics.external_wrench.heard_at
-        if self._settings['setpoint.timeout'] < silence < math.inf:
-            return payload.PayloadOutcome(f'measured_legs silent for {silence:.1f} s')
+        if silence := self._diagnostics.external_wrench.silence(time.monotonic()):
+            return payload.PayloadOutcome(silence)
         # Parameters are those of now, whatever changes meanwhile.
         return payload.identify(self._history, StewartPlatform(self._settings))
 

@@ -26,6 +26,7 @@ from collections.abc import Sequence
 import math
 
 from stewart_dynamics.external_wrench.estimate import Estimate, Overload
+from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.external_wrench.payload import (
     NAMES, numbers_of, Payload, PayloadOutcome, UNITS)
 from stewart_dynamics.node.diagnostics.levels import (
@@ -95,11 +96,15 @@ class ExternalWrenchDiagnostics(StatusPart):
     def _is_stale(self, now: float) -> bool:
         return now - max(self._begun, self._estimated_at) > self._timeout
 
-    def _no_wrench(self, now: float) -> str:
+    def silence(self, now: float) -> str:
+        """Return since when no message has come, if that is too long and one had come."""
         silent = now - self.heard_at
+        return (f'{MEASURED_LEGS} silent for {silent:.1f} s'
+                if self._timeout < silent < math.inf else '')
+
+    def _no_wrench(self, now: float) -> str:
         return 'no wrench: ' + (
-            f'measured_legs silent for {silent:.1f} s' if silent > self._timeout
-            else self.held.of(REJECTED, now).message
+            self.silence(now) or self.held.of(REJECTED, now).message
             or f'measurements are farther apart than setpoint.timeout, {self._timeout:g} s')
 
     def _numbers(self, estimate: Estimate) -> Values:
