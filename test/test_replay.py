@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
 import csv
-from dataclasses import replace
 import io
 import json
 import math
@@ -39,15 +38,13 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from mcap_ros2.decoder import DecoderFactory
 import messages
-from messages import STORE, UPRIGHT
+from messages import motion, MS, RECORDED, Recorded, SECOND, STORE, UPRIGHT
 import numpy as np
 import pyarrow.parquet
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
 import stewart_dynamics
@@ -67,19 +64,16 @@ from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.setpoints.inputs import ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
+from test_recording import write_ros_1
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
 PLATFORM = StewartPlatform(PARAMETERS)
 BAGS = ('clear', 'singular', 'flawed')
 TOPICS = (POSE, TWIST, ACCEL)
-MS = 1_000_000
-SECOND = 1000 * MS
-RECORDED = 1_700_000_000 * SECOND
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 KINDS = {topic.rpartition('/')[2]: kind for topic, kind in INPUT_TYPES.items()}
 
-Recorded = tuple[str, int, bytes]
 Rejected = Callable[..., str]
 
 
@@ -155,18 +149,6 @@ def write_bag(folder: Path, of: Iterable[Recorded], node: str = NODE,
                     (KINDS | types)[topic.rpartition('/')[2]], typestore=STORE)
             writer.write(connections[topic], when, data)
     return folder
-
-
-def motion(number: int) -> list[Recorded]:
-    """Return setpoints 10 ms apart: a slow heave."""
-    found: list[Recorded] = []
-    for n in range(1, number + 1):
-        t, stamp, when = 0.01 * n, n * 10 * MS, RECORDED + n * 10 * MS
-        found += [
-            (POSE, when, messages.pose(stamp, (0.0, 0.0, 1.1 + 0.05 * math.sin(t)))),
-            (TWIST, when + 1, messages.twist(stamp, (0.0, 0.0, 0.05 * math.cos(t), 0, 0, 0))),
-            (ACCEL, when + 2, messages.accel(stamp, (0.0, 0.0, -0.05 * math.sin(t), 0, 0, 0)))]
-    return found
 
 
 def heave(number: int) -> Motion:
@@ -665,15 +647,8 @@ def test_a_topic_of_another_type(topic: str, tmp_path: Path, rejected: Rejected)
 def test_a_bag_of_ros_1_gives_the_same(tmp_path: Path, rejected: Rejected) -> None:
     of = motion(30)
     assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
-    store = get_typestore(Stores.ROS1_NOETIC)
-    with Writer1(tmp_path / 'old.bag') as writer:
-        connections = {topic: writer.add_connection(
-            f'{NODE}/{topic}', INPUT_TYPES[topic], typestore=store) for topic in TOPICS}
-        for n, (topic, when, data) in enumerate(of):
-            read = STORE.deserialize_cdr(data, INPUT_TYPES[topic])
-            header = store.types['std_msgs/msg/Header'](n, read.header.stamp, 'base')
-            writer.write(connections[topic], when, store.serialize_ros1(
-                replace(read, header=header), INPUT_TYPES[topic]))
+    write_ros_1(tmp_path / 'old.bag', [
+        (f'{NODE}/{topic}', when, data) for topic, when, data in of], None)
     assert run(tmp_path / 'old.bag', tmp_path / 'out') == DONE
     old, new = rows_of(tmp_path / 'out' / 'old'), rows_of(tmp_path / 'out' / 'bag')
     assert len(new) == 30

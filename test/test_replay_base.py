@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import messages
+from messages import motion, MS, RECORDED, Recorded
 import numpy as np
 import pytest
 from referees import rotation_about
@@ -40,8 +41,7 @@ from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from test_replay import (
-    JOINT_STATE, motion, MS, nanoseconds, Outputs, outputs_of, PARAMETERS, RECORDED, Recorded,
-    six_of, write_bag)
+    JOINT_STATE, nanoseconds, Outputs, outputs_of, PARAMETERS, six_of, write_bag)
 
 MOVING = ('pose', 'motion', 'imu')
 MOUNTING = {'base.imu.position': [0.4, -0.3, 0.2], 'base.imu.orientation': [0.5, 0.5, 0.5, 0.5]}
