@@ -743,13 +743,6 @@ def test_the_rest_of_a_damaged_bag_is_replayed(
     assert [row for row in expected if row in rows] == rows
 
 
-def test_the_most_severe_exit_code_of_several_bags(tmp_path: Path) -> None:
-    bag, *others = (ROOT / 'bags' / 'singular', str(damaged_bag(tmp_path / 'damaged.mcap')),
-                    str(ROOT / 'bags' / 'clear'))
-    assert run(bag, tmp_path / 'out', *others, '--strict') == PARTLY_READ
-    assert run(bag, tmp_path / 'again', *others, str(tmp_path / 'none'), '--strict') == BAD_INPUT
-
-
 @pytest.mark.parametrize('plugin', list(StoragePlugin))
 def test_a_damaged_bag_never_crashes_the_replay(
         plugin: StoragePlugin, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
