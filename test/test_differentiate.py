@@ -178,14 +178,6 @@ def test_noise_of_the_acceleration_agrees_with_the_docstring() -> None:
         noise * math.sqrt(math.sqrt(2.0) / 16.0 * h * w ** 5), rel=0.02)
 
 
-def test_a_straight_line_stays_one_to_the_ends() -> None:
-    times = np.cumsum(rng().uniform(1e-3, 1e-2, 50))
-    spline = smoothing_spline(times, (2.0 + 3.0 * times)[:, None], 3.0)
-    assert np.allclose(spline.values[:, 0], 2.0 + 3.0 * times, rtol=1e-12)
-    assert np.allclose(spline.rates, 3.0, rtol=1e-10)
-    assert np.allclose(spline.accelerations, 0.0, atol=1e-8)
-
-
 # Motions
 
 # Twice the droop (f / f_c)^4 (sqrt(2) - 1) of the fastest part, the product of two of the angles'

@@ -901,14 +901,12 @@ def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
         assert {row[f'{name}_platform_joint_angle_rad'] for row in rows} == {''}
         found = summary['legs'][name]
         assert found['base_joint_angle_max_rad'] == max(of_leg)
-        assert found['base_joint_angle_margin_rad'] == 0.5 - max(of_leg)
         assert found['platform_joint_angle_max_rad'] is None
         assert (name in [each['leg'] for each in summary['limits']
                          if 'joint' in each['limit']]) is (max(of_leg) > 0.5)
         clearance = [float(row[f'{name}_clearance_m']) for row in rows]
         np.testing.assert_allclose(clearance, clearances[:, leg], rtol=0.0, atol=1e-14)
         assert found['clearance_min_m'] == min(clearance)
-        assert found['clearance_margin_m'] == min(clearance) - 0.1
     assert 'limits.base_joint_angle_max, 0.5 rad, exceeded by leg_4' in text
     assert 'clearance between legs: ' in text
     assert 'base joints: 0.5846 rad (33.5 deg) at most, leg_4 at t = 10.00 s; margin' in text
@@ -988,6 +986,12 @@ def test_summary_and_report_are_written(replayed: dict[str, Outputs]) -> None:
         assert abs(found['force_peak_n']) == np.max(np.abs(forces))
         lengths = [float(row[f'{leg}_length_m']) for row in rows]
         assert (found['length_min_m'], found['length_max_m']) == (min(lengths), max(lengths))
+        rates = np.array([float(row[f'{leg}_rate_m_s']) for row in rows])
+        assert abs(found['rate_peak_m_s']) == np.max(np.abs(rates))
+    conditions = [float(row['condition']) for row in rows]
+    assert summary['singularity']['condition_max'] == max(conditions)
+    moments = [float(row['base_moment_y_n_m']) for row in rows]
+    assert abs(summary['base_wrench']['moment_y']['peak_n_m']) == np.max(np.abs(moments))
     assert set(summary['force_breakdown']['leg_1']) == {*SOURCES} - {'base motion'}
     assert summary['parameters']['platform.mass'] == 150.0
 

@@ -30,11 +30,10 @@ from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-from referees import (
-    random_motion, random_parameters, random_wrench, rng, ROOT, symmetric_parameters)
+from referees import rng, ROOT, symmetric_parameters
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
+from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT, WRENCH
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE, TIME, UNSOLVABLE_CONDITION
 from stewart_dynamics.replay.residuals import AXES
@@ -42,8 +41,7 @@ from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.reporting.block_statistics import LISTED
-from stewart_dynamics.setpoints.base_wrench import BaseWrench
-from stewart_dynamics.setpoints.step import Batch, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, Outputs
 
 Array = NDArray[np.float64]
 
@@ -63,17 +61,6 @@ def hexapod(**changes: Any) -> Parameters:
     """Return a hexapod whose first leg has a name with a blank."""
     return symmetric_parameters().replaced({
         'joints': ['front left', 'b', 'c', 'd', 'e', 'f'], 'setpoint.timeout': 0.5, **changes})
-
-
-def batch(stamps: NDArray[np.int64], restarts: NDArray[np.bool_] | None = None,
-          motions: Array | None = None, wrenches: Array | None = None,
-          bases: Array | None = None) -> Batch:
-    """Return setpoints; omitted values are zero."""
-    many = len(stamps)
-    return Batch(
-        stamps, np.zeros((many, MOTION)) if motions is None else motions,
-        np.zeros((many, WRENCH)) if wrenches is None else wrenches,
-        np.zeros(many, dtype=bool) if restarts is None else restarts, stamps, bases)
 
 
 class Samples:
@@ -124,10 +111,11 @@ class Samples:
 
     def setpoints(self) -> Batch:
         """Return the setpoints; the base is still if it is always known."""
-        bases = np.zeros((len(self.seconds), BASE))
+        many = len(self.seconds)
+        bases = np.zeros((many, BASE))
         bases[self.base_unknown] = NO_BASE
-        return batch(self.stamps, self.restarts,
-                     bases=bases if self.base_unknown.any() else None)
+        return Batch(self.stamps, np.zeros((many, MOTION)), np.zeros((many, WRENCH)),
+                     self.restarts, self.stamps, bases if self.base_unknown.any() else None)
 
     def parts(self, edges: Sequence[int] = ()) -> Iterator[Answered]:
         """Return them as the replay gives them, in blocks with these edges."""
@@ -409,38 +397,6 @@ def test_a_long_motion_is_the_same_in_blocks_of_any_size(size: int) -> None:
     assert found['singularity']['crossings'] > len(crossings) == LISTED
     assert found['singularity']['warnings'] > LISTED
     assert_same(found, json.loads(json.dumps(plain(parameters, samples))))
-
-
-def test_it_summarizes_the_outputs_of_the_step() -> None:
-    random = rng()
-    p = random_parameters(random).replaced({'limits.force_max': 2000.0})
-    motion, wrench = random_motion(p, random, 200), random_wrench(p, random, 200)
-    setpoints = batch(np.arange(200) * SECOND, motions=motion.rows, wrenches=wrench)
-    outputs = Step(p).many(setpoints, None)
-    summary = Summary(p)
-    base_wrenches = BaseWrench(p).many(setpoints)
-    summary.add(Answered(
-        np.arange(200) * 1.0, setpoints, outputs, base_wrenches,
-        ForceBreakdownRows(p)(setpoints.motions, setpoints.wrenches)))
-    found = summary.values()
-    assert 0 < len(found['limits']) == np.any(np.abs(outputs.demanded_forces) > 2000.0,
-                                              axis=0).sum()
-    for leg, name in enumerate(p['joints']):
-        forces = outputs.demanded_forces[:, leg]
-        of_leg = found['legs'][name]
-        assert abs(of_leg['force_peak_n']) == np.abs(forces).max()
-        # of clipped forces of both signs, the first
-        assert abs(of_leg['force_published_peak_n']) == pytest.approx(
-            min(abs(of_leg['force_peak_n']), 2000.0))
-        assert of_leg['force_rms_n'] == pytest.approx(
-            math.sqrt((forces ** 2)[1:-1].sum() / 199.0
-                      + 0.5 * (forces[0] ** 2 + forces[-1] ** 2) / 199.0), rel=1e-12)
-        assert set(found['force_breakdown'][name]) == {*SOURCES} - {'base motion'}
-    assert found['singularity']['condition_max'] == outputs.conditions.max()
-    load = found['base_wrench']
-    assert abs(load['moment_y']['peak_n_m']) == np.abs(base_wrenches[:, 4]).max()
-    assert load['force']['peak_n'] == pytest.approx(
-        np.linalg.norm(base_wrenches[:, :3], axis=1).max(), rel=1e-12)
 
 
 def test_it_keeps_no_samples() -> None:
