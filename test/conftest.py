@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Fixtures of the tests that run the executables."""
+"""Fixtures of the tests that run the executables or a browser."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from contextlib import closing, ExitStack
 from itertools import count
 import os
 from pathlib import Path
+import shutil
 import subprocess
 from subprocess import DEVNULL
 import sys
@@ -31,6 +32,7 @@ from hypothesis import settings
 import pytest
 
 if TYPE_CHECKING:
+    from playwright.sync_api import Browser
     from running import DynamicsNode, NodeProcess
 
 # Before numpy is imported, in this process and those that it starts: with matrices as small as
@@ -38,6 +40,11 @@ if TYPE_CHECKING:
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 COMPILE_ALL = 'from stewart_dynamics.compile_all import compile_all; compile_all()'
+
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
+FLAGS = ('--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+         '--disable-background-networking', '--disable-component-update', '--disable-sync',
+         '--use-angle=swiftshader', '--enable-unsafe-swiftshader')
 
 # The same examples in every run, which may take long on a loaded computer: few.
 settings.register_profile('repeatable', deadline=None, derandomize=True, max_examples=30)
@@ -73,6 +80,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         places[path] = quick, numbers[quick, alone], alone
         numbers[quick, alone] += 1
     items.sort(key=lambda item: places[item.path])
+
+
+@pytest.fixture(scope='module')
+def browser() -> Iterator[Browser]:
+    """Return a browser; skip the test if no browser is installed."""
+    playwright = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.skip(f'no browser on this computer: none of {", ".join(BROWSERS)}')
+    with playwright.sync_playwright() as driver:
+        running = driver.chromium.launch(executable_path=found, args=FLAGS, timeout=300_000.0)
+        yield running
+        running.close()
 
 
 @pytest.fixture(scope='session')

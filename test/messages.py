@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
+import math
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,10 @@ COMBINED = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
 HOME = (0.0, 0.0, 1.1)
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 REST = (0.0,) * 6
-NOW = 1_700_000_000_000_000_000  # [ns]
+MS, SECOND = 1_000_000, 1_000_000_000  # [ns]
+NOW = RECORDED = 1_700_000_000 * SECOND
+
+Recorded = tuple[str, int, bytes]  # topic, time, message
 
 
 class Feed:
@@ -214,3 +218,15 @@ def trajectory(stamp: int, times: Sequence[int], rows: Sequence[Sequence[float]]
                     (transforms, twists, accelerations), many, strict=True)),
             _new('builtin_interfaces/msg/Duration', *divmod(time, 1_000_000_000))))
     return _bytes(_new(COMBINED, _header(stamp, frame), list(names), points), little_endian)
+
+
+def motion(number: int) -> list[Recorded]:
+    """Return setpoints as they are recorded, 10 ms apart: a slow heave."""
+    found: list[Recorded] = []
+    for n in range(1, number + 1):
+        t, stamp, when = 0.01 * n, n * 10 * MS, RECORDED + n * 10 * MS
+        found += [
+            ('setpoint/pose', when, pose(stamp, (0.0, 0.0, 1.1 + 0.05 * math.sin(t)))),
+            ('setpoint/twist', when + 1, twist(stamp, (0.0, 0.0, 0.05 * math.cos(t), 0, 0, 0))),
+            ('setpoint/accel', when + 2, accel(stamp, (0.0, 0.0, -0.05 * math.sin(t), 0, 0, 0)))]
+    return found

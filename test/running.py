@@ -87,6 +87,10 @@ DEADLINE = 240.0
 
 STEP = 10_000_000  # between two setpoints' stamps [ns]
 
+# Levels of diagnostics.
+OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
+NOT_JOINED = 'dropped: not all topics had its stamp'
+
 QOS = QoSProfile(depth=2000)
 LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -414,6 +418,8 @@ class Sample(NamedTuple):
 
 
 HOME = Sample()
+MOVING = Sample((0.05, -0.03, 1.12), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
+                (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
 
 
 def header(stamp: int, frame: str = 'base') -> Header:

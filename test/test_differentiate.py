@@ -101,7 +101,7 @@ def same(a: Batch, b: Batch) -> bool:
 # The spline
 
 @pytest.mark.parametrize(('rate', 'cutoff'), [(1000.0, 20.0), (100.0, 5.0), (100.0, 20.0)])
-@pytest.mark.parametrize('part', [0.2, 1.0, 2.0])
+@pytest.mark.parametrize('part', [0.2, 1.0, 2.0, 3.0])
 def test_a_sinusoid_passes_as_the_cutoff_frequency_says(
         rate: float, cutoff: float, part: float) -> None:
     h, w = 1.0 / rate, 2.0 * math.pi * part * cutoff
@@ -131,15 +131,6 @@ def test_a_sinusoid_passes_as_the_cutoff_frequency_says(
         assert passes == pytest.approx(promised, rel=2e-3)
     if part == 1.0:
         assert promised == pytest.approx(math.sqrt(0.5), rel=1e-12)
-
-
-def test_three_times_the_cutoff_leaves_three_hundredths() -> None:
-    times = np.arange(0.0, 4.0, 1e-3)
-    sine = np.sin(2.0 * math.pi * 60.0 * times)
-    spline = smoothing_spline(times, sine[:, None], 20.0)
-    passes = np.max(np.abs(spline.values[1000:3000])) / np.max(np.abs(sine))
-    assert passes == pytest.approx(1.0 / (1.0 + (math.sqrt(2.0) - 1.0) * 81.0), rel=1e-3)
-    assert passes == pytest.approx(0.029, abs=5e-4)
 
 
 @pytest.mark.parametrize('seed', range(4))
@@ -185,14 +176,6 @@ def test_noise_of_the_acceleration_agrees_with_the_docstring() -> None:
     w = 2.0 * math.pi * cutoff / (math.sqrt(2.0) - 1.0) ** 0.25
     assert np.std(spline.accelerations) == pytest.approx(
         noise * math.sqrt(math.sqrt(2.0) / 16.0 * h * w ** 5), rel=0.02)
-
-
-def test_a_straight_line_stays_one_to_the_ends() -> None:
-    times = np.cumsum(rng().uniform(1e-3, 1e-2, 50))
-    spline = smoothing_spline(times, (2.0 + 3.0 * times)[:, None], 3.0)
-    assert np.allclose(spline.values[:, 0], 2.0 + 3.0 * times, rtol=1e-12)
-    assert np.allclose(spline.rates, 3.0, rtol=1e-10)
-    assert np.allclose(spline.accelerations, 0.0, atol=1e-8)
 
 
 # Motions
@@ -281,25 +264,19 @@ def test_the_integral_of_the_twist_gives_the_pose_back() -> None:
 
 # Windows, segmentes and batches
 
-def test_windows_change_nothing() -> None:
-    times = np.cumsum(rng().uniform(5e-4, 1.5e-3, 30_000))
-    exact = motion_at(times).rows
-    batch = batch_of(times, exact)
-    whole = differentiated(Differentiator(20.0, 0.1, window=100_000), [batch])
-    for window in (300, 7000):
-        cut = differentiated(Differentiator(20.0, 0.1, window=window), [batch])
-        for part in (VELOCITY, OMEGA, ACCELERATION, ALPHA):
-            assert worst(cut.motions[:, part], whole.motions[:, part]) < 1e-9
-
-
-@pytest.mark.parametrize(('rate', 'cutoff'), [(100.0, 200.0), (100.0, 40.0), (30.0, 10.0)])
-def test_windows_change_nothing_where_poses_are_sparse(rate: float, cutoff: float) -> None:
-    times = np.arange(0.0, 20.0, 1.0 / rate)
+@pytest.mark.parametrize(('steps', 'cutoff', 'windows'), [
+    (rng().uniform(5e-4, 1.5e-3, 30_000), 20.0, (300, 7000)),
+    # sparse: few poses for each period of the cut-off frequency
+    (np.full(2000, 1e-2), 200.0, (50,)), (np.full(2000, 1e-2), 40.0, (50,)),
+    (np.full(600, 1.0 / 30.0), 10.0, (50,))])
+def test_windows_change_nothing(steps: Array, cutoff: float, windows: tuple[int, ...]) -> None:
+    times = np.cumsum(steps)
     batch = batch_of(times, motion_at(times).rows)
     whole = differentiated(Differentiator(cutoff, 0.1, window=100_000), [batch])
-    cut = differentiated(Differentiator(cutoff, 0.1, window=50), [batch])
-    for part in (VELOCITY, OMEGA, ACCELERATION, ALPHA):
-        assert worst(cut.motions[:, part], whole.motions[:, part]) < 1e-9
+    for window in windows:
+        cut = differentiated(Differentiator(cutoff, 0.1, window=window), [batch])
+        for part in (VELOCITY, OMEGA, ACCELERATION, ALPHA):
+            assert worst(cut.motions[:, part], whole.motions[:, part]) < 1e-9
 
 
 @given(st.lists(st.sampled_from([0.004, 0.01, 0.0100001, 0.02, 0.3, -0.5, 0.0]), max_size=400),

@@ -37,9 +37,9 @@ from rclpy.parameter import Parameter as RosParameter
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 from running import (
-    assert_only_log_lines, bits, DEADLINE, DynamicsNode, executable, HOME, LATCHED, log_lines,
-    nanoseconds, NODE, NodeProcess, OUTPUTS, participants, Peer, PLATFORM, raw, rejected, ROOT,
-    Sample, says, SEPARATE, wrench_message)
+    assert_only_log_lines, bits, DEADLINE, DynamicsNode, ERROR, executable, HOME, LATCHED,
+    log_lines, MOVING, nanoseconds, NODE, NodeProcess, NOT_JOINED, OK, OUTPUTS, participants, Peer,
+    PLATFORM, raw, rejected, ROOT, Sample, says, SEPARATE, STALE, wrench_message)
 from std_msgs.msg import Bool
 
 from stewart_dynamics import Pose, StewartPlatform
@@ -47,18 +47,12 @@ from stewart_dynamics.replay import main as replay
 
 Start = Fresh = Callable[..., DynamicsNode]
 
-OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
-
-MOVING = Sample((0.05, -0.03, 1.12), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
-                (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
 # All legs lie in the plane of the base: they cannot carry a load.
 FLAT = Sample((0.0, 0.0, 0.0))
 # Turned by 88 degrees; at 90 the hexapod is singular.
 TURNED = Sample((0.0, 0.0, 0.9), (0.0, 0.0, math.sin(0.768), math.cos(0.768)))
 LATER = 10_000_000_000  # the legs can be anywhere then [ns]
 LEAPING = Sample(accel=(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
-
-NOT_JOINED = 'dropped: not all topics had its stamp'
 
 
 # Setpoints from a bag
@@ -82,11 +76,9 @@ def _by_topic(replayed: list[tuple[int, str, bytes]]) -> dict[str, list[bytes]]:
             for topic in OUTPUTS}
 
 
-def test_node_and_replay_give_the_same_bits(fresh: Fresh, tmp_path: Path) -> None:
+def test_node_and_replay_give_the_same_bits(node: DynamicsNode, tmp_path: Path) -> None:
     expected = _replayed('flawed', tmp_path)
     completed = {at for at, topic, _ in expected if topic == 'leg_states'}
-    node = fresh()
-    node.until_active()
     answers = 0
     for at, topic, data in _recorded(ROOT / 'bags/flawed'):
         node.publish(topic, data)
@@ -113,10 +105,8 @@ def test_node_and_replay_give_the_same_bits(fresh: Fresh, tmp_path: Path) -> Non
 
 
 def test_a_thousand_setpoints_are_answered_with_the_librarys_bits(
-        fresh: Fresh, tmp_path: Path) -> None:
+        node: DynamicsNode, tmp_path: Path) -> None:
     replayed = _by_topic(_replayed('singular', tmp_path))
-    node = fresh()
-    node.until_active()
     played = _recorded(ROOT / 'bags/singular')
     for n, (_, topic, data) in enumerate(played):
         node.publish(topic, data)
@@ -185,20 +175,14 @@ def _bag_samples(played: list[tuple[int, str, bytes]]) -> tuple[list[Sample], li
             'geometry_msgs/msg/AccelStamped'), strict=True))
     samples, stamps = [], []
     for p, t, a in zip(poses, twists, accels, strict=True):
-        stamps.append(nanoseconds_of_bag(p))
-        assert nanoseconds_of_bag(t) == nanoseconds_of_bag(a) == stamps[-1]
+        stamps.append(nanoseconds(p.header.stamp))
+        assert p.header.stamp == t.header.stamp == a.header.stamp
         q = p.pose.orientation
         samples.append(Sample(
             _numbers(p.pose.position), (q.x, q.y, q.z, q.w),
             _numbers(t.twist.linear) + _numbers(t.twist.angular),
             _numbers(a.accel.linear) + _numbers(a.accel.angular)))
     return samples, stamps
-
-
-def nanoseconds_of_bag(message: Any) -> int:
-    """Return the stamp [ns] of a message that rosbags has read."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
 def _numbers(three: Any) -> tuple[float, ...]:
@@ -348,9 +332,7 @@ def test_joint_angles_and_clearance_outside_limits_are_reported(shared: NodeProc
 
 # Other writers and readers
 
-def test_readers_of_the_answers_are_counted(fresh: Fresh) -> None:
-    node = fresh()
-    node.until_active()
+def test_readers_of_the_answers_are_counted(node: DynamicsNode) -> None:
     readers = {f'leg_{of}: readers': '1' for of in ('states', 'forces')}
     node.until(lambda: readers.items() <= node.values('setpoints').items(), 'this one is known')
     second = node.peer.node.create_subscription(
@@ -459,9 +441,7 @@ def test_setpoints_of_poses_alone_are_quasi_static(fresh: Fresh) -> None:
 
 # The load that the surroundings put on the platform
 
-def test_a_wrench_holds_for_the_setpoints_to_come(fresh: Fresh) -> None:
-    node = fresh()
-    node.until_active()
+def test_a_wrench_holds_for_the_setpoints_to_come(node: DynamicsNode) -> None:
     node.answer(MOVING)
     loads = ((100.0, -50.0, -800.0, 20.0, 10.0, -5.0), (0.0, 0.0, 300.0, 0.0, 0.0, 0.0))
     for load in loads:

@@ -33,26 +33,20 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from running import (
-    bits, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS,
-    Peer, Planner, Program, raw, ROOT, Sample, says, SEPARATE, STEP,
-    wrench_message)
+    bits, DynamicsNode, ERROR, FEEDER, Feeder, HOME, log_lines, MOVING, nanoseconds, NODE,
+    NOT_JOINED, OK, OUTPUTS, Peer, Planner, Program, raw, ROOT, Sample, says, SEPARATE, STALE,
+    STEP, WARN, wrench_message)
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.ros.security import PROFILES
 
 Start = Callable[..., DynamicsNode]
-
-OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
-
-MOVING = Sample((0.05, -0.03, 1.12), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
-                (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
-NOT_JOINED = 'dropped: not all topics had its stamp'
 
 
 # In every case the node is at work when the fault has ended, and all that it has published was
 # asked for: these fixtures check it behind every test, `close` how the node ends.
 
 @pytest.fixture
-def at_work(node: DynamicsNode) -> Iterator[DynamicsNode]:
+def node(node: DynamicsNode) -> Iterator[DynamicsNode]:
     """Return the module's node, newly configured and active."""
     yield node
     node.at_work()
@@ -85,8 +79,7 @@ def _started(start: Start) -> Iterator[Start]:
 
 # Stamps
 
-def test_a_setpoint_sent_twice_is_answered_once(at_work: DynamicsNode) -> None:
-    node = at_work
+def test_a_setpoint_sent_twice_is_answered_once(node: DynamicsNode) -> None:
     before = len(node.received('leg_states'))
     stamps = [node.stamp() for _ in range(5)]
     for stamp in stamps:
@@ -106,8 +99,7 @@ def test_a_setpoint_sent_twice_is_answered_once(at_work: DynamicsNode) -> None:
     assert answered[before:] == stamps
 
 
-def test_after_a_stamp_of_the_far_future_normal_ones_are_followed(at_work: DynamicsNode) -> None:
-    node = at_work
+def test_after_a_stamp_of_the_far_future_normal_ones_are_followed(node: DynamicsNode) -> None:
     node.answer(MOVING)
     node.answer(MOVING, stamp=2**31 * 10**9 - 1)  # the last that a header can hold
     for _ in range(3):
@@ -123,8 +115,8 @@ def test_after_a_stamp_of_the_far_future_normal_ones_are_followed(at_work: Dynam
     node.answer(MOVING)
 
 
-def test_a_stamp_of_the_far_future_on_one_topic_delays_nothing(at_work: DynamicsNode) -> None:
-    node, topic = at_work, 'setpoint/twist'
+def test_a_stamp_of_the_far_future_on_one_topic_delays_nothing(node: DynamicsNode) -> None:
+    topic = 'setpoint/twist'
     far = node.stamp(0) + 4 * 10**17  # 12 years
     node.publish(topic, MOVING.messages(far)[topic])
     for _ in range(3):
@@ -136,8 +128,7 @@ def test_a_stamp_of_the_far_future_on_one_topic_delays_nothing(at_work: Dynamics
     node.asked[far] = 0
 
 
-def test_a_bag_that_loops_is_followed(at_work: DynamicsNode) -> None:
-    node = at_work
+def test_a_bag_that_loops_is_followed(node: DynamicsNode) -> None:
     with AnyReader([ROOT / 'bags/clear']) as reader:
         played = [(connection.topic.removeprefix(f'{NODE}/'), bytes(data))
                   for connection, _, data in reader.messages()][:90]
@@ -194,8 +185,8 @@ def test_simulated_time_stands_still_and_jumps(begin: Start) -> None:
 
 # Topics that are late or too many
 
-def test_a_late_topic_is_waited_for(at_work: DynamicsNode) -> None:
-    node, late = at_work, 'setpoint/pose'
+def test_a_late_topic_is_waited_for(node: DynamicsNode) -> None:
+    late = 'setpoint/pose'
     before = len(node.raw['leg_states'])
     stamps = [node.stamp() for _ in range(50)]
     for stamp in stamps:
@@ -260,8 +251,7 @@ def test_best_effort_publishers_are_received_with_qos_overrides(begin: Start) ->
     assert not log_lines(node.program.stderr, 'ERROR')
 
 
-def test_an_incompatible_quality_of_service_is_named(at_work: DynamicsNode) -> None:
-    node = at_work
+def test_an_incompatible_quality_of_service_is_named(node: DynamicsNode) -> None:
     before = len(log_lines(node.program.stderr, 'ERROR'))
     deaf = node.peer.writer(f'{NODE}/setpoint/twist', type(MOVING.messages(0)['setpoint/twist']),
                             BEST_EFFORT)
@@ -274,8 +264,7 @@ def test_an_incompatible_quality_of_service_is_named(at_work: DynamicsNode) -> N
     node.peer.node.destroy_publisher(deaf)
 
 
-def test_a_second_node_of_the_same_name_is_reported(at_work: DynamicsNode) -> None:
-    node = at_work
+def test_a_second_node_of_the_same_name_is_reported(node: DynamicsNode) -> None:
     second = Peer(node.domain, 'stewart_dynamics')
     try:
         node.until_status('setpoints', ERROR, f'2 nodes are named {NODE}')
@@ -324,8 +313,7 @@ def _by_udp(folder: Path, lease: str = '') -> dict[str, str]:
 
 
 def test_a_publisher_that_is_killed_and_started_again_is_received(
-        at_work: DynamicsNode, tmp_path: Path) -> None:
-    node = at_work
+        node: DynamicsNode, tmp_path: Path) -> None:
     killed = Feeder(node, tmp_path / 'killed', 100, **_brief(tmp_path))
     killed.begin()
     _until_answered(node, killed)
@@ -468,8 +456,7 @@ def _until_all_answered(node: DynamicsNode, number: int) -> None:
     node.until(lambda: len(node.raw['leg_states']) == number, 'all are answered')
 
 
-def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode) -> None:
-    node = at_work
+def test_calls_do_not_cost_a_setpoint(node: DynamicsNode) -> None:
     before = len(node.raw['leg_states'])
     mass = float(node.platform.parameters['platform.mass'])
     names = list(node.platform.parameters)
@@ -491,9 +478,8 @@ def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode) -> None:
     assert {bits(state.effort) for state in node.received('leg_states')[before:]} == either
 
 
-def test_a_stopped_subscriber_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
+def test_a_stopped_subscriber_costs_no_setpoint(node: DynamicsNode, tmp_path: Path) -> None:
     """A viewer that hangs reads neither forces nor markers; the node does not wait for it."""
-    node = at_work
     viewer = Program([sys.executable, FEEDER], node.domain, tmp_path / 'viewer',
                      **_by_udp(tmp_path))
     markers = f'{NODE}/markers'
@@ -520,8 +506,7 @@ def _turned(degrees: float, rate: float = 0.0) -> Sample:
                   (0.0,) * 5 + (rate,))
 
 
-def test_a_singularity_between_two_samples_is_reported(at_work: DynamicsNode) -> None:
-    node = at_work
+def test_a_singularity_between_two_samples_is_reported(node: DynamicsNode) -> None:
     node.answer()
     node.until(lambda: node.warning is False, 'no warning is on')
     crossings = int(node.values('singularity').get('crossings', '0'))

@@ -22,7 +22,7 @@ import shutil
 from typing import Any
 
 import pytest
-from running import DynamicsNode, NODE, Planner
+from running import DynamicsNode, MOVING, NODE, Planner
 from std_srvs.srv import Trigger
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.compilation.machine_code import COMPILED, folder_to_write
@@ -31,7 +31,6 @@ from stewart_dynamics.external_wrench import estimate, payload
 from stewart_dynamics.external_wrench.measured_legs import NOT_COMPILED
 from stewart_dynamics.planned import trajectory
 from stewart_dynamics.setpoints import base_wrench, step
-from test_dynamics_node import MOVING
 from test_external_wrench_node import Felt
 from test_planned_trajectory_node import check, MOTION
 

@@ -317,19 +317,35 @@ def test_a_bag_finished_by_the_same_run_is_not_replayed_again(bags: Path, tmp_pa
 
 
 @pytest.mark.parametrize('deaths', [1, 2])
+@pytest.mark.parametrize('where', ['processes', pytest.param('cluster', marks=pytest.mark.slow)])
 def test_a_process_that_dies_costs_only_its_bag(
-        bags: Path, tmp_path: Path, deaths: int) -> None:
+        bags: Path, tmp_path: Path, deaths: int, where: str, request: pytest.FixtureRequest,
+        monkeypatch: pytest.MonkeyPatch) -> None:
     output = tmp_path / 'out'
     pairs = folders_of_results([bags], output)
+    how: dict[str, Any] = {'jobs': 2}
+    if where == 'cluster':
+        cluster = request.getfixturevalue('cluster')
+        how = {'scheduler': cluster.scheduler_address}
+        workers = {worker.pid for worker in cluster.workers.values()}
+        if deaths == 2:
+            # With one death Dask fails the bag; no other bag waits for the same worker.
+            monkeypatch.setattr(cluster.scheduler, 'allowed_failures', 0)
+            monkeypatch.setattr(cluster.scheduler, 'WORKER_SATURATION', 1.0)
     killed = [os.getpid()]
     with ThreadPoolExecutor() as apart:
-        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN, 2)
+        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN, **how)
         for _ in range(deaths):
             killed.append(until(
                 lambda: (pid := process_in(output, 'long')) not in killed and pid,
                 'another process in the middle of a bag'))
             os.kill(killed[-1], signal.SIGKILL)
+        left = hidden(output)
         fleet = running.result()
+    if where == 'cluster':
+        # Its partial results are left, and another worker has replayed the bag.
+        assert killed[1] in workers
+        assert any(path.name.startswith('.long.') for path in left)
     if deaths == 1:
         check_each_once(fleet, pairs, output)
         return
@@ -538,51 +554,6 @@ def test_processes_end_with_the_one_that_started_them(huge: Path, tmp_path: Path
 
 
 # On a cluster
-
-@pytest.mark.slow
-def test_every_bag_is_replayed_once_when_a_worker_is_killed(
-        bags: Path, tmp_path: Path, cluster: LocalCluster) -> None:
-    output = tmp_path / 'out'
-    pairs = folders_of_results([bags], output)
-    workers = {worker.pid for worker in cluster.workers.values()}
-    with ThreadPoolExecutor() as apart:
-        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN,
-                               scheduler=cluster.scheduler_address)
-        pid = until(lambda: process_in(output, 'long'), 'a worker in the middle of a bag')
-        assert pid in workers
-        os.kill(pid, signal.SIGKILL)
-        left = hidden(output)
-        fleet = running.result()
-    # Its partial results are left, and another worker has replayed the bag.
-    assert any(path.name.startswith('.long.') for path in left)
-    check_each_once(fleet, pairs, output)
-
-
-@pytest.mark.slow
-def test_a_bag_that_kills_its_workers_does_not_affect_others(
-        bags: Path, tmp_path: Path, cluster: LocalCluster,
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    output = tmp_path / 'out'
-    pairs = folders_of_results([bags], output)
-    # With one death Dask fails the bag; no other bag waits for the same worker.
-    monkeypatch.setattr(cluster.scheduler, 'allowed_failures', 0)
-    monkeypatch.setattr(cluster.scheduler, 'WORKER_SATURATION', 1.0)
-    with ThreadPoolExecutor() as apart:
-        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN,
-                               scheduler=cluster.scheduler_address)
-        killed: set[int] = set()
-        while not running.done():
-            pid = process_in(output, 'long')
-            if pid is not None and pid not in killed and len(killed) < 2:
-                killed.add(pid)
-                os.kill(pid, signal.SIGKILL)
-            time.sleep(0.05)  # the cluster needs this process, too
-        fleet = running.result()
-    check_only_the_long_one_failed(fleet, pairs, output)
-    assert fleet.ended[0].error.endswith(
-        '/long: every process that replayed it was killed (out of memory?)')
-    assert len(killed) == 2
-
 
 @pytest.mark.slow
 def test_a_lost_cluster_is_reported_for_each_bag(

@@ -43,6 +43,7 @@ TRUE = GIVEN.replaced({
 # The true hexapod on a base that is not level.
 TILTED = TRUE.replaced({'gravity': rotation_about(
     np.array([np.cos(0.7), np.sin(0.7), 0.0]), np.radians(1.5)) @ GIVEN['gravity']})
+VALUES = dict(zip(Unknowns(TRUE).names, Unknowns(TRUE).start, strict=True))
 RATE = 100.0
 SECONDS = 20.0
 # Noise at 100 samples per second, each the mean of ten at 1 kHz.
@@ -89,13 +90,12 @@ def test_the_true_hexapod_is_found_within_its_intervals(
     code, result, out, err = identified('fourier')
     assert (code, err) == (0, '')
     assert 'platform.mass ' in out
-    truth = Unknowns(TRUE)
     assert set(values_of(result, 'state').values()) == {'identified'}
-    off = []
-    for name, true, value, error in zip(
-            truth.names, truth.start, values_of(result).values(),
-            values_of(result, 'standard_error').values(), strict=True):
-        off.append((value - true) / error)
+    values, errors, off = values_of(result), values_of(result, 'standard_error'), []
+    assert list(values) == list(VALUES)
+    for name, true in VALUES.items():
+        value = values[name]
+        off.append((value - true) / errors[name])
         kind = name.rpartition('.')[0]
         allowed = {'platform': 0.002 * 180.0, 'platform.center_of_mass': 1e-3,
                    'platform.inertia': 0.02 * 24.0, 'actuator.viscous_friction': 12.0,
@@ -150,13 +150,11 @@ def test_rotation_about_one_axis_identifies_the_inertia_about_it(
     assert {name for name, state in states.items() if state == 'in_combination'} == {
         f'platform.inertia.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz')}
     sums = {frozenset(each['parameters']): each for each in result['combinations']}
-    truth = Unknowns(TRUE)
-    true = dict(zip(truth.names, truth.start, strict=True))
     for pair in (('xx', 'xy'), ('xz', 'yz'), ('yy', 'xy')):
         names = [f'platform.inertia.{axes}' for axes in pair]
         found = sums.pop(frozenset(names))
         assert found['coefficients'] == pytest.approx([1.0, 1.0], abs=0.01)
-        assert abs(found['value'] - sum(true[name] for name in names)) < (
+        assert abs(found['value'] - sum(VALUES[name] for name in names)) < (
             4.0 * found['standard_error'])
         assert found['words'] in out
     assert not sums
@@ -183,8 +181,7 @@ def test_the_tilt_of_a_base_is_found_within_its_interval(
     assert (code, err) == (0, '')
     assert _degrees_between(_turned(result), TILTED['gravity']) < 0.02
     assert _degrees_between(GIVEN['gravity'], TILTED['gravity']) > 1.4  # unlike the file's gravity
-    truth = Unknowns(TRUE)
-    true = dict(zip(truth.names, truth.start, strict=True)) | {
+    true = VALUES | {
         'gravity.tilt_x': np.radians(1.5) * np.cos(0.7),
         'gravity.tilt_y': np.radians(1.5) * np.sin(0.7)}
     values, errors = values_of(result), values_of(result, 'standard_error')
@@ -242,10 +239,9 @@ def test_at_rest_the_tilt_is_identifiable_unless_efforts_have_offsets(
 
 
 def _swapped(given: Recorded) -> Recorded:
-    order = [0, 2, 1, 3, 4, 5]
     assert given.rates is not None
-    return Recorded(given.times, given.positions[:, order], given.rates[:, order],
-                    given.efforts[:, order])
+    return Recorded(given.times, *(each[:, [0, 2, 1, 3, 4, 5]] for each in (
+        given.positions, given.rates, given.efforts)))
 
 
 @pytest.mark.parametrize(('change', 'named', 'options'), [
@@ -272,43 +268,33 @@ def test_likely_mistakes_are_named_and_nothing_is_written(
     assert not (tmp_path / 'found').exists()
 
 
-def test_motor_torques_need_the_right_lead(identified: Callable[..., Any], tmp_path: Path) -> None:
-    def torques(given: Recorded) -> Recorded:
-        return given._replace(efforts=given.efforts * 0.01 / (2.0 * np.pi))
+CONSTANT = np.array([0.3, 0.35, 0.4, 0.45, 0.5, 0.55])
 
-    params = tmp_path / 'with lead.yaml'
-    GIVEN.replaced({'actuator.screw_lead': 0.01}).to_yaml(params)
-    code, result, _, _ = identified('fourier', '--no-report', '--motor-torque', change=torques,
-                                    params=params)
+
+@pytest.mark.parametrize(('option', 'per_newton', 'given', 'needed'), [
+    ('--motor-torque', 0.01 / (2.0 * np.pi), {}, {'actuator.screw_lead': 0.01}),
+    ('--motor-current', 0.01 / (2.0 * np.pi * 3.0) / CONSTANT,
+     {'actuator.screw_lead': 0.01, 'drive.gear_ratio': 3.0}, {'drive.torque_constant': CONSTANT})])
+def test_efforts_of_motors_need_the_drive(
+        identified: Callable[..., Any], tmp_path: Path, option: str, per_newton: Any,
+        given: dict[str, Any], needed: dict[str, Any]) -> None:
+    params = tmp_path / 'driven.yaml'
+    GIVEN.replaced(given | needed).to_yaml(params)
+    code, result, _, _ = identified(
+        'fourier', '--no-report', option, params=params,
+        change=lambda given: given._replace(efforts=given.efforts * per_newton))
     assert code == 0
     assert values_of(result)['platform.mass'] == pytest.approx(180.0, rel=0.002)
-    GIVEN.replaced({'actuator.screw_lead': 0.04}).to_yaml(params)
-    code, _, _, err = identified('fourier', '--force', '--motor-torque', params=params)
+    assert result['options'][option[2:].replace('-', '_')] is True
+    GIVEN.replaced(given).to_yaml(params)
+    code, _, _, err = identified('fourier', '--force', option, params=params)
     assert code == 2
-    assert 'likely actuator.screw_lead, 0.04 m, is wrong: about 0.0' in err
-    code, _, _, err = identified('fourier', '--force', '--motor-torque')
-    assert code == 2
-    assert 'actuator.screw_lead: has no value: --motor-torque needs it' in err
-
-
-def test_motor_currents_with_a_gear(identified: Callable[..., Any], tmp_path: Path) -> None:
-    constant = np.array([0.3, 0.35, 0.4, 0.45, 0.5, 0.55])
-
-    def currents(given: Recorded) -> Recorded:
-        return given._replace(efforts=given.efforts * 0.01 / (2.0 * np.pi * 3.0) / constant)
-
-    params = tmp_path / 'with gear.yaml'
-    driven = GIVEN.replaced({'actuator.screw_lead': 0.01, 'drive.gear_ratio': 3.0})
-    driven.replaced({'drive.torque_constant': constant}).to_yaml(params)
-    code, result, _, _ = identified('fourier', '--no-report', '--motor-current', change=currents,
-                                    params=params)
-    assert code == 0
-    assert values_of(result)['platform.mass'] == pytest.approx(180.0, rel=0.002)
-    assert result['options']['motor_current'] is True
-    driven.to_yaml(params)
-    code, _, _, err = identified('fourier', '--force', '--motor-current', params=params)
-    assert code == 2
-    assert 'drive.torque_constant: has no value: --motor-current needs it' in err
+    assert f'{[*needed][0]}: has no value: {option} needs it' in err
+    if not given:
+        GIVEN.replaced({'actuator.screw_lead': 0.04}).to_yaml(params)
+        code, _, _, err = identified('fourier', '--force', option, params=params)
+        assert code == 2
+        assert 'likely actuator.screw_lead, 0.04 m, is wrong: about 0.0' in err
 
 
 def test_mistakes_may_be_accepted(identified: Callable[..., Any]) -> None:

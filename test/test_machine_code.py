@@ -50,6 +50,14 @@ def {name}(matrix, factor, shift, doubled, sums):
 def chosen(numbers, n):
     numbers[0] = 2.0 * n
 """
+UNSUITABLE = """\
+import numpy as np
+from stewart_dynamics.compilation.functions import entry_point
+
+@entry_point('f8[::1]')
+def unsuitable(numbers):
+    {}
+"""
 SIGNS = {'scaled_sums': 1.0, 'negative_sums': -1.0}
 
 
@@ -140,7 +148,7 @@ def test_a_damaged_file_is_not_used(kept: Path, damage: Callable[[bytes], bytes]
     assert not machine_code.load('scaled_sums')
 
 
-def test_a_flipped_bit_anywhere_is_found(kept: Path) -> None:
+def test_a_flipped_bit_anywhere_and_the_file_of_another_module_are_found(kept: Path) -> None:
     file = file_of(kept)
     whole = file.read_bytes()
     for place in np.random.default_rng(7).integers(0, 8 * len(whole), 200):
@@ -148,6 +156,8 @@ def test_a_flipped_bit_anywhere_is_found(kept: Path) -> None:
         flipped[place // 8] ^= 1 << (place % 8)
         file.write_bytes(flipped)
         assert not is_kept('scaled_sums'), f'bit {place}'
+    file.write_bytes(file_of(kept, 'negative_sums').read_bytes())
+    assert not is_kept('scaled_sums'), 'the file of another module'
 
 
 def test_a_damaged_file_is_replaced(kept: Path, announced: list[str]) -> None:
@@ -159,11 +169,6 @@ def test_a_damaged_file_is_replaced(kept: Path, announced: list[str]) -> None:
                          'seconds, only this once']
     assert file.read_bytes() == whole
     assert len(list(kept.iterdir())) == 2
-
-
-def test_the_file_of_another_module_is_not_used(kept: Path) -> None:
-    file_of(kept).write_bytes(file_of(kept, 'negative_sums').read_bytes())
-    assert not is_kept('scaled_sums')
 
 
 def test_a_changed_source_is_compiled_anew(kept: Path, folder: Path) -> None:
@@ -187,13 +192,7 @@ def test_modules_compiled_by_one_process_depend_on_their_own_sources_only(
     monkeypatch.syspath_prepend(str(tmp_path))
     for name in SIGNS:
         file_of(kept, name).unlink()
-    (tmp_path / 'unsuitable.py').write_text("""
-from stewart_dynamics.compilation.functions import entry_point
-
-@entry_point('f8[::1]')
-def unsuitable(numbers):
-    numbers[0] = sorted(3.0)
-""")
+    (tmp_path / 'unsuitable.py').write_text(UNSUITABLE.format('numbers[0] = sorted(3.0)'))
     functions = [imported(name) for name in ('unsuitable', *SIGNS)]
     with pytest.warns(RuntimeWarning, match='^unsuitable cannot be compiled: '):
         prepare(functions)
@@ -266,14 +265,7 @@ def test_a_function_that_cannot_be_machine_code_alone_runs_uncompiled_with_a_war
         result: float) -> None:
     """The loader of another process does not find such functions, and would end the program."""
     monkeypatch.syspath_prepend(str(tmp_path))
-    (tmp_path / 'unsuitable.py').write_text(f"""\
-import numpy as np
-from stewart_dynamics.compilation.functions import entry_point
-
-@entry_point('f8[::1]')
-def unsuitable(numbers):
-    {statement}
-""")
+    (tmp_path / 'unsuitable.py').write_text(UNSUITABLE.format(statement))
     numbers = np.zeros(3)
     with pytest.warns(RuntimeWarning, match=(
             r'^unsuitable cannot be compiled: .*: the dynamics run uncompiled')):
@@ -326,8 +318,7 @@ def test_an_array_of_another_layout_is_an_error(kept: Path, wrong: Any) -> None:
         imported('scaled_sums')(wrong, 1.0, 0, False, np.empty(3))
 
 
-def test_preparation_compiles_in_the_background(
-        kept: Path, announced: list[str]) -> None:
+def test_preparation_compiles_in_the_background(kept: Path, announced: list[str]) -> None:
     assert Preparation(imported('scaled_sums')).ready
     file_of(kept).unlink()
     functions = [imported(name) for name in SIGNS]

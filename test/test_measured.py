@@ -55,6 +55,12 @@ class Case(NamedTuple):
             self.motion, wrench).forces
         return forces
 
+    def later(self, seconds: int) -> Case:
+        """Return the same some time later."""
+        stamps = self.setpoints.stamps + seconds * SECOND
+        return self._replace(seconds=self.seconds + seconds,
+                             setpoints=self.setpoints._replace(stamps=stamps))
+
     def part(self, which: Any) -> Case:
         """Return some of the setpoints."""
         motion = Motion(*(each[which] for each in (
@@ -100,6 +106,13 @@ def compared(comparison: Comparison, *given: Any) -> list[Array]:
             blocks.append(comparison.add_measured(*each))
     blocks.append(comparison.finish())
     return [np.concatenate(each) for each in zip(*blocks, strict=True)]
+
+
+def values_of(case: Case, measured: Array) -> dict[str, Any]:
+    """Return the result for forces that are measured at every setpoint."""
+    comparison = Comparison(case.parameters)
+    compared(comparison, case, (case.setpoints.stamps, measured))
+    return comparison.values()
 
 
 # The residual and the external wrench
@@ -155,11 +168,11 @@ def test_a_load_in_the_model_leaves_no_residual() -> None:
     case = case_of()
     load = rng().uniform(-300.0, 300.0, (500, 6))
     batch = case.setpoints
-    with_load = Batch(batch.stamps, batch.motions, load, batch.restarts, batch.times)
+    with_load = batch._replace(wrenches=load)
     outputs = Step(case.parameters).many(with_load, None)
     comparison = Comparison(case.parameters)
     _, _, _, wrench = compared(
-        comparison, Case(case.parameters, case.motion, case.seconds, with_load, outputs),
+        comparison, case._replace(setpoints=with_load, outputs=outputs),
         (batch.stamps, case.forces(load)))
     assert np.max(np.abs(wrench)) < 1e-9
     assert comparison.values()['contacts']['count'] == 0
@@ -167,15 +180,11 @@ def test_a_load_in_the_model_leaves_no_residual() -> None:
 
 def test_a_contact_may_last_for_nearly_half_of_the_bag() -> None:
     case = case_of(many=1000)
-    comparison = Comparison(case.parameters)
     load = np.where(((case.seconds >= 3.0) & (case.seconds < 7.0))[:, None],
                     [0.0, 0.0, -200.0, 0.0, 0.0, 0.0], 0.0)
     forces = case.forces(load)
     scale = np.sqrt(np.mean(forces ** 2))
-    compared(comparison, case, (case.setpoints.stamps,
-                                forces + 1e-4 * scale * rng().normal(size=forces.shape)))
-    values = comparison.values()
-    contacts = values['contacts']
+    contacts = values_of(case, forces + 1e-4 * scale * rng().normal(size=forces.shape))['contacts']
     assert contacts['count'] == 1
     assert contacts['strongest'][0]['from_s'] == pytest.approx(3.0, abs=0.02)
     assert contacts['strongest'][0]['to_s'] == pytest.approx(7.0, abs=0.02)
@@ -186,9 +195,7 @@ def test_the_headline_names_the_difference_and_the_leg_where_it_is_largest() -> 
     case = case_of()
     offsets = np.array([1.0, 0.0, -2.0, 0.0, 20.0, 0.0])
     measured = case.forces() + offsets
-    comparison = Comparison(case.parameters)
-    compared(comparison, case, (case.setpoints.stamps, measured))
-    values = comparison.values()
+    values = values_of(case, measured)
     rms = np.sqrt(np.mean(offsets ** 2))
     share = rms / np.sqrt(np.mean(measured ** 2))
     assert values['residual_rms_n'] == pytest.approx(rms, rel=1e-9)
@@ -202,14 +209,10 @@ def test_the_headline_names_the_difference_and_the_leg_where_it_is_largest() -> 
 
 def test_a_contact_is_found_with_its_time_and_load() -> None:
     case = case_of(many=3000)
-    random = rng()
     load = np.zeros((3000, 6))
     load[1200:1230, 2] = -400.0
     load[2000:2005, 3] = 900.0
-    noise = random.normal(0.0, 1.0, (3000, 6))
-    comparison = Comparison(case.parameters)
-    compared(comparison, case, (case.setpoints.stamps, case.forces(load) + noise))
-    contacts = comparison.values()['contacts']
+    contacts = values_of(case, case.forces(load) + rng().normal(0.0, 1.0, (3000, 6)))['contacts']
     assert contacts['count'] == 2
     push, blow = contacts['strongest']
     assert push['from_s'] == pytest.approx(12.0, abs=contacts['resolution_s'])
@@ -226,10 +229,7 @@ def test_a_contact_of_one_sample_has_one_time_in_the_summary() -> None:
     case = case_of(many=3000)
     load = np.zeros((3000, 6))
     load[[0, *range(1200, 1230)], 2] = -400.0
-    comparison = Comparison(case.parameters)
-    compared(comparison, case, (case.setpoints.stamps, case.forces(load)))
-    values = comparison.values()
-    lines = _measured_lines({'headline': '', **values})
+    lines = _measured_lines({'headline': '', **values_of(case, case.forces(load))})
     assert [line.partition(':')[0] for line in lines if line.startswith('contact')] == [
         'contact at t = 0.00 s', 'contact from t = 12.00 to 12.29 s']
 
@@ -237,10 +237,8 @@ def test_a_contact_of_one_sample_has_one_time_in_the_summary() -> None:
 def test_a_payload_and_noise_are_no_contact() -> None:
     case = case_of(many=3000)
     load = np.array([0.0, 0.0, -500.0, 30.0, 0.0, 0.0]) + np.zeros((3000, 1))
-    comparison = Comparison(case.parameters)
-    compared(comparison, case, (case.setpoints.stamps,
-                                case.forces(load) + rng().normal(0.0, 20.0, (3000, 6))))
-    assert comparison.values()['contacts']['count'] == 0
+    noise = rng().normal(0.0, 20.0, (3000, 6))
+    assert values_of(case, case.forces(load) + noise)['contacts']['count'] == 0
 
 
 def test_times_of_contacts_hold_in_a_recording_of_hours() -> None:
@@ -252,10 +250,9 @@ def test_times_of_contacts_hold_in_a_recording_of_hours() -> None:
         load = np.zeros((2000, 6))
         if turn == 31:
             load[700:720, 0] = 1000.0
-        later = 600 * turn
-        batch = Batch(case.setpoints.stamps + later * SECOND, *list(case.setpoints)[1:])
-        comparison.add_measured(batch.stamps, case.forces(load))
-        comparison.add_setpoints(case.seconds + later, batch, case.outputs)
+        later = case.later(600 * turn)
+        comparison.add_measured(later.setpoints.stamps, case.forces(load))
+        comparison.add_setpoints(later.seconds, later.setpoints, later.outputs)
     comparison.finish()
     contacts = comparison.values()['contacts']
     assert contacts['count'] == 1
@@ -273,9 +270,7 @@ def test_the_strongest_hundred_contacts_are_listed_in_order_of_time() -> None:
     strengths = rng().uniform(3000.0, 9000.0, 150)
     for number, strength in enumerate(strengths):
         load[100 + 120 * number, 1] = strength
-    comparison = Comparison(case.parameters)
-    compared(comparison, case, (case.setpoints.stamps, case.forces(load)))
-    contacts = comparison.values()['contacts']
+    contacts = values_of(case, case.forces(load))['contacts']
     assert contacts['count'] == 150
     found = [each['force_n'][1] for each in contacts['strongest']]
     assert found == pytest.approx([each for each in strengths
@@ -302,7 +297,6 @@ def test_forces_are_interpolated_between_samples_and_never_extrapolated() -> Non
     assert values['setpoints_not_compared']['without_measurement'] == 100 - within.sum()
     assert values['gap_limit_s'] == TIMEOUT
     # samples exactly as far apart as the limit still count, and one at the very stamp alone
-    case = case_of(many=100)
     seconds, *_ = compared(Comparison(case.parameters), case,
                            (stamps[[10, 20, 50]], np.zeros((3, 6))))
     assert np.array_equal(seconds, case.seconds[[*range(10, 21), 50]])
@@ -451,14 +445,13 @@ def test_cuts_and_turns_change_nothing(
 
 def test_unmatched_samples_are_dropped_and_counted() -> None:
     case = case_of(many=5000)
+    forces = case.forces()
     comparison = Comparison(case.parameters)
-    far = 0
     for turn in range(20):
-        far = turn * 50 * SECOND
-        batch = Batch(case.setpoints.stamps + far, *list(case.setpoints)[1:])
-        comparison.add_setpoints(case.seconds + far * 1e-9, batch, case.outputs)
+        later = case.later(50 * turn)
+        comparison.add_setpoints(later.seconds, later.setpoints, later.outputs)
     # the last waiting setpoints are all compared, earlier ones are not
-    late = comparison.add_measured(case.setpoints.stamps + far, case.forces())
+    late = comparison.add_measured(later.setpoints.stamps, forces)
     rest = comparison.finish()
     assert len(late.seconds) + len(rest.seconds) == 5000
     values = comparison.values()
@@ -467,10 +460,9 @@ def test_unmatched_samples_are_dropped_and_counted() -> None:
 
     comparison = Comparison(case.parameters)
     for turn in range(100):
-        comparison.add_measured(case.setpoints.stamps + turn * 50 * SECOND, case.forces())
+        later = case.later(50 * turn)
+        comparison.add_measured(later.setpoints.stamps, forces)
     assert values['samples'] == 5000
-    far = 99 * 50 * SECOND
-    batch = Batch(case.setpoints.stamps + far, *list(case.setpoints)[1:])
-    comparison.add_setpoints(case.seconds + far * 1e-9, batch, case.outputs)
+    comparison.add_setpoints(later.seconds, later.setpoints, later.outputs)
     comparison.finish()
     assert comparison.values()['setpoints_compared'] == 5000

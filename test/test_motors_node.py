@@ -23,12 +23,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
-from running import DynamicsNode, NODE, PLATFORM, Sample
+from running import DynamicsNode, ERROR, MOVING, NODE, OK, PLATFORM, Sample
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Parameters, StewartPlatform
-from test_dynamics_node import ERROR, MOVING, OK
 from test_simulator_node import begin, SIMULATOR, stamp_of, STEPPED  # noqa: F401
 
 DRIVES = {

@@ -16,7 +16,6 @@
 """Hexapods in files of other tools: parameters, remarks and rejections."""
 
 import os
-from pathlib import Path
 import re
 import shutil
 import subprocess
@@ -25,7 +24,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from referees import random_parameters, rng
+from referees import random_parameters, rng, ROOT
 from stewart_dynamics import Parameters, StewartError, StewartPlatform
 from stewart_dynamics.description import read_mjcf as loading
 from stewart_dynamics.description.hexapod import Hexapod
@@ -35,14 +34,14 @@ from stewart_dynamics.description.sdf import sdf, upright
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 
-PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
+PLATFORM = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 WRITERS = {'urdf': urdf, 'sdf': sdf, 'xml': mjcf}
 EXACT = 1e-12
 
 
 def machines():
     """Yield hexapods of all kinds, those without mass in their legs and in a world frame too."""
-    yield Parameters.from_yaml(PLATFORM)
+    yield PLATFORM
     for seed in range(3):
         yield random_parameters(rng(seed))
     given = random_parameters(rng(5)).given
@@ -51,7 +50,9 @@ def machines():
 
 
 def written(p, kind, folder, change=lambda text: text):
-    """Return the file of a hexapod."""
+    """Return the file of a hexapod; an MJCF is read by MuJoCo, where that is installed."""
+    if kind == 'xml':
+        pytest.importorskip('mujoco')
     path = folder / f'hexapod.{kind}'
     path.write_text(change(WRITERS[kind](Hexapod(p), 'hexapod')), encoding='utf-8')
     return path
@@ -70,8 +71,6 @@ def foreign(text):
 @pytest.mark.parametrize('kind', WRITERS)
 @pytest.mark.parametrize('machine', range(5))
 def test_written_files_read_back_with_the_same_numbers(kind, machine, tmp_path):
-    if kind == 'xml':
-        pytest.importorskip('mujoco')
     p = [*machines()][machine]
     read = read_hexapod(written(p, kind, tmp_path)).parameters
     for name, value in p.items():
@@ -85,9 +84,7 @@ def test_written_files_read_back_with_the_same_numbers(kind, machine, tmp_path):
 
 @pytest.mark.parametrize('kind', ['sdf', 'xml'])
 def test_closed_files_of_others_are_read_by_how_bodies_are_connected(kind, tmp_path):
-    if kind == 'xml':
-        pytest.importorskip('mujoco')
-    p = Parameters.from_yaml(PLATFORM)
+    p = PLATFORM
     found = read_hexapod(written(p, kind, tmp_path, foreign))
     for name in ('geometry.base_joints', 'geometry.platform_joints', 'platform.inertia',
                  'legs.piston.center_of_mass', 'limits.force_max', 'actuator.viscous_friction'):
@@ -104,11 +101,9 @@ def test_closed_files_of_others_are_read_by_how_bodies_are_connected(kind, tmp_p
 @pytest.mark.parametrize('kind', WRITERS)
 @pytest.mark.parametrize('change', [lambda text: text, foreign], ids=['own', 'foreign'])
 def test_a_hanging_hexapod_keeps_its_side_in_every_format(kind, change, tmp_path):
-    if kind == 'xml':
-        pytest.importorskip('mujoco')
     if kind == 'urdf' and change is foreign:
         pytest.skip('its loops are open: it has no pose')
-    p = Parameters.from_yaml(PLATFORM).replaced({
+    p = PLATFORM.replaced({
         'geometry.platform_side': 'negative', 'platform.center_of_mass': [0.02, -0.01, -0.12]})
     assert Hexapod(p).position[2] < -1.0
     found = read_hexapod(written(p, kind, tmp_path, change)).parameters
@@ -130,7 +125,7 @@ def at_home(text, hexapod):
 
 
 def test_an_open_urdf_whose_loops_gazebo_closes_is_read(tmp_path):
-    p = Parameters.from_yaml(PLATFORM)
+    p = PLATFORM
 
     def closed_by_gazebo(text):
         root, _ = at_home(text, Hexapod(p))
@@ -148,7 +143,7 @@ def test_an_open_urdf_whose_loops_gazebo_closes_is_read(tmp_path):
 
 def test_an_open_urdf_in_which_one_leg_carries_the_platform_is_read_and_reported(tmp_path):
     """As CAD programs write it: the other five legs end in the air."""
-    p = Parameters.from_yaml(PLATFORM)
+    p = PLATFORM
 
     def carried_by_a_leg(text):
         hexapod = Hexapod(p)
@@ -185,7 +180,7 @@ def changed(text, pattern, replacement):
 
 
 def test_a_start_outside_the_limits_is_reported(tmp_path):
-    p = Parameters.from_yaml(PLATFORM)
+    p = PLATFORM
 
     def moved(text):
         return changed(foreign(text), r'<lower>[^<]*</lower>', '<lower>0.1</lower>')
@@ -233,8 +228,7 @@ def test_an_mjcf_that_mujoco_rejects_is_rejected_with_the_reason_of_mujoco(tmp_p
 
 
 def test_a_prismatic_joint_across_its_leg_is_rejected(tmp_path):
-    pytest.importorskip('mujoco')
-    path = written(Parameters.from_yaml(PLATFORM), 'xml', tmp_path, lambda text: changed(
+    path = written(PLATFORM, 'xml', tmp_path, lambda text: changed(
         text, '(<joint name="leg_5" type="slide" axis)="0 0 1"', r'\1="1 0 0"'))
     with pytest.raises(StewartError, match='leg_5: the axis of this prismatic joint is inclined '
                        'to the line between the joints of its leg by 90 degrees: must be along'):
@@ -242,8 +236,7 @@ def test_a_prismatic_joint_across_its_leg_is_rejected(tmp_path):
 
 
 def test_a_negative_gear_is_reported(tmp_path):
-    pytest.importorskip('mujoco')
-    path = written(Parameters.from_yaml(PLATFORM), 'xml', tmp_path, lambda text: changed(
+    path = written(PLATFORM, 'xml', tmp_path, lambda text: changed(
         text, '<motor name="leg_6"', '<motor name="leg_6" gear="-1"'))
     found = read_hexapod(path)
     assert 'leg_6: the gear of its actuator is negative: forces are along its joint here' in (
@@ -252,7 +245,7 @@ def test_a_negative_gear_is_reported(tmp_path):
 
 
 def test_a_leg_without_a_joint_at_one_end_is_rejected(tmp_path):
-    path = written(Parameters.from_yaml(PLATFORM), 'sdf', tmp_path, lambda text: re.sub(
+    path = written(PLATFORM, 'sdf', tmp_path, lambda text: re.sub(
         '(<joint name="[^"]*") type="ball"', r'\1 type="fixed"', foreign(text)))
     with pytest.raises(StewartError, match="leg_1: no joint between it and 'platform': a leg of "
                        'this model turns at both of its ends'):
@@ -269,14 +262,14 @@ def test_legs_that_are_cut_in_two_are_rejected(tmp_path):
     with pytest.raises(StewartError, match=(
             "no hexapod: legs with one prismatic joint each between 'base' and 'platform': 5; "
             "there must be six. 2 bodies have one joint alone, as '.*': joints or constraints")):
-        read_hexapod(written(Parameters.from_yaml(PLATFORM), 'sdf', tmp_path, cut))
+        read_hexapod(written(PLATFORM, 'sdf', tmp_path, cut))
 
 
 @pytest.mark.parametrize('kind', ['urdf', 'sdf'])
 def test_parameters_that_no_format_has_elements_for_are_carried(kind, tmp_path):
     given = {'actuator.screw_lead': 0.01, 'actuator.coulomb_velocity': [
         1e-3 * n for n in range(1, 7)], 'limits.base_joint_angle_max': 0.7}
-    read = read_hexapod(written(Parameters.from_yaml(PLATFORM).replaced(given), kind, tmp_path))
+    read = read_hexapod(written(PLATFORM.replaced(given), kind, tmp_path))
     for name, value in given.items():
         assert read.parameters[name] == pytest.approx(np.broadcast_to(value, 6)), name
 
@@ -292,23 +285,17 @@ def chain_of_frames(count):
             '<parent>world</parent><child>a</child></joint></model></sdf>')
 
 
-def chain_of_links(count, kind='fixed'):
-    """Return a URDF whose links carry each other."""
+def links(count, kind, parent):
+    """Return a URDF whose links are carried by others."""
     return '<robot name="x"><link name="l0"/>' + ''.join(
-        f'<link name="l{n}"/><joint name="j{n}" type="{kind}"><parent link="l{n - 1}"/>'
-        f'<child link="l{n}"/></joint>' for n in range(1, count)) + '</robot>'
-
-
-def star_of_links(count):
-    """Return a URDF in which one link carries all others, by joints of one axis."""
-    return '<robot name="x"><link name="l0"/>' + ''.join(
-        f'<link name="l{n}"/><joint name="j{n}" type="continuous"><parent link="l0"/>'
+        f'<link name="l{n}"/><joint name="j{n}" type="{kind}"><parent link="l{parent(n)}"/>'
         f'<child link="l{n}"/></joint>' for n in range(1, count)) + '</robot>'
 
 
 @pytest.mark.parametrize('text', [
-    chain_of_frames(20_000), chain_of_links(20_000), chain_of_links(20_000, 'continuous'),
-    star_of_links(20_000)], ids=['frames', 'fixed links', 'hinged links', 'star'])
+    chain_of_frames(20_000), links(20_000, 'fixed', lambda n: n - 1),
+    links(20_000, 'continuous', lambda n: n - 1), links(20_000, 'continuous', lambda n: 0)],
+    ids=['frames', 'fixed links', 'hinged links', 'star'])
 def test_large_models_take_time_in_proportion_to_their_size(text, tmp_path):
     path = tmp_path / 'large.xml'
     path.write_text(text)
@@ -338,7 +325,7 @@ def test_mujoco_is_given_bounded_time_and_memory(text, why, tmp_path, monkeypatc
 def test_mujoco_writes_its_warnings_nowhere(tmp_path, monkeypatch):
     pytest.importorskip('mujoco')
     monkeypatch.chdir(tmp_path)
-    path = written(Parameters.from_yaml(PLATFORM), 'xml', tmp_path, lambda text: changed(
+    path = written(PLATFORM, 'xml', tmp_path, lambda text: changed(
         text, '<worldbody>', '<worldbody><body pos="nan 0 0"><geom size="1"/></body>'))
     with pytest.raises(StewartError):
         read_hexapod(path)
@@ -354,7 +341,7 @@ PROGRAM = next((name for name in ('gz', 'ign') if shutil.which(name)), '')
 @pytest.mark.skipif(not PROGRAM, reason='needs gz sdf or ign sdf')
 @pytest.mark.parametrize('seed', [None, 0])
 def test_libsdformat_finds_the_file_valid(seed, tmp_path):
-    p = Parameters.from_yaml(PLATFORM) if seed is None else random_parameters(rng(seed))
+    p = PLATFORM if seed is None else random_parameters(rng(seed))
     file = tmp_path / 'hexapod.sdf'
     file.write_text(sdf(Hexapod(p), 'hexapod'), encoding='utf-8')
     done = subprocess.run([PROGRAM, 'sdf', '-k', str(file)], capture_output=True, text=True,
@@ -363,9 +350,12 @@ def test_libsdformat_finds_the_file_valid(seed, tmp_path):
     assert 'Valid' in done.stdout
 
 
+def sdf_model(p):
+    return ET.fromstring(sdf(Hexapod(p), 'hexapod')).find('model')
+
+
 def test_the_joints_and_the_tips_close_the_loops():
-    p = Parameters.from_yaml(PLATFORM)
-    model = ET.fromstring(sdf(Hexapod(p), 'hexapod')).find('model')
+    p, model = PLATFORM, sdf_model(PLATFORM)
     joints = {joint.get('name'): joint for joint in model.iter('joint')}
     kinds = [joint.get('type') for joint in joints.values()]
     assert [kinds.count(kind) for kind in ('fixed', 'universal', 'prismatic', 'ball')] == [
@@ -383,14 +373,13 @@ def test_the_joints_and_the_tips_close_the_loops():
 
 def test_no_link_has_two_parent_joints() -> None:
     """Gazebo's engines reject a joint whose child has a parent already."""
-    model = ET.fromstring(sdf(Hexapod(Parameters.from_yaml(PLATFORM)), 'hexapod')).find('model')
+    model = sdf_model(PLATFORM)
     children = [joint.findtext('child') for joint in model.iter('joint')]
     assert len(children) == len(set(children)) == 1 + 6 * 3
 
 
 def test_length_limits_count_from_the_home_pose() -> None:
-    p = Parameters.from_yaml(PLATFORM)
-    model = ET.fromstring(sdf(Hexapod(p), 'hexapod')).find('model')
+    p, model = PLATFORM, sdf_model(PLATFORM)
     joints = {joint.get('name'): joint for joint in model.iter('joint')}
     home = StewartPlatform(p).inverse_kinematics(StewartPlatform(p).home_pose())
     limit = joints['leg_1'].find('axis/limit')
@@ -408,6 +397,5 @@ def test_the_model_is_turned_until_gravity_points_down(gravity):
 
 
 def test_a_base_frame_with_the_name_of_the_world_gets_another_in_sdf():
-    p = Parameters.from_yaml(PLATFORM).replaced({'base_frame': 'world'})
-    model = ET.fromstring(sdf(Hexapod(p), 'hexapod')).find('model')
+    model = sdf_model(PLATFORM.replaced({'base_frame': 'world'}))
     assert [link.get('name') for link in model.iter('link')][0] == 'world_base'

@@ -18,9 +18,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from dataclasses import replace
 from io import BytesIO
-import math
 import os
 from pathlib import Path
 import random
@@ -39,7 +39,7 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Me
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapWriter
 import messages
-from messages import STORE
+from messages import MS, RECORDED, Recorded, STORE
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
@@ -53,12 +53,10 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.program import PARTLY_READ
 from stewart_dynamics.replay.one_bag import replay as replay_one
 from stewart_dynamics.replay.replay_options import NODE, Options
-from stewart_dynamics.setpoints.inputs import ACCEL, INPUT_TYPES, POSE, TWIST
+from stewart_dynamics.setpoints.inputs import INPUT_TYPES, POSE, TWIST
 import zstandard
 
 PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
-MS = 1_000_000
-RECORDED = 1_700_000_000_000 * MS
 MAGIC = b'\x89MCAP0\r\n'
 WITHOUT_INDEX: dict[str, Any] = {
     'index_types': IndexType.NONE, 'repeat_channels': False, 'repeat_schemas': False,
@@ -72,13 +70,16 @@ KINDS: dict[str, dict[str, Any]] = {
     'without a summary': {**WITHOUT_INDEX, 'index_types': IndexType.MESSAGE},
 }
 
-Recorded = tuple[str, int, bytes]
-
 
 class Read(NamedTuple):
     messages: list[Recorded]
     missing: list[str]
     notices: list[str]
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / 'bag.mcap'
 
 
 def read(bag: Path, *topics: str) -> Read:
@@ -94,15 +95,7 @@ def read(bag: Path, *topics: str) -> Read:
 
 def motion(number: int) -> list[Recorded]:
     """Return setpoints 10 ms apart: a slow heave."""
-    found = []
-    for n in range(1, number + 1):
-        t, stamp, when = 0.01 * n, n * 10 * MS, RECORDED + n * 10 * MS
-        for k, (topic, data) in enumerate((
-                (POSE, messages.pose(stamp, (0.0, 0.0, 1.1 + 0.05 * math.sin(t)))),
-                (TWIST, messages.twist(stamp, (0.0, 0.0, 0.05 * math.cos(t), 0, 0, 0))),
-                (ACCEL, messages.accel(stamp, (0.0, 0.0, -0.05 * math.sin(t), 0, 0, 0))))):
-            found.append((f'{NODE}/{topic}', when + k, data))
-    return found
+    return [(f'{NODE}/{topic}', when, data) for topic, when, data in messages.motion(number)]
 
 
 TYPES = {f'{NODE}/{topic}': kind for topic, kind in INPUT_TYPES.items()}
@@ -220,10 +213,9 @@ def shifted(content: bytes, chance: random.Random) -> bytes:
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('spoil', [cut, flipped, zeroed, shifted])
 def test_a_damaged_bag_gives_no_wrong_messages_and_reports_missing_ones(
-        spoil: Callable[[bytes, random.Random], bytes], kind: str, tmp_path: Path) -> None:
+        spoil: Callable[[bytes, random.Random], bytes], kind: str, file: Path) -> None:
     given_ = motion(60)
     content = mcap(given_, **KINDS[kind])
-    file = tmp_path / 'bag.mcap'
     file.write_bytes(content)
     assert read(file) == (given_, [], [])
     chance = random.Random(f'{spoil.__name__} {kind}')
@@ -233,10 +225,9 @@ def test_a_damaged_bag_gives_no_wrong_messages_and_reports_missing_ones(
 
 
 @pytest.mark.parametrize('kind', ['plain', 'without a summary'])
-def test_a_flipped_bit_in_the_records_gives_no_wrong_messages(kind: str, tmp_path: Path) -> None:
+def test_a_flipped_bit_in_the_records_gives_no_wrong_messages(kind: str, file: Path) -> None:
     given_ = motion(6)
     content = mcap(given_, chunk_size=700, **KINDS[kind])
-    file = tmp_path / 'bag.mcap'
     whole = 0
     for at, _ in records_of(content):
         for bit in (*range(8), *range(8, 32, 3)):  # of the kind, of the length
@@ -263,10 +254,9 @@ def test_a_bag_cut_by_twenty_bytes_is_read_to_its_end(kind: str, tmp_path: Path)
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_damaged_chunk_is_lost_and_without_an_index_all_after_it(
-        kind: str, tmp_path: Path) -> None:
+        kind: str, file: Path) -> None:
     given_ = motion(60)
     content = mcap(given_, **KINDS[kind])
-    file = tmp_path / 'bag.mcap'
     chunks = [at for at, _ in records_of(content) if content[at] == Opcode.CHUNK]
     assert len(chunks) > 3
     # all topics are declared before it
@@ -287,9 +277,8 @@ def test_a_damaged_chunk_is_lost_and_without_an_index_all_after_it(
         assert any(f'byte {chunks[2]}' in said for said in found.missing)
 
 
-def test_chunks_are_in_order_although_a_time_in_a_head_is_wrong(tmp_path: Path) -> None:
+def test_chunks_are_in_order_although_a_time_in_a_head_is_wrong(file: Path) -> None:
     given_ = motion(60)
-    file = tmp_path / 'bag.mcap'
     for kind in ('plain', 'without a summary'):
         content = mcap(given_, **KINDS[kind])
         at = [at for at, _ in records_of(content) if content[at] == Opcode.CHUNK][2] + 9
@@ -300,6 +289,7 @@ def test_chunks_are_in_order_although_a_time_in_a_head_is_wrong(tmp_path: Path) 
             assert is_part(found.messages, given_)
 
 
+ONE = schema(1, 'a/msg/A') + channel(1, '/a')
 DECLARED = schema(1, 'a/msg/A') + channel(2, '/a') + channel(3, '/c')
 AMONG = (DECLARED, chunk(message(2, 5), 5), message(2, 3), chunk(message(2, 1), 1))
 LAST = (1 << 63) - 1
@@ -316,8 +306,7 @@ LAST = (1 << 63) - 1
          'between chunks', 'two channels of a topic', 'times out of range', 'chunk in a chunk'])
 def test_records_that_are_used_and_records_that_are_damage(
         records: tuple[bytes, ...], times: list[int], missing: str,
-        tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+        file: Path) -> None:
     file.write_bytes(file_of(*records))
     found = read(file)
     assert [when for _, when, _ in found.messages] == times
@@ -327,9 +316,8 @@ def test_records_that_are_used_and_records_that_are_damage(
 
 # Files as recorders write them
 
-def test_unchunked_bags_are_read_with_a_notice(tmp_path: Path) -> None:
+def test_unchunked_bags_are_read_with_a_notice(file: Path) -> None:
     given_ = motion(30)
-    file = tmp_path / 'bag.mcap'
     for options in ({}, WITHOUT_INDEX):  # the latter is rosbag2's preset fastwrite
         content = mcap(given_, use_chunking=False, **options)
         file.write_bytes(content)
@@ -345,9 +333,8 @@ def test_unchunked_bags_are_read_with_a_notice(tmp_path: Path) -> None:
         assert 'no checksums' in found.notices[0]
 
 
-def test_a_checksum_of_the_file_covers_messages_outside_of_chunks(tmp_path: Path) -> None:
+def test_a_checksum_of_the_file_covers_messages_outside_of_chunks(file: Path) -> None:
     given_ = motion(30)
-    file = tmp_path / 'bag.mcap'
     content = mcap(given_, use_chunking=False, enable_data_crcs=True)
     file.write_bytes(content)
     assert read(file) == (given_, [], [])
@@ -361,15 +348,14 @@ def test_a_checksum_of_the_file_covers_messages_outside_of_chunks(tmp_path: Path
         assert found.messages == given_ or found.missing
 
 
-def test_chunks_without_checksums_are_read_with_a_notice(tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+def test_chunks_without_checksums_are_read_with_a_notice(file: Path) -> None:
     file.write_bytes(file_of(DECLARED, chunk(message(2, 5), 5, checksum=0)))
     found = read(file)
     assert (len(found.messages), found.missing) == (1, [])
     assert 'no checksums' in found.notices[0]
 
 
-def test_attachments_and_metadata_between_chunks_are_skipped(tmp_path: Path) -> None:
+def test_attachments_and_metadata_between_chunks_are_skipped(file: Path) -> None:
     given_ = motion(20)
     stream = BytesIO()
     writer = McapWriter(stream, chunk_size=500, compression=CompressionType.NONE)
@@ -384,14 +370,12 @@ def test_attachments_and_metadata_between_chunks_are_skipped(tmp_path: Path) -> 
             writer.add_attachment(when, when, 'ü', 'text/plain', mcap(given_)[:3000 * n])
             writer.add_metadata('rosbag2', {'a': 'b' * n, 'ü': ''})
     writer.finish()
-    file = tmp_path / 'bag.mcap'
     for content in (stream.getvalue(), stream.getvalue()[:-20]):
         file.write_bytes(content)
         assert read(file).messages == given_
 
 
-def test_bags_without_definitions_have_their_types_by_name(tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+def test_bags_without_definitions_have_their_types_by_name(file: Path) -> None:
     file.write_bytes(file_of(
         channel(1, '/before', schema=7), schema(7, 'a/msg/A'), channel(2, '/without', schema=0),
         channel(3, '/json', schema=7, encoding='json'), channel(4, '/two', schema=7),
@@ -405,8 +389,7 @@ def test_bags_without_definitions_have_their_types_by_name(tmp_path: Path) -> No
         '/mixed': 'a/msg/A and a/msg/A encoded as json'}
 
 
-def test_empty_bags(tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+def test_empty_bags(file: Path) -> None:
     for content in (mcap([]), file_of(), file_of(chunk(b''))):
         file.write_bytes(content)
         assert read(file) == ([], [], [])
@@ -442,9 +425,8 @@ def test_messages_come_in_the_order_in_which_rosbags_has_them(
     assert read(file).messages == sorted(written, key=lambda each: each[1])
 
 
-def test_topics_recorded_one_after_the_other_are_merged(tmp_path: Path) -> None:
+def test_topics_recorded_one_after_the_other_are_merged(file: Path) -> None:
     given_ = motion(3000)
-    file = tmp_path / 'bag.mcap'
     by_topic = sorted(given_, key=lambda each: each[0])
     for options in ({'chunk_size': 20_000}, {'use_chunking': False}):
         file.write_bytes(mcap(by_topic, **options))
@@ -466,17 +448,15 @@ def peak_of(file: Path, *topics: str) -> int:
         tracemalloc.stop()
 
 
-def test_large_messages_of_other_topics_are_not_kept_in_memory(tmp_path: Path) -> None:
+def test_large_messages_of_other_topics_are_not_kept_in_memory(file: Path) -> None:
     given_ = [('/image', RECORDED + 10 * MS * n + 5, bytes(2_000_000)) for n in range(1, 31)]
-    file = tmp_path / 'bag.mcap'
     ordered = sorted([*motion(30), *given_], key=lambda each: each[1])
     for options in ({}, {'use_chunking': False}, {'compression': CompressionType.ZSTD}):
         file.write_bytes(mcap(ordered, **options))
         assert peak_of(file, *TYPES) < 12_000_000
 
 
-def test_long_bags_are_not_kept_in_memory(tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+def test_long_bags_are_not_kept_in_memory(file: Path) -> None:
     peaks = []
     for number in (20_000, 80_000):
         of = [(topic, n, bytes(92)) for topic in ('/a', '/b') for n in range(number)]
@@ -486,24 +466,22 @@ def test_long_bags_are_not_kept_in_memory(tmp_path: Path) -> None:
     assert peaks[1] < 1.2 * peaks[0] < 8_000_000
 
 
-def test_attachments_are_not_read_into_memory(tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+def test_attachments_are_not_read_into_memory(file: Path) -> None:
     attachment = record(Attachment(create_time=0, log_time=0, name='film', media_type='video/mp4',
                                    data=bytes(40_000_000)))
-    file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(1, '/a'), chunk(message(1, 1), 1),
-                             attachment, chunk(message(1, 2), 2)))
+    file.write_bytes(file_of(
+        ONE, chunk(message(1, 1), 1), attachment, chunk(message(1, 2), 2)))
     assert read(file)[1:] == ([], [])
     assert peak_of(file) < 6_000_000
 
 
 @pytest.mark.parametrize('compression', ['', 'lz4', 'zstd'])
 def test_a_chunk_with_a_wrong_size_is_not_decompressed(
-        compression: str, tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+        compression: str, file: Path) -> None:
     frame = zstandard.ZstdCompressor().compress(bytes(50_000_000))
     for size in (3, 1 << 20, 1 << 40, (1 << 64) - 1):
         file.write_bytes(file_of(
-            schema(1, 'a/msg/A'), channel(1, '/a'), chunk(message(1, 1), 1),
+            ONE, chunk(message(1, 1), 1),
             chunk(b'', 2, size, 1, compression, packed=frame if compression == 'zstd' else
                   b'\x04\x22\x4d\x18' + frame)))
         found = read(file)
@@ -511,10 +489,9 @@ def test_a_chunk_with_a_wrong_size_is_not_decompressed(
         assert peak_of(file) < 10_000_000
 
 
-def test_large_compressed_messages_do_not_fill_the_memory(tmp_path: Path) -> None:
+def test_large_compressed_messages_do_not_fill_the_memory(file: Path) -> None:
     zeros = zstandard.ZstdCompressor().compress(bytes(1 << 24))
     small = zstandard.ZstdCompressor().compress(bytes(LARGEST_MESSAGE))
-    file = tmp_path / 'bag.mcap'
     for frame, size in ((zeros, len(zeros)), (small, LARGEST_MESSAGE)):
         given_ = [(f'{NODE}/{POSE}', RECORDED + n, frame) for n in range(150)]
         file.write_bytes(mcap(given_, compression=CompressionType.ZSTD))
@@ -526,13 +503,12 @@ def test_large_compressed_messages_do_not_fill_the_memory(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize('compression', ['', 'zstd', 'lz4'])
-def test_a_chunk_that_is_too_large_is_missing(compression: str, tmp_path: Path) -> None:
+def test_a_chunk_that_is_too_large_is_missing(compression: str, file: Path) -> None:
     whole = message(1, 2, bytes(LARGEST_CHUNK))
     packed = {'': lambda data: data, 'zstd': zstandard.ZstdCompressor().compress,
               'lz4': lz4.frame.compress}[compression](whole)
-    file = tmp_path / 'bag.mcap'
     file.write_bytes(file_of(
-        schema(1, 'a/msg/A'), channel(1, '/a'), chunk(message(1, 1), 1),
+        ONE, chunk(message(1, 1), 1),
         chunk(whole, 2, compression=compression, packed=packed), chunk(message(1, 3), 3)))
     del whole, packed
     found = read(file)
@@ -548,7 +524,7 @@ def empty_messages(count: int, time: int) -> bytes:
 
 def bomb(*contents: bytes, start: int = 5) -> bytes:
     packer = zstandard.ZstdCompressor()
-    return file_of(schema(1, 'a/msg/A'), channel(1, '/a'), *(
+    return file_of(ONE, *(
         chunk(content, start, compression='zstd', packed=packer.compress(content))
         for content in contents))
 
@@ -557,8 +533,7 @@ def bomb(*contents: bytes, start: int = 5) -> bytes:
     [empty_messages(1_000_000, 5)], [empty_messages(200_000, time) for time in range(5, 10)],
     [empty_messages(300_000, 5)] * 4])
 def test_of_a_file_with_more_messages_than_bytes_the_first_are_read(
-        contents: list[bytes], tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+        contents: list[bytes], file: Path) -> None:
     file.write_bytes(bomb(*contents))
     size = file.stat().st_size
     assert size < 20_000
@@ -574,8 +549,7 @@ def test_of_a_file_with_more_messages_than_bytes_the_first_are_read(
 
 
 def test_chunks_that_overlap_wait_in_limited_memory(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = tmp_path / 'bag.mcap'
+        file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     contents = [message(1, 7, bytes(1 << 20)) + message(1, 8 + n, bytes(1 << 20))
                 for n in range(20)]
     file.write_bytes(bomb(*contents))
@@ -593,19 +567,16 @@ def test_chunks_that_overlap_wait_in_limited_memory(
     assert peak_of(file) < 40_000_000
 
 
-def test_declarations_do_not_fill_the_memory(tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+def test_declarations_do_not_fill_the_memory(file: Path) -> None:
     file.write_bytes(bomb(*(channel(n, '/' + 'a' * (1 << 24)) for n in range(2, 22))))
     assert file.stat().st_size < 100_000
     assert any('topics and types: more than' in said for said in read(file).missing)
     assert peak_of(file) < 250_000_000
 
 
-def test_many_small_chunks_of_equal_times(tmp_path: Path) -> None:
-    file = tmp_path / 'bag.mcap'
+def test_many_small_chunks_of_equal_times(file: Path) -> None:
     for content, count in ((b'', 0), (message(1, 5), 5000)):
-        file.write_bytes(file_of(
-            schema(1, 'a/msg/A'), channel(1, '/a'), chunk(content, 5) * 5000))
+        file.write_bytes(file_of(ONE, chunk(content, 5) * 5000))
         assert read(file) == ([('/a', 5, b'\0\1\0\0')] * count, [], [])
 
 
@@ -688,6 +659,12 @@ def storage(folder: Path) -> Path:
     return found
 
 
+def execute(file: Path, *scripts: str) -> None:
+    """Change a bag of sqlite3."""
+    with closing(sqlite3.connect(file)) as database:
+        database.executescript('; '.join(scripts))
+
+
 def test_sqlite3_is_read_in_the_order_of_time(tmp_path: Path) -> None:
     given_ = motion(2000)
     mixed = random.Random(1).sample(given_, len(given_))
@@ -728,13 +705,11 @@ def test_lost_rows_of_sqlite3_are_reported(tmp_path: Path) -> None:
 def test_rows_that_are_not_messages_are_missing(tmp_path: Path) -> None:
     given_ = motion(2)
     file = storage(write_bag(tmp_path / 'bag', given_))
-    with sqlite3.connect(file) as database:
+    execute(file, *(
+        'INSERT INTO messages (topic_id, timestamp, data) SELECT topic_id, timestamp, data FROM '
+        f'messages LIMIT 1; UPDATE messages SET {wrong} WHERE id = last_insert_rowid()'
         for wrong in ("timestamp = 'soon'", 'timestamp = 1.5', 'data = 1000000000000',
-                      "data = 'text'"):
-            database.execute('INSERT INTO messages (topic_id, timestamp, data) SELECT topic_id, '
-                             'timestamp, data FROM messages LIMIT 1')
-            database.execute(f'UPDATE messages SET {wrong} WHERE id = last_insert_rowid()')
-    database.close()
+                      "data = 'text'")))
     found = read(file)
     assert found.messages == given_
     assert found.missing == [f'{file.name}: 4 rows that are not messages']
@@ -753,9 +728,7 @@ ENDLESS = 'WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) '
     'DROP TABLE messages; CREATE TABLE messages (id, topic_id, timestamp)'])
 def test_tables_that_may_never_end_are_rejected(changes: str, tmp_path: Path) -> None:
     file = storage(write_bag(tmp_path / 'bag', motion(1)))
-    with sqlite3.connect(file) as database:
-        database.executescript(changes)
-    database.close()
+    execute(file, changes)
     with pytest.raises(BagError, match='has no table (messages|topics) with the columns'):
         Recording(file)
 
@@ -763,12 +736,9 @@ def test_tables_that_may_never_end_are_rejected(changes: str, tmp_path: Path) ->
 def test_definitions_that_never_end_are_not_read(tmp_path: Path) -> None:
     given_ = motion(1)
     file = storage(write_bag(tmp_path / 'bag', given_))
-    with sqlite3.connect(file) as database:
-        database.executescript(
-            'DROP TABLE IF EXISTS message_definitions; CREATE VIEW message_definitions AS '
+    execute(file, 'DROP TABLE IF EXISTS message_definitions; CREATE VIEW message_definitions AS '
             f"{ENDLESS} SELECT x AS id, '' AS topic_type, '' AS encoding, '' AS "
             "encoded_message_definition, '' AS type_description_hash FROM n")
-    database.close()
     assert read(file)[:2] == (given_, [])
 
 
@@ -782,9 +752,7 @@ def test_definitions_that_never_end_are_not_read(tmp_path: Path) -> None:
 def test_odd_rows_are_missing(changes: str, missing: str, tmp_path: Path) -> None:
     given_ = motion(2)
     file = storage(write_bag(tmp_path / 'bag', given_))
-    with sqlite3.connect(file) as database:
-        database.execute(changes)
-    database.close()
+    execute(file, changes)
     found = read(file)
     assert found.messages == [each for each in given_ if not each[0].endswith(POSE)]
     assert len(found.missing) == 1
@@ -988,12 +956,11 @@ def test_bags_compressed_message_by_message(plugin: StoragePlugin, tmp_path: Pat
         assert read(path)[:2] == (given_, [])
 
 
-def test_a_damaged_compressed_message_stays_as_it_is(tmp_path: Path) -> None:
+def test_a_damaged_compressed_message_stays_as_it_is(file: Path) -> None:
     frame = zstandard.ZstdCompressor().compress(bytes(100))
     large = zstandard.ZstdCompressor().compress(bytes(1 << 25))
     of = [('/a', n, data) for n, data in enumerate(
         (frame, frame[:-3], b'', b'\x28', frame[:4], large, b'\0\1\0\0'))]
-    file = tmp_path / 'bag.mcap'
     file.write_bytes(mcap(of))
     assert read(file).messages == [('/a', 0, bytes(100)), *of[1:]]
 

@@ -17,9 +17,8 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable
 import csv
-from dataclasses import replace
 import io
 import json
 import math
@@ -39,15 +38,13 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from mcap_ros2.decoder import DecoderFactory
 import messages
-from messages import STORE, UPRIGHT
+from messages import motion, MS, RECORDED, Recorded, SECOND, STORE, UPRIGHT
 import numpy as np
 import pyarrow.parquet
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
 import stewart_dynamics
@@ -67,17 +64,17 @@ from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.setpoints.inputs import ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
+from test_recording import write_ros_1
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
 PLATFORM = StewartPlatform(PARAMETERS)
 BAGS = ('clear', 'singular', 'flawed')
 TOPICS = (POSE, TWIST, ACCEL)
-MS = 1_000_000
-SECOND = 1000 * MS
-RECORDED = 1_700_000_000 * SECOND
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+KINDS = {topic.rpartition('/')[2]: kind for topic, kind in INPUT_TYPES.items()}
 
-Recorded = tuple[str, int, bytes]
+Rejected = Callable[..., str]
 
 
 class Outputs(NamedTuple):
@@ -90,17 +87,15 @@ class Outputs(NamedTuple):
     folder: Path
 
 
-def run(bag: Path, folder: Path, *options: str, report: bool = False) -> int:
-    """Run the program in this process."""
-    return main([str(bag), '--params', str(PARAMS), '--output', str(folder),
-                 *([] if report else ['--no-report']), *options])
+def arguments(bag: Path, folder: Path, *options: str, params: Path = PARAMS) -> list[str]:
+    return [str(bag), *options, '--params', str(params), '--output', str(folder)]
 
 
-def run_apart(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run the program in a process of its own."""
-    return subprocess.run(
-        [sys.executable, '-m', 'stewart_dynamics.replay', *map(str, arguments)],
-        capture_output=True, text=True, timeout=300, check=False, **options)
+def run(bag: Path, folder: Path, *options: str, params: Path = PARAMS,
+        report: bool = False) -> int:
+    """Run the program in this process; options may begin with more bags."""
+    plain = () if report else ('--no-report',)
+    return main(arguments(bag, folder, *options, *plain, params=params))
 
 
 def decoded(bag: Path) -> list[tuple[str, int, Any]]:
@@ -110,12 +105,25 @@ def decoded(bag: Path) -> list[tuple[str, int, Any]]:
             file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()]
 
 
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    with (folder / 'legs.csv').open(newline='', encoding='utf-8') as file:
+        return list(csv.DictReader(file))
+
+
+def forces_of(rows: Iterable[dict[str, str]]) -> list[list[float]]:
+    return [[float(row[f'{leg}_force_n']) for leg in PARAMETERS['joints']] for row in rows]
+
+
+def summary_of(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
+    return found
+
+
 def outputs_of(folder: Path) -> Outputs:
     found: dict[str, list[tuple[int, Any]]] = defaultdict(list)
     for topic, when, message in decoded(folder / 'bag' / 'bag.mcap'):
         found[topic].append((when, message))
-    with (folder / 'legs.csv').open(newline='', encoding='utf-8') as file:
-        return Outputs(found, list(csv.DictReader(file)), folder)
+    return Outputs(found, rows_of(folder), folder)
 
 
 def recorded(bag: Path) -> list[Recorded]:
@@ -131,28 +139,30 @@ def nanoseconds(message: Any) -> int:
 
 def write_bag(folder: Path, of: Iterable[Recorded], node: str = NODE,
               plugin: StoragePlugin = StoragePlugin.MCAP, **types: str) -> Path:
-    """Write a rosbag2; topics are made as they come, ``types`` overrides their types."""
+    """Write a rosbag2; topics are made as they come, of types by the ends of their names."""
     with Writer(folder, version=9, storage_plugin=plugin) as writer:
         connections: dict[str, Any] = {}
         for topic, when, data in of:
             if topic not in connections:
                 connections[topic] = writer.add_connection(
                     topic if topic.startswith('/') else f'{node}/{topic}',
-                    types.get(topic.rpartition('/')[2]) or INPUT_TYPES[topic], typestore=STORE)
+                    (KINDS | types)[topic.rpartition('/')[2]], typestore=STORE)
             writer.write(connections[topic], when, data)
     return folder
 
 
-def motion(number: int) -> list[Recorded]:
-    """Return setpoints 10 ms apart: a slow heave."""
-    found: list[Recorded] = []
-    for n in range(1, number + 1):
-        t, stamp, when = 0.01 * n, n * 10 * MS, RECORDED + n * 10 * MS
-        found += [
-            (POSE, when, messages.pose(stamp, (0.0, 0.0, 1.1 + 0.05 * math.sin(t)))),
-            (TWIST, when + 1, messages.twist(stamp, (0.0, 0.0, 0.05 * math.cos(t), 0, 0, 0))),
-            (ACCEL, when + 2, messages.accel(stamp, (0.0, 0.0, -0.05 * math.sin(t), 0, 0, 0)))]
-    return found
+def heave(number: int) -> Motion:
+    """Return the same as the library's motion."""
+    t = [0.01 * n for n in range(1, number + 1)]
+    return Motion([(0.0, 0.0, 1.1 + 0.05 * math.sin(each)) for each in t], np.eye(3),
+                  [(0.0, 0.0, 0.05 * math.cos(each)) for each in t], None,
+                  [(0.0, 0.0, -0.05 * math.sin(each)) for each in t])
+
+
+def at_home(stamp: int, when: int) -> list[Recorded]:
+    """Return one setpoint at rest."""
+    return [(topic, when, write(stamp)) for topic, write in (
+        (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))]
 
 
 @pytest.fixture(scope='module')
@@ -292,20 +302,14 @@ def test_the_table_has_the_same_numbers_exactly(
 
 @pytest.mark.parametrize('name', ['clear', 'singular'])
 def test_the_table_has_what_no_topic_has(name: str, replayed: dict[str, Outputs]) -> None:
-    result = PLATFORM.inverse_dynamics(library_motion(name))
-    for n, row in enumerate(replayed[name].rows):
+    rows, motion = replayed[name].rows, library_motion(name)
+    result = PLATFORM.inverse_dynamics(motion)
+    first = int(rows[0]['stamp_ns'])
+    for n, row in enumerate(rows):
         assert [float(row[f'{leg}_demanded_force_n'])
                 for leg in PARAMETERS['joints']] == result.forces[n].tolist()
         assert float(row['determinant_rate_m3_s']) == result.determinant_rate[n]
         assert float(row['condition']) == result.condition_number[n]
-
-
-@pytest.mark.parametrize('name', ['clear', 'singular'])
-def test_the_table_has_time_and_pose(name: str, replayed: dict[str, Outputs]) -> None:
-    rows = replayed[name].rows
-    motion = library_motion(name)
-    first = int(rows[0]['stamp_ns'])
-    for n, row in enumerate(rows):
         assert float(row['time_s']) == pytest.approx((int(row['stamp_ns']) - first) * 1e-9)
         assert [float(row[f'position_{axis}_m']) for axis in 'xyz'] == motion.position[n].tolist()
         quaternion = np.array([float(row[f'orientation_{part}']) for part in 'xyzw'])
@@ -365,7 +369,7 @@ def test_the_flaws_are_counted_as_they_are_in_the_bag(tmp_path: Path) -> None:
     result = replay(ROOT / 'bags' / 'flawed', PARAMETERS, tmp_path / 'flawed')
     answered, expected = expected_of('flawed')
     assert rejections(result) == expected
-    assert [int(row['stamp_ns']) for row in outputs_of(tmp_path / 'flawed').rows] == answered
+    assert [int(row['stamp_ns']) for row in rows_of(tmp_path / 'flawed')] == answered
     # every message of the bag is in a setpoint or in a count
     held = Counter(topic for topic, _, _ in recorded(bag_file('flawed')))
     for topic in TOPICS:
@@ -404,14 +408,9 @@ def test_a_wrench_in_the_bag_is_used(tmp_path: Path) -> None:
     at = 3 * 10
     of.insert(at, (WRENCH, of[at][1] - 1, messages.wrench(0, load)))
     assert run(write_bag(tmp_path / 'loaded', of), tmp_path / 'out') == DONE
-    rows = outputs_of(tmp_path / 'out' / 'loaded').rows
-    heave = Motion(
-        [(0.0, 0.0, 1.1 + 0.05 * math.sin(0.01 * n)) for n in range(1, 21)], np.eye(3),
-        [(0.0, 0.0, 0.05 * math.cos(0.01 * n)) for n in range(1, 21)], None,
-        [(0.0, 0.0, -0.05 * math.sin(0.01 * n)) for n in range(1, 21)])
-    free = PLATFORM.inverse_dynamics(heave).forces
-    loaded = PLATFORM.inverse_dynamics(heave, load).forces
-    forces = [[float(row[f'{leg}_force_n']) for leg in PARAMETERS['joints']] for row in rows]
+    forces = forces_of(rows_of(tmp_path / 'out' / 'loaded'))
+    free = PLATFORM.inverse_dynamics(heave(20)).forces
+    loaded = PLATFORM.inverse_dynamics(heave(20), load).forces
     assert np.array_equal(forces[:10], free[:10])
     assert np.array_equal(forces[10:], loaded[10:])
     assert np.min(np.max(np.abs(free - loaded), axis=1)) > 10.0
@@ -433,29 +432,24 @@ def test_a_combined_bag_gives_the_numbers_of_the_separate_one(tmp_path: Path) ->
         for n in range(1, 31)])
     params = parameter_file(tmp_path, 'setpoint: {source: combined}')
     assert run(separate, tmp_path / 'out') == DONE
-    assert main([str(combined), '--params', str(params), '--output', str(tmp_path / 'out')
-                 ]) == DONE
-    out = tmp_path / 'out'
-    assert outputs_of(out / 'combined').rows == outputs_of(out / 'separate').rows
+    assert run(combined, tmp_path / 'out', params=params) == DONE
+    assert rows_of(tmp_path / 'out' / 'combined') == rows_of(tmp_path / 'out' / 'separate')
 
 
 def test_a_bag_of_poses_is_quasi_static(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = write_bag(tmp_path / 'poses', motion(30)[::3])
     params = parameter_file(tmp_path, 'setpoint: {source: pose}')
-    assert main([str(bag), '--params', str(params), '--output', str(tmp_path / 'out')]) == DONE
-    still = PLATFORM.inverse_dynamics(Motion(
-        [(0.0, 0.0, 1.1 + 0.05 * math.sin(0.01 * n)) for n in range(1, 31)], np.eye(3)))
-    rows = outputs_of(tmp_path / 'out' / 'poses').rows
-    assert [[float(row[f'{leg}_force_n']) for leg in PARAMETERS['joints']]
-            for row in rows] == still.forces.tolist()
+    assert run(bag, tmp_path / 'out', params=params, report=True) == DONE
+    still = PLATFORM.inverse_dynamics(Motion(heave(30).position, np.eye(3)))
+    rows = rows_of(tmp_path / 'out' / 'poses')
+    assert forces_of(rows) == still.forces.tolist()
     # values that depend on velocities are not known, and not zero
     assert {row[f'{leg}_rate_m_s'] for row in rows for leg in PARAMETERS['joints']} == {''}
     assert {row['determinant_rate_m3_s'] for row in rows} == {''}
     capsys.readouterr()
     for options, code in (((), LIMIT_MET), (('--differentiate', '--cutoff', '5'), DONE)):
-        assert main([str(bag), '--params', str(params), '--output', str(tmp_path / f'{code}'),
-                     '--strict', '--no-report', *options]) == code
+        assert run(bag, tmp_path / f'{code}', '--strict', *options, params=params) == code
         text = capsys.readouterr().out
         assert ('limits.velocity_max could not be checked' in text) is (code == LIMIT_MET)
         assert ('all limits held' in text) is (code == DONE)
@@ -470,15 +464,6 @@ def test_control_characters_in_names_are_escaped(
     text = capsys.readouterr().out
     assert '/a\\x1b[2J\\rb' in text
     assert not set(text) & {'\x1b', '\r'}
-
-
-@pytest.mark.parametrize('name', ['', '/', 'a b', '1st', 'a//b'])
-def test_an_invalid_node_name_is_rejected(
-        name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main([str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS), '--node', name])
-    assert caught.value.code == BAD_INPUT
-    assert 'not a valid node name' in capsys.readouterr().err
 
 
 def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
@@ -498,23 +483,19 @@ def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
 
 
 def test_setpoints_without_stamps_are_stamped_as_they_were_recorded(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'bag', [
-        (topic, RECORDED + n * 10 * MS, write(0)) for n in range(5) for topic, write in (
-            (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))])
+    times = [RECORDED + n * 10 * MS for n in range(5)]
+    bag = write_bag(tmp_path / 'bag', [each for when in times for each in at_home(0, when)])
     assert run(bag, tmp_path / 'out') == DONE
-    assert [int(row['stamp_ns']) for row in outputs_of(tmp_path / 'out' / 'bag').rows] == [
-        RECORDED + n * 10 * MS for n in range(5)]
+    assert [int(row['stamp_ns']) for row in rows_of(tmp_path / 'out' / 'bag')] == times
 
 
 def test_a_time_out_of_range_of_a_stamp_is_counted(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     late = 2 ** 31 * SECOND
-    bag = write_bag(tmp_path / 'bag', [
-        (topic, late + n, write(0)) for n in (-1, 0) for topic, write in (
-            (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))])
+    bag = write_bag(tmp_path / 'bag', [*at_home(0, late - 1), *at_home(0, late)])
     assert run(bag, tmp_path / 'out') == DONE
     assert 'setpoint: 1 rejected: out of range' in capsys.readouterr().out
-    assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 1
+    assert len(rows_of(tmp_path / 'out' / 'bag')) == 1
 
 
 def test_a_bag_that_loops_is_followed_with_a_notice(
@@ -526,7 +507,7 @@ def test_a_bag_that_loops_is_followed_with_a_notice(
     assert printed.count('followed as a restart') == 1
     assert 'rejected' not in printed
     assert '100 setpoints in 0.98 s, 1 restart' in printed
-    assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 100
+    assert len(rows_of(tmp_path / 'out' / 'bag')) == 100
 
 
 def test_another_name_of_the_node(tmp_path: Path) -> None:
@@ -571,7 +552,7 @@ def test_a_bag_without_answers_is_reported(
     assert 'no setpoint could be answered' in printed
     for topic in TOPICS:
         assert f'{topic}: 3 rejected: {MALFORMED}' in printed
-    assert not outputs_of(tmp_path / 'out' / 'bag').rows
+    assert not rows_of(tmp_path / 'out' / 'bag')
 
 
 @pytest.mark.parametrize(('name', 'options', 'code'), [
@@ -591,150 +572,121 @@ def test_strict_exits_with_1_at_limits_and_warnings(
 def test_strict_exits_with_1_at_a_limit_without_a_warning(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(3))
     params = tmp_path / 'platform.yaml'
-    params.write_text(PARAMS.read_text(encoding='utf-8').replace(
-        'force_max: 6000.0', 'force_max: 100.0'), encoding='utf-8')
-    assert main([str(bag), '--params', str(params), '--output', str(tmp_path / 'out'),
-                 '--strict']) == LIMIT_MET
-    for row in outputs_of(tmp_path / 'out' / 'bag').rows:
-        assert {abs(float(row[f'{leg}_force_n'])) for leg in PARAMETERS['joints']} == {100.0}
+    PARAMETERS.replaced({'limits.force_max': 100.0}).to_yaml(params)
+    assert run(bag, tmp_path / 'out', '--strict', params=params) == LIMIT_MET
+    assert np.all(np.abs(forces_of(rows_of(tmp_path / 'out' / 'bag'))) == 100.0)
 
 
-def rejected(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """Return the one line printed for bad arguments; the code is 2, stdout empty."""
-    assert main([str(argument) for argument in arguments]) == BAD_INPUT
-    printed = capsys.readouterr()
-    assert not printed.out
-    assert printed.err.count('\n') == 1
-    assert printed.err.startswith('stewart_replay: ')
-    return printed.err
+@pytest.fixture
+def rejected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Rejected:
+    """Return a function that gives the one line printed for a bag; the code is 2, no results."""
+    def given(bag: Path, *options: object, params: Path = PARAMS,
+              output: Path = tmp_path / 'rejected') -> str:
+        def found() -> list[Any]:
+            return [output.exists(), *((path, path.stat()) for path in output.rglob('*'))]
+
+        before = found()
+        capsys.readouterr()
+        assert main(arguments(bag, output, *map(str, options), params=params)) == BAD_INPUT
+        printed = capsys.readouterr()
+        assert not printed.out
+        assert printed.err.count('\n') == 1
+        assert printed.err.startswith('stewart_replay: ')
+        assert found() == before
+        return printed.err
+
+    return given
 
 
 def test_bad_bags_and_parameters_are_rejected_before_anything_is_written(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, rejected: Rejected) -> None:
     """One of each kind; the modules that read bags and parameters test all of them."""
-    clear, file, out = ROOT / 'bags' / 'clear', tmp_path / 'file.mcap', tmp_path / 'out'
-    bad, none, empty = tmp_path / 'bad.yaml', tmp_path / 'none', tmp_path / 'empty'
+    clear, file, empty = ROOT / 'bags' / 'clear', tmp_path / 'file.mcap', tmp_path / 'empty'
+    bad, none = tmp_path / 'bad.yaml', tmp_path / 'none'
     empty.mkdir()
     file.write_bytes(b'no bag')
     bad.write_text(PARAMS.read_text(encoding='utf-8').replace('mass: 150.0', 'mass: -1.0'))
     for bag, params, text in (
             (none, PARAMS, f'{none}'), (file, PARAMS, f'{file}'), (empty, PARAMS, f'{empty}'),
+            (write_bag(tmp_path / 'bag', []), PARAMS, 'contains no topics'),
             (clear, bad, f'{bad}: platform.mass: -1.0 kg: must be more than 0'),
             (clear, none, f'{none}: cannot be read')):
-        assert text in rejected(capsys, bag, '--params', params, '--output', out)
-    assert not out.exists()
+        assert text in rejected(bag, params=params)
 
 
-def test_a_missing_topic_lists_the_topics_of_the_bag(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(('options', 'text'), [
+    (['--params', 'y.yaml'], 'usage: stewart_replay'), (['--cutoff', '5'], '--cutoff'),
+    (['--differentiate', '--cutoff', '1e300'], '--cutoff'),
+    *((['--node', name], 'not a valid node name') for name in ('', '/', 'a b', '1st', 'a//b'))])
+def test_bad_arguments(
+        options: list[str], text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run(ROOT / 'bags' / 'clear', tmp_path, *options)
+    assert caught.value.code == BAD_INPUT
+    assert text in capsys.readouterr().err
+
+
+def test_a_missing_topic_lists_the_topics_of_the_bag(tmp_path: Path, rejected: Rejected) -> None:
     bag = write_bag(tmp_path / 'bag', motion(3)[:2])
-    text = rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    text = rejected(bag)
     assert f'has no topic {NODE}/{ACCEL}' in text
     assert f'{NODE}/{POSE} (geometry_msgs/msg/PoseStamped)' in text
     assert f'{NODE}/{TWIST} (geometry_msgs/msg/TwistStamped)' in text
-    text = rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out', '--node', 'x')
-    assert f'has no topic /x/{ACCEL}' in text
-    assert not (tmp_path / 'out').exists()
-
-
-def test_an_empty_bag_contains_no_topics(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = rejected(capsys, write_bag(tmp_path / 'bag', []), '--params', PARAMS)
-    assert 'contains no topics' in text
+    assert f'has no topic /x/{ACCEL}' in rejected(bag, '--node', 'x')
 
 
 @pytest.mark.parametrize('topic', [*TOPICS, WRENCH])
-def test_a_topic_of_another_type(
-        topic: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_topic_of_another_type(topic: str, tmp_path: Path, rejected: Rejected) -> None:
     of = [*motion(1), (WRENCH, RECORDED + SECOND, messages.wrench(0))]
     bag = write_bag(tmp_path / 'bag', of, **{
         topic.rpartition('/')[2]: 'geometry_msgs/msg/PointStamped'})
-    text = rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
     assert (f'{NODE}/{topic}: is a geometry_msgs/msg/PointStamped, must be a '
-            f'{INPUT_TYPES[topic]}') in text
-    assert not (tmp_path / 'out').exists()
+            f'{INPUT_TYPES[topic]}') in rejected(bag)
 
 
-def test_an_existing_output_folder_is_not_changed(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    kept = tmp_path / 'out' / 'clear' / 'legs.csv'
-    kept.parent.mkdir(parents=True)
-    kept.write_text('kept')
-    text = rejected(capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output',
-                    tmp_path / 'out')
-    assert f'{kept.parent}: exists already' in text
-    assert kept.read_text() == 'kept'
-    assert [path.name for path in (tmp_path / 'out').iterdir()] == ['clear']
-
-
-def test_a_bag_of_ros_1_gives_the_same(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bag_of_ros_1_gives_the_same(tmp_path: Path, rejected: Rejected) -> None:
     of = motion(30)
     assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
-    store = get_typestore(Stores.ROS1_NOETIC)
-    with Writer1(tmp_path / 'old.bag') as writer:
-        connections = {topic: writer.add_connection(
-            f'{NODE}/{topic}', INPUT_TYPES[topic], typestore=store) for topic in TOPICS}
-        for n, (topic, when, data) in enumerate(of):
-            read = STORE.deserialize_cdr(data, INPUT_TYPES[topic])
-            header = store.types['std_msgs/msg/Header'](n, read.header.stamp, 'base')
-            writer.write(connections[topic], when, store.serialize_ros1(
-                replace(read, header=header), INPUT_TYPES[topic]))
+    write_ros_1(tmp_path / 'old.bag', [
+        (f'{NODE}/{topic}', when, data) for topic, when, data in of], None)
     assert run(tmp_path / 'old.bag', tmp_path / 'out') == DONE
-    old, new = outputs_of(tmp_path / 'out' / 'old'), outputs_of(tmp_path / 'out' / 'bag')
-    assert len(new.rows) == 30
-    assert old.rows == new.rows
-    capsys.readouterr()
-    assert 'has no topic /none' in rejected(
-        capsys, tmp_path / 'old.bag', '--params', PARAMS, '--output', tmp_path / 'again',
-        '--pose', '/none')
-
-
-@pytest.mark.parametrize('arguments', [
-    [], ['bag', '--params', 'x.yaml', '--params', 'y.yaml']])
-def test_bad_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(arguments)
-    assert caught.value.code == BAD_INPUT
-    assert 'usage: stewart_replay' in capsys.readouterr().err
+    old, new = rows_of(tmp_path / 'out' / 'old'), rows_of(tmp_path / 'out' / 'bag')
+    assert len(new) == 30
+    assert old == new
+    assert 'has no topic /none' in rejected(tmp_path / 'old.bag', '--pose', '/none')
 
 
 def test_where_results_cannot_be_written_the_folder_is_named(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, rejected: Rejected) -> None:
     bag, file = write_bag(tmp_path / 'bag', motion(3)), tmp_path / 'file'
     file.touch()
-    text = rejected(capsys, bag, '--params', PARAMS, '--output', file / 'out')
-    assert text == f'stewart_replay: {file / "out"}: cannot be written: Not a directory\n'
-    assert f'{file}' in rejected(capsys, bag, '--params', PARAMS, '--output', file)
+    assert rejected(bag, output=file / 'out') == (
+        f'stewart_replay: {file / "out"}: cannot be written: Not a directory\n')
+    assert f'{file}' in rejected(bag, output=file)
 
 
 # Several bags
 
 def test_bags_of_one_name_are_rejected_before_anything_is_written(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for folder in ('a', 'b'):
-        write_bag(tmp_path / folder / 'x', motion(3))
-    a, b, out = tmp_path / 'a' / 'x', tmp_path / 'b' / 'x', tmp_path / 'out'
+        tmp_path: Path, rejected: Rejected) -> None:
+    a, b = (write_bag(tmp_path / folder / 'x', motion(3)) for folder in ('a', 'b'))
     for second in (b, a, tmp_path / 'a' / '..' / 'a' / 'x', a / 'x.mcap'):
-        text = rejected(capsys, a, second, '--params', PARAMS, '--output', out)
-        assert f'{a}, {second}: the results of both would be {out / "x"}' in text
-        assert not out.exists()
+        assert (f'{a}, {second}: the results of both would be {tmp_path / "out" / "x"}'
+                in rejected(a, second, output=tmp_path / 'out'))
 
 
 def test_a_point_in_a_name_is_no_suffix(tmp_path: Path) -> None:
     bags = [write_bag(tmp_path / name, motion(3)) for name in (
         'run_2024-05-01-12.00.01', 'run_2024-05-01-12.00.02')]
-    assert main([*map(str, bags), '--params', str(PARAMS), '--output', str(tmp_path / 'out')
-                 ]) == DONE
+    assert run(bags[0], tmp_path / 'out', str(bags[1])) == DONE
     assert sorted(path.name for path in (tmp_path / 'out').iterdir()) == [
         'fleet.csv', 'index.html', *(bag.name for bag in bags)]
 
 
 def test_a_bad_bag_is_reported_and_the_others_are_replayed(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    good = [write_bag(tmp_path / name, motion(3)) for name in ('one', 'two')]
-    assert main([str(good[0]), str(tmp_path / 'none'), str(good[1]), '--params', str(PARAMS),
-                 '--output', str(tmp_path / 'out')]) == BAD_INPUT
+    one, two = (write_bag(tmp_path / name, motion(3)) for name in ('one', 'two'))
+    assert run(one, tmp_path / 'out', str(tmp_path / 'none'), str(two)) == BAD_INPUT
     printed = capsys.readouterr()
     assert printed.out.count('3 setpoints') == 2
     assert str(tmp_path / 'none') in printed.err
@@ -781,24 +733,14 @@ def test_the_rest_of_a_damaged_bag_is_replayed(
     printed = capsys.readouterr()
     assert f'{bag}: part of it could not be read: damaged.mcap: the chunk at byte ' in printed.err
     assert 'its checksum is wrong' in printed.err
-    rows = outputs_of(tmp_path / 'out' / 'damaged').rows
+    rows = rows_of(tmp_path / 'out' / 'damaged')
     assert 80 < len(rows) < 95
-    whole = write_bag(tmp_path / 'whole', motion(100))
-    assert run(whole, tmp_path / 'out') == DONE
-    expected = outputs_of(tmp_path / 'out' / 'whole').rows
+    assert run(write_bag(tmp_path / 'whole', motion(100)), tmp_path / 'out') == DONE
+    expected = rows_of(tmp_path / 'out' / 'whole')
     lost = [n for n, row in enumerate(expected) if row not in rows]
     # only the messages in the chunk
     assert lost == list(range(lost[0], lost[-1] + 1))
     assert [row for row in expected if row in rows] == rows
-
-
-def test_the_most_severe_exit_code_of_several_bags(tmp_path: Path) -> None:
-    bags = [str(bag) for bag in (ROOT / 'bags' / 'singular', damaged_bag(
-        tmp_path / 'damaged.mcap'), ROOT / 'bags' / 'clear')]
-    assert main([*bags, '--params', str(PARAMS), '--output', str(tmp_path / 'out'), '--strict'
-                 ]) == PARTLY_READ
-    assert main([*bags, str(tmp_path / 'none'), '--params', str(PARAMS), '--output',
-                 str(tmp_path / 'again'), '--strict']) == BAD_INPUT
 
 
 @pytest.mark.parametrize('plugin', list(StoragePlugin))
@@ -821,8 +763,10 @@ def test_a_damaged_bag_never_crashes_the_replay(
 
 @pytest.mark.slow
 def test_it_runs_as_a_program(tmp_path: Path, replayed: dict[str, Outputs]) -> None:
-    done = run_apart(*(ROOT / 'bags' / name for name in BAGS), '--params', PARAMS, '--output',
-                     tmp_path / 'out', '--strict', '--no-report')
+    done = subprocess.run(
+        [sys.executable, '-m', 'stewart_dynamics.replay', *(ROOT / 'bags' / name for name in BAGS),
+         '--params', PARAMS, '--output', tmp_path / 'out', '--strict', '--no-report'],
+        capture_output=True, text=True, timeout=300, check=False)
     assert (done.returncode, done.stderr) == (LIMIT_MET, '')
     assert done.stdout.count('setpoints in') == 3
     for name in BAGS:
@@ -855,9 +799,9 @@ def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def begun(bag: Path, out: Path) -> subprocess.Popen[str]:
     """Return a replay that is in the middle of its work."""
     process = subprocess.Popen(
-        [sys.executable, '-m', 'stewart_dynamics.replay', str(bag), '--params', str(PARAMS),
-         '--output', str(out), '--no-report'], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True, env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
+        [sys.executable, '-m', 'stewart_dynamics.replay', *arguments(bag, out, '--no-report')],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
     end = time.monotonic() + 300.0
     while not any(path.stat().st_size for path in out.glob('.*/legs.csv')):
         assert time.monotonic() < end
@@ -908,11 +852,10 @@ def test_unexpected_errors_are_one_line_and_leave_nothing(
 
     monkeypatch.setattr(Summary, 'values', fail)
     out = tmp_path / 'out'
-    for given in ([ROOT / 'bags' / 'clear'], [ROOT / 'bags' / 'clear', ROOT / 'bags' / 'flawed']):
-        assert main([*map(str, given), '--params', str(PARAMS), '--output', str(out),
-                     '--no-report']) == BAD_INPUT
+    for others in ([], [str(ROOT / 'bags' / 'flawed')]):
+        assert run(ROOT / 'bags' / 'clear', out, *others) == BAD_INPUT
         lines = capsys.readouterr().err.splitlines()
-        assert len(lines) == len(given)
+        assert len(lines) == 1 + len(others)
         for line in lines:
             assert re.fullmatch(f'stewart_replay: (.*: )?{text}', line)
         assert {path.name for path in out.iterdir()} <= {'fleet.csv', 'index.html'}
@@ -931,7 +874,7 @@ def test_the_library_raises_what_the_program_prints(tmp_path: Path) -> None:
     assert result.summary['complete']
     assert not result.summary['limit_met']
     assert not rejections(result)
-    assert json.loads((tmp_path / 'out' / 'summary.json').read_text()) == result.summary
+    assert summary_of(tmp_path / 'out') == result.summary
 
 
 def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
@@ -941,9 +884,8 @@ def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
         'legs.cylinder.radius': 0.05, 'legs.cylinder.length': 0.8, 'legs.piston.radius': 0.03}))
     file = tmp_path / 'hexapod.yaml'
     platform.parameters.to_yaml(file)
-    code = main([str(ROOT / 'bags' / 'clear'), '--params', str(file), '--strict',
-                 '--output', str(tmp_path / 'out')])
-    assert code == LIMIT_MET
+    assert run(ROOT / 'bags' / 'clear', tmp_path / 'out', '--strict', params=file,
+               report=True) == LIMIT_MET
     folder = tmp_path / 'out' / 'clear'
     rows = rows_of(folder)
     poses = Pose.from_quaternion(*(np.array(
@@ -951,7 +893,7 @@ def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
         for name, axes, unit in (('position', 'xyz', '_m'), ('orientation', 'xyzw', ''))))
     angles, _ = platform.joint_angles(poses)
     clearances = LegClearance(platform.parameters)(motion_rows(poses))
-    summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
+    summary = summary_of(folder)
     text = capsys.readouterr().out
     for leg, name in enumerate(PARAMETERS['joints']):
         of_leg = [float(row[f'{name}_base_joint_angle_rad']) for row in rows]
@@ -959,14 +901,12 @@ def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
         assert {row[f'{name}_platform_joint_angle_rad'] for row in rows} == {''}
         found = summary['legs'][name]
         assert found['base_joint_angle_max_rad'] == max(of_leg)
-        assert found['base_joint_angle_margin_rad'] == 0.5 - max(of_leg)
         assert found['platform_joint_angle_max_rad'] is None
         assert (name in [each['leg'] for each in summary['limits']
                          if 'joint' in each['limit']]) is (max(of_leg) > 0.5)
         clearance = [float(row[f'{name}_clearance_m']) for row in rows]
         np.testing.assert_allclose(clearance, clearances[:, leg], rtol=0.0, atol=1e-14)
         assert found['clearance_min_m'] == min(clearance)
-        assert found['clearance_margin_m'] == min(clearance) - 0.1
     assert 'limits.base_joint_angle_max, 0.5 rad, exceeded by leg_4' in text
     assert 'clearance between legs: ' in text
     assert 'base joints: 0.5846 rad (33.5 deg) at most, leg_4 at t = 10.00 s; margin' in text
@@ -979,93 +919,65 @@ def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
 
 # Topics under other names
 
-def named(of: Iterable[Recorded], **names: str) -> list[Recorded]:
-    """Return messages under other topics: of the pose, twist, accel or wrench."""
-    return [(names.get(topic.rpartition('/')[2], f'{NODE}/{topic}'), when, data)
-            for topic, when, data in of]
-
-
-def write_named(folder: Path, of: Iterable[Recorded], **names: str) -> Path:
-    kinds = {name.rpartition('/')[2]: INPUT_TYPES[
-        f'setpoint/{key}' if key != 'wrench' else WRENCH] for key, name in names.items()}
-    kinds |= {topic.rpartition('/')[2]: kind for topic, kind in INPUT_TYPES.items()
-              if topic.rpartition('/')[2] not in kinds}
-    return write_bag(folder, named(of, **names), **kinds)
-
-
-def rows_of(folder: Path) -> list[dict[str, str]]:
-    with (folder / 'legs.csv').open(newline='', encoding='utf-8') as file:
-        return list(csv.DictReader(file))
-
-
 def test_remapped_topics_are_found_by_their_type(tmp_path: Path) -> None:
-    bag = write_named(tmp_path / 'bag', motion(20), pose='/cmd/where', twist='/cmd/speed',
-                      accel='/cmd/push')
+    names = {POSE: '/cmd/where', TWIST: '/cmd/speed', ACCEL: '/cmd/push'}
+    of = [(names[topic], when, data) for topic, when, data in motion(20)]
+    bag = write_bag(tmp_path / 'bag', of, **{
+        name.rpartition('/')[2]: INPUT_TYPES[topic] for topic, name in names.items()})
     assert run(bag, tmp_path / 'out') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
-    inputs = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['inputs']
-    assert inputs['topics'] == {POSE: '/cmd/where', TWIST: '/cmd/speed', ACCEL: '/cmd/push'}
+    assert summary_of(tmp_path / 'out' / 'bag')['inputs']['topics'] == names
 
 
 def test_a_namespace_is_found_by_the_end_of_the_name(tmp_path: Path) -> None:
-    of = named(motion(20), **{key: f'/cell/{NODE}/setpoint/{key}'
-                              for key in ('pose', 'twist', 'accel')})
-    bag = write_bag(tmp_path / 'bag', [*of, ('/elsewhere', RECORDED, messages.pose(0))],
-                    elsewhere=INPUT_TYPES[POSE], pose=INPUT_TYPES[POSE],
-                    twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
+    of = [(f'/cell/{NODE}/{topic}', when, data) for topic, when, data in motion(20)]
+    bag = write_bag(tmp_path / 'bag', [*of, ('/else/pose', RECORDED, messages.pose(0))])
     assert run(bag, tmp_path / 'out') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
 
 
 def test_ambiguous_topics_are_listed_and_can_be_selected(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    of = named(motion(20), pose='/a/where') + [
-        ('/b/where2', RECORDED, messages.pose(0, (0.0, 0.0, 1.2)))]
-    bag = write_bag(tmp_path / 'bag', of, where=INPUT_TYPES[POSE], where2=INPUT_TYPES[POSE],
-                    twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
-    text = rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
-    assert '/a/where, /b/where2: select one by --pose' in text
+        tmp_path: Path, rejected: Rejected) -> None:
+    of = [('/a/where' if topic == POSE else topic, when, data)
+          for topic, when, data in motion(20)]
+    bag = write_bag(
+        tmp_path / 'bag', [*of, ('/b/where', RECORDED, messages.pose(0, (0.0, 0.0, 1.2)))],
+        where=INPUT_TYPES[POSE])
+    assert '/a/where, /b/where: select one by --pose' in rejected(bag)
     assert run(bag, tmp_path / 'out', '--pose', '/a/where') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
-    capsys.readouterr()
     for topic, words in (('/none', 'has no topic /none; it contains /a/where (geometry'),
                          (f'{NODE}/{TWIST}', 'must be a geometry_msgs/msg/PoseStamped')):
-        assert words in rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'x',
-                                 '--pose', topic)
-    assert not (tmp_path / 'x').exists()
+        assert words in rejected(bag, '--pose', topic)
 
 
 def test_a_wrench_is_never_found_by_its_type(tmp_path: Path) -> None:
-    of = named(motion(5), wrench='/cell/load')
-    of.insert(0, ('/cell/load', RECORDED, messages.wrench(0, (0.0, 0.0, -1000.0, 0, 0, 0))))
-    bag = write_bag(tmp_path / 'bag', of, load=INPUT_TYPES[WRENCH], pose=INPUT_TYPES[POSE],
-                    twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
+    load = ('/cell/load', RECORDED, messages.wrench(0, (0.0, 0.0, -1000.0, 0, 0, 0)))
+    bag = write_bag(tmp_path / 'bag', [load, *motion(5)], load=INPUT_TYPES[WRENCH])
     assert run(bag, tmp_path / 'free') == DONE
-    assert run(bag, tmp_path / 'loaded', '--no-report', '--wrench', '/cell/load') == DONE
+    assert run(bag, tmp_path / 'loaded', '--wrench', '/cell/load') == DONE
     free, loaded = (rows_of(tmp_path / name / 'bag')[0]['leg_1_force_n'] for name in (
         'free', 'loaded'))
     assert float(loaded) > float(free) + 100.0
 
 
-def test_combined_by_its_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_combined_by_its_option(tmp_path: Path, rejected: Rejected) -> None:
     bag = write_bag(tmp_path / 'bag', [
         ('/cmd/all', RECORDED + n * MS, messages.combined(n * MS)) for n in range(1, 9)],
         all=INPUT_TYPES[COMBINED])
-    assert '--combined reads' in rejected(
-        capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert '--combined reads' in rejected(bag)
+    assert '--combined: is not read' in rejected(bag, '--differentiate', '--combined', '/all')
     assert run(bag, tmp_path / 'out', '--combined', '/cmd/all') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 8
 
 
 # Other files
 
-def test_summary_and_report_are_written(tmp_path: Path) -> None:
-    assert run(ROOT / 'bags' / 'flawed', tmp_path, report=True) == DONE
-    folder = tmp_path / 'flawed'
+def test_summary_and_report_are_written(replayed: dict[str, Outputs]) -> None:
+    _, rows, folder = replayed['flawed']
     assert sorted(path.name for path in folder.iterdir()) == [
         'bag', 'legs.csv', 'report.html', 'summary.json']
-    summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
-    rows = rows_of(folder)
+    summary = summary_of(folder)
     assert summary['version'] == 1
     assert summary['complete']
     assert summary['setpoints']['answered'] == len(rows)
@@ -1074,24 +986,22 @@ def test_summary_and_report_are_written(tmp_path: Path) -> None:
         assert abs(found['force_peak_n']) == np.max(np.abs(forces))
         lengths = [float(row[f'{leg}_length_m']) for row in rows]
         assert (found['length_min_m'], found['length_max_m']) == (min(lengths), max(lengths))
+        rates = np.array([float(row[f'{leg}_rate_m_s']) for row in rows])
+        assert abs(found['rate_peak_m_s']) == np.max(np.abs(rates))
+    conditions = [float(row['condition']) for row in rows]
+    assert summary['singularity']['condition_max'] == max(conditions)
+    moments = [float(row['base_moment_y_n_m']) for row in rows]
+    assert abs(summary['base_wrench']['moment_y']['peak_n_m']) == np.max(np.abs(moments))
     assert set(summary['force_breakdown']['leg_1']) == {*SOURCES} - {'base motion'}
     assert summary['parameters']['platform.mass'] == 150.0
 
 
-def test_without_a_report(tmp_path: Path) -> None:
-    assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
-    assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
-        'bag', 'legs.csv', 'summary.json']
-    assert json.loads((tmp_path / 'clear' / 'summary.json').read_text())['force_breakdown'] is None
-
-
-def test_parquet_has_the_columns_and_numbers_of_csv(tmp_path: Path) -> None:
-    assert run(ROOT / 'bags' / 'singular', tmp_path) == DONE
-    assert run(ROOT / 'bags' / 'singular', tmp_path / 'p', '--no-report', '--parquet') == DONE
-    folder = tmp_path / 'p' / 'singular'
-    assert not (folder / 'legs.csv').exists()
-    table = pyarrow.parquet.read_table(folder / 'legs.parquet')
-    rows = rows_of(tmp_path / 'singular')
+def test_parquet_has_the_columns_and_numbers_of_csv(
+        tmp_path: Path, replayed: dict[str, Outputs]) -> None:
+    assert run(ROOT / 'bags' / 'singular', tmp_path, '--parquet') == DONE
+    assert not (tmp_path / 'singular' / 'legs.csv').exists()
+    table = pyarrow.parquet.read_table(tmp_path / 'singular' / 'legs.parquet')
+    rows = replayed['singular'].rows
     assert table.column_names == list(rows[0])
     for name in table.column_names:
         values = table[name].to_pylist()
@@ -1099,24 +1009,20 @@ def test_parquet_has_the_columns_and_numbers_of_csv(tmp_path: Path) -> None:
                           for row in rows]
 
 
-def test_force_replaces_results_and_nothing_else(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(ROOT / 'bags' / 'clear', tmp_path, report=True) == DONE
-    capsys.readouterr()
-    assert '--force replaces results' in rejected(
-        capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path)
-    assert (tmp_path / 'clear' / 'report.html').exists()
-    assert run(ROOT / 'bags' / 'clear', tmp_path, '--force') == DONE
+def test_force_replaces_results_and_nothing_else(tmp_path: Path, rejected: Rejected) -> None:
+    clear = ROOT / 'bags' / 'clear'
+    assert run(clear, tmp_path, report=True) == DONE
+    for words in (f'{tmp_path / "clear"}: exists already', '--force replaces results'):
+        assert words in rejected(clear, output=tmp_path)
+    assert run(clear, tmp_path, '--force') == DONE
     assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
         'bag', 'legs.csv', 'summary.json']
+    assert summary_of(tmp_path / 'clear')['force_breakdown'] is None
     assert [path.name for path in tmp_path.iterdir()] == ['clear']
-    capsys.readouterr()
     other = tmp_path / 'other' / 'clear'
     other.mkdir(parents=True)
     (other / 'thesis.tex').touch()
-    assert 'not a folder of replay results' in rejected(
-        capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', other.parent, '--force')
-    assert [path.name for path in other.iterdir()] == ['thesis.tex']
+    assert 'not a folder of replay results' in rejected(clear, '--force', output=other.parent)
 
 
 def test_force_keeps_old_results_where_new_ones_fail(tmp_path: Path) -> None:
@@ -1134,11 +1040,9 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
     for n in range(1, 21):
         # two writers, of simulated and of real time
         stamp = n * 10 * MS + (n % 2) * 1_700_000_000 * SECOND
-        of += [(topic, RECORDED + n, write(stamp)) for topic, write in (
-            (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))]
-    bag = write_bag(tmp_path / 'bag', of)
-    assert run(bag, tmp_path / 'out') == DONE
-    found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['setpoints']
+        of += at_home(stamp, RECORDED + n)
+    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
+    found = summary_of(tmp_path / 'out' / 'bag')['setpoints']
     assert found['answered'] == 20
     assert found['duration_s'] == pytest.approx(9 * 1_700_000_000.0, rel=1e-6)
 
@@ -1184,23 +1088,13 @@ def test_names_that_the_terminal_cannot_encode(
     assert b'\\xfc:\n3 setpoints' in terminal.buffer.getvalue()
 
 
-def test_options_without_effect_are_rejected(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert '--combined: is not read' in rejected(
-        capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path,
-        '--differentiate', '--combined', '/all')
-    for words in (['--cutoff', '5'], ['--differentiate', '--cutoff', '1e300']):
-        with pytest.raises(SystemExit):
-            main([str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS), *words])
-
-
 # Bags that have only poses
 
-def test_poses_are_differentiated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_poses_are_differentiated(
+        tmp_path: Path, rejected: Rejected, capsys: pytest.CaptureFixture[str]) -> None:
     of = motion(400)
     bag = write_bag(tmp_path / 'bag', of[::3])
-    assert '--differentiate computes' in rejected(
-        capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert '--differentiate computes' in rejected(bag)
     assert run(bag, tmp_path / 'out', '--differentiate', '--cutoff', '5') == DONE
     printed = capsys.readouterr().out
     assert 'smoothing splines through the poses, cut-off frequency 5 Hz' in printed
@@ -1213,8 +1107,7 @@ def test_poses_are_differentiated(tmp_path: Path, capsys: pytest.CaptureFixture[
             float(other['leg_1_rate_m_s']), abs=2e-5)
         assert float(one['leg_1_force_n']) == pytest.approx(
             float(other['leg_1_force_n']), abs=0.5)
-    summary = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())
-    assert summary['inputs']['differentiated_cutoff_hz'] == 5.0
+    assert summary_of(tmp_path / 'out' / 'bag')['inputs']['differentiated_cutoff_hz'] == 5.0
     with AnyReader([tmp_path / 'out' / 'bag' / 'bag']) as reader:
         times = [when for connection, when, _ in reader.messages()
                  if connection.topic.endswith('leg_states')]
@@ -1223,51 +1116,37 @@ def test_poses_are_differentiated(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 # Comparison with measured efforts
 
-def joint_state(stamp: int, names: Sequence[str], efforts: Sequence[float]) -> bytes:
-    kinds = STORE.types
-    header = kinds['std_msgs/msg/Header'](
-        kinds['builtin_interfaces/msg/Time'](*divmod(stamp, SECOND)), '')
-    empty = np.empty(0)
-    return bytes(STORE.serialize_cdr(
-        kinds['sensor_msgs/msg/JointState'](header, list(names), empty, empty,
-                                            np.array(efforts)), 'sensor_msgs/msg/JointState'))
-
-
 def test_measured_legs_that_are_not_compared_are_a_notice(tmp_path: Path) -> None:
     of = motion(5)
     for topic in ('/hexapod/state', '/stewart_dynamics/leg_states'):
-        of.insert(0, (topic, RECORDED, joint_state(0, PARAMETERS['joints'], [0.0] * 6)))
-    kind = 'sensor_msgs/msg/JointState'
-    bag = write_bag(tmp_path / 'bag', of, state=kind, leg_states=kind)
+        of.insert(0, (topic, RECORDED, messages.joint_state(
+            0, PARAMETERS['joints'], [], [], [0.0] * 6)))
+    bag = write_bag(tmp_path / 'bag', of, state=JOINT_STATE, leg_states=JOINT_STATE)
     expected = ('/hexapod/state: not used; --measured compares the efforts of measured legs with '
                 'the computed forces')
     for options, given in (((), [expected]), (('--measured', '/hexapod/state'), [])):
-        run(bag, tmp_path / 'out', '--force', '--no-report', *options)
-        summary = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())
-        assert [each for each in summary['notices'] if '--measured' in each] == given
+        run(bag, tmp_path / 'out', '--force', *options)
+        notices = summary_of(tmp_path / 'out' / 'bag')['notices']
+        assert [each for each in notices if '--measured' in each] == given
 
 
 def test_measured_forces_give_the_external_load(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     load = np.array([30.0, -10.0, -200.0, 5.0, 8.0, -4.0])
     of = motion(200)
-    heave = Motion(
-        [(0.0, 0.0, 1.1 + 0.05 * math.sin(0.01 * n)) for n in range(1, 201)], np.eye(3),
-        [(0.0, 0.0, 0.05 * math.cos(0.01 * n)) for n in range(1, 201)], None,
-        [(0.0, 0.0, -0.05 * math.sin(0.01 * n)) for n in range(1, 201)])
     loads = np.where((np.arange(200) >= 100)[:, None], load, np.zeros(6))
-    forces = PLATFORM.inverse_dynamics(heave, loads).forces
+    forces = PLATFORM.inverse_dynamics(heave(200), loads).forces
     names = list(PARAMETERS['joints'])[::-1]
     for n in range(200):
         stamp = (n + 1) * 10 * MS
-        of.append(('/hexapod/state', RECORDED + stamp + 3, joint_state(
-            stamp, ['other', *names], [0.0, *forces[n][::-1]])))
+        of.append(('/hexapod/state', RECORDED + stamp + 3, messages.joint_state(
+            stamp, ['other', *names], [], [], [0.0, *forces[n][::-1]])))
     of.sort(key=lambda each: each[1])
-    bag = write_bag(tmp_path / 'bag', of, state='sensor_msgs/msg/JointState')
+    bag = write_bag(tmp_path / 'bag', of, state=JOINT_STATE)
     assert run(bag, tmp_path / 'out', '--measured', '/hexapod/state', report=True) == DONE
-    found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['measured']
+    found = summary_of(tmp_path / 'out' / 'bag')['measured']
     assert found['setpoints_compared'] == 200
-    without = PLATFORM.inverse_dynamics(heave).forces
+    without = PLATFORM.inverse_dynamics(heave(200)).forces
     difference = np.sqrt(np.mean((forces - without) ** 2))
     assert found['headline'].startswith(
         f'measured and computed forces differ by {difference:.3g} N RMS')
@@ -1294,8 +1173,7 @@ def test_the_page_names_files_that_a_bag_runs_through(tmp_path: Path) -> None:
     threading.setprofile(note)
     sys.setprofile(note)
     try:
-        code = main([str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS), '--output',
-                     str(tmp_path / 'replayed')])
+        code = run(ROOT / 'bags' / 'clear', tmp_path / 'replayed', report=True)
     finally:
         sys.setprofile(None)
         threading.setprofile(None)

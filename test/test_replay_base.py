@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import messages
+from messages import motion, MS, RECORDED, Recorded
 import numpy as np
 import pytest
 from referees import rotation_about
@@ -40,8 +41,7 @@ from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from test_replay import (
-    joint_state, motion, MS, nanoseconds, Outputs, outputs_of, PARAMETERS, RECORDED, Recorded,
-    six_of, write_bag)
+    JOINT_STATE, nanoseconds, Outputs, outputs_of, PARAMETERS, six_of, write_bag)
 
 MOVING = ('pose', 'motion', 'imu')
 MOUNTING = {'base.imu.position': [0.4, -0.3, 0.2], 'base.imu.orientation': [0.5, 0.5, 0.5, 0.5]}
@@ -121,9 +121,7 @@ def replayed(of: list[Recorded], parameters: Parameters, folder: Path, *options:
 # Types of topics with other names; the usual names imply their types.
 TYPES = {'deck_pose': INPUT_TYPES[BASE_POSE], 'deck_twist': INPUT_TYPES[BASE_TWIST],
          'deck_accel': INPUT_TYPES[BASE_ACCEL], 'deck_imu': INPUT_TYPES[BASE_IMU],
-         'pose': INPUT_TYPES[POSE], 'twist': INPUT_TYPES[TWIST], 'accel': INPUT_TYPES[ACCEL],
-         'imu': INPUT_TYPES[BASE_IMU], 'where': INPUT_TYPES[POSE],
-         'state': 'sensor_msgs/msg/JointState'}
+         'where': INPUT_TYPES[POSE], 'state': JOINT_STATE}
 
 
 # The numbers
@@ -367,8 +365,8 @@ def test_measured_forces_on_a_base_that_moves_differ_by_a_missing_mass_and_nothi
         for setpoint, output in answers(parameters, of):
             forces = true.solve(np.array([setpoint.motion]), None, np.array([setpoint.base]))
             added.append(forces[0, 12:18] - output.forces)
-            legs.append(('/hexapod/state', RECORDED + setpoint.stamp + 3, joint_state(
-                setpoint.stamp, parameters['joints'], forces[0, 12:18].tolist())))
+            legs.append(('/hexapod/state', RECORDED + setpoint.stamp + 3, messages.joint_state(
+                setpoint.stamp, parameters['joints'], [], [], forces[0, 12:18])))
         replayed(sorted([*of, *legs], key=lambda each: each[1]), parameters, tmp_path / name,
                  '--measured', '/hexapod/state')
         found = summary_of(tmp_path / name)['measured']

@@ -250,9 +250,12 @@ def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...
                  'ROS_SECURITY_ENCLAVE_OVERRIDE', *NAMES):
         monkeypatch.delenv(name, raising=False)
 
-    def change(**variables: str) -> None:
+    def change(**variables: str | None) -> None:
         for name, value in variables.items():
-            monkeypatch.setenv(name, value.replace('{tmp}', str(tmp_path)))
+            if value is None:
+                monkeypatch.delenv(name)
+            else:
+                monkeypatch.setenv(name, value.replace('{tmp}', str(tmp_path)))
 
     return change
 
@@ -267,6 +270,7 @@ def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...
     (TLS, []),
     ({**TLS, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}, []),
     ({PROFILES: str(ONE_HOST)}, []),
+    ({PROFILES: str(ONE_HOST), OTHER: str(ONE_HOST)}, []),
     ({PROFILES: ''}, []),
 ])
 def test_a_sound_environment_is_let_be(environment: Callable[..., None],
@@ -286,6 +290,9 @@ def test_a_sound_environment_is_let_be(environment: Callable[..., None],
     ({PROFILES: '{tmp}/none.xml'},
      f'{PROFILES}: {{tmp}}/none.xml: cannot be read: No such file'),
     ({PROFILES: '{tmp}/openssl.cnf'}, 'cannot be read: not XML'),
+    ({PROFILES: None, OTHER: str(ONE_HOST)}, f'this Fast DDS reads {PROFILES} in its place'),
+    # Fast DDS would take nothing in its place.
+    ({'STEWART_KEYS': None}, 'the variable STEWART_KEYS is not set'),
     ({'STEWART_KEYS': '/none'}, 'private_key_file: /none/key.pem: cannot be read: No such file'),
     ({'OPENSSL_CONF': ''}, "OPENSSL_CONF: '': has no VerifyMode = Require"),
     ({'OPENSSL_CONF': '{tmp}/key.pem'}, "OPENSSL_CONF: '{tmp}/key.pem': has no VerifyMode"),
@@ -295,7 +302,7 @@ def test_a_sound_environment_is_let_be(environment: Callable[..., None],
     ({'ROS_LOCALHOST_ONLY': '1'}, 'and ROS_LOCALHOST_ONLY not at all'),
 ])
 def test_an_open_environment_is_rejected(environment: Callable[..., None], tmp_path: Path,
-                                         changes: dict[str, str], text: str) -> None:
+                                         changes: dict[str, str | None], text: str) -> None:
     """Each is a mistake that ROS or Fast DDS ignores, which leaves the program open to others."""
     environment(**KEYSTORE, **TLS)
     check_environment(['--enclave', '/mine'])
@@ -315,24 +322,6 @@ def test_a_profile_that_another_replaces_is_rejected(
     environment(SKIP_DEFAULT_XML_FILE='true')  # which Fast DDS ignores
     with pytest.raises(StewartError, match=r'is replaced by DEFAULT_FASTRTPS_PROFILES\.xml'):
         check_environment([])
-
-
-def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],
-                                               monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fast DDS would take nothing in its place."""
-    environment(**TLS)
-    monkeypatch.delenv('STEWART_KEYS')
-    with pytest.raises(StewartError, match='the variable STEWART_KEYS is not set'):
-        check_environment([])
-
-
-def test_the_name_that_the_variable_has_in_another_ros_is_rejected(
-        environment: Callable[..., None]) -> None:
-    environment(**{OTHER: str(ONE_HOST)})
-    with pytest.raises(StewartError, match=f'this Fast DDS reads {PROFILES} in its place'):
-        check_environment([])
-    environment(**{PROFILES: str(ONE_HOST)})
-    check_environment([])
 
 
 @pytest.mark.skipif(PROFILES == NAMES[0], reason='Jazzy reads one of them')

@@ -40,6 +40,7 @@ from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 Array = NDArray[np.float64]
 
 EXAMPLE = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+ON_EXAMPLE = StewartPlatform(EXAMPLE)
 
 
 @pytest.fixture(scope='module')
@@ -133,8 +134,7 @@ def test_a_singular_sample_is_named_or_marked() -> None:
 
 def test_the_force_breakdown_names_its_sources_and_sums_to_the_forces(
         platform: StewartPlatform) -> None:
-    motion = random_motion(platform.parameters, rng(), 12)
-    motion = Motion.of_rows(motion.rows.reshape(3, 4, -1))
+    motion = Motion.of_rows(random_motion(platform.parameters, rng(), 12).rows.reshape(3, 4, -1))
     wrench = random_wrench(platform.parameters, rng(), 4)
     by = platform.force_breakdown(motion, wrench)
     assert isinstance(by, ForceBreakdown)
@@ -174,8 +174,7 @@ def test_stiffness_is_the_derivative_of_the_wrench_of_elastic_legs(
 
 
 def test_natural_modes_solve_the_eigenvalue_problem(platform: StewartPlatform) -> None:
-    motion = random_motion(platform.parameters, rng(), 12)
-    motion = Motion.of_rows(motion.rows.reshape(3, 4, -1))
+    motion = Motion.of_rows(random_motion(platform.parameters, rng(), 12).rows.reshape(3, 4, -1))
     legs = rng().uniform(1e6, 1e8, (4, 6))
     modes = platform.natural_modes(motion, legs)
     assert modes.frequencies.shape == (3, 4, 6)
@@ -225,16 +224,14 @@ def test_an_invalid_stiffness_is_rejected(
 # Home, likely mistakes, representation
 
 def test_home_has_the_mean_leg_halfway_between_its_limits() -> None:
-    platform = StewartPlatform(EXAMPLE)
-    home = platform.home_pose()
+    home = ON_EXAMPLE.home_pose()
     assert home.shape == ()
     assert home.position[2] > 0.9
     assert np.allclose(home.rotation, np.eye(3), rtol=0.0, atol=1e-12)
     middle = 0.5 * (EXAMPLE['limits.length_min'] + EXAMPLE['limits.length_max'])
-    assert np.mean(platform.inverse_kinematics(home)) == pytest.approx(np.mean(middle), abs=1e-9)
-    no_limits = EXAMPLE.replaced({'limits.length_min': (), 'limits.length_max': (),
-                                  'geometry.zero_length': 1.2})
-    lower = StewartPlatform(no_limits)
+    assert np.mean(ON_EXAMPLE.inverse_kinematics(home)) == pytest.approx(np.mean(middle), abs=1e-9)
+    lower = StewartPlatform(EXAMPLE.replaced({
+        'limits.length_min': (), 'limits.length_max': (), 'geometry.zero_length': 1.2}))
     assert np.mean(lower.inverse_kinematics(lower.home_pose())) == pytest.approx(1.2, abs=1e-9)
 
 
@@ -248,7 +245,7 @@ def test_an_unknown_home_is_an_error(changes: dict[str, Any], text: str) -> None
 
 
 def test_check_returns_the_likely_mistakes() -> None:
-    assert StewartPlatform(EXAMPLE).check() == ()
+    assert ON_EXAMPLE.check() == ()
     wrong = EXAMPLE.replaced({'gravity': [0.0, 0.0, -9806.65]})
     found = StewartPlatform(wrong).check()
     assert found == likely_mistakes(wrong)
@@ -257,7 +254,7 @@ def test_check_returns_the_likely_mistakes() -> None:
 
 
 def test_representations_are_short(platform: StewartPlatform) -> None:
-    assert repr(StewartPlatform(EXAMPLE)) == (
+    assert repr(ON_EXAMPLE) == (
         '<StewartPlatform: 150 kg, joints on 0.9 m (base) and 0.6 m (platform)>')
     motion = random_motion(platform.parameters, rng(), 5000)
     for result in (motion, platform.inverse_dynamics(motion), platform.force_breakdown(motion),
@@ -334,31 +331,24 @@ ODD = st.sampled_from([None, 'text', {}, {'a': 1}, [], [[]], object(), 1 + 1j, T
                        np.datetime64('2026-01-01'), np.ma.masked, Motion, float])
 
 
-def motions() -> st.SearchStrategy[Any]:
-    """Return motions and poses of any finite numbers, of one sample, two or none."""
+def vectors(many: int) -> st.SearchStrategy[list[Array]]:
+    """Return vectors of any finite numbers, of one sample, two or none."""
     finite = st.one_of(st.floats(-3.0, 3.0), st.floats(allow_nan=False, allow_infinity=False))
+    return st.builds(
+        lambda numbers, shape: [np.broadcast_to(part, (*shape, 3))
+                                for part in np.reshape(numbers, (many, 3))],
+        st.lists(finite, min_size=3 * many, max_size=3 * many),
+        st.sampled_from([(), (2,), (0,), (3, 1)]))
 
-    def made(numbers: list[float], angles: list[float], shape: Any, pose: bool) -> Any:
-        parts = np.reshape(numbers, (5, 3))
-        at = [np.broadcast_to(part, (*shape, 3)) for part in parts]
-        motion = Motion.from_pose(Pose.from_euler(at[0], angles), *at[1:])
+
+def motions() -> st.SearchStrategy[Any]:
+    """Return motions and poses."""
+    def made(parts: list[Array], angles: list[float], pose: bool) -> Any:
+        motion = Motion.from_pose(Pose.from_euler(parts[0], angles), *parts[1:])
         return motion.pose if pose else motion
 
-    return st.builds(made, st.lists(finite, min_size=15, max_size=15),
-                     st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3),
-                     st.sampled_from([(), (2,), (0,), (3, 1)]), st.booleans())
-
-
-def base_motions() -> st.SearchStrategy[Any]:
-    """Return base motions of any finite numbers, of one sample, two or none."""
-    finite = st.one_of(st.floats(-9.0, 9.0), st.floats(allow_nan=False, allow_infinity=False))
-
-    def made(numbers: list[float], shape: Any) -> BaseMotion:
-        return BaseMotion(*(np.broadcast_to(part, (*shape, 3))
-                            for part in np.reshape(numbers, (4, 3))))
-
-    return st.builds(made, st.lists(finite, min_size=12, max_size=12),
-                     st.sampled_from([(), (2,), (0,), (3, 1)]))
+    return st.builds(made, vectors(5), st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3),
+                     st.booleans())
 
 
 @pytest.mark.parametrize('name', CALLS)
@@ -369,7 +359,8 @@ def test_any_arguments_give_finite_numbers_or_one_line(name: str, data: st.DataO
              if p.name not in ('self', 'singular', 'christoffel', 'tilt')]
     arguments = {each: data.draw(st.one_of(
         motions() if each in ('motion', 'pose', 'guess') else
-        base_motions() if each == 'base' else ARRAYS, ARRAYS, ODD)) for each in names}
+        vectors(4).map(lambda parts: BaseMotion(*parts)) if each == 'base' else ARRAYS,
+        ARRAYS, ODD)) for each in names}
     with np.errstate(all='raise', under='ignore'):
         try:
             result = CALLS[name](platform, **arguments)
@@ -384,8 +375,7 @@ def test_any_arguments_give_finite_numbers_or_one_line(name: str, data: st.DataO
 # Results as text, as a table and as a figure
 
 def test_one_result_shows_its_numbers() -> None:
-    platform = StewartPlatform(EXAMPLE)
-    result = platform.inverse_dynamics(Motion.from_pose(platform.home_pose()))
+    result = ON_EXAMPLE.inverse_dynamics(Motion.from_pose(ON_EXAMPLE.home_pose()))
     text = repr(result)
     assert isinstance(result.determinant, float)
     assert f'forces [{result.forces[0]:.6g}, ' in text
@@ -395,9 +385,8 @@ def test_one_result_shows_its_numbers() -> None:
 
 @pytest.mark.parametrize('shape', [(), (4,), (2, 3)])
 def test_results_are_columns_of_a_table(shape: tuple[int, ...]) -> None:
-    platform = StewartPlatform(EXAMPLE)
     position = np.broadcast_to([0.0, 0.0, 1.1], (*shape, 3)) + rng().normal(0.0, 0.01, (*shape, 3))
-    result = platform.inverse_dynamics(Motion(position, np.eye(3)))
+    result = ON_EXAMPLE.inverse_dynamics(Motion(position, np.eye(3)))
     table = result.to_dict()
     size = int(np.prod(shape))
     assert {column.shape for column in table.values()} == {(size,)}
@@ -409,9 +398,8 @@ def test_results_are_columns_of_a_table(shape: tuple[int, ...]) -> None:
 
 
 def test_results_are_drawn_where_matplotlib_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    platform = StewartPlatform(EXAMPLE)
     position = np.array([[0.0, 0.0, 1.1], [0.0, 0.0, 1.12], [0.0, 0.0, 1.15]])
-    result = platform.inverse_dynamics(Motion(position, np.eye(3)))
+    result = ON_EXAMPLE.inverse_dynamics(Motion(position, np.eye(3)))
     times = [0.0, 0.1, 0.3]
     axes = result.plot(times).axes
     assert [each.get_ylabel() for each in axes] == ['length [m]', 'rate [m/s]', 'force [N]']
@@ -422,14 +410,13 @@ def test_results_are_drawn_where_matplotlib_is_installed(monkeypatch: pytest.Mon
     with pytest.raises(MotionError, match=r'times: shape \(2,\)'):
         result.plot([0.0, 0.1])
     with pytest.raises(MotionError, match=r'plot: results of shape \(\): must be \(N,\)'):
-        platform.inverse_dynamics(Motion(position[0], np.eye(3))).plot()
+        ON_EXAMPLE.inverse_dynamics(Motion(position[0], np.eye(3))).plot()
     monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
     with pytest.raises(ModuleNotFoundError, match='plot: matplotlib is not installed: pip'):
         result.plot()
 
 
 def test_forward_kinematics_begins_at_home() -> None:
-    platform = StewartPlatform(EXAMPLE)
     pose = Pose.from_euler([0.1, -0.05, 1.25], [0.1, 0.05, -0.2])
-    found = platform.forward_kinematics(platform.inverse_kinematics(pose))
+    found = ON_EXAMPLE.forward_kinematics(ON_EXAMPLE.inverse_kinematics(pose))
     assert np.abs(found.rows - pose.rows).max() < 1e-11

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import json
 import math
 import re
@@ -30,11 +30,10 @@ from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-from referees import (
-    random_motion, random_parameters, random_wrench, rng, ROOT, symmetric_parameters)
+from referees import rng, ROOT, symmetric_parameters
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
+from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT, WRENCH
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE, TIME, UNSOLVABLE_CONDITION
 from stewart_dynamics.replay.residuals import AXES
@@ -42,8 +41,7 @@ from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.reporting.block_statistics import LISTED
-from stewart_dynamics.setpoints.base_wrench import BaseWrench
-from stewart_dynamics.setpoints.step import Batch, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, Outputs
 
 Array = NDArray[np.float64]
 
@@ -63,17 +61,6 @@ def hexapod(**changes: Any) -> Parameters:
     """Return a hexapod whose first leg has a name with a blank."""
     return symmetric_parameters().replaced({
         'joints': ['front left', 'b', 'c', 'd', 'e', 'f'], 'setpoint.timeout': 0.5, **changes})
-
-
-def batch(stamps: NDArray[np.int64], restarts: NDArray[np.bool_] | None = None,
-          motions: Array | None = None, wrenches: Array | None = None,
-          bases: Array | None = None) -> Batch:
-    """Return setpoints; omitted values are zero."""
-    many = len(stamps)
-    return Batch(
-        stamps, np.zeros((many, MOTION)) if motions is None else motions,
-        np.zeros((many, WRENCH)) if wrenches is None else wrenches,
-        np.zeros(many, dtype=bool) if restarts is None else restarts, stamps, bases)
 
 
 class Samples:
@@ -124,22 +111,28 @@ class Samples:
 
     def setpoints(self) -> Batch:
         """Return the setpoints; the base is still if it is always known."""
-        bases = np.zeros((len(self.seconds), BASE))
-        bases[self.base_unknown] = NO_BASE
-        return batch(self.stamps, self.restarts,
-                     bases=bases if self.base_unknown.any() else None)
-
-    def summary(self, parameters: Parameters, edges: Sequence[int] = ()) -> Summary:
-        """Return the summary of them, given to it in parts."""
         many = len(self.seconds)
+        bases = np.zeros((many, BASE))
+        bases[self.base_unknown] = NO_BASE
+        return Batch(self.stamps, np.zeros((many, MOTION)), np.zeros((many, WRENCH)),
+                     self.restarts, self.stamps, bases if self.base_unknown.any() else None)
+
+    def parts(self, edges: Sequence[int] = ()) -> Iterator[Answered]:
+        """Return them as the replay gives them, in blocks with these edges."""
         outputs, setpoints = self.outputs(), self.setpoints()
-        summary = Summary(parameters)
-        for first, end in zip([0, *edges], [*edges, many], strict=True):
+        for first, end in zip([0, *edges], [*edges, len(self.seconds)], strict=True):
             part = slice(first, end)
-            summary.add(Answered(
+            yield Answered(
                 self.seconds[part], setpoints.chosen(part),
                 Outputs(*(each[part] for each in outputs)), self.base_wrenches[part],
-                None if self.breakdown is None else self.breakdown[part]))
+                None if self.breakdown is None else self.breakdown[part])
+
+    def summary(self, parameters: Parameters, edges: Sequence[int] = (),
+                quasi_static: bool = False) -> Summary:
+        """Return the summary of them, given to it in parts."""
+        summary = Summary(parameters, quasi_static)
+        for part in self.parts(edges):
+            summary.add(part)
         return summary
 
 
@@ -380,12 +373,17 @@ def test_the_summary_agrees_with_its_definitions(seed: int, many: int) -> None:
 
 
 @given(st.data(), st.integers(0, 10 ** 6), st.integers(1, 60))
-def test_any_split_gives_the_same(data: st.DataObject, seed: int, many: int) -> None:
+def test_any_split_gives_the_same_and_can_be_read_before_the_end(
+        data: st.DataObject, seed: int, many: int) -> None:
     edges = sorted(data.draw(st.lists(st.integers(0, many), max_size=many)))
     samples, parameters = random_samples(seed, many), hexapod(**LIMITS)
     whole, split = samples.summary(parameters), samples.summary(parameters, edges)
-    assert_same(split.values(), whole.values())
-    assert_same(split.values(), whole.values())
+    for _ in range(2):
+        assert_same(split.values(), whole.values())
+    early = Summary(parameters)
+    for part, end in zip(samples.parts(edges), [*edges, many], strict=True):
+        early.add(part)
+        assert early.values()['setpoints']['answered'] == end
 
 
 @pytest.mark.parametrize('size', [1, 7, 999, 1000, 1001, 2500])
@@ -399,51 +397,6 @@ def test_a_long_motion_is_the_same_in_blocks_of_any_size(size: int) -> None:
     assert found['singularity']['crossings'] > len(crossings) == LISTED
     assert found['singularity']['warnings'] > LISTED
     assert_same(found, json.loads(json.dumps(plain(parameters, samples))))
-
-
-def test_it_can_be_read_before_the_end() -> None:
-    samples, parameters = random_samples(3, 40), hexapod(**LIMITS)
-    outputs, setpoints = samples.outputs(), samples.setpoints()
-    summary = Summary(parameters)
-    for first in range(0, 40, 10):
-        part = slice(first, first + 10)
-        summary.add(Answered(
-            samples.seconds[part], setpoints.chosen(part),
-            Outputs(*(each[part] for each in outputs)), samples.base_wrenches[part]))
-        assert summary.values()['setpoints']['answered'] == first + 10
-        assert summary.values() == summary.values()
-
-
-def test_it_summarizes_the_outputs_of_the_step() -> None:
-    random = rng()
-    p = random_parameters(random).replaced({'limits.force_max': 2000.0})
-    motion, wrench = random_motion(p, random, 200), random_wrench(p, random, 200)
-    setpoints = batch(np.arange(200) * SECOND, motions=motion.rows, wrenches=wrench)
-    outputs = Step(p).many(setpoints, None)
-    summary = Summary(p)
-    base_wrenches = BaseWrench(p).many(setpoints)
-    summary.add(Answered(
-        np.arange(200) * 1.0, setpoints, outputs, base_wrenches,
-        ForceBreakdownRows(p)(setpoints.motions, setpoints.wrenches)))
-    found = summary.values()
-    assert 0 < len(found['limits']) == np.any(np.abs(outputs.demanded_forces) > 2000.0,
-                                              axis=0).sum()
-    for leg, name in enumerate(p['joints']):
-        forces = outputs.demanded_forces[:, leg]
-        of_leg = found['legs'][name]
-        assert abs(of_leg['force_peak_n']) == np.abs(forces).max()
-        # of clipped forces of both signs, the first
-        assert abs(of_leg['force_published_peak_n']) == pytest.approx(
-            min(abs(of_leg['force_peak_n']), 2000.0))
-        assert of_leg['force_rms_n'] == pytest.approx(
-            math.sqrt((forces ** 2)[1:-1].sum() / 199.0
-                      + 0.5 * (forces[0] ** 2 + forces[-1] ** 2) / 199.0), rel=1e-12)
-        assert set(found['force_breakdown'][name]) == {*SOURCES} - {'base motion'}
-    assert found['singularity']['condition_max'] == outputs.conditions.max()
-    load = found['base_wrench']
-    assert abs(load['moment_y']['peak_n_m']) == np.abs(base_wrenches[:, 4]).max()
-    assert load['force']['peak_n'] == pytest.approx(
-        np.linalg.norm(base_wrenches[:, :3], axis=1).max(), rel=1e-12)
 
 
 def test_it_keeps_no_samples() -> None:
@@ -683,12 +636,7 @@ def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
 
 def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     samples = Samples(3, rates=0.0, breakdown=1.0)
-    parameters = hexapod(**LIMITS)
-    summary = Summary(parameters, quasi_static=True)
-    summary.add(Answered(
-        samples.seconds, batch(samples.stamps), samples.outputs(), samples.base_wrenches,
-        samples.breakdown))
-    found = summary.values()
+    found = samples.summary(hexapod(**LIMITS), quasi_static=True).values()
     leg = found['legs']['b']
     assert {key for key, value in leg.items() if value is None} == {
         'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
@@ -702,17 +650,14 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     text = '\n'.join(summary_lines(found))
     assert 'limits.velocity_max could not be checked' in text
     assert 'all limits held' not in text
-    without = Summary(hexapod(**{'limits.force_max': 5.0}), quasi_static=True)
-    without.add(Answered(
-        samples.seconds, batch(samples.stamps), samples.outputs(), samples.base_wrenches))
-    assert not without.values()['limit_met']
+    assert not samples.summary(hexapod(**FORCE_LIMIT), quasi_static=True).values()['limit_met']
 
 
 def test_setpoints_without_a_known_base_are_counted_and_have_no_forces() -> None:
     demanded, loads = np.ones((4, 6)), np.ones((4, 6))
     demanded[1:3] = loads[1:3] = math.nan
     samples = Samples(4, demanded=demanded, base_wrenches=loads, base_unknown=[0, 1, 1, 0])
-    limited = hexapod(**{'limits.force_max': 5.0})
+    limited = hexapod(**FORCE_LIMIT)
     for parameters, checked in ((limited, False), (hexapod(), True)):
         found = samples.summary(parameters).values()
         assert found['setpoints']['base_unknown'] == 2
