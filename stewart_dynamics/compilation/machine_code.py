@@ -28,7 +28,6 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from functools import cache, partial
 from hashlib import sha256
-from importlib.metadata import distributions
 from importlib.util import find_spec
 import inspect
 import os
@@ -257,12 +256,26 @@ def _file_name(module: str) -> str:
 
 def _digest(module: str, code: bytes) -> bytes:
     """Return the digest of code and of all that it depends on."""
-    versions = [each.version for name in ('numba', 'llvmlite')
-                for each in distributions(name=name)]
+    versions = [version_of(name) for name in ('numba', 'llvmlite')]
     digest = sha256(repr((module, versions, _processor())).encode() + code)
     for path in code.partition(b'\n')[0].decode(errors='replace').split('\t'):
         digest.update(_source(path))
     return digest.digest()
+
+
+@cache
+def version_of(library: str) -> str:
+    """
+    Return a library's version, by the names of the folders of its metadata; empty without one.
+
+    ``importlib.metadata`` takes 20 ms, a fifth of the time by which the node starts later than a
+    bare one.
+    """
+    found = find_spec(library)
+    places = found.submodule_search_locations or () if found else ()
+    names = sorted(each.name for place in places
+                   for each in Path(place).parent.glob(f'{library}-*-info'))
+    return ' '.join(name.removeprefix(f'{library}-') for name in names)
 
 
 @cache

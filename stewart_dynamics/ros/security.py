@@ -23,13 +23,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import metadata
 import os
 from pathlib import Path
 import re
 import warnings
 from xml.etree import ElementTree
 
+from stewart_dynamics.compilation.machine_code import version_of
 from stewart_dynamics.errors import StewartError
 
 _OLD, _NEW = 'FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'
@@ -44,11 +44,8 @@ _ASKS_FOR_CERTIFICATES = re.compile(r'^\s*VerifyMode\s*=\s*Require\b', re.MULTIL
 
 
 def _profiles() -> str:
-    try:
-        renamed = int(metadata.version('rclpy').split('.')[0]) >= 9
-    except (metadata.PackageNotFoundError, ValueError):
-        renamed = False
-    return _NEW if renamed else _OLD
+    major = version_of('rclpy').partition('.')[0]
+    return _NEW if major.isdigit() and int(major) >= 9 else _OLD
 
 
 PROFILES = _profiles()
