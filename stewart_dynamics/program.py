@@ -113,17 +113,18 @@ class Program:
             self.complain(f'interrupted: {exc}' if str(exc) else 'interrupted')
             return INTERRUPTED
 
-    def end(self, results: object, missing: Mapping[object, Iterable[str]], found: bool) -> int:
+    def end(self, results: object, missing: Mapping[Any, Sequence[str]], found: bool) -> int:
         """
         Print where the results are, and return the exit code.
 
-        missing: the parts of each bag that could not be read, by bag.
+        missing: the parts of each bag that could not be read, by bag; empty: all was.
         found: whether what gives STRICT was found, and the user wants that.
         """
         self.say(f'results: {results}')
         for bag, parts in missing.items():
-            self.complain(partly_read(bag, parts))
-        return PARTLY_READ if missing else STRICT if found else DONE
+            if parts:
+                self.complain(partly_read(bag, parts))
+        return PARTLY_READ if any(missing.values()) else STRICT if found else DONE
 
     def say(self, text: str) -> None:
         """Print on stdout."""

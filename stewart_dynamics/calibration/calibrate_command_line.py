@@ -116,5 +116,5 @@ def _run(given: argparse.Namespace) -> int:
     for each in result['likely_mistakes']:
         _PROGRAM.complain(f'warning: {each["text"]}')
     _PROGRAM.say(result_text(result))
-    return _PROGRAM.end(output, {given.poses: missing} if missing else {},
-                        given.strict and not is_complete(result))
+    return _PROGRAM.end(
+        output, {given.poses: missing}, given.strict and not is_complete(result))

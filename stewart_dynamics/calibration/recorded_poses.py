@@ -27,14 +27,13 @@ from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.errors import BagError
-from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.messages import setpoint, type_names
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit
-from stewart_dynamics.setpoints.output_messages import LEG_STATES
+from stewart_dynamics.replay.bag_topics import find_measured_legs
 
 # Legs are at rest while no position changes by more than this part of the characteristic length,
 # for at least this time [s], of which this part at each end is left out: the platform settles.
@@ -59,8 +58,7 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
     """
     with closing(Recording(path)) as recording:
         topics = {
-            recording.find_topic(type_names.JOINT_STATE, measured, f'{node}/{MEASURED_LEGS}',
-                                 '--measured', {f'{node}/{LEG_STATES}'}): 'legs',
+            find_measured_legs(recording, node, measured): 'legs',
             recording.find_topic(type_names.POSE_STAMPED, pose, '', '--pose'): 'pose'}
         reader = JointStateReader(parameters['joints'], ['position'])
         leg_stamps: list[Stamps] = []

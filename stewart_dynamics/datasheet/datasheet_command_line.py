@@ -132,5 +132,5 @@ def _run(given: argparse.Namespace) -> int:
             parameters, order, given.output, options, Progress(stage, bar.update))
     _PROGRAM.say(sheet_text(sheet))
     missing = sheet['motion']['missing'] if sheet['motion'] else []
-    return _PROGRAM.end(given.output, {given.motion: missing} if missing else {},
-                        given.strict and not is_possible(sheet))
+    return _PROGRAM.end(
+        given.output, {given.motion: missing}, given.strict and not is_possible(sheet))

@@ -24,6 +24,7 @@ from collections.abc import Mapping, Sequence
 import math
 from typing import Any, NamedTuple
 
+from stewart_dynamics.capability.travel import LIMITS
 from stewart_dynamics.datasheet.ratings import AXES
 from stewart_dynamics.mechanics.limits import QUANTITIES, short_name, SINGULARITY
 from stewart_dynamics.parameters.table import FIXED
@@ -40,8 +41,9 @@ class Unit(NamedTuple):
 
 
 MM, DEGREE = Unit('mm', 1e3), Unit('°', math.degrees(1.0))
-# Units in which those of limits are written.
-_UNITS = {'m': MM, 'rad': DEGREE}
+# Units in which the excesses of limits are written.
+_OF_LIMITS = {short_name(limit): {'m': MM, 'rad': DEGREE}[QUANTITIES[limit].unit]
+              for limit in LIMITS}
 LINEAR = {'travel': MM, 'velocity': Unit('mm/s', 1e3), 'acceleration': Unit('m/s²', 1.0),
           'force': Unit('N', 1.0), 'stiffness': Unit('N/µm', 1e-6)}
 ANGULAR = {'travel': DEGREE, 'velocity': Unit('°/s', DEGREE.factor),
@@ -202,6 +204,5 @@ def _exceeded(found: dict[str, Any]) -> str:
         return f'not proven: no pose exceeds a limit as far as searched, {limit} is nearest'
     if found['limit'] == SINGULARITY:
         return f'{limit}: condition number exceeded by {down(excess)}'
-    unit = next(_UNITS[quantity.unit] for name, quantity in QUANTITIES.items()
-                if short_name(name) == found['limit'])
+    unit = _OF_LIMITS[found['limit']]
     return f'{limit} exceeded by {down(excess * unit.factor)} {unit.name}'

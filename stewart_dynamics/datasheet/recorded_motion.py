@@ -154,13 +154,13 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
     joints = p['joints']
     worst = max(used, key=lambda name: float(used[name].max()))
     sample = int(used[worst].argmax())
+    singular = bool(used[SINGULARITY].max() >= 1.0)
     found: dict[str, Any] = {
-        'possible': bool(used[worst][sample] <= 1.0 + limits.TOLERANCE),
+        'possible': not singular and bool(used[worst][sample] <= 1.0 + limits.TOLERANCE),
         'samples': len(recorded.seconds), 'duration_s': float(recorded.seconds[-1]),
         'largest_use': {name: float(each.max()) if np.isfinite(each.max()) else None
                         for name, each in used.items()},
         'largest_use_limit': worst, 'largest_use_at_s': float(recorded.seconds[sample])}
-    singular = used[SINGULARITY].max() >= 1.0
     if singular:
         at = int(used[SINGULARITY].argmax())
         return found | {'factor': 0.0, 'limit': limits.SINGULARITY, 'leg': None,

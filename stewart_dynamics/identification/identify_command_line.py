@@ -149,8 +149,8 @@ def _run(given: argparse.Namespace) -> int:
     _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))
     result = run(bags, parameters, output, options, _PROGRAM.complain)
     _PROGRAM.say(result_text(result))
-    missing = {bag['bag']: bag['missing'] for bag in result['bags'] if bag['missing']}
-    return _PROGRAM.end(output, missing, given.strict and not is_complete(result))
+    return _PROGRAM.end(output, {bag['bag']: bag['missing'] for bag in result['bags']},
+                        given.strict and not is_complete(result))
 
 
 def _kinds(text: str) -> tuple[str, ...]:

@@ -24,14 +24,12 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.identification.windows import (
     FEWEST, period_of, segments, Signal, uniform, Window)
 from stewart_dynamics.messages import type_names
-from stewart_dynamics.messages.joint_state import (
-    FIELDS, JointStateReader, NUMBERS_END)
+from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, NUMBERS_END
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.setpoints.output_messages import LEG_STATES
+from stewart_dynamics.replay.bag_topics import find_measured_legs
 
 JOINT_STATE = type_names.JOINT_STATE
 # Maximum number of samples in a window, so that it and its extract fit into memory.
@@ -55,9 +53,7 @@ def find_topics(recording: Recording, node: str, measured: str | None, efforts: 
     """
     if efforts is not None:
         recording.checked_topic(efforts, JOINT_STATE)
-    # ~/leg_states is computed, not measured
-    legs = recording.find_topic(JOINT_STATE, measured, f'{node}/{MEASURED_LEGS}', '--measured',
-                                {f'{node}/{LEG_STATES}', efforts or ''})
+    legs = find_measured_legs(recording, node, measured, efforts or '')
     return Topics(legs, efforts or legs)
 
 

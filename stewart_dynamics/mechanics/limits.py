@@ -86,8 +86,8 @@ def short_name(limit: str) -> str:
     return limit.rpartition('.')[2]
 
 
-def result_values(lengths: Six, rates: Six, forces: Six | None) -> dict[str, Six | None]:
-    """Return the values of OF_RESULTS of one sample."""
+def result_values(lengths: Any, rates: Any, forces: Any) -> dict[str, Any]:
+    """Return the values of OF_RESULTS, of one sample (6,) or of many (N, 6)."""
     return {LENGTH_MIN: lengths, LENGTH_MAX: lengths, VELOCITY_MAX: rates, FORCE_MAX: forces}
 
 
@@ -149,7 +149,8 @@ class Limits:
 
     def threshold(self, limit: str) -> Array:
         """Return the values (6,) above (or below) which a limit is exceeded."""
-        return np.asarray(self.thresholds[LIMITS.index(limit)], dtype=float)
+        threshold: Array = self.thresholds[LIMITS.index(limit)]
+        return threshold
 
     def exceeds(self, limit: str, values: Array) -> Flags:
         """Return where values (..., 6) of its quantity exceed a limit; nan never does."""
@@ -165,8 +166,11 @@ class Limits:
         nearest: of CLEARANCE_MIN, the nearest leg or plate of each leg, see ``leg_clearance``.
         """
         found: list[Exceedance] = []
-        for limit, (bounds, thresholds) in self._of_samples.items():
-            for leg, value in enumerate(values.get(limit) or ()):
+        for limit, of_legs in values.items():
+            if of_legs is None or limit not in self._of_samples:
+                continue
+            bounds, thresholds = self._of_samples[limit]
+            for leg, value in enumerate(of_legs):
                 if _exceeds(limit, value, thresholds[leg]):
                     other = nearest[leg] if limit == CLEARANCE_MIN else -1
                     found.append(Exceedance(limit, leg, value, bounds[leg], other))

@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.dynamics import friction
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits,
+    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, Limits, result_values,
     SPEED_MAX, TEMPERATURE_RISE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
@@ -133,8 +133,8 @@ class Checks:
             samples = samples.until(n)
         results = samples.results
         self._keep_largest_force(results[:, FORCES])
-        for limit, values in ((LENGTH_MIN, results[:, LENGTHS]), (LENGTH_MAX, results[:, LENGTHS]),
-                              (VELOCITY_MAX, results[:, RATES]), (FORCE_MAX, results[:, FORCES])):
+        for limit, values in result_values(
+                results[:, LENGTHS], results[:, RATES], results[:, FORCES]).items():
             self._check_limit(limit, values, _of_legs(samples.times))
         self._check_cubics(samples)
         return sorted({

@@ -262,10 +262,11 @@ def margin_columns(parameters: Parameters) -> list[tuple[Quantity, str, list[str
 def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the smallest margins of all quantities with a limit, each with its leg."""
     found = []
-    for name, unit in dict.fromkeys(QUANTITIES[limit] for limit in LIMITS):
-        if margins := values_of(summary['legs'], margin_key(Quantity(name, unit))):
+    for quantity in dict.fromkeys(QUANTITIES[limit] for limit in LIMITS):
+        if margins := values_of(summary['legs'], margin_key(quantity)):
             value, joint = min(margins, key=FIRST)
-            found.append({'name': name, 'value': value, 'unit': unit, 'leg': joint})
+            found.append({'name': quantity.name, 'value': value, 'unit': quantity.unit,
+                          'leg': joint})
     return found
 
 

@@ -22,6 +22,7 @@ from collections.abc import Iterable, Mapping
 from stewart_dynamics.bags.recording import joined, Recording
 from stewart_dynamics.description.model import JOINT_STATES
 from stewart_dynamics.errors import BagError, StewartError
+from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
@@ -64,6 +65,14 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
             raise BagError(f'{recording.path}: {name}: selected as '
                            f'{" and ".join(key for key in found if found[key] == name)}')
     return found
+
+
+def find_measured_legs(recording: Recording, node: str, given: str | None, taken: str = '') -> str:
+    """Return the topic of the measured legs; raise BagError if it is not found."""
+    computed = f'{node}/{LEG_STATES}'
+    advice = f'; {computed} is computed, not measured' if computed in recording.topics else ''
+    return recording.find_topic(type_names.JOINT_STATE, given, f'{node}/{MEASURED_LEGS}',
+                                '--measured', {computed, taken}, advice)
 
 
 def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Parameters,

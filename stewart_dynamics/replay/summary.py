@@ -31,7 +31,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA,
-    OF_RESULTS, QUANTITIES, Quantity, VELOCITY_MAX)
+    OF_RESULTS, QUANTITIES, Quantity, result_values, VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.motor_loads import MotorLoads
@@ -163,8 +163,7 @@ class Summary:
                 (demanded ** 2, np.maximum(power, 0.0), np.maximum(-power, 0.0)), axis=1))
         self._published.add(seconds, outputs.forces)
         self._power.add(seconds, power)
-        values = {LENGTH_MIN: lengths, LENGTH_MAX: lengths, VELOCITY_MAX: rates,
-                  FORCE_MAX: demanded}
+        values = result_values(lengths, rates, demanded)
         for name in self._limits.of_joints:
             values[name] = outputs.joint_angles[:, ANGLES[name]]
         if CLEARANCE_MIN in self._limits.bounds:
@@ -260,11 +259,13 @@ class Summary:
             if name not in OF_RESULTS:
                 kind = 'min' if name in MINIMA else 'max'
                 found |= peak.named(leg, f'{quantity.key}_{kind}', quantity.unit)
-            excess = None if bound is None else finite(
-                Exceedance(name, leg, peak.values[leg], bound[leg]).excess)
-            margins = [found.get(margin_key(quantity)), None if excess is None else 0.0 - excess]
-            found[margin_key(quantity)] = min(
-                (each for each in margins if each is not None), default=None)
+            key, margin = margin_key(quantity), None
+            if bound is not None:
+                margin = finite(
+                    0.0 - Exceedance(name, leg, peak.values[leg], bound[leg]).excess)
+            # a length has two limits
+            found[key] = min((each for each in (found.get(key), margin) if each is not None),
+                             default=None)
         return found | (dict.fromkeys(_OF_VELOCITY) if self._quasi_static else {})
 
     def _singularity(self) -> dict[str, Any]:

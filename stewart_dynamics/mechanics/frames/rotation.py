@@ -142,7 +142,8 @@ def to_rotation_vector(rotation: ArrayLike) -> Array:
     sine = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, q[..., 3:])
     scale = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 0.0)
-    return np.asarray(scale * q[..., :3], dtype=float)
+    vectors: Array = scale * q[..., :3]
+    return vectors
 
 
 def quaternion_product(first: Array, second: Array) -> Array:

@@ -520,7 +520,8 @@ function frameAt(number) {
 // Where the platform joints are in a frame, base axes.
 function platformJoints(frame) {
   return report.platformJoints.map(p => [0, 1, 2].map(
-    k => frame.rotation.subarray(3 * k, 3 * k + 3).reduce((sum, r, n) => sum + r * p[n], frame.position[k])));
+    k => frame.position[k] + frame.rotation[3 * k] * p[0] + frame.rotation[3 * k + 1] * p[1]
+      + frame.rotation[3 * k + 2] * p[2]));
 }
 
 const column = (points, k) => points.map(point => point[k]);
