@@ -226,9 +226,13 @@ def test_bad_input_is_rejected_in_one_line(
     assert not (tmp_path / 'found').exists()
 
 
-def test_a_bag_without_measured_legs_is_rejected() -> None:
+def test_a_bag_without_measured_legs_is_rejected(tmp_path: Path) -> None:
     with closing(Recording(ROOT / 'bags' / 'clear')) as read, pytest.raises(
             BagError, match='has no topic /stewart_dynamics/measured_legs'):
+        find_topics(read, '/stewart_dynamics', None, None)
+    bag = write_bag(tmp_path / 'bag', recording(), GIVEN['joints'], '/stewart_dynamics/leg_states')
+    with closing(Recording(bag)) as read, pytest.raises(
+            BagError, match='; /stewart_dynamics/leg_states is computed, not measured$'):
         find_topics(read, '/stewart_dynamics', None, None)
 
 
