@@ -37,10 +37,11 @@ from stewart_dynamics.calibration.measured_poses import POSITION, QUATERNION
 from stewart_dynamics.calibration.noise import covariances, Noise, whitening
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.mechanics import limits
-from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.motion import Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR, TWO_SIDED
+from stewart_dynamics.mechanics.pose_limits import PoseLimits
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.approach import approach, TimedMotion
 
@@ -118,20 +119,13 @@ def _within_limits(platform: StewartPlatform, random: np.random.Generator, count
     lengths = platform.inverse_kinematics(poses)
     sound = ((lengths > low + _MARGIN * stroke) & (lengths < high - _MARGIN * stroke)).all(axis=1)
     poses = poses[np.flatnonzero(sound)[:count]]
-    result = platform.inverse_dynamics(Motion(poses.position, poses.rotation), singular='nan')
-    side = platform.inverse_dynamics(Motion(home.position, home.rotation)).determinant
-    sound = (result.condition_number < p['singularity.warn_condition']) & (
-        result.determinant * side > 0.0)
-    known = limits.Limits(p)
-    for name, angles in zip(limits.OF_JOINTS, platform.joint_angles(poses), strict=True):
-        if name in known.of_joints:
-            sound &= ~known.exceeds(name, angles).any(axis=1)
-    if limits.FORCE_MAX in known.bounds:
-        sound &= ~known.exceeds(limits.FORCE_MAX, np.abs(result.forces)).any(axis=1)
-    clearances = clearance_to_check(p)
-    if clearances is not None:
-        sound &= ~known.exceeds(limits.CLEARANCE_MIN, clearances(poses.rows)).any(axis=-1)
-    return poses[sound]
+    known, motions = PoseLimits(p), motion_rows(poses)
+    side, results = (platform.solve(rows) for rows in (motion_rows(home), motions))
+    values = {**known.values(motions, results), **known.clearances(motions),
+              limits.FORCE_MAX: results[:, FORCES]}
+    return poses[known.regular(results, side[0, DETERMINANT]) & (
+        results[:, CONDITION] < p['singularity.warn_condition'])
+        & ~known.exceeded(values, len(poses))]
 
 
 def _exchange(rows: Array, chosen: Integers) -> Integers:

@@ -45,11 +45,9 @@ from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
-from stewart_dynamics.mechanics.kinematics.leg_clearance import (
-    clearance_to_check, LegClearance)
-from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, TWIST
-from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
+from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
+from stewart_dynamics.mechanics.pose_limits import PoseLimits
+from stewart_dynamics.mechanics.rows import ACCELERATION, DETERMINANT, MOTION, POSE, RESULT, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, NaturalModes
 
@@ -139,15 +137,15 @@ class Capability:
         if not isinstance(platform, StewartPlatform):
             raise wrong_type('platform', platform, 'a StewartPlatform')
         self.platform = platform
-        self._limits = limits.Limits(platform.parameters)
+        self._pose_limits = PoseLimits(platform.parameters)
+        self._limits = self._pose_limits.limits
         bounds = self._limits.bounds
         self._bounds = np.array([
             bounds.get(name, np.full(6, _UNLIMITED.get(name, math.inf))) for name in LIMITS])
-        clearance = clearance_to_check(platform.parameters)
+        clearance, angles = self._pose_limits.clearance, self._pose_limits.angles
         none = np.empty((0, 3))
         self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes
         self._plates = (none, none) if clearance is None else (clearance.base, clearance.platform)
-        angles = angles_to_check(platform.parameters, self._limits.of_joints)
         self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
         self._motors = MotorBounds(platform.parameters) if platform.parameters.drives else None
         self._frictionless = StewartPlatform(platform.parameters.replaced({
@@ -577,20 +575,15 @@ class Capability:
         Lengths, joint angles, clearance, and the condition number; a determinant of the other sign
         than at the first sample is beyond a singularity.
         """
-        values = {limits.LENGTH_MIN: solved.lengths, limits.LENGTH_MAX: solved.lengths}
-        if limits.CLEARANCE_MIN in self._limits.bounds:
-            values[limits.CLEARANCE_MIN] = LegClearance(self.platform.parameters)(
-                motion_rows(motion))
-        if self._limits.of_joints:
-            values.update(zip(limits.OF_JOINTS, self.platform.joint_angles(motion), strict=True))
+        results, motions = solved.rows.reshape(-1, RESULT), motion_rows(motion)
+        of_poses = self._pose_limits
+        values = {**of_poses.values(motions, results), **of_poses.clearances(motions)}
         for name, each in values.items():
-            exceeded = self._limits.exceeds(name, each).reshape(-1, 6)
+            exceeded = self._limits.exceeds(name, each)
             if exceeded.any():
                 sample, leg = (int(n) for n in np.argwhere(exceeded)[0])
                 return Extent(0.0, limits.short_name(name), leg, sample)
-        side = np.ravel(solved.determinant)
-        singular = ~(np.ravel(solved.condition_number) < stop_condition_of(
-            self.platform.parameters)) | ~(side * side[:1] > 0.0)
+        singular = ~of_poses.regular(results, results[0, DETERMINANT])
         if not singular.any():
             return None
         return Extent(0.0, limits.SINGULARITY, -1, int(singular.argmax()))

@@ -36,12 +36,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
-from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, Limits, OF_JOINTS, short_name,
     SINGULARITY)
-from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, LENGTHS, MOTION, POSITION
-from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
+from stewart_dynamics.mechanics.pose_limits import PoseLimits
+from stewart_dynamics.mechanics.rows import DETERMINANT, MOTION, POSITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Points of a curve at least, and steps of a bisection.
@@ -111,46 +110,29 @@ class _Plane:
 
     def __init__(self, platform: StewartPlatform, start: Motion, normal: int) -> None:
         self._platform, self._row, self._normal = platform, start.rows, normal
-        self._limits = Limits(platform.parameters)
+        self._limits = PoseLimits(platform.parameters)
         # all lengths are within this range
         p = platform.parameters
         tips = p['geometry.base_joints'] - p['geometry.platform_joints'] @ start.rotation.T
-        longest = self._limits.bounds[LENGTH_MAX][:, None]
+        longest = self._limits.limits.bounds[LENGTH_MAX][:, None]
         self._low, self._high = (tips - longest).max(axis=0), (tips + longest).min(axis=0)
         self._side = float(platform.solve(start.rows[None])[0, DETERMINANT])
-        self._stop = stop_condition_of(platform.parameters)
-        self._clearance = clearance_to_check(platform.parameters)
 
     def regular(self, points: Array) -> Flags:
         """Return at which positions (N, 3) the condition number and the sign of det(J) hold."""
-        solved = self._platform.solve(self._rows(points))
-        with np.errstate(all='ignore'):
-            regular: Flags = (solved[:, CONDITION] < self._stop) & (
-                solved[:, DETERMINANT] * self._side > 0.0)
-        return regular
+        return self._limits.regular(self._platform.solve(self._rows(points)), self._side)
 
     def clear(self, points: Array) -> Flags:
         """Return at which positions (N, 3) no two legs are too near."""
-        if self._clearance is None:
-            return np.ones(len(points), dtype=bool)
-        near = self._limits.exceeds(CLEARANCE_MIN, self._clearance(self._rows(points)))
-        kept: Flags = np.asarray(~near.any(axis=1))
-        return kept
+        clearances = self._limits.clearances(self._rows(points))
+        return ~self._limits.exceeded(clearances, len(points))
 
     def within(self, points: Array) -> Flags:
         """Return at which positions (N, 3) lengths and angles of the joints keep their limits."""
         kept: Flags = np.asarray(np.isfinite(points).all(axis=1))
         rows = self._rows(points[kept])
-        lengths = self._platform.solve(rows)[:, LENGTHS]
-        exceeded = self._limits.exceeds(LENGTH_MAX, lengths).any(axis=1)
-        if LENGTH_MIN in self._limits.bounds:
-            exceeded |= self._limits.exceeds(LENGTH_MIN, lengths).any(axis=1)
-        if self._limits.of_joints and len(rows):
-            angles = self._platform.joint_angles(Motion.of_rows(rows))
-            for name, each in zip(OF_JOINTS, angles, strict=True):
-                if name in self._limits.of_joints:
-                    exceeded |= self._limits.exceeds(name, each).any(axis=1)
-        kept[kept] = ~exceeded
+        values = self._limits.values(rows, self._platform.solve(rows))
+        kept[kept] = ~self._limits.exceeded(values, len(rows))
         return kept
 
     def parts(self, name: str, leg: int, curve: _Curve, crossings: Array,
@@ -197,11 +179,12 @@ class _Plane:
 
     def too_near(self) -> Iterator[Boundary]:
         """Yield the boundary at which legs are too near, in the range that other limits leave."""
-        if self._clearance is None:
+        clearance = self._limits.clearance
+        if clearance is None:
             return
         for piece in self._edges(self.clear):
             if self.within(piece).all() and self.regular(piece).all():
-                leg = int(self._clearance(self._rows(piece[:1]))[0].argmin())
+                leg = int(clearance(self._rows(piece[:1]))[0].argmin())
                 yield Boundary(short_name(CLEARANCE_MIN), leg, piece)
 
     def _edges(self, kept: Callable[[Array], Flags]) -> Iterator[Array]:

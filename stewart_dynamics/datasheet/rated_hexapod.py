@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,12 +25,11 @@ from stewart_dynamics.capability.capability import Capability, Extent
 from stewart_dynamics.capability.reachable import Reachable
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
-from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
-from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
-from stewart_dynamics.mechanics.limits import (
-    angle_values, CLEARANCE_MIN, LIMITS, Limits, result_values)
-from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, FORCE_MAX, LIMITS
+from stewart_dynamics.mechanics.pose_limits import PoseLimits
+from stewart_dynamics.mechanics.rows import CONDITION, FORCES
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import (
     inertia_matrix, LEG_SHAPE, Parameters, PLATFORM_OUTLINE)
@@ -130,22 +129,19 @@ class RatedHexapod:
 
     def _check(self, whole: StewartPlatform, pose: Pose) -> None:
         """Raise where a limit is exceeded at the pose already."""
-        result = whole.inverse_dynamics(Motion.from_pose(pose), singular='nan')
-        stop = stop_condition_of(self.given)
-        if not result.condition_number < stop:
+        known, motions = PoseLimits(self.given), motion_rows(pose)
+        results = whole.solve(motions)
+        condition, stop = float(results[0, CONDITION]), known.stop_condition
+        if not condition < stop:
             raise SingularityError(
-                f'pose: singular: the condition number of J_inv is {result.condition_number:.6g}, '
+                f'pose: singular: the condition number of J_inv is {condition:.6g}, '
                 f'must be less than singularity.stop_condition, {stop:g}')
-        limits = Limits(self.given)
-        found: Any = limits.exceeded(result_values(*(tuple(each.tolist()) for each in (
-            result.lengths, result.rates, result.forces))))
-        if not found and limits.of_joints:
-            found = limits.exceeded(angle_values(np.concatenate(
-                whole.joint_angles(pose)).tolist()))
-        clearances = clearance_to_check(self.given)
-        if not found and clearances is not None:
-            distances, nearest = clearances.nearest(Motion.from_pose(pose).rows[None])
-            found = limits.exceeded({CLEARANCE_MIN: distances[0].tolist()}, nearest[0].tolist())
+        values = {**known.values(motions, results), FORCE_MAX: results[:, FORCES]}
+        found = known.limits.exceeded({name: each[0].tolist() for name, each in values.items()})
+        if not found and known.clearance is not None:
+            clearances, nearest = known.clearance.nearest(motions)
+            found = known.limits.exceeded(
+                {CLEARANCE_MIN: clearances[0].tolist()}, nearest[0].tolist())
         if found:
             raise PoseError(f'pose: {found[0].words(self.joints)}')
 

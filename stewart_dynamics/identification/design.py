@@ -27,7 +27,7 @@ doi:10.1007/978-3-540-87700-4_30). Equal seeds give equal results.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 import math
 from typing import Any, NamedTuple
 
@@ -39,14 +39,13 @@ from stewart_dynamics.identification.identification_options import DesignOptions
 from stewart_dynamics.identification.unknowns import regression, Unknowns
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
-from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, MINIMA, OF_JOINTS, OF_RESULTS,
+    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, MINIMA, OF_JOINTS, OF_RESULTS,
     VELOCITY_MAX)
+from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, FORCES, LENGTHS, MOTION, POSE, POSITION, RATES, ROTATION)
+    CONDITION, FORCES, MOTION, POSE, POSITION, RATES, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.motion import motion_at
@@ -87,11 +86,10 @@ class DesignLimits:
         self.center: Array = np.array(center, dtype=float)  # X Y Z alpha beta gamma
         self._rotation = from_euler(self.center[3:]).ravel()
         self._bounds = _bounds(p)
-        self._of_joints = tuple(name for name in OF_JOINTS if name in self._bounds)
-        self._angles, self._clearance = angles_to_check(p, self._of_joints), clearance_to_check(p)
+        self._limits = PoseLimits(p)
         row = np.zeros((1, 1, MOTION))
         row[..., POSE] = *self.center[:3], *self._rotation
-        self._there = {name: values[0, 0] for name, values in self._values(row)}
+        self._there = {name: values[0, 0] for name, values in self._values(row).items()}
         for name, there in self._there.items():
             bound = self._bounds[name]
             if np.any(there <= bound if name in MINIMA else there >= bound):
@@ -117,7 +115,7 @@ class DesignLimits:
         """Return the fraction (M,) of the range from the center to each bound that is used."""
         parts = {
             name: (values - self._there[name]) / (self._bounds[name] - self._there[name])
-            for name, values in self._values(rows)}
+            for name, values in self._values(rows).items()}
         if self._amplitude is not None:
             moved = np.linalg.norm(rows[..., POSITION] - self.center[:3], axis=-1)
             turned = self._size * np.linalg.norm(
@@ -125,21 +123,17 @@ class DesignLimits:
             parts['--amplitude'] = np.maximum(moved, turned)[..., None] / self._amplitude
         return {name: part.max(axis=(1, 2)) for name, part in parts.items()}
 
-    def _values(self, rows: Array) -> Iterator[tuple[str, Array]]:
-        """Yield the values (M, N, ...) that each limit bounds, for motions (M, N, MOTION)."""
-        flat, shape = rows.reshape(-1, MOTION), rows.shape[:2]
-        results = self._platform.solve(flat).reshape(*shape, -1)
-        yield LENGTH_MIN, results[..., LENGTHS]
-        yield LENGTH_MAX, results[..., LENGTHS]
-        yield VELOCITY_MAX, np.abs(results[..., RATES])
-        yield FORCE_MAX, np.abs(results[..., FORCES])
-        yield _WARN_CONDITION, results[..., CONDITION, None]
-        if self._angles:
-            angles = self._angles(flat).reshape(*shape, -1)
-            for name in self._of_joints:
-                yield name, angles[..., ANGLES[name]]
-        if self._clearance:
-            yield CLEARANCE_MIN, self._clearance(flat).min(axis=-1).reshape(*shape, 1)
+    def _values(self, rows: Array) -> dict[str, Array]:
+        """Return the values (M, N, ...) that each limit bounds, for motions (M, N, MOTION)."""
+        motions = rows.reshape(-1, MOTION)
+        results = self._platform.solve(motions)
+        found = {**self._limits.values(motions, results),
+                 VELOCITY_MAX: np.abs(results[:, RATES]), FORCE_MAX: np.abs(results[:, FORCES]),
+                 _WARN_CONDITION: results[:, CONDITION, None],
+                 **self._limits.clearances(motions)}
+        if CLEARANCE_MIN in found:
+            found[CLEARANCE_MIN] = found[CLEARANCE_MIN].min(axis=1, keepdims=True)
+        return {name: values.reshape(*rows.shape[:2], -1) for name, values in found.items()}
 
 
 def _bounds(p: Parameters) -> dict[str, Any]:
