@@ -41,7 +41,7 @@ from stewart_dynamics.external_wrench.measured_legs import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, TURNED)
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    COULOMB_FRICTION, PLATFORM, VISCOUS_FRICTION)
+    BODY_UNITS, COULOMB_FRICTION, PLATFORM, VISCOUS_FRICTION)
 from stewart_dynamics.mechanics.rows import ACCELERATION, FORCES, LENGTHS
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
@@ -81,7 +81,6 @@ _LEAST_SCALE, _MOST_SCALE = 0.1, 10.0
 
 NAMES = ('mass', *(f'center of mass {axis}' for axis in 'xyz'),
          *(f'inertia {axes}' for axes in table.INERTIA))
-UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
 
 
 class Payload(NamedTuple):
@@ -304,10 +303,10 @@ def _outcome(payload: Payload) -> PayloadOutcome:
 def _words(payload: Payload) -> str:
     """Return the identified numbers, the others' names and the parameters to set, in one line."""
     fitted, more = payload.fitted, payload.fitted.body.mass - payload.given.mass
-    known = [f'{name} {with_interval(value, half)} {unit}' for name, unit, value, half, is_known
-             in zip(NAMES, UNITS, numbers_of(fitted.body), fitted.half_widths, fitted.known,
-                    strict=True) if is_known]
-    unknown = [name for name, is_known in zip(NAMES, fitted.known, strict=True) if not is_known]
+    rows = rows_of(fitted)
+    known = [f'{name} {with_interval(value, half)} {unit}'
+             for name, unit, value, half, is_known in rows if is_known]
+    unknown = [name for name, *_, is_known in rows if not is_known]
     text = (f'{", ".join(known)}; platform.mass {more:+.6g} kg; from '
             f'{payload.seconds:.1f} s')
     text += _excluded(payload.excluded)
@@ -335,6 +334,12 @@ def _parameters(body: Body) -> str:
                        for values in (body.center, body.inertia))
     return (f'{{mass: {float(f"{body.mass:.6g}")}, center_of_mass: [{center}], '
             f'inertia: [{inertia}]}}')
+
+
+def rows_of(fitted: FittedBody) -> list[tuple[str, str, float, float, bool]]:
+    """Return name, unit, value, half of the interval, and whether it is known, of each number."""
+    return list(zip(NAMES, BODY_UNITS, numbers_of(fitted.body), fitted.half_widths.tolist(),
+                    fitted.known.tolist(), strict=True))
 
 
 def numbers_of(body: Body) -> list[float]:

@@ -34,9 +34,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, FIRST_MOMENT,
-    LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS,
-    PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
+    about_origin, BODY_UNITS, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND,
+    FIRST_MOMENT, LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST,
+    PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
 from stewart_dynamics.mechanics.kinematics.home_pose import turns_about
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
@@ -45,7 +45,6 @@ from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
 # Platform parameters as defined in the parameter file.
 _PLATFORM = ('platform.mass', *(f'platform.center_of_mass.{axis}' for axis in 'xyz'),
              *(f'platform.inertia.{axes[1:]}' for axes in table.INERTIA))
-_PLATFORM_UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
 MASS, CENTER, INERTIA = slice(0, 1), slice(1, 4), slice(4, 10)
 PLATFORM = 10
 
@@ -151,7 +150,7 @@ class Unknowns:
         names = names_of(p)
         self.names = (
             *(_PLATFORM[n] for n in self._platform), *(names[n] for n in legs), *of_tilt)
-        self.units = (*(_PLATFORM_UNITS[n] for n in self._platform), *(UNITS[n] for n in legs),
+        self.units = (*(BODY_UNITS[n] for n in self._platform), *(UNITS[n] for n in legs),
                       *len(of_tilt) * ['rad'])
         self._of_file: Array = np.concatenate([
             [p['platform.mass']], p['platform.center_of_mass'], p['platform.inertia']])

@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
-from stewart_dynamics.setpoints.step import Batch
+from stewart_dynamics.setpoints.step import Batch, restarts_of
 
 # Poses in a window.
 WINDOW = 4096
@@ -273,12 +273,10 @@ class Differentiator:
     def _followed(self, given: Batch, motions: Array, followed: Flags) -> Batch:
         """Leave out setpoints that the spline could not follow; keep a restart among them."""
         self.left_out.update({TOO_FAST: n} if (n := int(np.count_nonzero(~followed))) else {})
-        jumps = np.cumsum(given.restarts) + self._restart
-        kept = jumps[followed]
-        self._restart = bool(jumps[-1] > (kept[-1] if len(kept) else 0))
+        restarts, self._restart = restarts_of(given.restarts, followed, self._restart)
         if n:
             given, motions = given.chosen(followed), motions[followed]
-        return given._replace(motions=motions, restarts=np.diff(kept, prepend=0) > 0)
+        return given._replace(motions=motions, restarts=restarts)
 
 
 def _vector_of_quotient(a: Array, b: Array) -> Array:

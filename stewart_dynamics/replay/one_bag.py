@@ -54,7 +54,7 @@ from stewart_dynamics.setpoints import base_wrench, inputs, step
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection, stamp_of
-from stewart_dynamics.setpoints.step import Batch, State, Step
+from stewart_dynamics.setpoints.step import Batch, restarts_of, State, Step
 from stewart_dynamics.whole_file import write_json
 
 VERSION = 1  # version of summary.json; increased when the meaning of a key changes
@@ -269,15 +269,11 @@ class _Run:
         if self._restarting:
             setpoints.restarts[0] = True
         outputs = self._step.many(setpoints, self._state)
-        restarts = np.cumsum(setpoints.restarts)
-        restarts_answered = restarts[outputs.answered]
+        restarts, self._restarting = restarts_of(setpoints.restarts, outputs.answered)
         rejected = len(setpoints.stamps) - len(outputs.stamps)
         if rejected:
             self._setpoints.reject('setpoint', OUT_OF_RANGE, '', rejected)
-            # A restart applies to the next setpoint that is answered.
-            setpoints = setpoints.chosen(outputs.answered)._replace(
-                restarts=np.diff(restarts_answered, prepend=0) > 0)
-        self._restarting = bool(restarts[-1] > restarts_answered.max(initial=0))
+            setpoints = setpoints.chosen(outputs.answered)._replace(restarts=restarts)
         if not len(setpoints.stamps):
             return 0
         self._state = outputs.state

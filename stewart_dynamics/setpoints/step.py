@@ -135,6 +135,19 @@ class Batch(NamedTuple):
         return Batch._make(None if part is None else part[which] for part in self)
 
 
+def restarts_of(restarts: Flags, kept: Flags, waiting: bool = False) -> tuple[Flags, bool]:
+    """
+    Return the restarts of those setpoints (N,) that are kept, and whether one waits for the next.
+
+    A restart that is left out passes to the next setpoint that is kept; one was already waiting
+    or not. ``DynamicsNode`` and ``published_forces`` do so setpoint by setpoint.
+    """
+    counts = np.cumsum(restarts) + waiting
+    of_kept = counts[kept]
+    return (np.diff(of_kept, prepend=0) > 0,
+            bool(counts[-1] > (of_kept[-1] if len(of_kept) else 0)))
+
+
 class Outputs(NamedTuple):
     """Results of the step for the N setpoints of a batch that could be answered."""
 
@@ -339,9 +352,8 @@ class Step:
         answered, forces, exceeding = outputs.answered, outputs.forces, outputs.exceeding
         motions, restarts = setpoints.motions, setpoints.restarts
         if not answered.all():
-            # If one cannot be answered, the next one is the restart.
             motions = motions[answered]
-            restarts = np.diff(np.cumsum(restarts)[answered], prepend=0) > 0
+            restarts, _ = restarts_of(restarts, answered)
         none: Array = np.empty((len(forces), 0))
         angles = none if self._angles is None else self._angles(motions)
         clearances = none if self._clearance is None else self._clearance(motions)

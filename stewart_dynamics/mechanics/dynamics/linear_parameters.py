@@ -60,6 +60,8 @@ _OF_ACTUATORS = {'actuator.reflected_mass': REFLECTED_MASS,
                  'actuator.viscous_friction': VISCOUS_FRICTION,
                  'actuator.coulomb_friction': COULOMB_FRICTION}
 
+# Units of a body as a parameter file has it: mass, center of mass, inertia about it.
+BODY_UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
 # The unit of each parameter.
 UNITS = (*_OF_PLATFORM.values(), *(unit for unit in _OF_LEGS.values() for _ in range(6)))
 

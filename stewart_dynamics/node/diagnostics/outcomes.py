@@ -27,8 +27,7 @@ import math
 
 from stewart_dynamics.external_wrench.estimate import Estimate, Overload
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
-from stewart_dynamics.external_wrench.payload import (
-    NAMES, numbers_of, Payload, PayloadOutcome, UNITS)
+from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome, rows_of
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
 from stewart_dynamics.parameters.table import Parameters
@@ -205,9 +204,7 @@ class PayloadDiagnostics(_OutcomeDiagnostics):
 
 def _values_of(payload: Payload) -> Values:
     fitted, values = payload.fitted, []
-    for name, unit, value, half, known in zip(
-            NAMES, UNITS, numbers_of(fitted.body), fitted.half_widths, fitted.known,
-            strict=True):
+    for name, unit, value, half, known in rows_of(fitted):
         values.append((f'{name} ({unit})', f'{value:.6g}'))
         values.append((f'{name}, half of the 95 % interval ({unit})',
                        f'{half:.3g}' if known else 'not identified'))
