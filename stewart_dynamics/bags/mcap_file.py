@@ -99,8 +99,8 @@ def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> N
         and end, see Scan.
     """
     count = at = 0
-    while at + 9 <= len(data):
-        opcode, begin, length = np.int64(data[at]), at + 9, _integer(data, at + 1, 8)
+    while at + HEAD <= len(data):
+        opcode, begin, length = np.int64(data[at]), at + HEAD, _integer(data, at + 1, 8)
         # Fields up to this offset are read.
         needed = 22 if opcode == 5 else 6 if opcode == 7 else 2 if opcode in (3, 4) else 0
         if opcode > 12 or not totals[0] >> opcode & 1 or begin + needed > len(data) or not (

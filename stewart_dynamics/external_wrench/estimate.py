@@ -58,13 +58,14 @@ from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import (
-    BASE, consecutive, FORCES, MOTION, NO_BASE, RESULT, WRENCH)
+    BASE, consecutive, FORCES, MOTION, NO_BASE, PARTS_OF_WRENCH, RESULT, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import cross
 from stewart_dynamics.parameters.table import Parameters
 
 # Under the node's name.
 EXTERNAL_WRENCH = 'external_wrench'
+LIMITS = {f'{EXTERNAL_WRENCH}.{part}_max': part for part in PARTS_OF_WRENCH}
 
 # The outcome of a measurement, besides the codes of forward_kinematics.
 _OUT_OF_RANGE = 3
@@ -93,7 +94,7 @@ class Measurement(NamedTuple):
 class Overload(NamedTuple):
     """A threshold that the external wrench exceeds."""
 
-    limit: str
+    limit: str  # one of LIMITS
     value: float
     bound: float
 
@@ -218,8 +219,8 @@ class ExternalWrench:
         self._numbers[_PLATFORM] = StewartPlatform(parameters).constants
         self._longest_gap = round(parameters['setpoint.timeout'] * SECOND)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
-        self._most_force, self._most_moment = (
-            parameters[f'{EXTERNAL_WRENCH}.{limit}'] for limit in ('force_max', 'moment_max'))
+        self._bounds = [(limit, part, parameters[limit]) for limit, part in LIMITS.items()
+                        if parameters[limit] is not None]
 
     def __call__(self, measurement: Measurement, before: Estimate | None, known: Six,
                  target: Sequence[float] | None, base: tuple[float, ...] = NO_BASE) -> Estimate:
@@ -288,10 +289,10 @@ class ExternalWrench:
                 for position, rotation in zip(*homes(self._parameters), strict=True)]
 
     def _overloads(self, estimate: Estimate) -> Iterator[Overload]:
-        for limit, value, bound in (('force_max', estimate.force, self._most_force),
-                                    ('moment_max', estimate.moment, self._most_moment)):
-            if bound is not None and value > bound:
-                yield Overload(f'{EXTERNAL_WRENCH}.{limit}', value, bound)
+        for limit, part, bound in self._bounds:
+            value = getattr(estimate, part)
+            if value > bound:
+                yield Overload(limit, value, bound)
 
 
 def _error(measurement: Measurement, result: tuple[float, ...],

@@ -33,8 +33,9 @@ LINEAR_ACCELERATION, ANGULAR_ACCELERATION = slice(18, 21), slice(21, 24)
 ACCELERATION = slice(18, 24)
 MOTION = 24
 
-# A row of a wrench: force and moment.
+# A row of a wrench: force and moment, and their units.
 WRENCH = 6
+PARTS_OF_WRENCH = {'force': 'N', 'moment': 'N m'}
 
 # A row of a base's motion, base axes. One of nan adds no load: the base is still, or its motion is
 # not known.

@@ -38,13 +38,13 @@ from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.limits import (
     CLEARANCE_MIN, LIMITS, OF_JOINTS, QUANTITIES, Quantity)
 from stewart_dynamics.mechanics.rows import (
-    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE, POSITION,
-    ROTATION)
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, PARTS_OF_WRENCH,
+    POSE, POSITION, ROTATION)
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
-from stewart_dynamics.replay.summary import Answered, margin_key, PARTS, unit_key
+from stewart_dynamics.replay.summary import Answered, margin_key, unit_key
 from stewart_dynamics.reporting.colors import FORCE_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
@@ -157,7 +157,7 @@ class Report:
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
             date=date(summary['setpoints']['first_stamp_ns']), quantities=QUANTITIES,
             units={name: each.unit or '' for name, each in PARAMETERS.items()},
-            most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS,
+            most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
             unit_key=unit_key,
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})

@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.arrays import Array, Bytes, SECOND, Stamps
-from stewart_dynamics.bags.mcap_file import MAGIC
+from stewart_dynamics.bags.mcap_file import HEAD, MAGIC
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.model import JOINT_STATES, LinkTransforms, MODEL_TYPES, TF
 from stewart_dynamics.description.urdf import urdf
@@ -166,7 +166,7 @@ class OutputBag:
                 ('opcode', 'u1'), ('length', '<u8'), ('channel', '<u2'), ('sequence', '<u4'),
                 ('logged', '<u8'), ('published', '<u8'), ('data', messages.dtype)])
             records['opcode'] = int(Opcode.MESSAGE)
-            records['length'] = records.dtype.itemsize - 9
+            records['length'] = records.dtype.itemsize - HEAD
             records['channel'] = channel
             records['sequence'] = 0
             records['logged'] = records['published'] = times[which]
@@ -225,7 +225,7 @@ class OutputBag:
         at = self._file.tell()
         # Like mcap's Chunk, without two copies of the content.
         self._file.write(_CHUNK_HEAD.pack(
-            Opcode.CHUNK, _CHUNK_HEAD.size - 9 + len(content), begin, end, len(content),
+            Opcode.CHUNK, _CHUNK_HEAD.size - HEAD + len(content), begin, end, len(content),
             zlib.crc32(content.data), 0, len(content)))
         self._file.write(content.data)
         behind = self._file.tell()

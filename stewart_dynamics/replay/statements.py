@@ -29,8 +29,9 @@ from typing import Any, NamedTuple
 from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, CLIPPED, Exceedance, LENGTH_MAX, PLATFORM_ANGLE_MAX, QUANTITIES, SPEED_MAX,
     TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
+from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.replay.motor_loads import NEEDS
-from stewart_dynamics.replay.summary import margin_key, PARTS, unit_key
+from stewart_dynamics.replay.summary import margin_key, unit_key
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
 
 Summary = Mapping[str, Any]  # the content of summary.json
@@ -204,7 +205,7 @@ def _angle(radians: float) -> str:
 
 
 def _loads(found: Summary) -> Iterator[Statement]:
-    for name, unit in PARTS.items():
+    for name, unit in PARTS_OF_WRENCH.items():
         each, key = found[name], unit_key(unit)
         if each[f'peak_{key}'] is not None:
             rms = '-' if each[f'rms_{key}'] is None else f'{each[f"rms_{key}"]:.1f}'

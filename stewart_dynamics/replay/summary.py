@@ -32,6 +32,7 @@ from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA,
     OF_RESULTS, QUANTITIES, Quantity, result_values, VELOCITY_MAX)
+from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.motor_loads import MotorLoads
@@ -44,10 +45,9 @@ _OF_VELOCITY = (
     'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
     'power_mean_w', 'energy_driving_j', 'energy_braking_j')
 _AT_REST = ('gravity', 'wrench', 'base motion')
-# Units of the parts of a wrench, and of their components.
-PARTS = {'force': 'N', 'moment': 'N m'}
-COMPONENTS = {f'{part}_{axis}': unit for part, unit in PARTS.items() for axis in 'xyz'}
-_BASE_WRENCH = PARTS | COMPONENTS
+# Units of the components of a wrench.
+COMPONENTS = {f'{part}_{axis}': unit for part, unit in PARTS_OF_WRENCH.items() for axis in 'xyz'}
+_BASE_WRENCH = PARTS_OF_WRENCH | COMPONENTS
 
 
 def margin_key(quantity: Quantity) -> str:

@@ -25,19 +25,18 @@ from collections import Counter
 from collections.abc import Sequence
 import math
 
-from stewart_dynamics.external_wrench.estimate import Estimate, Overload
+from stewart_dynamics.external_wrench.estimate import Estimate, LIMITS, Overload
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome, rows_of
+from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.messages import PlannedOutcome
 
-_QUANTITIES = {'external_wrench.force_max': ('force', 'N'),
-               'external_wrench.moment_max': ('moment', 'N m')}
 _OVERLOAD = 'overload'  # a cause of a level
-_COMPONENTS = ('force x (N)', 'force y (N)', 'force z (N)', 'moment x (N m)', 'moment y (N m)',
-               'moment z (N m)')
+_COMPONENTS = [f'{part} {axis} ({unit})'
+               for part, unit in PARTS_OF_WRENCH.items() for axis in 'xyz']
 _LONG = 2.0  # duration of a task above which it is logged [s]
 
 
@@ -109,8 +108,8 @@ class ExternalWrenchDiagnostics(StatusPart):
     def _numbers(self, estimate: Estimate) -> Values:
         values = []
         if estimate.wrench is not None and estimate.differences is not None:
-            values = [('force (N)', f'{estimate.force:.6g}'),
-                      ('moment (N m)', f'{estimate.moment:.6g}'),
+            values = [*((f'{part} ({unit})', f'{getattr(estimate, part):.6g}')
+                        for part, unit in PARTS_OF_WRENCH.items()),
                       *((key, f'{value:.6g}') for key, value in zip(
                           _COMPONENTS, estimate.wrench, strict=True))]
             force, leg = max(zip(estimate.differences, self._joints, strict=True),
@@ -132,7 +131,8 @@ def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, flo
 
 
 def _words(overload: Overload) -> str:
-    quantity, unit = _QUANTITIES[overload.limit]
+    quantity = LIMITS[overload.limit]
+    unit = PARTS_OF_WRENCH[quantity]
     return (f'{quantity} {overload.value:.6g} {unit} is {overload.value - overload.bound:.6g} '
             f'{unit} above {overload.limit}')
 
