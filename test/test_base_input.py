@@ -36,7 +36,7 @@ from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.setpoint import imu, layout_of
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import (
-    BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, POSE, WRENCH)
+    BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, LARGEST, POSE, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (
     MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE, TOO_OLD, TWICE,
@@ -235,6 +235,12 @@ def test_invalid_samples_are_rejected_and_the_last_one_holds(
     assert known(feed.row(SECOND + 3 * MS))
 
 
+def test_the_largest_number_is_used() -> None:
+    feed = Feed('motion')
+    feed.sample(SECOND, LARGEST)
+    assert known(feed.row(SECOND)) and not feed.counts
+
+
 @pytest.mark.parametrize(('given', 'reasons'), [
     ([{'frame': 'camera', 'covariances': (0.0, -1.0, 0.0)}, {'frame': 'imu'}], [NOT_MEASURED]),
     ([{'frame': frame} for frame in ('', 'imu', '', 'imu', 'other')], [WRONG_FRAME]),
@@ -374,6 +380,7 @@ def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPa
                      for part in (given[:103], given[103:])]
         assert all(map(np.any, map(np.isfinite, bases)))
         assert not feed.said
+        messages.check_many(Feed(source), Feed(source), given, TOPICS, [103])
 
 
 # The IMU's angular acceleration: what docs/moving_base.md states

@@ -67,7 +67,8 @@ def test_blocks_sum_to_the_whole() -> None:
     np.testing.assert_allclose(parts.matrix, whole.matrix, rtol=1e-12)
     x = solve(whole, np.zeros(4), SCALES).values
     residuals = (efforts - regressor @ x) / SIGMAS
-    assert whole.residual_squares(x) == pytest.approx(float(np.sum(residuals ** 2)), rel=1e-9)
+    for each in (whole, parts):
+        assert each.residual_squares(x) == pytest.approx(float(np.sum(residuals ** 2)), rel=1e-9)
 
 
 def test_weight_zero_leaves_out() -> None:

@@ -166,6 +166,16 @@ def test_clearance_from_a_plate_is_the_least_distance_of_the_hulls(seed: int) ->
             assert nearest[n, leg] == (BASE, PLATFORM)[int(values[2] < values[1])]
 
 
+def test_a_leg_that_pierces_a_plate_overlaps_by_its_radius() -> None:
+    p, pose = upright(0.0)
+    plate = np.array([[5.0, 5.0, 0.0], [-5.0, 5.0, 0.0], [-5.0, -5.0, 0.0], [5.0, -5.0, 0.0]])
+    for name, height, radius in ((OUTLINES[0], 0.85, 0.02), (OUTLINES[1], -0.65, 0.04)):
+        found, nearest = LegClearance(p.replaced({name: (plate + [0.0, 0.0, height]).ravel()})
+                                      ).nearest(Motion.from_pose(pose).rows[None])
+        assert found == pytest.approx(np.full((1, 6), -radius), abs=1e-15)
+        assert (nearest == (BASE if name == OUTLINES[0] else PLATFORM)).all()
+
+
 @pytest.mark.parametrize(('corners', 'words'), [
     ([0.0] * 6, 'must have three corners or more'),
     ([0.0] * 4, 'must have 3 n entries, has 4'),

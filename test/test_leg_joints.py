@@ -116,14 +116,18 @@ def test_within_the_limits_of_a_hexapod_all_legs_stay_away_from_the_singular_dir
 
 def test_upright_legs_have_a_mount_of_their_own_place():
     ring = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi / 3])
-    p = Parameters({'geometry.base_joints': ring, 'geometry.platform_joints': ring,
-                    'geometry.zero_length': 1.0, 'platform.mass': 1.0,
-                    'platform.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]})
-    joints = TreeJoints(p)
-    assert joints.mounts[:, :, 2] == pytest.approx(np.tile(Z, (6, 1)))
-    assert joints.mounts[:, :, 0] == pytest.approx(np.cross(Z, ring))  # tangential
-    motion = random_motion(p, rng(), 1)[0]
-    assert gaps(p, motion, joints.of_sample(motion.rows.tolist()), joints) < CLOSED
+    for off in (0.0, 8e-4):  # nearly upright legs, too
+        p = Parameters({'geometry.base_joints': ring, 'geometry.platform_joints': ring + off * X,
+                        'geometry.zero_length': 1.0, 'platform.mass': 1.0,
+                        'platform.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]})
+        joints = TreeJoints(p)
+        assert joints.mounts[:, :, 2] == pytest.approx(np.tile(Z, (6, 1)), abs=off + 1e-15)
+        tangents = np.cross(Z, ring)
+        assert joints.mounts[:, :, 0] == pytest.approx(tangents, abs=off + 1e-15)
+        assert joints.mounts @ joints.mounts.swapaxes(1, 2) == pytest.approx(
+            np.tile(np.eye(3), (6, 1, 1)), abs=1e-15)
+        motion = random_motion(p, rng(), 1)[0]
+        assert gaps(p, motion, joints.of_sample(motion.rows.tolist()), joints) < CLOSED
 
 
 def test_the_prismatic_joint_has_the_name_and_position_of_the_leg():

@@ -300,6 +300,21 @@ def test_a_mistake_is_reported_once(name: str) -> None:
     assert name != 'one base joint in mm' or not any('another order' in each for each in found)
 
 
+@pytest.mark.parametrize('size', [0.1, 1.0])
+def test_an_inertia_about_the_origin_of_the_base_is_found_wherever_the_platform_frame_is(
+        size: float) -> None:
+    words = (f'and the base is {1.3 * size:.3g} m from the center of mass at home: about the '
+             "base's origin?")
+    for height in (0.0, 0.4 * size, -0.3 * size):
+        up = np.array([0.0, 0.0, height])
+        found = likely_mistakes(Parameters({
+            'geometry.base_joints': size * BASE, 'geometry.platform_joints': size * TOP + up,
+            'geometry.zero_length': 1.3 * size, 'platform.mass': 150.0 * size ** 3,
+            'platform.center_of_mass': size * PLATFORM['platform.center_of_mass'] + up,
+            'platform.inertia': size ** 5 * OF_BASE}))
+        assert any(words in each for each in found), found
+
+
 # The platform joints of this hexapod are 0.6 m from their center, the base joints 0.9 m.
 @pytest.mark.parametrize('gyration, words', [
     (26.0, ''), (28.0, 'in g mm^2 or kg mm^2?'), (0.6 / 190.0, ''), (0.6 / 210.0, 'scaled twice')])
@@ -478,6 +493,21 @@ def test_a_wrong_digit_that_moves_a_joint_a_little_is_found(table, off):
         assert odd.expected == pytest.approx(good[joint], abs=3e-4)
 
 
+@pytest.mark.parametrize('joint', range(6))
+@pytest.mark.parametrize('axis', range(2))
+def test_a_wrong_sign_among_mirror_images_is_found(joint: int, axis: int) -> None:
+    angles, radii = np.deg2rad([10.0, -10.0, 80.0, -80.0, 160.0, -160.0]), [0.9, 0.7, 1.1]
+    good = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
+    good = (good * np.repeat(radii, 2)[:, None])[:, [axis, 1 - axis, 2]]
+    joints = good.copy()
+    joints[joint, axis] *= -1.0  # mirrored at the axis that the mirror images leave alone
+    odd = odd_joint(joints)
+    assert odd is not None and 'mirror images' in odd.symmetry
+    assert odd.joint // 2 == joint // 2  # either of the pair may be wrong
+    image = joints[odd.joint ^ 1] * np.where(np.arange(3) == 1 - axis, -1.0, 1.0)
+    assert odd.expected == pytest.approx(image, abs=1e-12)
+
+
 @pytest.mark.parametrize('error', [0.0, 1e-9, 1e-4, 1e-2])
 @pytest.mark.parametrize('table', TABLES)
 def test_symmetric_and_calibrated_hexapods_have_no_odd_joint(table, error):
@@ -567,6 +597,8 @@ def test_a_good_drive_gives_no_warning() -> None:
     ({'drive__motor_inertia': None}, 'drive.motor_inertia: missing', 'without inertia'),
     ({'drive__screw_inertia': 0.6}, 'drive.screw_inertia: 0.6 kg m^2 is 0.15 kg m^2 at the motor',
      'at another shaft?'),
+    ({'drive__gear_ratio': [4.0] * 5 + [1.0], 'drive__screw_inertia': [2.0] * 5 + [0.3]},
+     'drive.screw_inertia: 0.3 kg m^2 is 0.3 kg m^2 at the motor', 'at another shaft?'),
     ({'drive__speed_max': 6700.0}, 'drive.speed_max: 6700 rad/s, 63980 rpm', 'in rpm?'),
     ({'drive__torque_speed': [0.0, 6.0, 6700.0, 4.0]}, 'drive.torque_speed: 6700', 'in rpm?'),
     ({'drive__torque_max': 0.06, 'drive__torque_continuous': None, 'drive__torque_speed': None,

@@ -29,7 +29,7 @@ import pytest
 from referees import (
     random_motion, random_parameters, random_wrench, rng, ROOT)
 
-from stewart_dynamics import Motion, MotionError, Pose, StewartPlatform
+from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.mechanics.single_sample import SingleSample
 
@@ -144,6 +144,7 @@ def test_arguments_of_other_types_are_converted(
     lambda p, m: p.inverse_dynamics(m, singular='skip'),
     lambda p, m: p.inverse_dynamics(m.pose),
     lambda p, m: p.inverse_dynamics(None),
+    lambda p, m: p.inverse_dynamics(m, base=BaseMotion.of_rows(np.full(12, np.nan))),
     lambda p, m: p.forward_dynamics(m, np.full(6, np.nan)),
     lambda p, m: p.forward_dynamics(m, None),
     lambda p, m: p.forward_dynamics(m, np.zeros(6), np.full(6, -np.inf)),

@@ -100,8 +100,9 @@ def test_other_types_in_place_of_a_platform_are_rejected(given: Any) -> None:
 def test_the_error_about_a_pose_in_place_of_a_motion_says_how_to_make_one(
         platform: StewartPlatform) -> None:
     pose = Pose([0.0, 0.0, 1.0], np.eye(3))
-    with pytest.raises(MotionError, match='must be a Motion; Motion.from_pose makes one at rest'):
-        platform.inverse_dynamics(pose)
+    for call in (platform.inverse_dynamics, platform.inverse_jacobian_rate, platform.motors):
+        with pytest.raises(MotionError, match='be a Motion; Motion.from_pose makes one at rest'):
+            call(pose)
 
 
 # Singular samples

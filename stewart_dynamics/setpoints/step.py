@@ -41,7 +41,7 @@ from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
     RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import (
-    CAUSE, Singularity, STATE, STOPPED, thresholds, TIME, UNSOLVABLE_CONDITION)
+    CAUSE, Singularity, STATE, thresholds, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
@@ -210,11 +210,6 @@ class Outputs(NamedTuple):
     def warnings(self) -> Flags:
         """(N,): the singularity warning is on."""
         return self.states[:, CAUSE] > 0.0
-
-    @property
-    def stopped(self) -> Flags:
-        """(N,): inside stop_condition."""
-        return self.states[:, STOPPED] > 0.0
 
 
 # Layout of one setpoint in memory, inputs and results: packing is faster than passing arrays.
