@@ -84,8 +84,8 @@ def test_files_and_page(table: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     # Results are replaced on request alone.
     assert main(arguments) == 2
     assert 'exists already' in capsys.readouterr().err
-    assert main([*arguments, '--force', '--no-report', '--fixed', 'zero_length']) == 0
-    assert not (output / 'report.html').exists()
+    assert main([*arguments, '--force', '--fixed', 'zero_length']) == 0
+    assert (output / 'report.html').read_text().count('<td class="none">fixed</td>') == 6
 
 
 def test_units_and_angles(table: Path, tmp_path: Path) -> None:

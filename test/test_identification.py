@@ -142,9 +142,12 @@ def test_at_rest_only_the_weight_is_identifiable(identified: Callable[..., Any],
 
 
 def test_rotation_about_one_axis_identifies_the_inertia_about_it(
-        identified: Callable[..., Any]) -> None:
+        identified: Callable[..., Any], tmp_path: Path) -> None:
     # I n for n = (1, 1, 0) is identifiable: each of its components is a sum of two elements of I.
-    _, result, out, _ = identified('diagonal', '--no-report')
+    _, result, out, _ = identified('diagonal')
+    page = (tmp_path / 'found' / 'report.html').read_text()
+    assert page.count('>only in a combination</td>') == 5
+    assert page.count('>kept: not identifiable</td>') == 1
     states = values_of(result, 'state')
     assert states['platform.inertia.zz'] == 'not_identifiable'
     assert {name for name, state in states.items() if state == 'in_combination'} == {

@@ -189,8 +189,8 @@ def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
     def named(state: str) -> list[str]:
         return grouped([each['name'] for each in result['parameters'] if each['state'] == state])
 
-    return {'parameters': [drawn(each) for each in result['parameters']],
-            'without_value': WITHOUT_VALUE,
+    return {'parameters': [{**drawn(each), 'without_value': WITHOUT_VALUE.get(each['state'])}
+                           for each in result['parameters']],
             'combinations': [drawn(each) for each in result['combinations']],
             'identified': sum(each['state'] == IDENTIFIED for each in result['parameters']),
             'combined': named(IN_COMBINATION), 'not_identifiable': named(NOT_IDENTIFIABLE)}
