@@ -128,6 +128,15 @@ class Identified(NamedTuple):
     lack_of_fit: LackOfFit | None  # None if the residuals are noise
 
 
+class _Motion(NamedTuple):
+    """A window of a bag, and how much the legs move in it."""
+
+    number: int  # among all extracts
+    window: Window
+    read: WindowRead
+    squares: float  # sum of the squared rates
+
+
 class Identification:
     """Reads bags and identifies parameters, beginning with those of the file."""
 
@@ -152,8 +161,9 @@ class Identification:
         self.extracts, self._noisy = Extracts(), Extracts()
         self.bags: list[BagRead] = []
         self._first: tuple[Extraction, Window] | None = None
-        # For the first window of each bag: sums without and with more noise, the Gram matrix of
-        # that noise in the regressor, and the number of samples.
+        # For the window of each bag with the most motion: its number; sums without and with more
+        # noise, the Gram matrix of that noise in the regressor, and the number of samples.
+        self._moving: list[int] = []
         self._noises: list[tuple[Sums, Sums, Array, int]] = []
 
     def read(self, path: Path, progress: Callable[[int], None] | None = None) -> None:
@@ -183,6 +193,7 @@ class Identification:
         notices: list[str] = []
         extraction: Extraction | None = None
         last: WindowRead | None = None
+        motion: _Motion | None = None
         before = self.extracts.samples
         for window in windows:
             if extraction is None:
@@ -202,19 +213,20 @@ class Identification:
                 if len(window.positions) < fewest + lag:
                     lag = 0
             window = window.with_lag(lag)
-            is_first, last = last is None, self._read_window(path, extraction, window, last)
-            self.extracts.add(len(self.bags), (window.begin - begin) * NANOSECOND, last.extract)
-            if is_first:
-                self._add_noise(extraction, window, last)
+            last = self._read_window(path, extraction, window, last)
             speeds = np.abs(last.extract.legs[..., 1])
+            if motion is None or np.sum(speeds ** 2) > motion.squares:
+                motion = _Motion(len(self.extracts), window, last, float(np.sum(speeds ** 2)))
+            self.extracts.add(len(self.bags), (window.begin - begin) * NANOSECOND, last.extract)
             counts.update({
                 'samples': len(window.positions), 'stops': last.stops,
                 'outliers': int(np.count_nonzero(window.outliers)), 'speeds': speeds.size,
                 'slow': int(np.count_nonzero(
                     speeds < self.parameters['actuator.coulomb_velocity']))})
             end = window.begin + round(len(window.positions) * window.period * SECOND)
-        if extraction is None or last is None:
+        if extraction is None or last is None or motion is None:
             return None
+        self._add_noise(extraction, motion)
         period, rates = window.period, window.rates is not None
         notices += self._notices(
             extraction, period, (self.extracts.samples - before) * extraction.step * period,
@@ -294,12 +306,13 @@ class Identification:
         except (PoseError, SingularityError) as exc:
             raise BagError(f'{path}: {of_no_pose(self.parameters, window.positions)}') from exc
 
-    def _add_noise(self, extraction: Extraction, window: Window, read: WindowRead) -> None:
+    def _add_noise(self, extraction: Extraction, motion: _Motion) -> None:
         """Determine the information due to noise alone in a window."""
-        extract = read.extract
+        window, extract = motion.window, motion.read.extract
         noisy = extraction(window, first_pose(self.platform, window),
                            np.random.default_rng(_SEED)).extract
         self._noisy.add(len(self.bags), 0.0, noisy)
+        self._moving.append(motion.number)
         change = noisy.regressor - extract.regressor
         self._noises.append((
             Sums.of(extract.columns, extract.used), Sums.of(noisy.columns, extract.used),
@@ -335,7 +348,8 @@ class Identification:
             Sums.stacked(clean), Sums.stacked(noisy), unknowns, found, self._cutoffs)
         errors = errors._replace(covariance=errors.covariance + np.outer(shift, shift))
         residuals = Residuals.of(sums, unknowns, found)
-        lack = lack_of_fit(self.platform, extracts, self._noisy, unknowns, found)
+        lack = lack_of_fit(
+            self.platform, extracts, self._moving, self._noisy, unknowns, found)
         if not likely:
             assert self._first is not None
             likely += of_fit(self.parameters, *self._first, found, lack, float(np.sqrt(

@@ -32,7 +32,6 @@ Directions that are mostly this noise, or of which the projection leaves little,
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
 import math
 import tempfile
 from typing import Any, NamedTuple
@@ -179,16 +178,17 @@ class _Scores(NamedTuple):
         return inverse, white.shape[1]
 
 
-def lack_of_fit(platform: StewartPlatform, extracts: Extracts, noisy: Extracts,
-                unknowns: Unknowns, fit: Fit) -> LackOfFit | None:
+def lack_of_fit(platform: StewartPlatform, extracts: Extracts, moving: Sequence[int],
+                noisy: Extracts, unknowns: Unknowns, fit: Fit) -> LackOfFit | None:
     """
     Return the lack of fit with its likeliest causes; None if nothing significant is left.
 
-    ``noisy`` has the first extract of each bag again, with more noise of lengths and rates.
+    ``noisy`` has one extract of each bag again, of the number in ``moving``, with more noise of
+    lengths and rates.
     """
     def tested(geometry: bool) -> tuple[Sequence[Cause], _Scores, Array, _Scores]:
         causes = Causes(platform, unknowns, fit, _selected(extracts, len(extracts)), geometry)
-        return _scores(causes, extracts, noisy, unknowns, fit)
+        return _scores(causes, extracts, moving, noisy, unknowns, fit)
 
     try:
         causes, scores, _, _ = tested(geometry=False)
@@ -241,8 +241,8 @@ def _selected(each: Iterable[Any], count: int) -> Iterator[Any]:
     return (one for n, one in enumerate(each) if n in tested)
 
 
-def _scores(causes: Causes, extracts: Extracts, noisy: Extracts, unknowns: Unknowns, fit: Fit,
-            ) -> tuple[Sequence[Cause], _Scores, Array, _Scores]:
+def _scores(causes: Causes, extracts: Extracts, moving: Sequence[int], noisy: Extracts,
+            unknowns: Unknowns, fit: Fit) -> tuple[Sequence[Cause], _Scores, Array, _Scores]:
     """
     Return the causes, weighted sums, derivatives of unknowns by columns (k, m), and plain sums.
 
@@ -292,7 +292,8 @@ def _scores(causes: Causes, extracts: Extracts, noisy: Extracts, unknowns: Unkno
             spectra = np.load(file)
             weighted = weighted + _gram(_whitened(spectra, spectra, rest, inverse, samples))
     noisy_samples = 0
-    for clean, more in _selected(zip(_first_of_bags(extracts), noisy, strict=True), len(noisy)):
+    clean_ones = (each for n, each in enumerate(extracts) if n in moving)
+    for clean, more in _selected(zip(clean_ones, noisy, strict=True), len(noisy)):
         spectra = spectra_of(clean, None)
         of_noise = of_noise + _gram(_whitened(
             spectra_of(more._replace(used=clean.used), None) - spectra, spectra, rest, inverse,
@@ -310,12 +311,6 @@ def _between(begin: float, end: float, count: int) -> Array:
     """Return evenly spaced numbers, without the end."""
     numbers: Array = np.linspace(begin, end, count, endpoint=False, dtype=float)
     return numbers
-
-
-def _first_of_bags(extracts: Extracts) -> Iterator[Extract]:
-    """Yield the first extract of each bag."""
-    for _, of_bag in groupby(extracts, lambda each: each.bag):
-        yield next(of_bag)
 
 
 def _spectra(columns: Array) -> Array:
@@ -347,8 +342,9 @@ def _whitened(columns: Array, spectra: Array, rest: Array, inverse: Array, sampl
     white = left / deviations[:, None]
     along = white.reshape(-1, 6)
     correlation = along.T @ along
-    sizes = np.sqrt(np.diag(correlation))
-    correlation /= np.outer(sizes, sizes)
+    sizes = np.sqrt(np.outer(np.diag(correlation), np.diag(correlation)))
+    # A leg of which nothing is used has no residuals.
+    correlation = np.divide(correlation, sizes, out=np.eye(6), where=sizes > 0.0)
     values, vectors = np.linalg.eigh(correlation)
     root = vectors / np.sqrt(np.maximum(values, 0.05)) @ vectors.T
     result: Array = root @ (columns / deviations[:, None, :, None])
