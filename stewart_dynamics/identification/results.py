@@ -201,7 +201,7 @@ def result_text(result: Mapping[str, Any]) -> str:
     """Return identification.json as text, at most 100 columns wide except for long names."""
     lack = result['lack_of_fit']
     notice = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
-    lines = [*notice, *_headline(result), '', *table_lines(result['parameters']),
+    lines = [*notice, *_headline(result), '', *table_lines(result['parameters'], 'identified'),
              *not_identifiable_lines(result, 'motion')]
     lines += _bags(result)
     return '\n'.join(lines)
