@@ -204,7 +204,7 @@ def test_a_failed_design_is_reported_in_one_line(
     code, out, err = run(capsys, *arguments, '--output', tmp_path / 'designed')
     assert (code, out) == (2, '')
     *progress, line = err.splitlines()
-    assert all(each.startswith('design') for each in progress)
+    assert all(each.startswith('stewart_identify: design') for each in progress)
     assert said in line
     assert not list(tmp_path.iterdir())
 
