@@ -80,7 +80,11 @@ def find_measured_legs(recording: Recording, node: str, given: str | None, taken
 
 
 def find_calibrated_legs(recording: Recording, node: str, given: str | None) -> tuple[str, bool]:
-    """Return the topic of measured legs, else of the commanded ones, and whether it is these."""
+    """
+    Return the topic of the legs' positions, and whether they are commanded, not measured.
+
+    Commanded ones are taken only if they are given, or the bag has no candidate for measured ones.
+    """
     commanded, usual = f'{node}/{LEG_STATES}', f'{node}/{MEASURED_LEGS}'
     if (not given and usual not in recording.topics
             and commanded in recording.topics_of(type_names.JOINT_STATE)
