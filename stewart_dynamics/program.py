@@ -26,7 +26,7 @@ from pathlib import Path
 import re
 import signal
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any, TextIO, TYPE_CHECKING
 
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import one_line, StewartError
@@ -128,11 +128,28 @@ class Program:
 
     def say(self, text: str) -> None:
         """Print on stdout."""
-        print(_printable(text))
+        if fault := _written(_printable(text), sys.stdout):
+            self.complain(f'standard output: cannot be written: {fault}')
 
     def complain(self, what: object) -> None:
         """Print one line on stderr."""
-        print(f'{self.name}: {_printable(one_line(what))}', file=sys.stderr)
+        _written(f'{self.name}: {_printable(one_line(what))}', sys.stderr)
+
+
+def _written(text: str, stream: TextIO) -> str:
+    """
+    Print text at once; return why it cannot be written, empty if it is or nobody reads it.
+
+    Such a stream is discarded from then on, so that results and exit code do not depend on it.
+    """
+    try:
+        print(text, file=stream, flush=True)
+    except OSError as exc:
+        # See "Note on SIGPIPE" in the documentation of Python's module signal.
+        with open(os.devnull, 'wb') as nowhere:
+            os.dup2(nowhere.fileno(), stream.fileno())
+        return '' if isinstance(exc, BrokenPipeError) else exc.strerror or str(exc)
+    return ''
 
 
 def _keep_freed_memory() -> None:

@@ -16,12 +16,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+import recorded
+from recorded import Recorded
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from running import PLATFORM
@@ -29,18 +31,26 @@ from stewart_dynamics import (
     check_planned_trajectory, Motion, ParameterError, Parameters, Pose, StewartError,
     StewartPlatform)
 from stewart_dynamics.calibration import main
+from stewart_dynamics.calibration.calibrate import calibrate
+from stewart_dynamics.calibration.calibration_report import _arrow_scale, _view
 from stewart_dynamics.calibration.design import design_poses, NOISE
-from stewart_dynamics.calibration.equations import Equations, values_of
+from stewart_dynamics.calibration.equations import (
+    BASE, Equations, PLATFORM as PLATFORM_JOINTS, values_of)
 from stewart_dynamics.calibration.fit import fit, Unknowns
 from stewart_dynamics.calibration.measured_poses import poses_csv, read_poses
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.one_run import CalibrationOptions, run
+from stewart_dynamics.calibration.recorded_poses import read_bag
+from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
-from stewart_dynamics.reporting.estimates import rounded
+from stewart_dynamics.reporting.estimates import (
+    estimate, page_values, rounded, table_lines)
 from test_calibration import HEXAPOD, measured, random_poses, true_values
 
+NODE = '/stewart_dynamics'
+WITHOUT_CHECKSUMS = 'bag.mcap: has no checksums: damaged bytes cannot be detected'
 JOINTS = HEXAPOD.parameters['joints']
 
 
@@ -190,43 +200,106 @@ def test_tables_have_no_more_digits_than_mean_something(
     assert rounded(value, error) == text
 
 
-def test_poses_of_a_bag_at_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The platform stops in each pose; legs at 100 Hz, a tracker at 20 Hz."""
-    rng = np.random.default_rng(3)
-    values, poses = true_values(rng), random_poses(rng, 30)
-    lengths, seen = measured(rng, values, poses)
-    folder = tmp_path / 'bag'
+def write_bag(folder: Path, rng: np.random.Generator, lengths: np.ndarray, seen: Pose,
+              *leg_topics: str, joints: Sequence[str] = JOINTS) -> Path:
+    """Write a bag of a platform that stops in each pose; legs at 100 Hz, a tracker at 20 Hz."""
     types = get_typestore(Stores.ROS2_JAZZY)
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        legs = writer.add_connection('/joint_states', 'sensor_msgs/msg/JointState',
-                                     typestore=types)
+        legs = [writer.add_connection(topic, 'sensor_msgs/msg/JointState', typestore=types)
+                for topic in leg_topics]
         device = writer.add_connection('/tracker', 'geometry_msgs/msg/PoseStamped',
                                        typestore=types)
-        states, poser = JointStateWriter(JOINTS), StampedWriter('tracker', 7)
-        for n in range(30):
+        states, poser = JointStateWriter(joints), StampedWriter('tracker', 7)
+        for n in range(len(lengths)):
             for tick in range(100):
                 # A second for each pose, of which 0.3 s lead to the next one.
                 stamp = 10 ** 9 + n * 10 ** 9 + tick * 10 ** 7
                 part = max(0.0, (tick - 70) / 30.0)
-                following = min(n + 1, 29)
+                following = min(n + 1, len(lengths) - 1)
                 row = lengths[n] + part * (lengths[following] - lengths[n])
                 noise = 1e-6 * rng.normal(size=6)
-                writer.write(legs, stamp, states.write(stamp, row + noise, [0.0] * 6, None))
+                state = states.write(stamp, row + noise, [0.0] * 6, None)
+                for each in legs:
+                    writer.write(each, stamp, state)
                 if tick % 5 == 0:
                     position = seen.position[n] + part * (
                         seen.position[following] - seen.position[n])
                     sign = 1.0 if tick % 2 else -1.0  # of the same rotation
                     writer.write(device, stamp, poser.write(
                         stamp, [*position, *(sign * seen.quaternion[n])]))
+    return folder
+
+
+def test_poses_of_a_bag_at_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rng = np.random.default_rng(3)
+    values, poses = true_values(rng), random_poses(rng, 30)
+    folder = write_bag(tmp_path / 'bag', rng, *measured(rng, values, poses), '/joint_states')
     output = tmp_path / 'out'
     assert main([str(folder), '--params', str(PLATFORM), '--output', str(output)]) == 0
     result = json.loads((output / 'calibration.json').read_text())
-    assert result['poses']['read'] == 30
+    assert result['poses'] == {
+        'source': str(folder), 'legs': '/joint_states', 'pose': '/tracker', 'read': 30,
+        'used': 30, 'notices': [WITHOUT_CHECKSUMS]}
     found = np.array([each['value'] for each in result['parameters']])
     assert np.abs(found - values[:42]).max() < 1e-4
     capsys.readouterr()
     assert main([str(folder), '--params', str(PLATFORM), '--pose', '/other']) == 2
     assert 'has no topic /other' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('names', 'measured_legs'), [
+    (['~/leg_states'], False), (['~/leg_states', '~/joint_states', '~/motor_states'], False),
+    (['~/leg_states', '/robot/legs'], True), (['~/leg_states', '~/measured_legs'], True)])
+def test_legs_are_the_commanded_ones_only_where_none_are_measured(
+        names: list[str], measured_legs: bool, tmp_path: Path) -> None:
+    topics = [name.replace('~', NODE) for name in names]
+    rng = np.random.default_rng(4)
+    seen = measured(rng, true_values(rng), random_poses(rng, 2))
+    found, missing = read_bag(write_bag(tmp_path / 'bag', rng, *seen, *topics),
+                              HEXAPOD.parameters, NODE, None, None)
+    assert missing == []
+    assert found.topics == (topics[-1] if measured_legs else topics[0], '/tracker')
+    assert found.notices == (WITHOUT_CHECKSUMS, *([] if measured_legs else [
+        f'{NODE}/leg_states: the commanded positions of the legs, not measured ones']))
+
+
+def test_bags_without_legs_or_poses_are_rejected(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    seen = measured(rng, true_values(rng), random_poses(rng, 2))
+    others = write_bag(tmp_path / 'others', rng, *seen, '/legs', joints=['a', *JOINTS[1:]])
+    with pytest.raises(BagError, match='/legs: no message contains leg_1; they contain a, leg_2'):
+        read_bag(others, HEXAPOD.parameters, NODE, None, None)
+    poser = write_bag(tmp_path / 'joints', rng, *seen, f'{NODE}/joint_states')
+    with pytest.raises(BagError, match='joint_states: computed by the node, not measured'):
+        read_bag(poser, HEXAPOD.parameters, NODE, None, None)
+    legs = recorded.write_bag(
+        tmp_path / 'legs', Recorded(np.zeros(1), np.zeros((1, 6)), None, np.zeros((1, 6))), JOINTS)
+    with pytest.raises(
+            BagError, match='has no topic of type geometry_msgs/msg/PoseStamped for --pose; it'):
+        read_bag(legs, HEXAPOD.parameters, NODE, None, None)
+
+
+@pytest.mark.parametrize('significant', [False, True])
+def test_arrows_have_one_scale_and_none_show_noise(significant: bool) -> None:
+    rng = np.random.default_rng(6)
+    true = values_of(HEXAPOD.parameters)
+    true[0] += 1e-3 * significant  # a base joint
+    found = calibrate(HEXAPOD, *measured(rng, true, random_poses(rng, 40), NOISE))
+    times = _arrow_scale(found)
+    assert (times > 0.0) == significant
+    for part in (BASE, PLATFORM_JOINTS):
+        view = _view(found, part, 'Joints', times)
+        assert ('times as long' in view) == significant
+        assert view.count('class="edge') == 6 * significant
+        moved = (found.values - found.start)[part].reshape(6, 3)[:, :2]
+        assert times * np.linalg.norm(moved, axis=1).max() < 0.5
+
+
+def test_tables_name_their_column_and_have_no_negative_zero() -> None:
+    row = estimate('platform.mass', 'kg', 5.0, 5.0 - 1e-4, 'identified', 0.1, 0.0, False, True)
+    assert table_lines([row], 'calibrated')[0].split()[:3] == ['parameter', 'file', 'calibrated']
+    (shown,) = page_values({'parameters': [row], 'combinations': []})['parameters']
+    assert str(shown['change']) == '0.0'
 
 
 def test_a_design_identifies_better_than_random_poses(
@@ -260,8 +333,9 @@ def test_a_design_identifies_better_than_random_poses(
     for position in poses.poses.position:
         still = np.abs(table[:, 1:4] - position).max(axis=1) < 1e-9
         assert np.ptp(table[still, 0]) > 0.99
-    assert main(['--design', '7', '--params', str(PLATFORM)]) == 2
-    assert '7 poses: at least 8 are needed' in capsys.readouterr().err
+    with pytest.raises(SystemExit, match='2'):
+        main(['--design', '7', '--params', str(PLATFORM)])
+    assert '7: must be at least 8, at most 500' in capsys.readouterr().err
     with pytest.raises(ParameterError, match='needed for a design'):
         design_poses(StewartPlatform(HEXAPOD.parameters.replaced(
             {'limits.length_min': None, 'limits.length_max': None})), 10)

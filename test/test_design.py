@@ -165,7 +165,7 @@ def test_the_file_is_for_stewart_trajectory(
     folder = tmp_path / 'designed'
     code, out, err = run(capsys, *QUICK, '--output', folder)
     assert code == 0
-    assert err.startswith('designing a motion of 8 s in 3 generations')
+    assert err.startswith('stewart_identify: designing a motion of 8 s in 3 generations')
     trajectory = ReferenceMotionParameters.from_yaml(folder / 'trajectory.yaml')
     assert (trajectory['motion.type'], trajectory['motion.duration']) == ('fourier', 8.0)
     lines = out.splitlines()
@@ -204,7 +204,7 @@ def test_a_failed_design_is_reported_in_one_line(
     code, out, err = run(capsys, *arguments, '--output', tmp_path / 'designed')
     assert (code, out) == (2, '')
     *progress, line = err.splitlines()
-    assert all(each.startswith('design') for each in progress)
+    assert all(each.startswith('stewart_identify: design') for each in progress)
     assert said in line
     assert not list(tmp_path.iterdir())
 

@@ -20,13 +20,14 @@ from collections.abc import Callable
 import json
 from pathlib import Path
 import re
+import shutil
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 from recorded import about, at_rest, fourier, MotionAt, Noise, Recorded, recorded, write_bag
-from referees import ROOT, rotation_about
+from referees import rng, ROOT, rotation_about
 
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.identification.identify_command_line import main
@@ -120,6 +121,30 @@ def test_the_true_hexapod_is_found_within_its_intervals(
     assert StewartPlatform.from_yaml(written).check() == ()
     report = (tmp_path / 'found' / 'report.html').read_text()
     assert '22 of 22 parameters identified' in report
+
+
+def test_brakes_at_the_start_do_not_widen_the_intervals(identified: Callable[..., Any],
+                                                        tmp_path: Path) -> None:
+    def with_brakes(given: Recorded) -> Recorded:
+        assert given.rates is not None
+        count = round(3.0 * RATE)
+        noise = rng(7).normal(size=(2, count, 6))
+        return Recorded(
+            np.concatenate([given.times[:count], given.times + 4.0]),
+            np.concatenate([given.positions[0] + NOISE.length * noise[0], given.positions]),
+            np.concatenate([NOISE.rate * noise[1], given.rates]),
+            np.concatenate([np.tile(3 * [900.0, -900.0], (count, 1)), given.efforts]))
+
+    def widths(result: Any) -> Array:
+        return np.array([np.diff(each) for each in values_of(result, 'interval').values()])
+
+    _, alone, _, _ = identified('fourier', '--no-report')
+    shutil.rmtree(tmp_path / 'a bag')
+    code, result, _, err = identified('fourier', '--no-report', '--force', change=with_brakes)
+    assert (code, err) == (0, '')
+    ratios = widths(result) / widths(alone)
+    assert 1.0 / 1.5 < ratios.min() <= ratios.max() < 1.5
+    assert result['lack_of_fit'] is None
 
 
 def test_at_rest_only_the_weight_is_identifiable(identified: Callable[..., Any],

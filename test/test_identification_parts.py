@@ -226,14 +226,20 @@ def test_bad_input_is_rejected_in_one_line(
     assert not (tmp_path / 'found').exists()
 
 
-def test_a_bag_without_measured_legs_is_rejected(tmp_path: Path) -> None:
+def test_a_bag_without_measured_legs_is_rejected() -> None:
     with closing(Recording(ROOT / 'bags' / 'clear')) as read, pytest.raises(
             BagError, match='has no topic /stewart_dynamics/measured_legs'):
         find_topics(read, '/stewart_dynamics', None, None)
-    bag = write_bag(tmp_path / 'bag', recording(), GIVEN['joints'], '/stewart_dynamics/leg_states')
-    with closing(Recording(bag)) as read, pytest.raises(
-            BagError, match='; /stewart_dynamics/leg_states is computed, not measured$'):
-        find_topics(read, '/stewart_dynamics', None, None)
+
+
+@pytest.mark.parametrize('name', ['leg_states', 'joint_states', 'motor_states'])
+def test_joint_states_of_the_node_are_not_measured_legs(tmp_path: Path, name: str) -> None:
+    topic = f'/stewart_dynamics/{name}'
+    bag = write_bag(tmp_path / 'bag', recording(), GIVEN['joints'], topic)
+    with closing(Recording(bag)) as read:
+        with pytest.raises(BagError, match=f'; {topic}: computed by the node, not measured$'):
+            find_topics(read, '/stewart_dynamics', None, None)
+        assert find_topics(read, '/stewart_dynamics', topic, None).legs == topic
 
 
 def test_small_matrices_are_multiplied_in_one_thread() -> None:

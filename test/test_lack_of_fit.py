@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 import re
 
@@ -27,11 +28,12 @@ from referees import rng
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.identification.identification_options import IdentificationOptions
-from stewart_dynamics.identification.identify import Identified
+from stewart_dynamics.identification.identify import Identification, Identified
 from stewart_dynamics.identification.kinematics import pose_near
-from stewart_dynamics.identification.lack_of_fit import deviations
+from stewart_dynamics.identification.lack_of_fit import deviations, LEFT_BY_FILTERS
 from stewart_dynamics.identification.results import document, result_text
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
@@ -83,6 +85,43 @@ def test_a_right_model_gives_no_notice(seed: int) -> None:
     at_rest, *map(about, np.eye(3))], ids=['at rest', 'about x', 'about y', 'about z'])
 def test_noise_of_lengths_in_the_columns_is_no_lack_of_fit(motion: MotionAt) -> None:
     assert identify(simulated(Case(true_hexapod(1)), 1, motion)).lack_of_fit is None
+
+
+@pytest.mark.parametrize('pieces', [1, 3])
+def test_short_recordings_are_not_tested(pieces: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wrong_models, 'SECONDS', 3.5 * pieces)  # 24 cut-off periods are left
+    (whole,) = simulated(Case(true_hexapod(1)), 1)
+    assert whole.rates is not None
+    gaps = np.array_split(np.arange(len(whole.times)), pieces)
+    options = IdentificationOptions(hold_out=0.0)
+    with closing(Identification(GIVEN, options)) as work:
+        work.add(Path('a bag'), [Window(
+            round(1e9 * (whole.times[part[0]] + n)), 1.0 / RATE, whole.positions[part],
+            whole.rates[part], whole.efforts[part], np.zeros((len(part), 6), dtype=bool))
+            for n, part in enumerate(gaps)])
+        assert len(work.extracts) == pieces
+        found = work.result()
+    assert (found.tested, found.lack_of_fit) == (False, None)
+    result = document(found, options)
+    assert (result['tested_for_lack_of_fit'], result['lack_of_fit']) == (False, None)
+    assert result_text(result).startswith('not tested for a lack of fit: the recording is too sh')
+
+
+def test_mistakes_in_short_recordings_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wrong_models, 'SECONDS', 5.0)
+    bags = simulated(Case(true_hexapod(1)), 1)
+    found = identify([each._replace(positions=each.positions - 0.02) for each in bags])
+    assert not found.tested
+    assert found.likely[0].what == 'zero_length'
+
+
+def test_errors_of_the_filters_are_no_lack_of_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wrong_models, 'NOISE', Noise(0.0, 0.0, 0.0, 0.0, 0.0))
+    found = identify(simulated(Case(true_hexapod(1)), 1))
+    assert (found.tested, found.lack_of_fit) == (True, None)
+    assert found.residuals.after.max() < LEFT_BY_FILTERS * found.residuals.measured.min()
+    wrong = identify(simulated(CAUSES['leg masses 10 % off'][0](true_hexapod(1), rng(1001)), 1))
+    assert wrong.lack_of_fit is not None
 
 
 def test_identified_offsets_are_no_lack_of_fit() -> None:

@@ -1118,10 +1118,11 @@ def test_poses_are_differentiated(
 
 def test_measured_legs_that_are_not_compared_are_a_notice(tmp_path: Path) -> None:
     of = motion(5)
-    for topic in ('/hexapod/state', '/stewart_dynamics/leg_states'):
+    own = dict.fromkeys(('leg_states', 'joint_states', 'motor_states'), JOINT_STATE)
+    for topic in ('/hexapod/state', *own):
         of.insert(0, (topic, RECORDED, messages.joint_state(
             0, PARAMETERS['joints'], [], [], [0.0] * 6)))
-    bag = write_bag(tmp_path / 'bag', of, state=JOINT_STATE, leg_states=JOINT_STATE)
+    bag = write_bag(tmp_path / 'bag', of, state=JOINT_STATE, **own)
     expected = ('/hexapod/state: not used; --measured compares the efforts of measured legs with '
                 'the computed forces')
     for options, given in (((), [expected]), (('--measured', '/hexapod/state'), [])):

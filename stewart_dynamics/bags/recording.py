@@ -107,8 +107,9 @@ class Recording:
         if others:
             raise BagError(f'{self.path}: has {lacking}several of type {kind}: {joined(others)}: '
                            f'select one by {option}')
-        raise BagError(f'{self.path}: has {lacking}no other of type {kind}; it contains '
-                       f'{self.contents}{advice}')
+        none = f'{lacking}no other of type {kind}' if usual else (
+            f'no topic of type {kind} for {option}')
+        raise BagError(f'{self.path}: has {none}; it contains {self.contents}{advice}')
 
     def topics_of(self, kind: str, left_out: Container[str] = ()) -> list[str]:
         """Return the topics of a type but some."""

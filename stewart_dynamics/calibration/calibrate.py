@@ -35,6 +35,7 @@ from stewart_dynamics.calibration.fit import Fit, fit, minimum, outliers, Unknow
 from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
 from stewart_dynamics.calibration.likely_mistakes import (
     lack_of_fit, mistakes_of_input, mistakes_of_result, not_identified)
+from stewart_dynamics.calibration.measured_poses import FEWEST
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
@@ -45,8 +46,6 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import (
     FIXED, HOLD_OUT, IDENTIFIED, justified, LikelyMistake, states_of)
 
-# Poses for each of the 7 unknowns of a leg, of which one is left for the noise.
-FEWEST = 8
 # Held-out poses are the middle ones of equal groups; below this number of others, no pose is.
 _FEWEST_OTHERS = 12
 # A larger part of the poses that are outliers is no accident.

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import math
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from stewart_dynamics.calibration.equations import BASE, PLATFORM, ZERO
 from stewart_dynamics.calibration.results import outlier_text, validation_text
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.reporting.estimates import FIXED, page_values
-from stewart_dynamics.reporting.pages import page
+from stewart_dynamics.reporting.pages import digits, page
 from stewart_dynamics.reporting.vector_picture import Chart, Picture, tick_text, ticks
 from stewart_dynamics.whole_file import write_files
 
@@ -36,17 +37,20 @@ _FOLDER = Path(__file__).with_name('templates')
 _MM = 1e3
 # Length of the longest arrow in a view, by the radius of the joints.
 _ARROW = 0.35
+# Standard errors that the largest of the 36 changes of exact joints exceeds with 5 %.
+_NOISE = 3.2
 
 
 def write_report(path: Path, result: Mapping[str, Any], found: Calibration) -> None:
     """Write the page with the content of calibration.json."""
+    times = _arrow_scale(found)
     text = page(
         _FOLDER, 'calibration', document=True, r=result, name=Path(result['poses']['source']).name,
         validation=validation_text(result['validation']),
         outliers=[outlier_text(each) for each in result['outliers']],
         changes=_changes(found), views=[
-            _view(found, BASE, 'Base joints, from above'),
-            _view(found, PLATFORM, 'Platform joints, from above')],
+            _view(found, BASE, 'Base joints, from above', times),
+            _view(found, PLATFORM, 'Platform joints, from above', times)],
         **page_values(result))
     write_files({path: text})
 
@@ -93,25 +97,43 @@ def _frame(picture: Picture, chart: Chart, title: str, first: bool) -> None:
             picture.text([left - 6.0, y + 3.5], tick_text(value), 'end', css='tick')
 
 
-def _view(found: Calibration, part: slice, title: str) -> str:
-    """Return joints from above, with arrows to where they are, larger than they are."""
+def _seen_from_above(found: Calibration, part: slice) -> tuple[Array, Array, Array, float]:
+    """Return joints (6, 2) by the file, their changes, and the joints' middle and radius."""
     start, end = (each[part].reshape(6, 3)[:, :2] for each in (found.start, found.values))
-    moved: Array = end - start
     middle = start.mean(axis=0)
-    radius = float(np.linalg.norm(start - middle, axis=1).max())
-    longest = float(np.linalg.norm(moved, axis=1).max())
-    times = _ARROW * radius / longest if longest > 0.0 else 1.0
+    return start, end - start, middle, float(np.linalg.norm(start - middle, axis=1).max())
+
+
+def _arrow_scale(found: Calibration) -> float:
+    """Return how many times too long the arrows of both plates are; 0: all changes are noise."""
+    changed = np.abs(found.values - found.start) > _NOISE * found.errors
+    if not any(changed[part].any() for part in (BASE, PLATFORM)):
+        return 0.0
+    scales = []
+    for part in (BASE, PLATFORM):
+        _, moved, _, radius = _seen_from_above(found, part)
+        longest = float(np.linalg.norm(moved, axis=1).max())
+        scales.append(_ARROW * radius / longest if longest > 0.0 else math.inf)
+    return min(scales)
+
+
+def _view(found: Calibration, part: slice, title: str, times: float) -> str:
+    """Return joints from above, with arrows of their changes, ``times`` too long."""
+    start, moved, middle, radius = _seen_from_above(found, part)
     width = 1.6 * radius
     picture = Picture(460, 400, f'{title}: change of each joint')
     chart = Chart(picture, (55.0, 30.0, 350.0, 350.0), *(
         (float(middle[n] - width), float(middle[n] + width)) for n in range(2)))
     picture.path(chart.at(start), closed=True, css='grid')
-    picture.text([20.0, 16.0], f'{title}, arrows {times:.3g} times as long', css='view')
+    picture.text([20.0, 16.0], f'{title}, ' + (
+        f'arrows {digits(float(f"{times:.2g}"))} times as long' if times else
+        'no change above the noise'), css='view')
     for leg in range(6):
         at, to = chart.at([start[leg], start[leg] + times * moved[leg]])
         picture.circle(at, 5.0, css='joint')
-        picture.line(at, to, css=f'edge leg{leg}')
-        picture.circle(to, 2.6, fill=f'var(--leg{leg})')
+        if times:
+            picture.line(at, to, css=f'edge leg{leg}')
+            picture.circle(to, 2.6, fill=f'var(--leg{leg})')
         outward = (start[leg] - middle) / max(float(np.linalg.norm(start[leg] - middle)), 1e-9)
         x, y = at + np.array([22.0, -22.0]) * outward
         picture.text([x, y + 4.0], f'{found.parameters["joints"][leg]}: '

@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from stewart_dynamics.calibration.measured_poses import FEWEST
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import between, whole
 from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_POSES, WAY_THROUGH_POSES
@@ -27,7 +28,7 @@ from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_POSES, 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that only a design has."""
     group = parser.add_argument_group('design of poses (--design)')
-    group.add_argument('--design', type=whole(1, 500), metavar='N',
+    group.add_argument('--design', type=whole(FEWEST, 500), metavar='N',
                        help='calibrate nothing, but choose the N poses within the limits that '
                             f'identify best: DIR/{DESIGNED_POSES}, and DIR/{WAY_THROUGH_POSES} '
                             f'that visits them (default DIR: {DESIGNED})')

@@ -30,6 +30,8 @@ from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
 from stewart_dynamics.whole_file import read_text
 
+# Minimum number of poses: one for each of the 7 unknowns of a leg, and one for the noise.
+FEWEST = 8
 POSITION = ('x', 'y', 'z')
 QUATERNION = ('qx', 'qy', 'qz', 'qw')
 ANGLES = ('alpha', 'beta', 'gamma')
@@ -47,6 +49,8 @@ class MeasuredPoses(NamedTuple):
     names: tuple[str, ...]  # of each pose, such as ``row 2``
     angles: Array | None = None
     """(N, 3) angles as they were read, if the poses were given by angles."""
+    topics: tuple[str, str] | None = None  # of the legs and of the poses, if they are from a bag
+    notices: tuple[str, ...] = ()
 
 
 def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,

@@ -33,7 +33,7 @@ from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit
-from stewart_dynamics.replay.bag_topics import find_measured_legs
+from stewart_dynamics.replay.bag_topics import find_calibrated_legs
 
 # Legs are at rest while no position changes by more than this part of the characteristic length,
 # for at least this time [s], of which this part at each end is left out: the platform settles.
@@ -57,9 +57,9 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
     Raises BagError: the bag cannot be read, a topic is not found, or nothing was measured at rest.
     """
     with closing(Recording(path)) as recording:
-        topics = {
-            find_measured_legs(recording, node, measured): 'legs',
-            recording.find_topic(type_names.POSE_STAMPED, pose, '', '--pose'): 'pose'}
+        legs_topic, commanded = find_calibrated_legs(recording, node, measured)
+        pose_topic = recording.find_topic(type_names.POSE_STAMPED, pose, '', '--pose')
+        topics = {legs_topic: 'legs', pose_topic: 'pose'}
         reader = JointStateReader(parameters['joints'], ['position'])
         leg_stamps: list[Stamps] = []
         leg_values: list[Array] = []
@@ -80,6 +80,10 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
                     if np.isfinite(values).all() and is_unit(np.linalg.norm(values[3:])):
                         poses.append((stamp, values))
         missing = list(recording.missing)
+        notices = [*recording.notices, *(
+            [f'{legs_topic}: the commanded positions of the legs, not measured ones']
+            if commanded else [])]
+    reader.check(f'{path}: {legs_topic}')
     stamps = np.concatenate(leg_stamps) if leg_stamps else np.empty(0, dtype=np.int64)
     if not len(stamps) or not poses:
         raise BagError(f'{path}: {" and ".join(topics)}: no valid message of the '
@@ -109,7 +113,8 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
             f'{at[0] / SECOND:.1f} to {at[-1] / SECOND:.1f} s')
     table = np.array(rows)
     return RecordedPoses(MeasuredPoses(
-        table[:, :6], Pose.from_quaternion(table[:, 6:9], table[:, 9:]), tuple(names)), missing)
+        table[:, :6], Pose.from_quaternion(table[:, 6:9], table[:, 9:]), tuple(names),
+        topics=(legs_topic, pose_topic), notices=tuple(notices)), missing)
 
 
 def _rests(stamps: Stamps, lengths: Array, tolerance: float) -> Iterator[tuple[int, int]]:

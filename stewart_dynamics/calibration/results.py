@@ -42,11 +42,13 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
     """Return the content of calibration.json."""
     what, joints = found.identifiability, found.parameters['joints']
     lack = found.lack_of_fit
+    legs, pose = measured.topics or (None, None)
     units = ['m'] * len(found.names)
     return {
         'version': VERSION, 'software': SOFTWARE,
         'date': now(),
-        'poses': {'source': source, 'read': len(measured.names), 'used': found.poses},
+        'poses': {'source': source, 'legs': legs, 'pose': pose, 'read': len(measured.names),
+                  'used': found.poses, 'notices': list(measured.notices)},
         'options': dict(options),
         'parameters': [
             estimate(name, 'm', start, value, state, error, share, False, not lack)
@@ -110,13 +112,15 @@ def result_text(result: Mapping[str, Any]) -> str:
     lack, noise = result['lack_of_fit'], result['noise']
     lines = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
     lines += [
+        *result['poses']['notices'],
         validation_text(result['validation']),
         f'residuals of the legs, RMS: {1e6 * result["residuals"]["before_rms_m"]:.3g} um by the '
         f'file, {1e6 * result["residuals"]["after_rms_m"]:.3g} um calibrated',
         f'noise {"as given" if noise["given"] else "estimated"}: leg positions '
         f'{1e6 * noise["length_m"]:.2g} um, poses {1e6 * noise["position_m"]:.2g} um and '
         f'{1e6 * noise["rotation_rad"]:.2g} urad',
-        *map(outlier_text, result['outliers']), '', *table_lines(result['parameters'])]
+        *map(outlier_text, result['outliers']), '',
+        *table_lines(result['parameters'], 'calibrated')]
     if result['not_identified']:
         lines += ['', *textwrap.wrap(result['not_identified'], 100)]
     return '\n'.join([*lines, *not_identifiable_lines(result, 'poses')])

@@ -20,7 +20,6 @@ import argparse
 from collections.abc import Sequence
 import math
 from pathlib import Path
-import sys
 from typing import Any
 
 from stewart_dynamics.program import (
@@ -126,7 +125,7 @@ def _run(given: argparse.Namespace) -> int:
             bar.set_description_str(name, refresh=False)
             bar.update(part if name != STAGES[0] else 0)
             if bar.disable and name in ('ranges at once', 'workspace'):
-                print(f'{_PROGRAM.name}: {name}', file=sys.stderr, flush=True)
+                _PROGRAM.complain(name)
 
         sheet: dict[str, Any] = write_datasheet(
             parameters, order, given.output, options, Progress(stage, bar.update))

@@ -94,7 +94,7 @@ def _write(given: argparse.Namespace) -> int:
     texts = {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
              f'{name}.xml': mjcf(hexapod, name)}
     for path in write_new(given.output, texts, given.force):
-        print(path)
+        _PROGRAM.say(str(path))
     return _judge(parameters, given)
 
 
@@ -108,7 +108,7 @@ def _read(given: argparse.Namespace) -> int:
     check_new([path], given.force)
     given.output.mkdir(parents=True, exist_ok=True)
     found.parameters.to_yaml(path)
-    print(path)
+    _PROGRAM.say(str(path))
     for remark in found.remarks:
         _PROGRAM.complain(remark)
     return _judge(found.parameters, given)

@@ -60,7 +60,8 @@ _LAG_STEP, _LESS = 0.05, 0.8
 # Number of samples for which the regressor is computed at once.
 _TOGETHER = 4096
 # Rates at which Stribeck friction may have fallen to 1/e, relative to the RMS rate of the first
-# window, and at least this multiple of the change of the rate between two samples at a reversal.
+# window that moves, and at least this multiple of the change of the rate between two samples at a
+# reversal.
 _STRIBECK, _RESOLVED = (0.1, 0.3), 4.0
 SLIP = 1 + len(_STRIBECK)
 """Number of friction shapes over the rate: Coulomb friction, Stribeck friction."""
@@ -143,7 +144,7 @@ class Extraction:
 
     ``platform`` has the parameters of the file; ``cutoff`` is the frequency of the narrow band
     [Hz]. ``speeds`` are the rates of the friction shapes [m/s], by default those of the first
-    window.
+    window that moves.
     """
 
     def __init__(self, platform: StewartPlatform, unknowns: Unknowns, period: float,
@@ -176,17 +177,13 @@ class Extraction:
         wrong, stops = self._wrong(window)
         count = len(columns)
         times = self._period * (self.margin + self.step * np.arange(count)).astype(float)
-        if self.speeds is None:
-            band = self.platform.parameters['actuator.coulomb_velocity']
-            step = self._period * _rms(accelerations) + float(np.mean(band))
-            self.speeds = tuple(
-                max(part * _rms(rates), _RESOLVED * step) for part in _STRIBECK)
+        speeds = self.speeds or self._chosen_speeds(rates, accelerations)
         taps = self._narrow.taps()
         legs = np.stack([decimated(each, taps, self.step)
                          for each in (lengths, rates, accelerations)], axis=-1)
         at = self._narrow.half + self.step * np.arange(count)
-        extract = Extract(times, columns, ~wrong[:count], legs,
-                          decimated(self._slip(rates), taps, self.step), found.rows[at][:, POSE])
+        slip = decimated(self._slip(rates, speeds), taps, self.step)
+        extract = Extract(times, columns, ~wrong[:count], legs, slip, found.rows[at][:, POSE])
         return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]))
 
     def lag(self, window: Window, guess: Pose, longest: float) -> tuple[int, float]:
@@ -221,12 +218,20 @@ class Extraction:
             best = 0
         return int(lags[best]), misfits[best]
 
-    def _slip(self, rates: Array) -> Array:
-        assert self.speeds is not None
+    def _chosen_speeds(self, rates: Array, accelerations: Array) -> tuple[float, ...]:
+        """Return the rates of the friction shapes; later windows have those of one that moves."""
+        band = float(np.mean(self.platform.parameters['actuator.coulomb_velocity']))
+        step = self._period * _rms(accelerations) + band
+        speeds = tuple(max(part * _rms(rates), _RESOLVED * step) for part in _STRIBECK)
+        if _rms(rates) > band:  # at rest, as with the brakes on, nothing slips
+            self.speeds = speeds
+        return speeds
+
+    def _slip(self, rates: Array, speeds: tuple[float, ...]) -> Array:
         sign = np.empty(rates.shape)
         friction(np.ascontiguousarray(rates), np.zeros(6), np.ones(6),
                  self.platform.parameters['actuator.coulomb_velocity'], sign)
-        return np.stack([sign, *(sign * np.exp(-(rates / speed) ** 2) for speed in self.speeds)],
+        return np.stack([sign, *(sign * np.exp(-(rates / speed) ** 2) for speed in speeds)],
                         axis=-1)
 
     def _deviations(self, window: Window) -> tuple[float, float]:

@@ -38,7 +38,8 @@ from stewart_dynamics.identification.filters import LowPass
 from stewart_dynamics.identification.fit import Errors, errors_of, Fit, fit, shift_of_noise
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.kinematics import first_pose
-from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
+from stewart_dynamics.identification.lack_of_fit import (
+    lack_of_fit, LackOfFit, LEFT_BY_FILTERS, long_pieces)
 from stewart_dynamics.identification.likely_mistakes import (
     FAR, LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose, scale_of_efforts)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
@@ -125,7 +126,8 @@ class Identified(NamedTuple):
     residuals: Residuals
     validation: Residuals | None  # residuals on held-out time, by a fit to the rest
     likely: tuple[LikelyMistake, ...]
-    lack_of_fit: LackOfFit | None  # None if the residuals are noise
+    lack_of_fit: LackOfFit | None  # None if the residuals are noise, or not tested
+    tested: bool  # for a lack of fit: the bags are long enough
 
 
 class _Motion(NamedTuple):
@@ -350,14 +352,17 @@ class Identification:
         residuals = Residuals.of(sums, unknowns, found)
         lack = lack_of_fit(
             self.platform, extracts, self._moving, self._noisy, unknowns, found)
+        left = float(np.sqrt(
+            np.mean(residuals.after ** 2) / (np.mean(residuals.measured ** 2) + 1e-300)))
         if not likely:
             assert self._first is not None
-            likely += of_fit(self.parameters, *self._first, found, lack, float(np.sqrt(
-                np.mean(residuals.after ** 2) / (np.mean(residuals.measured ** 2) + 1e-300))))
+            likely += of_fit(self.parameters, *self._first, found, lack, left)
+        tested = bool(long_pieces(extracts))
         return Identified(
             unknowns.parameters(found.values), unknowns, found, errors, tuple(self.bags),
             extracts.samples, outliers, unsound, residuals,
-            self._validation(noise) if options.hold_out else None, tuple(likely), lack)
+            self._validation(noise) if options.hold_out else None, tuple(likely),
+            lack if tested and left > LEFT_BY_FILTERS else None, tested)
 
     @property
     def _cutoffs(self) -> Array | None:

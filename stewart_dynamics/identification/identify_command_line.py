@@ -19,7 +19,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -181,9 +180,9 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
     check_free(folder, options, DESIGNED_MOTION)
     remove_abandoned([folder])
     asked = DesignOptions(**arguments_of(given, DesignOptions._fields))
-    print(f'designing a motion of {asked.duration:g} s in {asked.generations} generations: takes '
-          'about half a minute on an idle computer, minutes on a loaded one',
-          file=sys.stderr, flush=True)
+    _PROGRAM.complain(
+        f'designing a motion of {asked.duration:g} s in {asked.generations} generations: takes '
+        'about half a minute on an idle computer, minutes on a loaded one')
     tenth = max(1, asked.generations // 10)
     begun = time.monotonic()
 
@@ -191,9 +190,8 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
         bar.update(done - bar.n)
         if bar.disable and done % tenth == 0:  # no terminal
             elapsed = time.monotonic() - begun
-            print(f'designed {100 * done // asked.generations} %, about '
-                  f'{elapsed * (asked.generations / done - 1.0):.0f} s left',
-                  file=sys.stderr, flush=True)
+            _PROGRAM.complain(f'designed {100 * done // asked.generations} %, about '
+                              f'{elapsed * (asked.generations / done - 1.0):.0f} s left')
 
     with tqdm(total=asked.generations, disable=None, leave=False, dynamic_ncols=True,
               bar_format='{percentage:3.0f}%|{bar}| designing, {remaining} left') as bar:
@@ -204,8 +202,9 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
         head = ''.join(f'# {line}'.rstrip() + '\n' for line in _design_head(designed, asked))
         write_yaml(path, given_values, {
             name: designed.trajectory.table[name].unit for name in given_values}, head)
-    print('\n'.join(_design_lines(designed, asked)))
-    print(f'\nmotion: {folder / DESIGNED_MOTION}, for stewart_trajectory --ros-args --params-file')
+    _PROGRAM.say('\n'.join([
+        *_design_lines(designed, asked), '',
+        f'motion: {folder / DESIGNED_MOTION}, for stewart_trajectory --ros-args --params-file']))
 
 
 def _design_head(designed: Design, asked: DesignOptions) -> Iterator[str]:

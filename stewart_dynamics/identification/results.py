@@ -37,7 +37,7 @@ from stewart_dynamics.identification.extraction import Extracts
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import (
     Identification, Identified, Residuals)
-from stewart_dynamics.identification.lack_of_fit import Found
+from stewart_dynamics.identification.lack_of_fit import Found, PIECE, WHOLE
 from stewart_dynamics.identification.sums import residual_of, shifted_by
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics, regressor
@@ -60,6 +60,9 @@ from tqdm import tqdm
 VERSION = 1
 
 _TEMPLATES = Path(__file__).with_name('templates')
+NOT_TESTED = ('not tested for a lack of fit: the recording is too short: '
+              f'{WHOLE} cut-off periods are needed, in pieces of at least {PIECE}, besides the '
+              'ends that the filters take')
 # Largest number of samples in the curves of the report; later samples are not drawn.
 _MOST = 12_000
 
@@ -142,6 +145,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
         'residuals': _residuals(joints, found.residuals),
         'validation': None if found.validation is None else {
             'samples': found.validation.samples, **_residuals(joints, found.validation)},
+        'tested_for_lack_of_fit': found.tested,
         'lack_of_fit': None if lack is None else {
             'cause': lack.causes[0].what, 'text': lack.text,
             'intervals': 'widened' if sure else 'none', 'residual_left': lack.left,
@@ -201,7 +205,9 @@ def result_text(result: Mapping[str, Any]) -> str:
     """Return identification.json as text, at most 100 columns wide except for long names."""
     lack = result['lack_of_fit']
     notice = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
-    lines = [*notice, *_headline(result), '', *table_lines(result['parameters']),
+    if not result['tested_for_lack_of_fit']:
+        notice = textwrap.wrap(NOT_TESTED, 100)
+    lines = [*notice, *_headline(result), '', *table_lines(result['parameters'], 'identified'),
              *not_identifiable_lines(result, 'motion')]
     lines += _bags(result)
     return '\n'.join(lines)
@@ -263,7 +269,7 @@ def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapp
     text = page(
         _TEMPLATES, 'identification', [script], document=True, r=result,
         name=Path(bag).name or bag, **page_values(result), legs=legs, plotly=script, data=data,
-        two_sided=TWO_SIDED, samples=len(curves), most=_MOST)
+        two_sided=TWO_SIDED, samples=len(curves), most=_MOST, not_tested=NOT_TESTED)
     write_files({path: text})
 
 

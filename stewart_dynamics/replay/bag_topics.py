@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from stewart_dynamics.bags.recording import joined, Recording
-from stewart_dynamics.description.model import JOINT_STATES
+from stewart_dynamics.description.model import MODEL_TYPES
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.messages import type_names
@@ -28,9 +28,12 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
-from stewart_dynamics.setpoints.output_messages import LEG_STATES
+from stewart_dynamics.setpoints.output_messages import LEG_STATES, MOTOR_TYPES, OUTPUT_TYPES
 
 MEASURED = 'measured'
+# JointState topics that the node publishes, under its name: computed, never measured legs.
+_COMPUTED = tuple(name for name, kind in (OUTPUT_TYPES | MOTOR_TYPES | MODEL_TYPES).items()
+                  if kind == type_names.JOINT_STATE)
 _OF_BASE = tuple(dict.fromkeys(key for keys in inputs.BASE_SOURCES.values() for key in keys))
 
 
@@ -69,10 +72,26 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
 
 def find_measured_legs(recording: Recording, node: str, given: str | None, taken: str = '') -> str:
     """Return the topic of the measured legs; raise BagError if it is not found."""
-    computed = f'{node}/{LEG_STATES}'
-    advice = f'; {computed} is computed, not measured' if computed in recording.topics else ''
+    computed = _computed_by(node)
+    own = [name for name in recording.topics_of(type_names.JOINT_STATE) if name in computed]
+    advice = f'; {joined(own)}: computed by the node, not measured' if own else ''
     return recording.find_topic(type_names.JOINT_STATE, given, f'{node}/{MEASURED_LEGS}',
-                                '--measured', {computed, taken}, advice)
+                                '--measured', {*computed, taken}, advice)
+
+
+def find_calibrated_legs(recording: Recording, node: str, given: str | None) -> tuple[str, bool]:
+    """
+    Return the topic of the legs' positions, and whether they are commanded, not measured.
+
+    Commanded ones are taken only if they are given, or the bag has no candidate for measured ones.
+    """
+    commanded, usual = f'{node}/{LEG_STATES}', f'{node}/{MEASURED_LEGS}'
+    if (not given and usual not in recording.topics
+            and commanded in recording.topics_of(type_names.JOINT_STATE)
+            and not recording.topics_of(type_names.JOINT_STATE, _computed_by(node))):
+        return commanded, True
+    legs = find_measured_legs(recording, node, given)
+    return legs, legs == commanded
 
 
 def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Parameters,
@@ -93,12 +112,17 @@ def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Para
              or name.endswith(f'/{inputs.BASE_POSE}')))
     if base:
         notices.append(f'{joined(base)}: not used: base.source is {parameters["base.source"]}')
-    legs = recording.topics_of(type_names.JOINT_STATE, {
-        *topics.values(), f'{options.node}/{LEG_STATES}', f'{options.node}/{JOINT_STATES}'})
+    legs = recording.topics_of(type_names.JOINT_STATE,
+                               {*topics.values(), *_computed_by(options.node)})
     if legs and MEASURED not in topics:
         notices.append(f'{joined(legs)}: not used; --measured compares the efforts of measured '
                        'legs with the computed forces')
     return notices
+
+
+def _computed_by(node: str) -> set[str]:
+    """Return the JointState topics that a node publishes."""
+    return {f'{node}/{name}' for name in _COMPUTED}
 
 
 def name_of(key: str) -> str:

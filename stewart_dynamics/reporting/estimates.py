@@ -108,10 +108,10 @@ def in_words(coefficients: Array, names: Sequence[str]) -> str:
     return text
 
 
-def table_lines(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the table of estimates for the terminal."""
+def table_lines(parameters: Sequence[Mapping[str, Any]], column: str) -> list[str]:
+    """Return the table of estimates for the terminal; ``column`` is the heading of the values."""
     name_width = max([len(each['name']) for each in parameters] + [9])
-    lines = [f'{"parameter":<{name_width}} {"file":>10} {"identified":>12} {"95 % interval":>28}'
+    lines = [f'{"parameter":<{name_width}} {"file":>10} {column:>12} {"95 % interval":>28}'
              '  unit']
     for each in parameters:
         if each['state'] == IDENTIFIED:
@@ -186,11 +186,16 @@ def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
         return {**each, 'half': None if error is None else TWO_SIDED * error,
                 'digits': decimals(error) if error else 4}
 
+    def changed(each: Mapping[str, Any]) -> dict[str, Any]:
+        row = drawn(each)
+        # a sum with 0.0, so that no -0.000 is written
+        return {**row, 'change': round(row['value'] - row['file'], row['digits']) + 0.0,
+                'without_value': WITHOUT_VALUE.get(row['state'])}
+
     def named(state: str) -> list[str]:
         return grouped([each['name'] for each in result['parameters'] if each['state'] == state])
 
-    return {'parameters': [{**drawn(each), 'without_value': WITHOUT_VALUE.get(each['state'])}
-                           for each in result['parameters']],
+    return {'parameters': [changed(each) for each in result['parameters']],
             'combinations': [drawn(each) for each in result['combinations']],
             'identified': sum(each['state'] == IDENTIFIED for each in result['parameters']),
             'combined': named(IN_COMBINATION), 'not_identifiable': named(NOT_IDENTIFIABLE)}

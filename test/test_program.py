@@ -1,0 +1,72 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Output that cannot be written changes neither results nor exit codes."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import sys
+from typing import TextIO
+
+import pytest
+
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.program import BAD_INPUT, Program, STRICT
+
+PROGRAM = Program('some_program', 'parameters', 'something is found')
+
+
+def closed() -> TextIO:
+    """Return a stream that nobody reads."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    return open(writer, 'w', encoding='utf-8')
+
+
+def found() -> int:
+    """Print results twice, more than a buffer holds, and end."""
+    for _ in range(2):
+        PROGRAM.say('result ' * 9999)
+    return PROGRAM.end('out', {}, True)
+
+
+def test_output_that_nobody_reads(monkeypatch: pytest.MonkeyPatch,
+                                  capsys: pytest.CaptureFixture[str]) -> None:
+    with closed() as out, monkeypatch.context() as patched:
+        patched.setattr(sys, 'stdout', out)
+        assert PROGRAM.exit_code(found) == STRICT
+    assert capsys.readouterr().err == ''
+
+
+def test_errors_that_nobody_reads(monkeypatch: pytest.MonkeyPatch) -> None:
+    def bad() -> int:
+        raise StewartError('bad')
+
+    with closed() as out, closed() as err, monkeypatch.context() as patched:
+        patched.setattr(sys, 'stdout', out)
+        patched.setattr(sys, 'stderr', err)
+        assert PROGRAM.exit_code(found) == STRICT
+        assert PROGRAM.exit_code(bad) == BAD_INPUT
+
+
+@pytest.mark.skipif(not Path('/dev/full').exists(), reason='needs /dev/full')
+def test_a_full_disk_is_reported_once(monkeypatch: pytest.MonkeyPatch,
+                                      capsys: pytest.CaptureFixture[str]) -> None:
+    with open('/dev/full', 'w', encoding='utf-8') as out, monkeypatch.context() as patched:
+        patched.setattr(sys, 'stdout', out)
+        assert PROGRAM.exit_code(found) == STRICT
+    assert capsys.readouterr().err == (
+        'some_program: standard output: cannot be written: No space left on device\n')
