@@ -260,7 +260,8 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
     # each is named, with its error, in one line
     head, *told = fleet.text().splitlines()
     assert head == (
-        '16 bags: 10 done, 1 messages rejected, 1 limit or warning, 1 incomplete, 3 failed')
+        '16 bags: 10 done, 1 with messages rejected, 1 with a limit or warning, 1 incomplete, '
+        '3 failed')
     assert len(told) == 4
     for name, why in (('cut', 'cut.mcap: '), ('noise', 'not MCAP, not sqlite3'),
                       ('none', 'no such file'), ('other', 'exists already')):
