@@ -198,7 +198,8 @@ def test_plots_contain_the_samples_and_every_peak(tmp_path: Path) -> None:
     given = trajectory('singular')
     summary = given.write(tmp_path / 'report.html')
     data = data_of(tmp_path / 'report.html')
-    columns = {'position': given.motions[:, :3], 'velocity': given.motions[:, 12:15],
+    columns = {'position': given.motions[:, :3] - given.motions[0, :3],
+               'velocity': given.motions[:, 12:15],
                'angular_velocity': np.degrees(given.motions[:, 15:18]),
                'acceleration': given.motions[:, 18:21],
                'angular_acceleration': np.degrees(given.motions[:, 21:24]),
