@@ -31,9 +31,8 @@ from scipy.interpolate import make_smoothing_spline
 
 from stewart_dynamics import Motion
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.replay.differentiate import Differentiator, TOO_FAST, TOO_FEW
+from stewart_dynamics.replay.differentiate import Differentiator, TOO_FAR, TOO_FAST, TOO_FEW
 from stewart_dynamics.replay.smoothing_spline import FEWEST, smoothing_spline
-from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 from stewart_dynamics.setpoints.step import Batch
 
 Array = NDArray[np.float64]
@@ -353,7 +352,7 @@ def test_a_pose_far_out_of_range_is_left_out_alone(far: float) -> None:
     differentiator, others = Differentiator(10.0, 0.1), np.arange(400) != 200
     # the first piece ends with the far pose: its restart passes to the next pose
     done = differentiated(differentiator, pieces(batch, [100, 201]))
-    assert differentiator.left_out == {OUT_OF_RANGE: 1}
+    assert differentiator.left_out == {TOO_FAR: 1}
     restarts = batch.restarts.copy()
     restarts[201] = True
     assert same(done, differentiated(Differentiator(10.0, 0.1), [

@@ -32,13 +32,13 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
 from stewart_dynamics.setpoints.inputs import LARGEST
-from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 from stewart_dynamics.setpoints.step import Batch, restarts_of
 
 # Poses in a window.
 WINDOW = 4096
 
 TOO_FEW = f'fewer than {FEWEST} poses between gaps: no acceleration can be computed'
+TOO_FAR = f'position beyond {LARGEST:g} m'
 TOO_FAST = 'turns faster than the cut-off frequency can follow'
 
 # Poses closer in time than this begin another segment: the system is singular there [ns].
@@ -134,7 +134,7 @@ class Differentiator:
         if self._restart_before or not near.all():
             restarts, self._restart_before = restarts_of(
                 batch.restarts, near, self._restart_before)
-            self.left_out[OUT_OF_RANGE] += int(np.count_nonzero(~near))
+            self.left_out[TOO_FAR] += int(np.count_nonzero(~near))
             batch = batch.chosen(near)._replace(restarts=restarts)
         wrenches = np.broadcast_to(batch.wrenches, (len(batch.stamps), WRENCH))
         self._pending.append(Batch(
