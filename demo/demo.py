@@ -16,41 +16,41 @@
 Play the paper's bag into the real node in real time, and print the loads on the legs.
 
 ``make demo`` runs it. The bag's messages are published on ROS 2 topics as recorded, by another
-process than the node.
+process than the node. The table is that of a replay, which knows the demanded forces, too; the
+node's answers are compared with those of the replay.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 import os
 from pathlib import Path
 import signal
 import subprocess
+import tempfile
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped
-import numpy as np
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float64
+from stewart_dynamics.bags.find import OUTPUT_BAG
 from stewart_dynamics.executables import executable
-from stewart_dynamics.mechanics.rows import (
-    DETERMINANT, FORCES, JOINT_ANGLES, LENGTHS, MOTION, RATES, RESULT)
-from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.summary import Answered, Summary
+from stewart_dynamics.replay.one_bag import replay
+from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.summary_text import summary_lines
-from stewart_dynamics.setpoints.step import Batch, Outputs
 from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parent.parent
 NODE = '/stewart_dynamics'
+LEG_STATES = f'{NODE}/leg_states'
 TYPES = {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
 QOS = QoSProfile(depth=1000)
 
@@ -61,43 +61,26 @@ class Demo(Node):
     def __init__(self, bag: Path) -> None:
         super().__init__('demo')
         self.states: list[JointState] = []
-        self.determinants: list[float] = []
-        self.warnings: list[tuple[int, bool]] = []
         self.diagnostics: dict[str, Any] = {}
         with AnyReader([bag]) as reader:
             self.messages = [(at, connection.topic, data)
                              for connection, at, data in reader.messages()]
         self.outputs = {f'{NODE}/setpoint/{name}': self.create_publisher(
             kind, f'{NODE}/setpoint/{name}', QOS) for name, kind in TYPES.items()}
-        latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self.create_subscription(JointState, f'{NODE}/leg_states', self.states.append, QOS)
-        self.create_subscription(Float64, f'{NODE}/jacobian_determinant',
-                                 lambda message: self.determinants.append(message.data), QOS)
-        self.create_subscription(
-            Bool, f'{NODE}/singularity_warning', self._on_warning, latched)
+        self.create_subscription(JointState, LEG_STATES, self.states.append, QOS)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
 
     def connected(self) -> bool:
         """Return whether all topics are connected in both directions."""
         return (all(p.get_subscription_count() for p in self.outputs.values())
-                and all(self.count_publishers(f'{NODE}/{topic}') for topic in (
-                    'leg_states', 'jacobian_determinant', 'singularity_warning'))
+                and self.count_publishers(LEG_STATES) > 0
                 # published once a second while the node is active
                 and bool(self.diagnostics))
-
-    def _on_warning(self, message: Bool) -> None:
-        # The warning is published right after the state of the same setpoint.
-        stamp = self.states[-1].header.stamp if self.states else None
-        self.warnings.append((_nanoseconds(stamp) if stamp else 0, message.data))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.hardware_id == NODE.strip('/'):
                 self.diagnostics[status.name] = status
-
-
-def _nanoseconds(stamp: Any) -> int:
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
 def _wait(executor: Any, what: str, seconds: float, done: Any, process: Any) -> None:
@@ -126,34 +109,30 @@ def play(demo: Demo, executor: Any, process: Any) -> None:
             progress.update((time.monotonic_ns() - begun) * 1e-9 - progress.n)
     expected = len(demo.messages) // len(demo.outputs)
     _wait(executor, f'only {len(demo.states)} of {expected} setpoints were answered', 10.0,
-          lambda: len(demo.states) >= expected and len(demo.determinants) >= expected, process)
+          lambda: len(demo.states) >= expected, process)
 
 
-def report(demo: Demo, parameters: Parameters) -> str:
-    """Return the table of the node's answers."""
-    many = len(demo.states)
-    stamps = np.array([_nanoseconds(state.header.stamp) for state in demo.states])
-    forces = np.array([state.effort or [np.nan] * 6 for state in demo.states])
-    results = np.full((many, RESULT), np.nan)  # nan: not published
-    results[:, LENGTHS] = parameters['geometry.zero_length'] + [
-        list(state.position) for state in demo.states]
-    results[:, RATES] = [list(s.velocity) for s in demo.states]
-    results[:, FORCES] = forces
-    results[:, DETERMINANT] = demo.determinants[:many]
-    states = np.full((many, STATE), np.nan)
-    changes = np.searchsorted([stamp for stamp, _ in demo.warnings], stamps, side='right')
-    states[:, CAUSE] = [changed > 0 and demo.warnings[changed - 1][1] for changed in changes]
-    every, none = np.ones(many, dtype=bool), np.zeros(many, dtype=bool)
-    summary = Summary(parameters)
-    summary.add(Answered(
-        (stamps - stamps[0]) * 1e-9,
-        Batch(stamps, np.full((many, MOTION), np.nan), np.zeros((1, 6)), none,
-              stamps),
-        Outputs(every, stamps, results, forces, states, none, none,
-                none, np.full((many, JOINT_ANGLES), np.nan), np.empty((many, 0)),
-                np.empty((many, 0))),
-        np.full((many, 6), np.nan)))
-    return '\n'.join(summary_lines(summary.values()))
+def report(demo: Demo, bag: Path, parameters: Parameters) -> str:
+    """Return the summary of the bag's replay, and how far the node's answers are the same."""
+    with tempfile.TemporaryDirectory() as folder:
+        replayed = replay(bag, parameters, Path(folder) / 'replayed', Options(report=False))
+        with AnyReader([replayed.folder / OUTPUT_BAG]) as reader:
+            of_replay = _forces(
+                reader.deserialize(data, connection.msgtype)
+                for connection, _, data in reader.messages()
+                if connection.topic == LEG_STATES)
+    of_node = _forces(demo.states)
+    equal = sum(of_replay.get(stamp) == forces for stamp, forces in of_node.items())
+    return '\n'.join([
+        f'the node has answered {len(of_node)} of {len(of_replay)} setpoints, {equal} of them '
+        'with the forces that a replay publishes, to the last digit; the replay:', '',
+        *summary_lines(replayed.summary)])
+
+
+def _forces(states: Iterable[Any]) -> dict[tuple[int, int], list[float]]:
+    """Return the published forces of leg states by their stamp; empty where suppressed."""
+    return {(state.header.stamp.sec, state.header.stamp.nanosec): list(state.effort)
+            for state in states}
 
 
 def main() -> None:
@@ -168,7 +147,7 @@ def main() -> None:
     parameters = Parameters.from_yaml(options.params)
     command = [executable('stewart_dynamics'), '--ros-args',
                '--params-file', options.params]
-    replay = ' '.join(map(os.path.relpath, (
+    shown = ' '.join(map(os.path.relpath, (
         executable('stewart_replay'), options.bag))) + (
         f' --params {os.path.relpath(options.params)}')
     rclpy.init()
@@ -182,8 +161,8 @@ def main() -> None:
             _wait(executor, 'the node is not active', 60.0, demo.connected, process)
             play(demo, executor, process)
             print()
-            print(report(demo, parameters))
-            print(f'\nreport of this bag, with plots and the hexapod in motion:\n  {replay}')
+            print(report(demo, options.bag, parameters))
+            print(f'\nreport of this bag, with plots and the hexapod in motion:\n  {shown}')
         except (KeyboardInterrupt, ExternalShutdownException):
             raise SystemExit(130) from None
         finally:

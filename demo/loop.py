@@ -180,16 +180,21 @@ def payload_name(payload: float) -> str:
 def table(runs: Sequence[Run], titles: Sequence[str]) -> str:
     """Return the table of all runs: without and with feed-forward, each pair with its title."""
     pairs = list(zip(runs[::2], runs[1::2], strict=True))
-    lines = ['tracking error        ' + ''.join(f'{title:^36}' for title in titles),
-             'RMS (peak)            ' + f'{"PD only":>15}{"PD + forces":>15}{"":6}' * len(pairs)]
+    lines = ['tracking error        ' + ''.join(f'{title:^39}' for title in titles),
+             'RMS (peak)            ' + f'{"PD only":>16}{"PD + forces":>16}{"":7}' * len(pairs)]
     for name, unit in UNITS.items():
         line = f'{name:12}{unit:>5}     '
         for pd, forward in pairs:
-            line += ''.join(f'{each.errors.rms[name]:8.1f} {f"({each.errors.peak[name]:.0f})":>6}'
+            line += ''.join(f' {each.errors.rms[name]:8.1f} {_peak(each.errors.peak[name]):>6}'
                             for each in (pd, forward))
-            line += f'{pd.errors.rms[name] / forward.errors.rms[name]:5.0f}x'
+            line += f' {pd.errors.rms[name] / forward.errors.rms[name]:5.0f}x'
         lines.append(line)
     return '\n'.join(lines)
+
+
+def _peak(value: float) -> str:
+    """Return a peak in parentheses; a small one with a decimal, as the RMS before it."""
+    return f'({value:.{0 if value >= 100.0 else 1}f})'
 
 
 def draw(path: Path, runs: Sequence[Run]) -> None:

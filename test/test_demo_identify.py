@@ -104,9 +104,14 @@ def test_the_demo_prints_what_the_node_has_answered(domain: int, tmp_path: Path)
     table = program.stdout
     assert 'Traceback' not in program.stderr
     assert log_lines(program.stderr, 'ERROR')  # of the force limits and of the crossing
-    answered, = re.findall(r'^(\d+) setpoints in', table, re.MULTILINE)
+    (answered, equal), = re.findall(
+        r'^the node has answered (\d+) of 1001 setpoints, (\d+) of them', table, re.MULTILINE)
     assert int(answered) > 900  # the first may come before the node listens
+    assert equal == answered
     assert [line.split()[0] for line in table.splitlines() if line.startswith('leg_')] == [
         f'leg_{n}' for n in range(1, 7)]
+    # demanded forces, not the published ones, which never exceed the limit
+    assert 'limits.force_max, 6000 N, exceeded by leg_5 and 5 other legs: -2.45' in table
+    assert 'all limits held' not in table
     assert 'det(J) crossed zero at t = 8.4' in table
     assert 'stewart_replay' in table.splitlines()[-1]

@@ -474,7 +474,9 @@ def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
     assert of.level == ERROR
     suppressed = '; forces suppressed' if action == 'suppress_forces' else ''
     for text in (of.message, next(line for line in lines if line.startswith('limits: '))):
-        assert text.endswith(f'{suppressed}; likely mistake: position in mm')
+        text = text.removeprefix('limits: ')
+        assert text.startswith('likely mistake: position in mm; leg_')
+        assert text.endswith(f', and 5 other legs{suppressed}')
     values = dict(of.values)
     assert values.get('jumps') == (None if limited else '1')
     assert values.get('setpoints without forces, by limits.action') == (

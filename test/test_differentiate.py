@@ -31,7 +31,7 @@ from scipy.interpolate import make_smoothing_spline
 
 from stewart_dynamics import Motion
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.replay.differentiate import Differentiator, TOO_FAST, TOO_FEW
+from stewart_dynamics.replay.differentiate import Differentiator, TOO_FAR, TOO_FAST, TOO_FEW
 from stewart_dynamics.replay.smoothing_spline import FEWEST, smoothing_spline
 from stewart_dynamics.setpoints.step import Batch
 
@@ -342,6 +342,22 @@ def test_too_few_poses_in_a_row_are_left_out_and_counted() -> None:
     assert np.array_equal(done.stamps, batch.stamps[[*range(20), *range(27, 27 + FEWEST)]])
     # the restart before the three poses applies to the next pose
     assert np.flatnonzero(done.restarts).tolist() == [20]
+
+
+@pytest.mark.parametrize('far', [1e10, 1e300])
+def test_a_pose_far_out_of_range_is_left_out_alone(far: float) -> None:
+    times = np.arange(400) * 0.005
+    batch = batch_of(times, motion_at(times).rows, [200])
+    batch.motions[200, 2] = far
+    differentiator, others = Differentiator(10.0, 0.1), np.arange(400) != 200
+    # the first piece ends with the far pose: its restart passes to the next pose
+    done = differentiated(differentiator, pieces(batch, [100, 201]))
+    assert differentiator.left_out == {TOO_FAR: 1}
+    restarts = batch.restarts.copy()
+    restarts[201] = True
+    assert same(done, differentiated(Differentiator(10.0, 0.1), [
+        batch._replace(restarts=restarts).chosen(others)]))
+    assert differentiator.deviation.position_max < 1e-3
 
 
 def test_poses_that_turn_too_fast_for_the_cutoff_are_left_out_and_counted() -> None:

@@ -210,7 +210,7 @@ def test_every_bag_is_replayed_once_with_its_progress(
     check_each_once(fleet, pairs, output)
     assert [each.code for each in fleet.ended] == [DONE] * 10 + [LIMIT_MET]
     assert (fleet.code(strict=False), fleet.code(strict=True)) == (DONE, LIMIT_MET)
-    assert fleet.text() == '11 bags: 10 done, 1 limit or warning'
+    assert fleet.text() == '11 bags: 10 done, 1 with a limit or warning'
     # the row of a bag is its summary's
     summary = json.loads((output / 'singular' / 'summary.json').read_text(encoding='utf-8'))
     row = rows(output)['bags/singular']
@@ -260,7 +260,8 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
     # each is named, with its error, in one line
     head, *told = fleet.text().splitlines()
     assert head == (
-        '16 bags: 10 done, 1 messages rejected, 1 limit or warning, 1 incomplete, 3 failed')
+        '16 bags: 10 done, 1 with messages rejected, 1 with a limit or warning, 1 incomplete, '
+        '3 failed')
     assert len(told) == 4
     for name, why in (('cut', 'cut.mcap: '), ('noise', 'not MCAP, not sqlite3'),
                       ('none', 'no such file'), ('other', 'exists already')):
@@ -426,7 +427,7 @@ def test_an_interrupted_run_continues(bags: Path, tmp_path: Path) -> None:
     assert [each.kept for each in fleet.ended] == [True, *[False] * 9, True]
     assert hidden(output) == []
     assert fleet.text().splitlines() == [
-        '11 bags: 9 done, 1 limit or warning, 1 failed; 2 kept from an earlier run, their '
+        '11 bags: 9 done, 1 with a limit or warning, 1 failed; 2 kept from an earlier run, their '
         'inputs have not changed', fleet.ended[1].error]
     assert {folder: when for folder, when in times().items() if folder in before} == before
     (pairs[1][1] / 'bag').rmdir()

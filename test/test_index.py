@@ -85,7 +85,8 @@ def table(folder: Path) -> list[dict[str, str]]:
 
 def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
     limits = [exceeded('length_max', 'leg_2'), exceeded('force_max', 'leg_1'),
-              exceeded('force_max', 'leg_3')]
+              exceeded('force_max', 'leg_3'),
+              exceeded('', 'leg_1') | {'limit': 'drive.torque_max'}]
     write_fleet(tmp_path, [row('a', 1, summary(
         [3.0, -120.5, 7.0, 120.0], limits=limits, rejected=rejected(3, 4),
         singularity={**NEAR, 'determinant_nearest_m3': -1e-7, 'crossings': 2,
@@ -98,13 +99,15 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
         'force_worst_at_s': '1.0', 'force_margin_n': '-20.5', 'length_margin_m': '',
         'rate_margin_m_s': '0.0', 'base_joint_angle_margin_rad': '',
         'platform_joint_angle_margin_rad': '', 'clearance_margin_m': '',
-        'limits_exceeded': 'length_max: leg_2; force_max: leg_1, leg_3',
+        'limits_exceeded': 'length_max: leg_2; force_max: leg_1, leg_3; '
+                           'drive.torque_max: leg_1',
         'force_rms_n': '60.25', 'power_peak_w': '120.5', 'determinant_nearest_m3': '-1e-07',
         'crossings': '2', 'condition_max': '8000.0', 'warnings': '1', 'rejected': '7',
         'reason': 'limits.length_max, 1 m, exceeded by leg_2: 2 m at worst, first at t = 3.00 s; '
                   'limits.force_max, 1 N, exceeded by leg_1 and 1 other leg: 2 N at worst, first '
-                  'at t = 3.00 s; det(J) crossed zero at t = 1.00 s and 1 time more: forces grow '
-                  'without bound there; singularity warning at t = 0.50 s, 0.50 s before the '
+                  'at t = 3.00 s; drive.torque_max, 1 N m, exceeded by leg_1: 2 N m at worst, '
+                  'first at t = 3.00 s; det(J) crossed zero at t = 1.00 s and 1 time more: forces '
+                  'grow without bound there; singularity warning at t = 0.50 s, 0.50 s before the '
                   'crossing, for 0.00 s in all; setpoint/pose: 4 rejected: reason 1; '
                   'setpoint/pose: 3 rejected: reason 0',
         **{column.key: '' for column in COLUMNS if column.optional and column.key not in (
@@ -131,7 +134,7 @@ def test_results_without_answers_have_their_own_word(tmp_path: Path) -> None:
     ([900], 1, 'limit or warning', 'setpoint/pose: 900 rejected: reason 0'),
     ([5, 4, 3, 2, 1], 0, 'messages rejected', '; '.join(
         f'setpoint/pose: {5 - n} rejected: reason {n}' for n in range(3))
-        + '; 3 rejected for other reasons')])
+        + '; 3 not used for other reasons')])
 def test_rejected_messages_are_a_reason(
         counts: list[int], code: int, result: str, reason: str, tmp_path: Path) -> None:
     write_fleet(tmp_path, [row('a', code, summary([1.0], rejected=rejected(*counts)))])

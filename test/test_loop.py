@@ -79,6 +79,16 @@ def test_feed_forward_cuts_the_tracking_error(
     assert 100.0 < alone.errors.rms['all legs'] < 10e3  # [um]
 
 
+def test_the_table_has_a_space_between_large_numbers(demo: ModuleType) -> None:
+    seconds, legs, one = np.zeros(2), np.ones((2, 6)), np.ones(2)
+    large, small = (demo.Errors(seconds, size * legs, size * one, size * one)
+                    for size in (12345.6, 0.4))
+    pair = [demo.Run(False, 1.0, large), demo.Run(True, 1.0, small)]
+    line, = [each for each in demo.table(2 * pair, ['a', 'b']).splitlines()
+             if each.startswith('all legs')]
+    assert line.split()[3:] == 2 * ['12345.6', '(12346)', '0.4', '(0.4)', '30864x']
+
+
 @pytest.mark.slow
 def test_the_same_run_gives_the_same_bits(run: Callable[..., Any]) -> None:
     first, second = run(True, 1.3), run(True, 1.3, number=1)

@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.replay.index import row_of, write_fleet
 from stewart_dynamics.replay.motor_charts import Deliverable, OperatingPoints
 from stewart_dynamics.replay.motor_loads import MARGIN, needed
-from stewart_dynamics.replay.statements import motion_statements
+from stewart_dynamics.replay.statements import Card, cards, motion_statements
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.motor_step import DEMANDED_TORQUES, MOTOR_ROW, SPEEDS
@@ -150,6 +150,25 @@ def test_without_drives_there_are_no_motors_and_without_velocities_no_speeds() -
         'temperature_rise_max_at_s', 'temperature_rise_steady_k', 'temperature_rise_margin_k'}
 
 
+def test_the_card_of_the_motors_says_whether_their_limits_are_held() -> None:
+    motion = fourier(3, size=0.5)(TIMES[:20])
+
+    def card(**changes: Any) -> Card:
+        found = summary_of(P.replaced({f'drive.{k}': v for k, v in changes.items()}), motion,
+                           TIMES[:20], [])
+        return cards({**found, 'missing': [], 'rejected': [], 'measured': None})['motors']
+
+    limits = ('torque_max', 'torque_speed', 'speed_max', 'temperature_rise_max')
+    ample = {'torque_max': 1e3, 'torque_continuous': 1e2, 'speed_max': 1e4, 'torque_speed': None}
+    assert card(**ample)[:2] == ('good', 'All limits of the motors are held')
+    assert card(**ample, efficiency=None).level == 'good'
+    assert card(**ample | {'torque_continuous': 1e-3}).level == 'warn'
+    exceeded = card(**ample | {'torque_max': 1e-2, 'torque_continuous': None})
+    assert exceeded.level == 'bad'
+    assert any(each.line.startswith('drive.torque_max, ') for each in exceeded.statements)
+    assert card(**dict.fromkeys([*limits, 'torque_continuous'])).level == 'none'
+
+
 def rows_of(speeds: Array, torques: Array) -> Array:
     """Return rows of motors."""
     rows = np.zeros((len(speeds), MOTOR_ROW))
@@ -206,7 +225,7 @@ def test_the_motor_needed_is_that_of_all_bags_but_those_near_a_singularity(tmp_p
     assert largest['torque_peak_n_m'] == pytest.approx(MARGIN * max(
         abs(row['torque_peak_n_m']) for row in rows[:2]))
     page = (tmp_path / 'index.html').read_text(encoding='utf-8')
-    assert f'"motor":"continuous torque {largest["torque_continuous_n_m"]:.4g} N m, ' in page
+    assert f'"motor":"{largest["torque_continuous_n_m"]:.4g} N m continuous, ' in page
     with (tmp_path / 'fleet.csv').open(encoding='utf-8', newline='') as file:
         cells = next(csv.DictReader(file))
     assert float(cells['bus_power_peak_w']) == rows[0]['bus_power_peak_w']

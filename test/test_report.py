@@ -44,7 +44,8 @@ from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import measured_headline
 from stewart_dynamics.reporting.colors import LEG_COLORS, ROLES
-from stewart_dynamics.reporting.pages import digits, number, plotly_script, thousands
+from stewart_dynamics.reporting.pages import (
+    decimals, digits, number, plotly_script, thousands)
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 
@@ -198,7 +199,8 @@ def test_plots_contain_the_samples_and_every_peak(tmp_path: Path) -> None:
     given = trajectory('singular')
     summary = given.write(tmp_path / 'report.html')
     data = data_of(tmp_path / 'report.html')
-    columns = {'position': given.motions[:, :3], 'velocity': given.motions[:, 12:15],
+    columns = {'position': given.motions[:, :3] - given.motions[0, :3],
+               'velocity': given.motions[:, 12:15],
                'angular_velocity': np.degrees(given.motions[:, 15:18]),
                'acceleration': given.motions[:, 18:21],
                'angular_acceleration': np.degrees(given.motions[:, 21:24]),
@@ -347,6 +349,8 @@ def test_numbers_have_one_style_of_thousands() -> None:
     space = '\u202f'
     assert [number(value, 1) for value in (-999.96, 1000.0, 12345.67, -1234567.8, 0.04)] == [
         f'−1{space}000.0', f'1{space}000.0', f'12{space}345.7', f'−1{space}234{space}568', '0.0']
+    assert [decimals(each) for each in (
+        [0.02352, 0.024226, None], [-282.2, 99.0], [12345.6], [0.0, np.nan])] == [5, 1, 0, 1]
     assert [digits(value) for value in (8064.14, -23456.7, 123456.7, 0.25814, 1e12)] == [
         f'8{space}064.1', f'−23{space}457', f'123{space}457', '0.25814', '1e+12']
     assert thousands(1001) == f'1{space}001'
@@ -636,6 +640,25 @@ def test_nothing_is_wider_than_a_phone_or_paper(opened: Callable[..., Opened]) -
     report.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     report.until('[...byCanvas.values()].every(drawing => drawing.drawn)')
     assert report.page.evaluate('document.documentElement.scrollWidth') == 696
+
+
+def test_the_tables_of_the_motors_fit_and_columns_have_one_number_of_decimals(
+        opened: Callable[..., Opened]) -> None:
+    report = opened(trajectory('clear', PARAMETERS.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01, 'drive.motor_inertia': 5e-5,
+        'drive.torque_max': 20.0, 'drive.torque_continuous': 9.0, 'drive.speed_max': 900.0,
+        'drive.torque_constant': 0.35, 'drive.resistance': 1.5, 'drive.thermal_resistance': 0.9,
+        'drive.thermal_time_constant': 90.0, 'drive.temperature_rise_max': 80.0})))
+    report.page.set_viewport_size({'width': 1280, 'height': 800})
+    assert report.page.evaluate(
+        "[...document.querySelectorAll('#drives .scroll')].every("
+        'box => box.scrollWidth <= box.clientWidth)')
+    tables = report.page.locator('#drives table').filter(has_text='Motor').all()[:2]
+    for table in tables:
+        rows = [row.locator('td').all_inner_texts() for row in table.locator('tbody tr').all()]
+        assert len(rows) == len(rows[0]) == 6
+        for cells in zip(*rows, strict=True):
+            assert len({len(cell.partition('.')[2]) for cell in cells}) == 1
 
 
 def test_paper_shows_the_whole_hexapod(opened: Callable[..., Opened]) -> None:

@@ -41,6 +41,7 @@ from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.reporting.block_statistics import LISTED
+from stewart_dynamics.setpoints.rejections import NOT_JOINED
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
 Array = NDArray[np.float64]
@@ -628,10 +629,24 @@ def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
     assert [card.level for card in cards(empty).values()] == ['good', *['none'] * 4]
     lines = [each.line for each in cards(found)['reading'].statements]
     assert lines == ['2 setpoints in 1.00 s', '5: 5 rejected: late', '4: 4 rejected: late',
-                     '3: 3 rejected: late', '3 rejected for other reasons']
+                     '3: 3 rejected: late', '3 not used for other reasons']
     jumps = {**found, 'setpoints': {**found['setpoints'], 'jumps': 2, 'jumps_first_at_s': 0.5}}
     assert ('2 jumps, first at t = 0.50 s: the legs cannot follow within limits.velocity_max'
             in [each.line for each in cards(jumps)['limits'].statements])
+
+
+def test_dropped_messages_are_not_called_rejected() -> None:
+    samples = Samples(2)
+    found = {**samples.summary(hexapod()).values(), 'missing': [], 'measured': None,
+             'rejected': [{'topic': 'setpoint', 'count': 49, 'reason': NOT_JOINED}]}
+    assert ('setpoint: 49 dropped: not all topics had its stamp'
+            in [each.line for each in cards(found)['reading'].statements])
+
+
+def test_large_numbers_of_the_table_have_a_space_before_them() -> None:
+    samples = Samples(2, demanded=-1e10, rates=-1e100, lengths=1e10)
+    row = table_of(samples, hexapod(**LIMITS)).splitlines()[4].split()
+    assert len(row) == 12 and '-1e+100' in row  # the name has two words
 
 
 def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:

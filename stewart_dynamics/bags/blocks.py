@@ -49,7 +49,7 @@ class Source(Protocol):
     A file of a recording.
 
     missing: descriptions of the parts that could not be read so far.
-    unchecked: messages without a checksum were read.
+    unchecked: messages lacked the checksum that the format offers.
     topics: the type of each topic, and its encoding if that is not CDR.
     """
 
@@ -135,11 +135,11 @@ def compact(block: Messages) -> Messages:
 
 
 class RowsFile:
-    """A file without checksums that is read message by message, see Source."""
+    """A file of a format without checksums, read message by message, see Source."""
 
     def __init__(self) -> None:
         self.missing: list[str] = []
-        self.unchecked = True
+        self.unchecked = False
 
     def rows(self, keys: Mapping[str, str]) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, time [ns] and bytes of each message of these topics, in order of time."""

@@ -307,7 +307,8 @@ def _words(payload: Payload) -> str:
     known = [f'{name} {with_interval(value, half)} {unit}'
              for name, unit, value, half, is_known in rows if is_known]
     unknown = [name for name, *_, is_known in rows if not is_known]
-    text = (f'{", ".join(known)}; platform.mass {more:+.6g} kg; from '
+    text = (f'{", ".join(known)}; {abs(more):.{_decimals(fitted.half_widths[0])}f} kg '
+            f'{"less" if more < 0.0 else "more"} than platform.mass; from '
             f'{payload.seconds:.1f} s')
     text += _excluded(payload.excluded)
     if not fitted.consistent:
@@ -324,9 +325,13 @@ def _excluded(count: int) -> str:
 
 def with_interval(value: float, half_width: float) -> str:
     """Return a value and half of its 95 % interval, of which two digits are given."""
-    digits = 1 - math.floor(math.log10(half_width)) if half_width > 0.0 else 6
-    digits = min(max(digits, 0), 9)
+    digits = _decimals(half_width)
     return f'{value:.{digits}f} +- {half_width:.{digits}f}'
+
+
+def _decimals(half_width: float) -> int:
+    digits = 1 - math.floor(math.log10(half_width)) if half_width > 0.0 else 6
+    return min(max(digits, 0), 9)
 
 
 def _parameters(body: Body) -> str:

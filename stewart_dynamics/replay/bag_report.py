@@ -86,6 +86,7 @@ class Report:
         self._compared = Curves(timeout) if measured else None
         self._places_compared: dict[str, slice] = {}
         self._angles: Array = np.zeros((1, 3))
+        self._first: Array | None = None  # position [m]
         self._operating = OperatingPoints() if parameters.drives else None
 
     def add(self, block: Answered) -> None:
@@ -95,9 +96,11 @@ class Report:
         motions, forces = setpoints.motions, outputs.demanded_forces
         with np.errstate(over='ignore'):
             powers = forces * outputs.rates
+        if self._first is None:
+            self._first = motions[0, POSITION].copy()
         angles = self._continued(np.degrees(to_euler(motions[:, ROTATION].reshape(-1, 3, 3))))
         quantities = {
-            'position': motions[:, POSITION],
+            'position': motions[:, POSITION] - self._first,
             'angles': angles,
             'velocity': motions[:, LINEAR_VELOCITY],
             'angular_velocity': np.degrees(motions[:, ANGULAR_VELOCITY]),
@@ -177,8 +180,9 @@ class Report:
         p = self._parameters
         known = not summary['quasi_static']
         curves = _lines(self._curves)
-        plots = [*motion_plots(p, self._places, known), *base_wrench_plots(self._places)] if (
-            curves) else []
+        plots = [] if self._first is None else [
+            *motion_plots(p, self._places, known, self._first.tolist()),
+            *base_wrench_plots(self._places)]
         density = self._spectrum.density()
         if density is not None:
             plots += spectrum_plots(density, len(curves))

@@ -31,12 +31,14 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
+from stewart_dynamics.setpoints.inputs import LARGEST
 from stewart_dynamics.setpoints.step import Batch, restarts_of
 
 # Poses in a window.
 WINDOW = 4096
 
 TOO_FEW = f'fewer than {FEWEST} poses between gaps: no acceleration can be computed'
+TOO_FAR = f'position beyond {LARGEST:g} m'
 TOO_FAST = 'turns faster than the cut-off frequency can follow'
 
 # Poses closer in time than this begin another segment: the system is singular there [ns].
@@ -109,7 +111,8 @@ class Differentiator:
         # already and stay for the next window's sake, and its first stamp
         self._given = 0
         self._begun = 0  # [ns]
-        self._restart = False  # of a setpoint that was left out
+        # of a setpoint that was left out, by its spline and before it
+        self._restart = self._restart_before = False
         self._gathered = 0
         self._squares = np.zeros(2)
         self._largest = np.zeros(2)
@@ -124,8 +127,15 @@ class Differentiator:
         """
         Add setpoints that have only poses; return those that are done, with their motion.
 
-        batch: stamps increase, except at jumps back in time.
+        batch: stamps increase, except at jumps back in time. Positions beyond LARGEST are left
+            out: they would disturb the splines of all poses around them.
         """
+        near = np.all(np.abs(batch.motions[:, POSITION]) <= LARGEST, axis=1)
+        if self._restart_before or not near.all():
+            restarts, self._restart_before = restarts_of(
+                batch.restarts, near, self._restart_before)
+            self.left_out[TOO_FAR] += int(np.count_nonzero(~near))
+            batch = batch.chosen(near)._replace(restarts=restarts)
         wrenches = np.broadcast_to(batch.wrenches, (len(batch.stamps), WRENCH))
         self._pending.append(Batch(
             batch.stamps, batch.motions, wrenches, batch.restarts, batch.times, batch.bases))

@@ -29,8 +29,7 @@ from urllib.parse import quote
 
 from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, OF_JOINTS, OF_RESULTS, QUANTITIES, short_name,
-    VELOCITY_MAX)
+    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, OF_JOINTS, OF_RESULTS, QUANTITIES, VELOCITY_MAX)
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.legs_table import harmless
 from stewart_dynamics.replay.motor_loads import needed
@@ -54,6 +53,9 @@ NOTHING_ANSWERED = 'nothing answered'  # the result of code 3 if no setpoint cou
 SEVERITY = (RESULTS[DONE], REJECTED, RESULTS[LIMIT_MET], RESULTS[PARTLY_READ], NOTHING_ANSWERED,
             RESULTS[BAD_INPUT])
 """The results, the most severe last."""
+IN_WORDS = {REJECTED: f'with {REJECTED}', RESULTS[LIMIT_MET]: 'with a limit or warning',
+            NOTHING_ANSWERED: 'without an answer'}
+"""Results after a number of bags, where they differ."""
 
 
 class Column(NamedTuple):
@@ -114,7 +116,7 @@ _largest = partial(max, key=abs)
 def _exceeded(summary: dict[str, Any]) -> str:
     legs: dict[str, list[str]] = {}
     for each in summary['limits']:
-        legs.setdefault(short_name(each['limit']), []).append(each['leg'])
+        legs.setdefault(each['limit'].removeprefix('limits.'), []).append(each['leg'])
     return '; '.join(f'{limit}: {", ".join(of)}' for limit, of in legs.items())
 
 
@@ -148,7 +150,7 @@ COLUMNS = (
         ('torque_margin_n_m', 'torque margin', 'N m'),
         ('torque_continuous_margin_n_m', 'continuous torque margin', 'N m'),
         ('speed_margin_rad_s', 'speed margin', 'rad/s'),
-        ('temperature_rise_max_k', 'temperature rise', 'K'))),
+        ('temperature_rise_max_k', 'temperature rise of windings', 'K'))),
     *(Column(f'bus_{key}', head, unit, _value('motors', 'bus', key), optional=True)
       for key, head, unit in (
         ('power_peak_w', 'bus power', 'W'),

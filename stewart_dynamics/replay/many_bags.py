@@ -40,8 +40,10 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.bag_task import (
     At, counted, Ended, failed, finished, kept, LOCAL_INTERVAL, replay_task, Task)
-from stewart_dynamics.replay.index import Cell, listed_results, SEVERITY, write_fleet
+from stewart_dynamics.replay.index import (
+    Cell, IN_WORDS, listed_results, SEVERITY, write_fleet)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
+from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.results_folder import remove_abandoned
 from tqdm import tqdm
 
@@ -62,11 +64,12 @@ class Fleet(NamedTuple):
     def text(self) -> str:
         """Return the number of bags by result, and a line for every bag with an error."""
         number = Counter(str(each.row['result']) for each in self.ended)
-        counts = ', '.join(f'{number[result]} {result}' for result in SEVERITY if number[result])
+        counts = ', '.join(f'{number[result]} {IN_WORDS.get(result, result)}'
+                           for result in SEVERITY if number[result])
         unchanged = sum(each.kept for each in self.ended)
         if unchanged:
             counts += f'; {unchanged} kept from an earlier run, their inputs have not changed'
-        return '\n'.join([f'{len(self.ended)} bags: {counts}',
+        return '\n'.join([f'{plural(len(self.ended), "bag")}: {counts}',
                           *(each.error for each in self.ended if each.error)])
 
 

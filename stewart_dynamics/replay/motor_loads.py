@@ -46,11 +46,12 @@ class Need(NamedTuple):
     load: str
     name: str
     unit: str
+    kind: str = ''  # follows the unit
 
 
 # By the key of the motor that is needed.
-NEEDS = {'torque_continuous_n_m': Need('torque_rms_n_m', 'continuous torque', 'N m'),
-         'torque_peak_n_m': Need('torque_peak_n_m', 'peak torque', 'N m'),
+NEEDS = {'torque_continuous_n_m': Need('torque_rms_n_m', 'continuous torque', 'N m', 'continuous'),
+         'torque_peak_n_m': Need('torque_peak_n_m', 'peak torque', 'N m', 'peak'),
          'speed_rad_s': Need('speed_peak_rad_s', 'speed', 'rad/s')}
 
 

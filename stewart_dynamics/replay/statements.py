@@ -27,28 +27,32 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from stewart_dynamics.mechanics.limits import (
-    BASE_ANGLE_MAX, CLIPPED, Exceedance, LENGTH_MAX, PLATFORM_ANGLE_MAX, QUANTITIES, SPEED_MAX,
-    TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
+    BASE_ANGLE_MAX, CLIPPED, Exceedance, LENGTH_MAX, OF_MOTORS, PLATFORM_ANGLE_MAX, QUANTITIES,
+    SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.summary import margin_key, unit_key
-from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
+from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, Rejection
 
 Summary = Mapping[str, Any]  # the content of summary.json
 
-READING, MISSING, REJECTED, LIMITS, JOINTS, LOADS, MOTORS, SINGULARITY, MEASURED = (
-    'reading', 'missing', 'rejected', 'limits', 'joints', 'loads', 'motors', 'singularity',
-    'measured')
+(READING, MISSING, REJECTED, LIMITS, MOTOR_LIMITS, JOINTS, LOADS, MOTORS, SINGULARITY,
+ MEASURED) = (
+    'reading', 'missing', 'rejected', 'limits', 'motor limits', 'joints', 'loads', 'motors',
+    'singularity', 'measured')
 LEVELS = ('none', 'good', 'warn', 'bad')  # the worst last; the first: information
 _CARDS = {
     (READING, MISSING, REJECTED): {
         'good': 'The whole bag was read', 'warn': 'Not all messages could be used',
         'bad': 'The bag could not be read completely'},
-    (LIMITS,): {'none': 'No limits are given', 'good': 'All limits are held',
-                'warn': 'Not all limits could be checked', 'bad': 'Limits are exceeded'},
+    (LIMITS, MOTOR_LIMITS): {
+        'none': 'No limits are given', 'good': 'All limits are held',
+        'warn': 'Not all limits could be checked', 'bad': 'Limits are exceeded'},
     (SINGULARITY,): {'none': 'Singularity', 'good': 'Clear of singularities',
                      'warn': 'A singularity is near', 'bad': 'A singularity is reached'},
-    (MOTORS,): {'none': 'Motors', 'warn': 'Motors are too small for continuous duty'},
+    (MOTORS, MOTOR_LIMITS): {
+        'none': 'Motors', 'good': 'All limits of the motors are held',
+        'warn': 'Motors may be too small', 'bad': 'Limits of the motors are exceeded'},
     (MEASURED,): {'none': 'Measured forces', 'good': 'Measured forces',
                   'warn': 'Measured forces differ'}}
 # Maximum number of reasons of rejection.
@@ -133,10 +137,10 @@ def _messages(summary: Summary) -> Iterator[Statement]:
         yield Statement(MISSING, 'bad', f'not read: {each}')
     rejected = sorted(summary['rejected'], key=lambda each: -each['count'])
     for each in rejected[:_LISTED]:
-        yield Statement(
-            REJECTED, 'warn', f'{each["topic"]}: {each["count"]} rejected: {each["reason"]}')
+        yield Statement(REJECTED, 'warn', Rejection(each['topic'], each['reason']).counted(
+            each['count']).words(''))
     if others := sum(each['count'] for each in rejected[_LISTED:]):
-        yield Statement(REJECTED, 'warn', f'{others} rejected for other reasons')
+        yield Statement(REJECTED, 'warn', f'{others} not used for other reasons')
 
 
 def _interruptions(points: Summary) -> str:
@@ -158,8 +162,8 @@ def _limits(summary: Summary) -> Iterator[Statement]:
         quantity = QUANTITIES[name]
         at_worst = ' at that speed' if name == TORQUE_SPEED else ''
         yield Statement(
-            LIMITS, 'bad', f'{name}, {most["bound"]:g} {quantity.unit}{at_worst}, exceeded by '
-            f'{most["leg"]}{others}: {most["worst"]:.6g} {quantity.unit} at worst, first',
+            _topic(name), 'bad', f'{name}, {most["bound"]:g} {quantity.unit}{at_worst}, exceeded '
+            f'by {most["leg"]}{others}: {most["worst"]:.6g} {quantity.unit} at worst, first',
             min(each['first_at_s'] for each in of_legs), quantity.key)
     if points['jumps']:
         yield Statement(
@@ -173,11 +177,15 @@ def _limits(summary: Summary) -> Iterator[Statement]:
         if name in CLIPPED and any(number for number, _ in causes):
             why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
                                   for number, cause in causes if number)
-        yield Statement(LIMITS, 'warn', f'{name} could not be checked{why}')
+        yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
     problems = points['jumps'] or summary['limits'] or summary['limits_not_checked']
     if not problems and any(leg[key] is not None for leg in summary['legs'].values()
                             for key in leg if '_margin_' in key):
         yield Statement(LIMITS, 'good', 'all limits held')
+
+
+def _topic(limit: str) -> str:
+    return MOTOR_LIMITS if limit in OF_MOTORS else LIMITS
 
 
 def _joints(legs: Summary) -> Iterator[Statement]:
@@ -225,13 +233,16 @@ def _motors(summary: Summary) -> Iterator[Statement]:
         yield Statement(
             MOTORS, 'warn', f'drive.torque_continuous, exceeded by the RMS torque of {worst}'
             f'{others}: {legs[worst]["torque_rms_n_m"]:.4g} N m, by {-margin:.4g} N m')
-    for name, peak in ((TORQUE_MAX, 'torque_peak'), (SPEED_MAX, 'speed_peak'),
-                       (TEMPERATURE_RISE_MAX, 'temperature_rise_max')):
+    elif _motors_hold(summary):
+        yield Statement(MOTOR_LIMITS, 'good', 'all limits of the motors held')
+    for name, peak, of in ((TORQUE_MAX, 'torque_peak', ''), (SPEED_MAX, 'speed_peak', ''),
+                           (TEMPERATURE_RISE_MAX, 'temperature_rise_max', ' of the winding')):
         quantity = QUANTITIES[name]
         if values := values_of(legs, f'{peak}_{unit_key(quantity.unit)}'):
             value, most = max(values, key=lambda each: abs(each[0]))
             yield Statement(
-                MOTORS, 'none', f'{quantity.name}: {value:.4g} {quantity.unit} at most, {most},',
+                MOTORS, 'none',
+                f'{quantity.name}{of}: {value:.4g} {quantity.unit} at most, {most},',
                 legs[most][f'{peak}_at_s'], quantity.key)
     if bus := motors['bus']:
         yield Statement(MOTORS, 'none', f'power of the bus: {bus["power_peak_w"]:.4g} W at most,',
@@ -242,9 +253,17 @@ def _motors(summary: Summary) -> Iterator[Statement]:
         yield Statement(MOTORS, 'none', f'motor needed: {text}')
 
 
+def _motors_hold(summary: Summary) -> bool:
+    """Return whether a limit of the motors is given, and all are checked and held."""
+    given = any(load[key] is not None for load in summary['motors']['legs'].values()
+                for key in load if '_margin_' in key)
+    problems = [*(each['limit'] for each in summary['limits']), *summary['limits_not_checked']]
+    return given and not any(limit in OF_MOTORS for limit in problems)
+
+
 def needed_words(needed: Summary) -> str:
     """Return the motor that is needed in words; empty if it is not known."""
-    words = [f'{name} {needed[key]:.4g} {unit}' for key, (_, name, unit) in NEEDS.items()
+    words = [f'{needed[key]:.4g} {need.unit} {need.kind}'.rstrip() for key, need in NEEDS.items()
              if needed[key] is not None]
     return f'{", ".join(words)}, with a margin of {100.0 * (needed["margin"] - 1.0):.3g} %' * bool(
         words)

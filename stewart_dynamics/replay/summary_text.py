@@ -24,7 +24,7 @@ from typing import Any
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
-    JOINTS, LIMITS, LOADS, motion_statements, MOTORS, READING, SINGULARITY)
+    JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING, SINGULARITY)
 from stewart_dynamics.setpoints.rejections import Rejection
 
 _LISTED = 5
@@ -40,10 +40,9 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     mistakes = likely_mistakes(parameters)
     lines += [notice for notice in summary['notices'] if notice not in mistakes]
     for each in summary['rejected']:
-        rejection = Rejection(f'{each["topic"]}: {each["count"]}', each['reason'])
+        rejection = Rejection(each['topic'], each['reason']).counted(each['count'])
         when = '' if each['first_at_s'] is None else f' at t = {each["first_at_s"]:.3f} s'
-        lines.append(rejection.words(f'first{when}: {each["first"]}') if each['first']
-                     else rejection.words('').removesuffix(': '))
+        lines.append(rejection.words(f'first{when}: {each["first"]}' if each['first'] else ''))
     return '\n'.join(lines)
 
 
@@ -61,7 +60,8 @@ def summary_lines(summary: Mapping[str, Any]) -> list[str]:
                      'energy are not known')
     if any(clipped):
         lines.append('* reaches limits.force_max: the published force is clipped to it')
-    lines += [each.line for each in about if each.topic in (LIMITS, JOINTS, LOADS, MOTORS)]
+    lines += [each.line for each in about if each.topic in (
+        LIMITS, MOTOR_LIMITS, JOINTS, LOADS, MOTORS)]
     lines += [*reading, '', *(each.line for each in about if each.topic == SINGULARITY)]
     return [textwrap.fill(line, _WIDTH, subsequent_indent='  ') if len(line) > _WIDTH else line
             for line in lines]
@@ -137,10 +137,8 @@ def _legs_table(legs: Mapping[str, Mapping[str, float | None]],
 
 
 def _fitted(value: float | None, width: int, digits: int) -> str:
-    """Return a number with these decimals, or fewer if it would be too wide."""
+    """Return a number with these decimals, or fewer, so that a space is before it."""
     if value is None:
         return f'{"-":>{width}}'
-    for text in (f'{value:.{digits}f}', f'{value:.0f}'):
-        if len(text) < width:
-            return f'{text:>{width}}'
-    return f'{value:>{width}.1e}'
+    texts = [f'{value:{form}}' for form in (f'.{digits}f', '.0f', '.1e', '.0e')]
+    return next(text for text in texts if len(text) < width).rjust(width)

@@ -23,7 +23,7 @@ their digests. Names given by users are text, never markup.
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 import functools
 import hashlib
 import importlib.util
@@ -63,6 +63,13 @@ def digits(value: float | None) -> str:
     return typeset(f'{value:,.{decimals}f}')
 
 
+def decimals(values: Iterable[float | None]) -> int:
+    """Return the number of decimals that gives the largest of some numbers four digits."""
+    largest = max((abs(each) for each in values if each is not None and math.isfinite(each)),
+                  default=0.0)
+    return max(0, min(3 - math.floor(math.log10(largest)), 9)) if largest else 1
+
+
 def thousands(count: int) -> str:
     """Return a count with spaces between thousands."""
     return typeset(f'{count:,}')
@@ -78,6 +85,7 @@ def _environment(folder: Path) -> Environment:
     made = Environment(loader=FileSystemLoader([folder, _SHARED]), autoescape=True,
                        undefined=StrictUndefined, keep_trailing_newline=True)
     made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr,
+                        decimals=decimals,
                         unit=lambda text: text.replace('^2', '²'))
     made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
     # Data cannot end the element that contains them: the filter escapes < > & and '.

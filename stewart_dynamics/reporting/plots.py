@@ -83,9 +83,14 @@ class Plot(NamedTuple):
                          for name, curves in self.variants.items()]}
 
 
-def motion_plots(p: Parameters, at: Places, velocities_known: bool) -> list[Plot]:
-    """Return the plots of motion and forces; those of velocities only if they are known."""
-    joints = p['joints']
+def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Sequence[float],
+                 ) -> list[Plot]:
+    """
+    Return the plots of motion and forces; those of velocities only if they are known.
+
+    first: position of the first setpoint [m]; the curves of positions begin there.
+    """
+    joints, begin = p['joints'], ', '.join(f'{each:.6g}' for each in first)
     of_motion = [
         Plot('velocity', '13', 'Velocity of the platform', 'm/s',
              _of_axes(at['velocity'], 'v x', 'v y', 'v z'), 'of its origin, base axes'),
@@ -101,8 +106,10 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool) -> list[Plot
         Plot('powers', '', 'Mechanical power of the legs', 'W', _of_legs(joints, at['powers']),
              'demanded force times rate; + drives, − brakes', spikes=True)]
     return [
-        Plot('position', '12', 'Inputs: position of the platform', 'm',
-             _of_axes(at['position'], 'X', 'Y', 'Z'), 'of its origin, base axes'),
+        # one scale for all axes: the height above the base is far larger than the motion
+        Plot('position', '12', 'Inputs: position of the platform, from the first setpoint', 'm',
+             _of_axes(at['position'], 'X', 'Y', 'Z'),
+             f'of its origin, base axes; the first setpoint is at ({begin}) m'),
         Plot('angles', '12', 'Inputs: orientation of the platform', 'deg',
              _of_axes(at['angles'], 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
         *(of_motion if velocities_known else ()),

@@ -49,9 +49,13 @@ class Rejection(NamedTuple):
     reason: str
 
     def words(self, details: str) -> str:
-        """Return the log line for a message."""
+        """Return the log line for a message, whose details may be empty."""
         how = '' if self.reason.startswith(_DROPPED) else 'rejected: '
-        return f'{self.topic} {how}{self.reason}: {details}'
+        return f'{self.topic} {how}{self.reason}' + f': {details}' * bool(details)
+
+    def counted(self, count: int) -> Rejection:
+        """Return the rejection of a number of messages, for ``words``."""
+        return self._replace(topic=f'{self.topic}: {count}')
 
 
 _STAMP = re.compile(r'stamp (\d+) ns(: | is )?')

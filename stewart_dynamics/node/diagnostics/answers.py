@@ -271,15 +271,15 @@ class LimitsDiagnostics(StatusPart):
             if not exceeded:
                 self.held.see(OK_LEVEL, now, name)
                 continue
-            words = ', '.join(map(self._words, exceeded))
+            worst = max(exceeded, key=_excess)
+            words = self._words(worst, len(exceeded) - 1)
             if suppressed and name not in CLIPPED:
                 words += '; forces suppressed'
             if name in (LENGTH_MAX, JUMP):
-                words += mistake
+                words = mistake + words
             self.held.see(Level(ERROR, words), now, name)
             self._setpoints[name] += 1
-            self._worst[name] = max(*exceeded, self._worst.get(name, exceeded[0]),
-                                    key=lambda each: each.excess)
+            self._worst[name] = max(worst, self._worst.get(name, worst), key=_excess)
 
     def status(self, now: float) -> Status:
         """Return the status, with all causes of its level."""
@@ -323,14 +323,18 @@ class LimitsDiagnostics(StatusPart):
         return lines
 
     def _mistake(self, output: Output) -> str:
-        """Return the likely mistake where legs are too long, as words to append."""
+        """Return the likely mistake where legs are too long, as words that precede others."""
         longest = self._answers.parameters['limits.length_max']
         reference = output.state.lengths if longest is None else longest.tolist()
         if reference and all(0.3 < length / (_MILLIMETRES * most) < 1.5 for length, most in zip(
                 output.lengths, reference, strict=True)):
-            return '; likely mistake: position in mm'
+            return 'likely mistake: position in mm; '
         return ''
 
-    def _words(self, exceedance: Exceedance) -> str:
-        clipped = ', clipped' if exceedance.limit in CLIPPED else ''
-        return exceedance.words(self._joints) + clipped
+    def _words(self, worst: Exceedance, others: int = 0) -> str:
+        words = worst.words(self._joints) + ', clipped' * (worst.limit in CLIPPED)
+        return words + (f', and {others} other leg{"s" * (others > 1)}' if others else '')
+
+
+def _excess(exceedance: Exceedance) -> float:
+    return exceedance.excess

@@ -192,7 +192,8 @@ const AXIS = {gridcolor: color('grid'), zerolinecolor: color('zero'), linecolor:
 function layoutOf(xTitle, xaxis, yTitle, yaxis, more = {}) {
   const title = (text, standoff) => ({text, standoff, font: {size: 12.5}});
   return {
-    height: 270, margin: {l: 96, r: 14, t: 12, b: 42}, font: FONT, showlegend: false, hovermode: false,
+    // above the axes the tool bar has its place: it hides no label
+    height: 288, margin: {l: 96, r: 14, t: 30, b: 42}, font: FONT, showlegend: false, hovermode: false,
     separators: `.${THIN_SPACE}`, dragmode: TOUCH ? false : 'zoom', paper_bgcolor: PAPER, plot_bgcolor: PAPER,
     xaxis: {...AXIS, zeroline: false, ...xaxis, title: title(xTitle, 6)},
     yaxis: {...AXIS, ...yaxis, title: title(yTitle, 8)}, ...more};
