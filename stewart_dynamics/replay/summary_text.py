@@ -141,4 +141,4 @@ def _fitted(value: float | None, width: int, digits: int) -> str:
     if value is None:
         return f'{"-":>{width}}'
     texts = [f'{value:{form}}' for form in (f'.{digits}f', '.0f', '.1e', '.0e')]
-    return next(text for text in texts if len(text) < width).rjust(width)
+    return next((text for text in texts if len(text) < width), texts[-1]).rjust(width)
