@@ -43,7 +43,7 @@ from stewart_dynamics.datasheet.datasheet_text import (
     setpoints_used)
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
-from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads
+from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads, stiffness
 from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, RecordedMotion, uses
 from stewart_dynamics.replay import main as replay
 from stewart_dynamics.replay.replay_options import Options
@@ -98,6 +98,7 @@ def test_the_files_are_there_and_name_what_limits(sheet: Path, figures: dict[str
     assert figures['stiffness']['worst']['frequencies'][0] < figures['stiffness']['frequencies'][0]
     platform = StewartPlatform(PARAMETERS)
     loaded = RatedHexapod(PARAMETERS, payload=Payload(40.0, np.array([0.0, 0.0, 0.2]))).platform
+    held = StewartPlatform(loaded.parameters.replaced({'actuator.reflected_mass': 0.0}))
     for (i, j), plane in zip(((0, 2), (1, 2), (0, 1)), ('xz', 'yz', 'xy'), strict=True):
         found = figures['stiffness']['sections'][plane]
         values = np.array(found['frequencies'], dtype=float)
@@ -108,7 +109,7 @@ def test_the_files_are_there_and_name_what_limits(sheet: Path, figures: dict[str
             at = Pose(position, platform.home_pose().rotation)
             assert Capability(platform).travel(at, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]).value > 0.0
             assert values[n, m] == pytest.approx(
-                Capability(loaded).modes(at, 5e7).frequencies[0], rel=1e-6)
+                Capability(held).modes(at, 5e7).frequencies[0], rel=1e-6)
     page = (sheet / 'datasheet.html').read_text()
     assert page.count('aria-label="Lowest natural frequency') == 3
     assert page.count(f'smallest at {figures["worst"]["poses"]} poses') == 2
@@ -167,6 +168,19 @@ def test_the_rated_payload_brings_a_leg_to_its_largest_force() -> None:
     assert np.abs(forces).max() == pytest.approx(6000.0, rel=1e-9)
     with pytest.raises(PoseError, match=r'force .* above limits.force_max'):
         RatedHexapod(PARAMETERS, payload=Payload(1.001 * largest, PIVOT))
+
+
+def test_natural_frequencies_are_those_with_held_motors() -> None:
+    driven = PARAMETERS.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.005, 'drive.gear_ratio': 3.0,
+        'drive.motor_inertia': 1.37e-4})
+    found = [stiffness(RatedHexapod(each), 5e7, None, 3)['frequencies']
+             for each in (PARAMETERS, driven)]
+    assert found[0] == found[1]
+    held = StewartPlatform(driven.replaced({
+        'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None, 'drive.screw_inertia': None}))
+    np.testing.assert_allclose(
+        found[0], held.natural_modes(held.home_pose(), 5e7).frequencies, rtol=1e-3)
 
 
 def test_a_payload_in_any_orientation_exceeds_no_force_under_any_gravity() -> None:
@@ -248,6 +262,24 @@ def test_a_motion_that_exceeds_a_limit_is_not_possible(
     assert found['factor'] < 1.0
     assert found['limit'] == limit
     assert found['amplitude']['value'] < 1.0
+    # where the path is not possible no payload can be added in it
+    assert (found['payload'] is None) == (found['factor'] == 0.0) == (limit != 'velocity_max')
+    assert (found['between_setpoints'] is None) == (limit != 'velocity_max')
+
+
+def test_a_motion_ends_at_the_first_limit_though_it_is_singular_later(
+        recorded: RecordedMotion) -> None:
+    rows = recorded.motion.rows.copy()
+    rows[50:, 3:12] = rotation_about([0.0, 0.0, 1.0], math.pi / 2.0).ravel()
+    turned = recorded._replace(motion=Motion.of_rows(rows))
+    for longest, limit, sample in ((9.0, 'singularity', 50), (1.0, 'length_max', 0)):
+        platform = StewartPlatform(PARAMETERS.replaced(
+            {'limits.length_min': 0.1, 'limits.length_max': longest}))
+        found = judged(platform, turned, uses(platform, turned))
+        assert (found['limit'], found['at_s']) == (limit, turned.seconds[sample])
+        assert found['possible'] is False
+        assert found['factor'] == 0.0
+        assert found['amplitude'] is found['payload'] is None
 
 
 def test_without_a_limit_of_its_speed_a_motion_is_possible_and_can_be_larger(
@@ -266,7 +298,7 @@ def test_a_bag_through_a_singularity_is_not_possible(
     given = '--params', PLATFORM, '--motion', ROOT / 'bags' / 'singular', '--output'
     assert run(*given, tmp_path / 'a', '--strict') == 1
     printed = capsys.readouterr()
-    assert 'motion not possible: at no speed, by singularity at 8.4' in printed.out
+    assert 'motion not possible: at no speed, by singularity at 8.22' in printed.out
     assert f'results: {tmp_path / "a"}' in printed.out
 
 

@@ -31,6 +31,7 @@ from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, FORCE_MAX, LIMITS
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import CONDITION, FORCES
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.mechanics.stiffness import HELD_MOTORS
 from stewart_dynamics.parameters.table import (
     inertia_matrix, LEG_SHAPE, Parameters, PLATFORM_OUTLINE)
 from stewart_dynamics.planned.interpolation import rotation_vector
@@ -78,6 +79,7 @@ class RatedHexapod:
         self._limits = Capability(whole)
         self.platform = StewartPlatform(_moved(self.given, self.pivot))
         self.loads = Capability(self.platform)
+        self._held = Capability(StewartPlatform(self.platform.parameters.replaced(HELD_MOTORS)))
         self.pose = Pose(self.origin.position + self.origin.rotation @ self.pivot,
                          self.origin.rotation)
         self._check(whole, self.origin)
@@ -108,6 +110,14 @@ class RatedHexapod:
     def section(self, normal: str) -> Section:
         """Return ``Capability.section`` through the pose."""
         return self._limits.section(self.origin, normal)
+
+    def frequencies(self, poses: Pose, leg_stiffness: float) -> Array:
+        """
+        Return natural frequencies (..., 6) [Hz] at poses of the pivot, with held motors.
+
+        A leg's stiffness [N/m] is between its motor and the platform, so rotors stand still.
+        """
+        return self._held.modes(poses, leg_stiffness).frequencies
 
     def moved_by(self, direction: Array, by: float = 1.0) -> Pose:
         """Return the pose after a translation and a rotation vector (6,), base axes."""

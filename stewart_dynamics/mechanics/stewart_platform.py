@@ -488,8 +488,10 @@ class StewartPlatform:
         Return natural frequencies (..., 6) [Hz] and mode shapes (..., 6, 6) at a pose.
 
         Arguments are those of ``stiffness``. The mass matrix includes
-        ``actuator.reflected_mass``, as for compliance in the position control; for compliance
-        between held actuators and the platform, set it to zero (``parameters.replaced``).
+        ``actuator.reflected_mass``, as for compliance in the position control. Compliance between
+        held motors and the platform does not turn the rotors: take the modes of a platform of
+        ``parameters.replaced({'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
+        'drive.screw_inertia': None})``.
         """
         legs = stiffness.leg_stiffnesses(leg_stiffness)
         mass, j_inv = self.mass_matrix(pose), self.inverse_jacobian(pose)
