@@ -39,8 +39,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import main
 from stewart_dynamics.datasheet.datasheet import soft_legs
 from stewart_dynamics.datasheet.datasheet_text import (
-    between_setpoints, both_ways, box_verdict, down, LINEAR, motion_verdict, rated_payload,
-    setpoints_used)
+    between_setpoints, both_ways, box_verdict, down, LINEAR, motion_verdict, numbers,
+    rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads, stiffness
@@ -111,8 +111,14 @@ def test_the_files_are_there_and_name_what_limits(sheet: Path, figures: dict[str
             assert values[n, m] == pytest.approx(
                 Capability(held).modes(at, 5e7).frequencies[0], rel=1e-6)
     page = (sheet / 'datasheet.html').read_text()
-    assert page.count('aria-label="Lowest natural frequency') == 3
-    assert page.count(f'smallest at {figures["worst"]["poses"]} poses') == 2
+    assert page.count('aria-label="Lowest natural frequency') == page.count('"outside"') == 3
+    assert page.count(f'smallest at {figures["worst"]["poses"]} poses') == 1
+
+
+def test_numbers_of_a_vector_have_the_digits_of_the_largest() -> None:
+    assert numbers([3.3333e-5, -1e-9, 0.32060004], 1e3, ' mm') == '0.03, 0, 320.6 mm'
+    assert numbers([1e-17, -1e-17, 0.0]) == '0, 0, 0'
+    assert numbers([-0.25] * 6) == '−0.25'
 
 
 def test_travel_is_about_the_pivot_and_the_table_ends_at_the_limits(
