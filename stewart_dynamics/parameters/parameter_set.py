@@ -156,7 +156,7 @@ class ParameterSet(Mapping[str, Any]):
 
     Arrays are read-only numpy arrays: joints (6, 3), values of the legs (6,); limits that are not
     checked are None. None as a given value stands for the default. ``source`` names where the
-    values come from in the text of an error; ``exact_types`` rejects an integer in place of a
+    values come from in the text of an error, also of one that a model raises later; ``exact_types`` rejects an integer in place of a
     double, as ROS does. Raises ParameterError at the first rule that is broken.
     """
 
@@ -170,6 +170,7 @@ class ParameterSet(Mapping[str, Any]):
         if not isinstance(values, Mapping):
             raise ParameterError(
                 f'{source}: {shown(values)}: must be a mapping of names to values')
+        self.source = source
         for name in values:
             self.declared(name, source)
         self._given = {
