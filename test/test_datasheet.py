@@ -494,6 +494,15 @@ def test_report_and_datasheet_of_a_motion_link_to_each_other(tmp_path: Path) -> 
     sheet = tmp_path / 'datasheet' / 'datasheet.html'
     assert run(*given, '--motion', bag, '--output', sheet.parent) == 0
     assert linked(sheet) == [report]
+    # not with other parameters
+    other = tmp_path / 'other.yaml'
+    PARAMETERS.replaced({'platform.mass': 151.0}).to_yaml(other)
+    elsewhere = tmp_path / 'of_other' / 'datasheet.html'
+    assert run('--params', other, '--motion', bag, '--output', elsewhere.parent) == 0
+    assert not linked(elsewhere)
+    assert replay([str(each) for each in (
+        bag, '--params', other, '--plotly', 'shared', '--output', tmp_path / 'b')]) == 0
+    assert not linked(tmp_path / 'b' / 'clear' / 'report.html')
     assert replay([str(each) for each in (
         bag, *given, '--plotly', 'shared', '--output', report.parents[1], '--force')]) == 0
     assert linked(report) == [sheet]

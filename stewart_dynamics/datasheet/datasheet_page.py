@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.bags.find import RESULT
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
@@ -126,7 +127,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         verdicts=[(name.capitalize(), found, words(found)) for name, words in (
             ('motion', motion_verdict), ('box', box_verdict)) if (found := sheet[name])],
         report=link_to_other(path, [
-            Path(name, REPORT_PAGE), Path(REPLAYS, name, REPORT_PAGE)]) if name else None,
+            Path(name, REPORT_PAGE), Path(REPLAYS, name, REPORT_PAGE)], RESULT,
+            sheet['parameters']) if name else None,
         oblique=drawing.oblique().svg(), front=drawing.front().svg(), top=drawing.top().svg(),
         workspace=[each.svg() for each in pictures.workspace()],
         motion=(chart.svg() if (chart := pictures.motion()) else None),

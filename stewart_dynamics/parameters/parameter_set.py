@@ -156,8 +156,9 @@ class ParameterSet(Mapping[str, Any]):
 
     Arrays are read-only numpy arrays: joints (6, 3), values of the legs (6,); limits that are not
     checked are None. None as a given value stands for the default. ``source`` names where the
-    values come from in the text of an error, also of one that a model raises later; ``exact_types`` rejects an integer in place of a
-    double, as ROS does. Raises ParameterError at the first rule that is broken.
+    values come from in the text of an error, also of one that a model raises later;
+    ``exact_types`` rejects an integer in place of a double, as ROS does. Raises ParameterError at
+    the first rule that is broken.
     """
 
     table: ClassVar[Mapping[str, Parameter]]
