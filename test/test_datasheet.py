@@ -369,6 +369,7 @@ def test_a_stiffness_in_another_unit_is_a_likely_mistake() -> None:
 BAD: list[tuple[list[str], str]] = [
     (['--pose', '0', '0', '2', '0', '0', '0'], 'above limits.length_max'),
     (['--pose', '0', '0', '1.18', '0', '0', '1.5707963'], 'pose: singular: the condition number'),
+    (['--pose', '0', '0', '1180', '0', '0', '0'], '; likely mistake: position in mm'),
     (['--payload', '0', '0', '0', '0'], '--payload: mass 0 kg: must be above 0'),
     (['--payload', '9e4', '0', '0', '0'], 'above limits.force_max'),
     (['--leg-stiffness', '-1'], '--leg-stiffness: -1 N/m: must be above 0'),

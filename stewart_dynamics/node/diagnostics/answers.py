@@ -31,7 +31,7 @@ from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, OF_MOTORS,
-    QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
+    position_in_mm, QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
@@ -46,8 +46,6 @@ _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singular
 _OF_MOTORS = {SPEED_MAX: SPEEDS, TORQUE_MAX: DEMANDED_TORQUES, TEMPERATURE_RISE_MAX: RISES}
 _DEMANDED = FORCE_MAX, TORQUE_MAX
 _LIMITS = *LIMITS, *OF_MOTORS, JUMP
-# Factor by which legs exceed their maximum length if positions are in mm instead of m.
-_MILLIMETRES = 1000.0
 
 
 @dataclass
@@ -325,11 +323,8 @@ class LimitsDiagnostics(StatusPart):
     def _mistake(self, output: Output) -> str:
         """Return the likely mistake where legs are too long, as words to append."""
         longest = self._answers.parameters['limits.length_max']
-        reference = output.state.lengths if longest is None else longest.tolist()
-        if reference and all(0.3 < length / (_MILLIMETRES * most) < 1.5 for length, most in zip(
-                output.lengths, reference, strict=True)):
-            return '; likely mistake: position in mm'
-        return ''
+        return position_in_mm(
+            output.lengths, output.state.lengths if longest is None else longest.tolist())
 
     def _words(self, exceedance: Exceedance) -> str:
         clipped = ', clipped' if exceedance.limit in CLIPPED else ''
