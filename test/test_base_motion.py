@@ -230,6 +230,8 @@ def test_base_motions_are_a_sequence_of_samples() -> None:
     (lambda: BaseMotion([0.0, 0.0]), 'gravity: shape (2,): must end in (3,)'),
     (lambda: BaseMotion([0.0, 0.0, np.nan]), 'gravity[2]: nan: must be finite'),
     (lambda: BaseMotion(np.zeros((2, 3)), np.zeros((3, 3))), 'do not fit each other'),
+    (lambda: BaseMotion.from_motion(Motion(np.zeros((4, 3)), np.eye(3)), np.zeros((3, 3))),
+     'do not fit each other: motion (4,), gravity (3,)'),
     (lambda: BaseMotion.from_pose(np.eye(3)), 'must be a Pose or a Motion'),  # type: ignore
     (lambda: BaseMotion.from_motion(Pose(np.zeros(3), np.eye(3))),  # type: ignore
      'must be a Motion'),

@@ -371,6 +371,60 @@ def test_answers_have_the_leading_shapes_of_poses_and_directions() -> None:
     assert (type(one.value), type(one.limit), type(one.leg)) == (float, str, int)
 
 
+def test_no_poses_have_no_answers_and_a_motion_without_samples_is_rejected() -> None:
+    driven = StewartPlatform(PLATFORM.parameters.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01,
+        'drive.motor_inertia': 1e-4, 'drive.torque_max': 5.0, 'drive.speed_max': 300.0}))
+    nothing = np.zeros((0, 3))
+    poses, motion = Pose(nothing, np.eye(3)), Motion(nothing, np.eye(3))
+    direction = np.eye(6)[2]
+    for capability in (Capability(PLATFORM), Capability(driven)):
+        for found in (capability.travel(poses, direction), capability.wrench(poses, direction),
+                      capability.velocity(poses, direction),
+                      capability.acceleration(poses, direction),
+                      capability.payload(poses, np.zeros(3)),
+                      capability.wrench(PLATFORM.home_pose(), np.zeros((0, 6)))):
+            assert np.shape(found.value) == np.shape(found.limit) == np.shape(found.leg) == (0,)
+        for whole in (lambda c: c.speed_factor(motion), lambda c: c.amplitude_factor(motion),
+                      lambda c: c.payload(motion, np.zeros(3)),
+                      lambda c: c.speed_factor(Motion.from_pose(c.platform.home_pose()),
+                                               np.zeros((0, 6)))):
+            with pytest.raises(MotionError, match='samples'):
+                whole(capability)
+
+
+def test_a_path_ends_at_its_first_sample_that_exceeds_a_limit() -> None:
+    home = PLATFORM.home_pose()
+    heights = np.linspace(0.0, 1.0, 5)[:, None] * [0.0, 0.0, 1.0]
+    turned = np.array([rotation_about([0.0, 0.0, 1.0], angle) @ home.rotation
+                       for angle in (0.0, 0.0, 0.0, 0.0, math.pi / 2.0)])
+
+    def end(rotations: Array, **changes: Any) -> Any:
+        platform = StewartPlatform(PLATFORM.parameters.replaced(
+            {f'limits.{name}': value for name, value in changes.items()}))
+        found = Capability(platform).speed_factor(Motion(home.position + heights, rotations))
+        return found[0], found.limit, found.sample
+
+    longest, level = PLATFORM.inverse_kinematics(home).max(), np.broadcast_to(np.eye(3), (5, 3, 3))
+    assert end(turned, length_max=longest + 5.0) == (0.0, 'singularity', 4)
+    assert end(turned, length_max=longest + 0.1) == (0.0, 'length_max', 1)
+    # a limit of the angles that is exceeded at home already
+    axes = {'platform_joint_angle_max': 1e-3}
+    assert end(level, length_max=longest + 0.1, **axes)[1:] == ('platform_joint_angle_max', 0)
+    assert end(level, length_max=0.99 * longest, **axes)[1:] == ('length_max', 0)
+
+
+def test_a_singular_pose_has_no_travel_whatever_the_threshold() -> None:
+    home = PLATFORM.home_pose()
+    platform = StewartPlatform(PLATFORM.parameters.replaced({
+        'limits.length_min': None, 'limits.length_max': None,
+        'singularity.stop_condition': 1e300}))
+    singular = Pose(home.position, rotation_about([0.0, 0.0, 1.0], math.pi / 2.0))
+    found = Capability(platform).travel(singular, np.eye(6))
+    assert not found.value.any()
+    assert set(found.limit) == {'singularity'}
+
+
 def test_a_tilted_base_changes_the_wrench() -> None:
     tilted = BaseMotion([3.0, 0.0, -9.3])
     home = PLATFORM.home_pose()

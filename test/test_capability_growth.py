@@ -27,6 +27,7 @@ from stewart_dynamics.capability.growth import Growth
 from stewart_dynamics.capability.motions import Deviations
 from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.mechanics.limits import Limits
+from stewart_dynamics.mechanics.rows import CONDITION
 from test_capability_motors import driven
 
 COUNT = 20_000
@@ -128,13 +129,19 @@ def test_a_motion_without_displacement_grows_with_its_rates(factor: float) -> No
         assert found.limit == name
 
 
-def test_a_motion_into_a_singularity_that_cannot_be_decided_is_rejected() -> None:
-    """Forces below their limit up to det(J) = 0, next to which no bound of them exists."""
+def test_a_motion_into_a_singularity_ends_where_it_cannot_be_solved() -> None:
+    """Forces below their limit up to det(J) = 0: beyond its range their growth is not decided."""
     platform, home, _ = growing(1)
     unlimited = StewartPlatform(platform.parameters.replaced({
         'singularity.stop_condition': 1e300, 'limits.force_max': 1e300}))
     turned = Motion.from_pose(Pose(home.position, np.array(
         [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) @ home.rotation))
+    found = Capability(unlimited).amplitude_factor(turned[None], home)
+    assert found.limit == 'singularity'
+    reached = unlimited.solve(Deviations(home, turned[None].rows).at(found.value))
+    assert 1e11 < reached[0, CONDITION] < 1e12
+    growth = Growth(unlimited, Limits(unlimited.parameters).bounds, None,
+                    Deviations(home, turned[None].rows), None, None)
     with pytest.raises(MotionError, match='sample 0: not known whether a limit is exceeded at .* '
                                           'times its amplitude: too near to a singularity'):
-        Capability(unlimited).amplitude_factor(turned[None], home)
+        growth.first_exit(1.0)

@@ -39,11 +39,11 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import main
 from stewart_dynamics.datasheet.datasheet import soft_legs
 from stewart_dynamics.datasheet.datasheet_text import (
-    between_setpoints, both_ways, box_verdict, down, LINEAR, motion_verdict, rated_payload,
-    setpoints_used)
+    between_setpoints, both_ways, box_verdict, down, LINEAR, motion_verdict, numbers,
+    rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
-from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads
+from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads, stiffness
 from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, RecordedMotion, uses
 from stewart_dynamics.replay import main as replay
 from stewart_dynamics.replay.replay_options import Options
@@ -98,6 +98,7 @@ def test_the_files_are_there_and_name_what_limits(sheet: Path, figures: dict[str
     assert figures['stiffness']['worst']['frequencies'][0] < figures['stiffness']['frequencies'][0]
     platform = StewartPlatform(PARAMETERS)
     loaded = RatedHexapod(PARAMETERS, payload=Payload(40.0, np.array([0.0, 0.0, 0.2]))).platform
+    held = StewartPlatform(loaded.parameters.replaced({'actuator.reflected_mass': 0.0}))
     for (i, j), plane in zip(((0, 2), (1, 2), (0, 1)), ('xz', 'yz', 'xy'), strict=True):
         found = figures['stiffness']['sections'][plane]
         values = np.array(found['frequencies'], dtype=float)
@@ -108,10 +109,16 @@ def test_the_files_are_there_and_name_what_limits(sheet: Path, figures: dict[str
             at = Pose(position, platform.home_pose().rotation)
             assert Capability(platform).travel(at, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]).value > 0.0
             assert values[n, m] == pytest.approx(
-                Capability(loaded).modes(at, 5e7).frequencies[0], rel=1e-6)
+                Capability(held).modes(at, 5e7).frequencies[0], rel=1e-6)
     page = (sheet / 'datasheet.html').read_text()
-    assert page.count('aria-label="Lowest natural frequency') == 3
-    assert page.count(f'smallest at {figures["worst"]["poses"]} poses') == 2
+    assert page.count('aria-label="Lowest natural frequency') == page.count('"outside"') == 3
+    assert page.count(f'smallest at {figures["worst"]["poses"]} poses') == 1
+
+
+def test_numbers_of_a_vector_have_the_digits_of_the_largest() -> None:
+    assert numbers([3.3333e-5, -1e-9, 0.32060004], 1e3, ' mm') == '0.03, 0, 320.6 mm'
+    assert numbers([1e-17, -1e-17, 0.0]) == '0, 0, 0'
+    assert numbers([-0.25] * 6) == '−0.25'
 
 
 def test_travel_is_about_the_pivot_and_the_table_ends_at_the_limits(
@@ -167,6 +174,19 @@ def test_the_rated_payload_brings_a_leg_to_its_largest_force() -> None:
     assert np.abs(forces).max() == pytest.approx(6000.0, rel=1e-9)
     with pytest.raises(PoseError, match=r'force .* above limits.force_max'):
         RatedHexapod(PARAMETERS, payload=Payload(1.001 * largest, PIVOT))
+
+
+def test_natural_frequencies_are_those_with_held_motors() -> None:
+    driven = PARAMETERS.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.005, 'drive.gear_ratio': 3.0,
+        'drive.motor_inertia': 1.37e-4})
+    found = [stiffness(RatedHexapod(each), 5e7, None, 3)['frequencies']
+             for each in (PARAMETERS, driven)]
+    assert found[0] == found[1]
+    held = StewartPlatform(driven.replaced({
+        'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None, 'drive.screw_inertia': None}))
+    np.testing.assert_allclose(
+        found[0], held.natural_modes(held.home_pose(), 5e7).frequencies, rtol=1e-3)
 
 
 def test_a_payload_in_any_orientation_exceeds_no_force_under_any_gravity() -> None:
@@ -248,6 +268,24 @@ def test_a_motion_that_exceeds_a_limit_is_not_possible(
     assert found['factor'] < 1.0
     assert found['limit'] == limit
     assert found['amplitude']['value'] < 1.0
+    # where the path is not possible no payload can be added in it
+    assert (found['payload'] is None) == (found['factor'] == 0.0) == (limit != 'velocity_max')
+    assert (found['between_setpoints'] is None) == (limit != 'velocity_max')
+
+
+def test_a_motion_ends_at_the_first_limit_though_it_is_singular_later(
+        recorded: RecordedMotion) -> None:
+    rows = recorded.motion.rows.copy()
+    rows[50:, 3:12] = rotation_about([0.0, 0.0, 1.0], math.pi / 2.0).ravel()
+    turned = recorded._replace(motion=Motion.of_rows(rows))
+    for longest, limit, sample in ((9.0, 'singularity', 50), (1.0, 'length_max', 0)):
+        platform = StewartPlatform(PARAMETERS.replaced(
+            {'limits.length_min': 0.1, 'limits.length_max': longest}))
+        found = judged(platform, turned, uses(platform, turned))
+        assert (found['limit'], found['at_s']) == (limit, turned.seconds[sample])
+        assert found['possible'] is False
+        assert found['factor'] == 0.0
+        assert found['amplitude'] is found['payload'] is None
 
 
 def test_without_a_limit_of_its_speed_a_motion_is_possible_and_can_be_larger(
@@ -266,7 +304,7 @@ def test_a_bag_through_a_singularity_is_not_possible(
     given = '--params', PLATFORM, '--motion', ROOT / 'bags' / 'singular', '--output'
     assert run(*given, tmp_path / 'a', '--strict') == 1
     printed = capsys.readouterr()
-    assert 'motion not possible: at no speed, by singularity at 8.4' in printed.out
+    assert 'motion not possible: at no speed, by singularity at 8.22' in printed.out
     assert f'results: {tmp_path / "a"}' in printed.out
 
 
@@ -331,6 +369,7 @@ def test_a_stiffness_in_another_unit_is_a_likely_mistake() -> None:
 BAD: list[tuple[list[str], str]] = [
     (['--pose', '0', '0', '2', '0', '0', '0'], 'above limits.length_max'),
     (['--pose', '0', '0', '1.18', '0', '0', '1.5707963'], 'pose: singular: the condition number'),
+    (['--pose', '0', '0', '1180', '0', '0', '0'], '; likely mistake: position in mm'),
     (['--payload', '0', '0', '0', '0'], '--payload: mass 0 kg: must be above 0'),
     (['--payload', '9e4', '0', '0', '0'], 'above limits.force_max'),
     (['--leg-stiffness', '-1'], '--leg-stiffness: -1 N/m: must be above 0'),
@@ -456,6 +495,15 @@ def test_report_and_datasheet_of_a_motion_link_to_each_other(tmp_path: Path) -> 
     sheet = tmp_path / 'datasheet' / 'datasheet.html'
     assert run(*given, '--motion', bag, '--output', sheet.parent) == 0
     assert linked(sheet) == [report]
+    # not with other parameters
+    other = tmp_path / 'other.yaml'
+    PARAMETERS.replaced({'platform.mass': 151.0}).to_yaml(other)
+    elsewhere = tmp_path / 'of_other' / 'datasheet.html'
+    assert run('--params', other, '--motion', bag, '--output', elsewhere.parent) == 0
+    assert not linked(elsewhere)
+    assert replay([str(each) for each in (
+        bag, '--params', other, '--plotly', 'shared', '--output', tmp_path / 'b')]) == 0
+    assert not linked(tmp_path / 'b' / 'clear' / 'report.html')
     assert replay([str(each) for each in (
         bag, *given, '--plotly', 'shared', '--output', report.parents[1], '--force')]) == 0
     assert linked(report) == [sheet]

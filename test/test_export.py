@@ -565,6 +565,18 @@ def test_bad_parameters_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtu
                '--output', tmp_path / 'out') == 0
 
 
+def test_a_likely_mistake_is_printed_before_the_error_that_follows_from_it(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'mm.yaml'
+    Parameters.from_yaml(PLATFORM_FILE).replaced({
+        'limits.length_min': 950.0, 'limits.length_max': 1650.0,
+        'limits.base_joint_angle_max': 0.6}).to_yaml(path)
+    assert run('--params', path, '--output', tmp_path / 'out') == 2
+    *warnings, error = capsys.readouterr().err.splitlines()
+    assert warnings[0].startswith('stewart_export: warning: limits.length_min: 950 m')
+    assert error.startswith(f'stewart_export: {path}: home pose: ')
+
+
 def test_an_output_that_is_a_file_is_one_line(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / 'file').touch()

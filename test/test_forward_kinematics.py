@@ -218,7 +218,18 @@ def test_lengths_without_a_pose_are_named_in_a_batch(hexapod: StewartPlatform) -
             [lengths, lengths + [0.9, -0.3, 0.0, 0.0, 0.0, 0.0]], AT_HOME)
     assert str(error.value).startswith('sample 1: lengths [')
     assert str(error.value).endswith('iterations, must be at most 1e-12')
-    assert 'm: did not converge: residual ' in str(error.value)
+    assert 'did not converge: residual ' in str(error.value)
+
+
+def test_lengths_outside_the_limits_are_named_before_the_residual() -> None:
+    platform = StewartPlatform(symmetric_parameters().replaced({
+        'limits.length_min': 0.9, 'limits.length_max': 1.5}))
+    guess = Pose([1.0 / 3.0, -3e-18, 1.0], np.eye(3))
+    with pytest.raises(PoseError) as error:
+        platform.forward_kinematics([0.1] * 6, guess)
+    assert str(error.value).startswith(
+        'sample 0: lengths [0.1, 0.1, 0.1, 0.1, 0.1, 0.1] m from the guess [0.333333, 0, 1] m: '
+        'leg_1: length 0.1 m is 0.8 m below limits.length_min; did not converge: residual ')
 
 
 def test_a_guess_is_a_motion_or_a_pose(hexapod: StewartPlatform) -> None:

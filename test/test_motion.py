@@ -265,6 +265,8 @@ def test_bad_arguments_are_rejected_in_one_line(make: Any, texts: list[str]) -> 
         make()
     assert [text for text in texts if text not in str(caught.value)] == []
     assert '\n' not in str(caught.value)
+    # no traceback of the fast path before that of the error
+    assert caught.value.__context__ is caught.value.__cause__
 
 
 def batches() -> list[Any]:

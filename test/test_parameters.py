@@ -270,6 +270,18 @@ def test_a_value_that_breaks_a_rule_is_rejected(name: str, value: Any, rule: str
     assert rule in str(caught.value)
 
 
+@pytest.mark.parametrize(('name', 'meant'), [
+    ('geometry.platform_joint', 'geometry.platform_joints'),
+    ('geometry.base_joint', 'geometry.base_joints'), ('platfrom.mass', 'platform.mass'),
+    ('limits.max_force', 'limits.force_max'), ('base_joints', 'geometry.base_joints'),
+    ('platform.cog', None), ('legs.cylinder.com', None)])
+def test_the_nearest_name_is_suggested_for_an_unknown_one(name: str, meant: str | None) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Parameters.declared(name)
+    hint = f'; do you mean {meant}?' if meant else ''
+    assert str(caught.value) == f'parameters: {name}: unknown parameter{hint}'
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r'nowhere\.yaml: cannot be read: No such file'):
         Parameters.from_yaml(tmp_path / 'nowhere.yaml')

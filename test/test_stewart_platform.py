@@ -241,8 +241,8 @@ def test_home_has_the_mean_leg_halfway_between_its_limits() -> None:
      'or geometry.zero_length, must give a length'),
     ({'limits.length_min': 0.01, 'limits.length_max': 0.02}, 'no level pose has all legs')])
 def test_an_unknown_home_is_an_error(changes: dict[str, Any], text: str) -> None:
-    with pytest.raises(ParameterError, match=text):
-        StewartPlatform(EXAMPLE.replaced(changes)).home_pose()
+    with pytest.raises(ParameterError, match=f'^a.yaml: home pose: .*{text}'):
+        StewartPlatform(EXAMPLE.replaced(changes, 'a.yaml')).home_pose()
 
 
 def test_check_returns_the_likely_mistakes() -> None:

@@ -54,6 +54,8 @@ from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, 
 _ENDS = np.array(ENDS)
 # Bounds where a minimum is not given.
 _UNLIMITED = {limits.LENGTH_MIN: 0.0, limits.CLEARANCE_MIN: -math.inf}
+# Limits of a path; of those that are exceeded at one sample the first one is named.
+_OF_PATHS = (limits.LENGTH_MIN, limits.LENGTH_MAX, limits.CLEARANCE_MIN, *limits.OF_JOINTS)
 # Rounds in which the least tilt between two azimuths is found.
 _ZOOMS = 6
 # Step of a numerical derivative by the pose [m, rad].
@@ -127,7 +129,8 @@ class Capability:
     ParameterError
         By all calls: no limit of the question is set; names them.
     MotionError
-        By all calls: an argument has another type or shape, or is not finite.
+        By all calls: an argument has another type or shape, or is not finite; a whole motion has
+        no samples. No poses or directions, shape (0,), are no error: the answers are empty.
     SingularityError
         By calls on forces: J_inv cannot be solved at a pose.
 
@@ -184,7 +187,7 @@ class Capability:
         values = np.empty(len(rows))
         codes, legs = (np.empty(len(rows), dtype=np.int64) for _ in range(2))
         constants = (self.platform.constants, self._axes, self._bounds, self._shapes,
-                     *self._plates, self.platform.parameters['singularity.stop_condition'])
+                     *self._plates, self._pose_limits.stop_condition)
         in_parts(travel.travels, constants, rows, copies(directions, shape),
                  copies(pivots, shape), values, codes, legs,
                  scratch=travel.memory_of(self._plates))
@@ -570,23 +573,24 @@ class Capability:
 
     def _of_path(self, motion: Motion, solved: InverseDynamics) -> Extent | None:
         """
-        Return an extent of 0 where the path exceeds a limit at any speed.
+        Return an extent of 0 at the first sample where the path exceeds a limit at any speed.
 
-        Lengths, joint angles, clearance, and the condition number; a determinant of the other sign
+        Lengths, clearance, joint angles, and the condition number; a determinant of the other sign
         than at the first sample is beyond a singularity.
         """
         results, motions = solved.rows.reshape(-1, RESULT), motion_rows(motion)
         of_poses = self._pose_limits
         values = {**of_poses.values(motions, results), **of_poses.clearances(motions)}
-        for name, each in values.items():
-            exceeded = self._limits.exceeds(name, each)
-            if exceeded.any():
-                sample, leg = (int(n) for n in np.argwhere(exceeded)[0])
-                return Extent(0.0, limits.short_name(name), leg, sample)
-        singular = ~of_poses.regular(results, results[0, DETERMINANT])
-        if not singular.any():
+        exceeded = [(limits.short_name(name), self._limits.exceeds(name, values[name]))
+                    for name in _OF_PATHS if name in values]
+        regular = of_poses.regular(results, results[:1, DETERMINANT])
+        ends = [(*np.argwhere(each)[0].tolist(), name) for name, each in exceeded if each.any()]
+        if not regular.all():
+            ends.append((int(regular.argmin()), -1, limits.SINGULARITY))
+        if not ends:
             return None
-        return Extent(0.0, limits.SINGULARITY, -1, int(singular.argmax()))
+        sample, leg, name = min(ends, key=lambda end: end[0])
+        return Extent(0.0, name, leg, sample)
 
     def _of_rates(self, motion: Motion, solved: InverseDynamics) -> list[tuple[Array, Any]]:
         """Return multiples (..., 6) of the twist at which legs and motors are too fast."""
@@ -766,6 +770,8 @@ def _smallest(multiples: Array, names: Array) -> Extent:
 def _of_all(multiples: Array, names: Array) -> Extent:
     """Return the smallest of six multiples of all samples (..., 6)."""
     flat = multiples.reshape(-1, 6)
+    if not len(flat):
+        raise MotionError(f'motion: shape {multiples.shape[:-1]}: has no samples')
     sample, leg = divmod(int(flat.argmin()), 6)
     if not math.isfinite(flat[sample, leg]):
         return Extent(math.inf, '', -1)

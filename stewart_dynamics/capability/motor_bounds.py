@@ -25,7 +25,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.force_intervals import quadratic_exit
 from stewart_dynamics.mechanics.drives.motor_limits import bound_of, largest_torques
 from stewart_dynamics.mechanics.drives.motors import (
-    ACCELERATIONS, drive_constants, Drives, Motors, SPEEDS)
+    ACCELERATIONS, drive_constants, Drives, MOTORS, Motors, SPEEDS)
 from stewart_dynamics.mechanics.limits import short_name, SPEED_MAX, TORQUE_MAX, TORQUE_SPEED
 from stewart_dynamics.mechanics.rows import MOTION, RESULT
 from stewart_dynamics.parameters.table import GUIDED, Parameters
@@ -84,7 +84,7 @@ class MotorBounds:
         """Return the motors for rows (..., MOTION) and (..., RESULT)."""
         shape = results.shape[:-1]
         rows = np.broadcast_to(motions, (*shape, MOTION)).reshape(-1, MOTION)
-        turning, straight = (drives(rows, results.reshape(-1, RESULT)).reshape(*shape, -1)
+        turning, straight = (drives(rows, results.reshape(-1, RESULT)).reshape(*shape, MOTORS)
                              for drives in (self._drives, self._guided))
         own = self.inertia * turning[..., ACCELERATIONS]
         return MovingMotors(turning[..., SPEEDS], own,

@@ -57,8 +57,8 @@ def frequency_chart(section: Section, modes: Frequencies, origin: Array, axes: t
                     ) -> Picture:
     """Draw the lowest natural frequency over a section, darker where it is higher."""
     picture, chart, loops = _section(section, origin, axes, 'Lowest natural frequency')
-    values = modes.values
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    low, high = float(np.nanmin(modes.values)), float(np.nanmax(modes.values))
+    values = _spread(modes.values)
     with np.errstate(invalid='ignore'):
         bands = np.minimum((values - low) / max(high - low, 1e-9 * high) * _BANDS, _BANDS - 1)
     half = [0.5 * _MILLI * (each[1] - each[0]) for each in modes[:2]]
@@ -74,11 +74,25 @@ def frequency_chart(section: Section, modes: Frequencies, origin: Array, axes: t
                      closed=True, **shade)
     picture.text([60.0, 320.0], f'{tick_text(_rounded(low))} Hz', 'end', css='tick')
     picture.text([72.0 + 18.0 * _BANDS, 320.0], f'{tick_text(_rounded(high))} Hz', css='tick')
+    curves = [chart.at(loop) for loop in loops]
+    (left, right), (bottom, top) = chart.x, chart.y
+    frame = chart.at([[left, bottom], [right, bottom], [right, top], [left, top]])
+    picture.path(frame, *curves, closed=True, css='outside', fill_rule='evenodd')
     chart.draw_axes(f'{"XYZ"[axes[0]]} [mm]', f'{"XYZ"[axes[1]]} [mm]')
-    for loop in loops:
-        picture.path(chart.at(loop), closed=True, css='edge')
+    for curve in curves:
+        picture.path(curve, closed=True, css='edge')
     _cross(picture, chart.at([0.0, 0.0]))
     return picture
+
+
+def _spread(values: Array) -> Array:
+    """Return values of cells, also of those outside that the boundary may cross: a neighbor's."""
+    for _ in range(2):
+        around = np.pad(values, 1, constant_values=np.nan)
+        n, m = values.shape
+        values = np.where(np.isnan(values), np.fmax.reduce(
+            [around[i:i + n, j:j + m] for i in range(3) for j in range(3)]), values)
+    return values
 
 
 def _section(section: Section, origin: Array, axes: tuple[int, int], title: str,

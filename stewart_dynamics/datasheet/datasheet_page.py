@@ -23,11 +23,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.bags.find import RESULT
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
-    motion_verdict, rated_payload, setpoints_used, span, unit_of)
+    motion_verdict, numbers, rated_payload, setpoints_used, span, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.datasheet.ratings import AXES, grid, Payloads, poses_of
@@ -126,7 +127,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         verdicts=[(name.capitalize(), found, words(found)) for name, words in (
             ('motion', motion_verdict), ('box', box_verdict)) if (found := sheet[name])],
         report=link_to_other(path, [
-            Path(name, REPORT_PAGE), Path(REPLAYS, name, REPORT_PAGE)]) if name else None,
+            Path(name, REPORT_PAGE), Path(REPLAYS, name, REPORT_PAGE)], RESULT,
+            sheet['parameters']) if name else None,
         oblique=drawing.oblique().svg(), front=drawing.front().svg(), top=drawing.top().svg(),
         workspace=[each.svg() for each in pictures.workspace()],
         motion=(chart.svg() if (chart := pictures.motion()) else None),
@@ -276,15 +278,6 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
     """Return names and values of the other parameters that the figures rest on."""
     p = hexapod.given
     inertia = inertia_matrix(p['platform.inertia'])
-
-    def numbers(values: Any, factor: float = 1.0, unit: str = '') -> str:
-        given = factor * np.atleast_1d(np.asarray(values, dtype=float))
-        # not the rounding errors of a home pose
-        given[np.abs(given) < max(1e-9 * np.abs(given).max(), 1e-12)] = 0.0
-        texts = [f'{each:.5g}' for each in given.tolist()]
-        if len(set(texts)) == 1 and len(texts) == 6:
-            texts = texts[:1]
-        return f'{", ".join(texts)}{unit}'.replace('-', '−')
 
     rows = [
         ('Rated pose' + (', home' if sheet['pose']['home'] else ''),

@@ -24,6 +24,8 @@ from collections.abc import Mapping, Sequence
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from stewart_dynamics.capability.travel import LIMITS
 from stewart_dynamics.datasheet.ratings import AXES
 from stewart_dynamics.mechanics.limits import QUANTITIES, short_name, SINGULARITY
@@ -95,6 +97,18 @@ def span(bounds: Sequence[float | None], unit: Unit) -> str:
         return b if b in '0–' else f'±{b}'
     # the space that does not break keeps the dots on the first line of a narrow column
     return f'{a}\u00a0… +{b}' if b not in '0–' else f'{a}\u00a0… {b}'
+
+
+def numbers(values: Any, factor: float = 1.0, unit: str = '') -> str:
+    """Return numbers in five digits of the largest one, and six equal ones as one."""
+    given = factor * np.atleast_1d(np.asarray(values, dtype=float))
+    size = max(float(np.abs(given).max()), 1e-7)
+    # a home pose has rounding errors behind these digits
+    given = np.round(given, 4 - math.floor(math.log10(size))) + 0.0  # no -0
+    texts = [f'{each:.5g}' for each in given.tolist()]
+    if len(set(texts)) == 1 and len(texts) == 6:
+        texts = texts[:1]
+    return f'{", ".join(texts)}{unit}'.replace('-', '−')
 
 
 def sheet_text(sheet: dict[str, Any]) -> str:

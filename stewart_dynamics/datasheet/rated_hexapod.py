@@ -27,10 +27,12 @@ from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, FORCE_MAX, LIMITS
+from stewart_dynamics.mechanics.limits import (
+    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LIMITS, position_in_mm)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
-from stewart_dynamics.mechanics.rows import CONDITION, FORCES
+from stewart_dynamics.mechanics.rows import CONDITION, FORCES, LENGTHS
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.mechanics.stiffness import HELD_MOTORS
 from stewart_dynamics.parameters.table import (
     inertia_matrix, LEG_SHAPE, Parameters, PLATFORM_OUTLINE)
 from stewart_dynamics.planned.interpolation import rotation_vector
@@ -78,6 +80,7 @@ class RatedHexapod:
         self._limits = Capability(whole)
         self.platform = StewartPlatform(_moved(self.given, self.pivot))
         self.loads = Capability(self.platform)
+        self._held = Capability(StewartPlatform(self.platform.parameters.replaced(HELD_MOTORS)))
         self.pose = Pose(self.origin.position + self.origin.rotation @ self.pivot,
                          self.origin.rotation)
         self._check(whole, self.origin)
@@ -109,6 +112,14 @@ class RatedHexapod:
         """Return ``Capability.section`` through the pose."""
         return self._limits.section(self.origin, normal)
 
+    def frequencies(self, poses: Pose, leg_stiffness: float) -> Array:
+        """
+        Return natural frequencies (..., 6) [Hz] at poses of the pivot, with held motors.
+
+        A leg's stiffness [N/m] is between its motor and the platform, so rotors stand still.
+        """
+        return self._held.modes(poses, leg_stiffness).frequencies
+
     def moved_by(self, direction: Array, by: float = 1.0) -> Pose:
         """Return the pose after a translation and a rotation vector (6,), base axes."""
         rotation = from_rotation_vector(by * direction[3:]) @ self.pose.rotation
@@ -132,10 +143,14 @@ class RatedHexapod:
         known, motions = PoseLimits(self.given), motion_rows(pose)
         results = whole.solve(motions)
         condition, stop = float(results[0, CONDITION]), known.stop_condition
+        longest = self.given[LENGTH_MAX]
+        mistake = position_in_mm(
+            results[0, LENGTHS].tolist(), None if longest is None else longest.tolist())
+        mistake = f'; {mistake}' if mistake else ''
         if not condition < stop:
             raise SingularityError(
                 f'pose: singular: the condition number of J_inv is {condition:.6g}, '
-                f'must be less than singularity.stop_condition, {stop:g}')
+                f'must be less than singularity.stop_condition, {stop:g}{mistake}')
         values = {**known.values(motions, results), FORCE_MAX: results[:, FORCES]}
         found = known.limits.exceeded({name: each[0].tolist() for name, each in values.items()})
         if not found and known.clearance is not None:
@@ -143,7 +158,7 @@ class RatedHexapod:
             found = known.limits.exceeded(
                 {CLEARANCE_MIN: clearances[0].tolist()}, nearest[0].tolist())
         if found:
-            raise PoseError(f'pose: {found[0].words(self.joints)}')
+            raise PoseError(f'pose: {found[0].words(self.joints)}{mistake}')
 
 
 def _moved(p: Parameters, pivot: Array) -> Parameters:

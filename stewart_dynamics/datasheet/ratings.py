@@ -177,7 +177,7 @@ def stiffness(hexapod: RatedHexapod, leg_stiffness: float, ranges: Array | None,
     def of(poses: Pose) -> tuple[Array, Array]:
         k = hexapod.loads.stiffness(poses, leg_stiffness)
         compliance = np.diagonal(np.linalg.inv(k), axis1=-2, axis2=-1)
-        return 1.0 / compliance, hexapod.loads.modes(poses, leg_stiffness).frequencies
+        return 1.0 / compliance, hexapod.frequencies(poses, leg_stiffness)
 
     axes, frequencies = of(hexapod.pose)
     found: dict[str, Any] = {

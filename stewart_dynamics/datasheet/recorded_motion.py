@@ -161,26 +161,21 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
         'largest_use': {name: float(each.max()) if np.isfinite(each.max()) else None
                         for name, each in used.items()},
         'largest_use_limit': worst, 'largest_use_at_s': float(recorded.seconds[sample])}
-    if singular:
-        at = int(used[SINGULARITY].argmax())
-        return found | {'factor': 0.0, 'limit': limits.SINGULARITY, 'leg': None,
-                        'at_s': float(recorded.seconds[at]), 'between_setpoints': None,
-                        'amplitude': None, 'payload': None}
     if found['possible'] and not (c.limits_rates or c.limits_forces):
-        found |= {'factor': None, 'limit': None, 'leg': None, 'at_s': None,
-                  'between_setpoints': None}
+        found |= {'factor': None, 'limit': None, 'leg': None, 'at_s': None}
     else:
         speed = c.speed_factor(recorded.motion, recorded.wrench, recorded.base)
         found |= _named('factor', speed, recorded, joints)
-        found['between_setpoints'] = _between(c, recorded, joints)
-    amplitude = payload = None
-    if len(recorded.seconds) <= _MOST:
+    amplitude = payload = between = None
+    if found['factor']:
+        between = _between(c, recorded, joints)
+    if len(recorded.seconds) <= _MOST and not singular:
         larger = c.amplitude_factor(recorded.motion, None, recorded.wrench, recorded.base)
         amplitude = answer(float(larger.value), str(larger.limit), int(larger.leg), joints)
-    if c.limits_forces:
+    if c.limits_forces and found['factor'] != 0.0:
         more = c.payload(recorded.motion, np.zeros(3))
         payload = answer(float(more.value), str(more.limit), int(more.leg), joints)
-    return found | {'amplitude': amplitude, 'payload': payload}
+    return found | {'between_setpoints': between, 'amplitude': amplitude, 'payload': payload}
 
 
 def _between(capability: Capability, recorded: RecordedMotion, joints: Any) -> dict[str, Any]:

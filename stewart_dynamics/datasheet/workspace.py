@@ -116,7 +116,7 @@ def frequencies(hexapod: RatedHexapod, section: Section, axes: tuple[int, int],
     values: Array = np.full(len(at), math.nan)
     if inside.any():
         poses = Pose(positions, np.broadcast_to(hexapod.pose.rotation, (len(positions), 3, 3)))
-        values[inside] = hexapod.loads.modes(poses, leg_stiffness).frequencies[:, 0]
+        values[inside] = hexapod.frequencies(poses, leg_stiffness)[:, 0]
     return Frequencies(middles[:, 0], middles[:, 1], values.reshape(_CELLS, _CELLS))
 
 

@@ -59,6 +59,8 @@ def _export(given: argparse.Namespace) -> int:
 
     name = check_name(given.name)
     parameters = Parameters.from_yaml(given.params, given.node)
+    for mistake in likely_mistakes(parameters):
+        _PROGRAM.complain(f'warning: {mistake}')
     files: dict[str, str | bytes] = {**c_project(parameters, name)}
     if given.fmu:
         compiler = find_compiler() if has_binaries(given.fmu) else None
@@ -68,6 +70,4 @@ def _export(given: argparse.Namespace) -> int:
                               'computer is found ($CC, cc, gcc, clang)')
     for path in write_new(given.output, files, given.force):
         _PROGRAM.say(str(path))
-    for mistake in likely_mistakes(parameters):
-        _PROGRAM.complain(f'warning: {mistake}')
     return DONE

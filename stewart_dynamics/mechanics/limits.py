@@ -81,6 +81,10 @@ ANGLES = {BASE_ANGLE_MAX: BASE_JOINT_ANGLES, PLATFORM_ANGLE_MAX: PLATFORM_JOINT_
 """Where in a row of joint angles the values of a limit are."""
 
 
+# Factor by which legs exceed their maximum length if positions are in mm instead of m.
+_MILLIMETRES = 1000.0
+
+
 def short_name(limit: str) -> str:
     """Return the name of a limit without its section: length_max."""
     return limit.rpartition('.')[2]
@@ -94,6 +98,18 @@ def result_values(lengths: Any, rates: Any, forces: Any) -> dict[str, Any]:
 def angle_values(angles: Sequence[float]) -> dict[str, Sequence[float]]:
     """Return the values of OF_JOINTS of one sample's joint angles (JOINT_ANGLES,)."""
     return {limit: angles[where] for limit, where in ANGLES.items()}
+
+
+def position_in_mm(lengths: Sequence[float], usual: Sequence[float] | None) -> str:
+    """
+    Return the likely mistake that a position is in mm; empty if it is not.
+
+    usual: lengths that the legs may have, such as ``limits.length_max``; None if not known.
+    """
+    if usual and all(0.3 < length / (_MILLIMETRES * most) < 1.5
+                     for length, most in zip(lengths, usual, strict=True)):
+        return 'likely mistake: position in mm'
+    return ''
 
 
 class Exceedance(NamedTuple):

@@ -63,7 +63,7 @@ class PoseLimits:
             found |= self.limits.exceeds(name, of_legs).any(axis=1)
         return found
 
-    def regular(self, results: Array, side: float) -> Flags:
+    def regular(self, results: Array, side: Array | float) -> Flags:
         """Return which results (N, RESULT) are not singular, with the sign of det(J) of a side."""
         with np.errstate(all='ignore'):
             found: Flags = (results[:, CONDITION] < self.stop_condition) & (

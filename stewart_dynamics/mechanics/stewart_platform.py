@@ -38,10 +38,12 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
-from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, motion_rows, Pose
+from stewart_dynamics.mechanics.frames.motion import (
+    check_kind, listed, Motion, motion_rows, Pose)
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
     FORCES, GRAVITY, JOINT_ANGLES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
@@ -349,14 +351,17 @@ class StewartPlatform:
                        residuals)
         if codes.any():
             at = int(np.argmax(codes > 0))
-            where = (f'sample {place(at, shape)}: lengths {wanted[at].tolist()} m from the guess '
-                     f'{rows[at, POSITION].tolist()} m')
+            outside = Limits(self.parameters).exceeded(
+                dict.fromkeys((LENGTH_MIN, LENGTH_MAX), wanted[at].tolist()))
+            reason = f'{outside[0].words(self.parameters["joints"])}; ' if outside else ''
+            where = (f'sample {place(at, shape)}: lengths {listed(wanted[at])} m from the guess '
+                     f'{listed(rows[at, POSITION].round(9))} m: {reason}')
             if codes[at] == forward_kinematics.SINGULAR:
-                raise SingularityError(f'{where}: a singular pose after {steps[at]} iterations: '
+                raise SingularityError(f'{where}a singular pose after {steps[at]} iterations: '
                                        'give a guess farther from singularities')
             raise PoseError(
-                f'{where}: did not converge: residual {residuals[at]:.3g} m after {steps[at]} '
-                f'iterations, must be at most {forward_kinematics.RESIDUAL:g}')
+                f'{where}did not converge: residual {residuals[at]:.3g} m after '
+                f'{steps[at]} iterations, must be at most {forward_kinematics.RESIDUAL:g}')
         return Pose.of_rows(rows[:, POSE].reshape(*shape, POSE.stop).copy())
 
     def twist(self, pose: Pose | Motion, rates: ArrayLike) -> Array:
@@ -488,8 +493,10 @@ class StewartPlatform:
         Return natural frequencies (..., 6) [Hz] and mode shapes (..., 6, 6) at a pose.
 
         Arguments are those of ``stiffness``. The mass matrix includes
-        ``actuator.reflected_mass``, as for compliance in the position control; for compliance
-        between held actuators and the platform, set it to zero (``parameters.replaced``).
+        ``actuator.reflected_mass``, as for compliance in the position control. Compliance between
+        held motors and the platform does not turn the rotors: take the modes of a platform of
+        ``parameters.replaced({'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
+        'drive.screw_inertia': None})``.
         """
         legs = stiffness.leg_stiffnesses(leg_stiffness)
         mass, j_inv = self.mass_matrix(pose), self.inverse_jacobian(pose)

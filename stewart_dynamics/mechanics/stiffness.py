@@ -33,6 +33,10 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.dynamics.lagrange import Legs, skew
+from stewart_dynamics.parameters.table import DRIVE_INERTIAS
+
+HELD_MOTORS = {'actuator.reflected_mass': 0.0, **dict.fromkeys(DRIVE_INERTIAS)}
+"""Changes of parameters with which vibrations do not turn rotors and screws."""
 
 
 class NaturalModes(NamedTuple):

@@ -121,9 +121,11 @@ class DynamicsNode(LifecycleNode):
             self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
         if machine_code.HINT:
             self.get_logger().warning(machine_code.HINT)
-        if self._settings['autostart']:
+        self._starting = self._settings['autostart']
+        if self._starting:
             if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
                 raise StewartError(f'cannot be configured: {self._fault}')
+            self._starting = False
             self.trigger_activate()
         else:
             self.get_logger().info('unconfigured: autostart is false')
@@ -137,7 +139,8 @@ class DynamicsNode(LifecycleNode):
         except Exception as exc:
             # rclpy turns an exception in a transition into ERROR and logs nothing.
             self._fault = ' '.join(f'{type(exc).__name__}: {exc}'.split())
-            self.get_logger().error(f'cannot be configured: {self._fault}')
+            if not self._starting:  # else the program ends with this text
+                self.get_logger().error(f'cannot be configured: {self._fault}')
             self._close()
             return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS
@@ -194,6 +197,8 @@ class DynamicsNode(LifecycleNode):
         super().destroy_node()
 
     def _configure(self) -> None:
+        for mistake in likely_mistakes(self._settings):
+            self.get_logger().warning(mistake)
         begun = time.monotonic()
         self._models = SIGNALS.interruptible(partial(_Models.of, self._settings))
         if _expects_measured_legs(self._settings):
@@ -202,8 +207,6 @@ class DynamicsNode(LifecycleNode):
                 SIGNALS.interruptible(code.finish)
         how = 'compiled ' if machine_code.COMPILED else ''
         self.get_logger().info(f'{how}dynamics ready after {time.monotonic() - begun:.1f} s')
-        for mistake in likely_mistakes(self._settings):
-            self.get_logger().warning(mistake)
         self._messages = OutputMessages(self._settings)
         self._model_messages = ModelMessages(self._settings)
         self._topics.make(self._settings, self._on_setpoint, self._on_base, {

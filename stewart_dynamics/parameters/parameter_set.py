@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 import difflib
 from itertools import chain
 import math
@@ -148,6 +148,26 @@ def _broken(parameter: Parameter, value: Any, source: str, rule: str) -> Paramet
 
 # Parameters with all words of an unknown name that are suggested; more are no help.
 _MOST_SUGGESTED = 3
+# Similarity of names (difflib): of misspelt ones, and the smallest that is suggested.
+_MISSPELT, _SIMILAR = 0.9, 0.6
+
+
+def _similar(text: str, names: Collection[str]) -> list[str]:
+    """Return names that an unknown name may stand for; those of its group where that exists."""
+    group = text[:text.rfind('.') + 1]
+    members = [each for each in names if each.startswith(group)]
+    if not members:
+        group, members = '', list(names)
+    parts = {each[len(group):]: each for each in members}
+
+    def nearest(similarity: float) -> list[str]:
+        found = difflib.get_close_matches(text[len(group):], parts, n=1, cutoff=similarity)
+        return [parts[each] for each in found]
+
+    words = set(re.findall('[a-z]+', text))
+    with_words = [each for each in names if words <= set(re.findall('[a-z]+', each))]
+    certain = words and 1 <= len(with_words) <= _MOST_SUGGESTED
+    return nearest(_MISSPELT) or (with_words if certain else nearest(_SIMILAR))
 
 
 class ParameterSet(Mapping[str, Any]):
@@ -156,8 +176,9 @@ class ParameterSet(Mapping[str, Any]):
 
     Arrays are read-only numpy arrays: joints (6, 3), values of the legs (6,); limits that are not
     checked are None. None as a given value stands for the default. ``source`` names where the
-    values come from in the text of an error; ``exact_types`` rejects an integer in place of a
-    double, as ROS does. Raises ParameterError at the first rule that is broken.
+    values come from in the text of an error, also of one that a model raises later;
+    ``exact_types`` rejects an integer in place of a double, as ROS does. Raises ParameterError at
+    the first rule that is broken.
     """
 
     table: ClassVar[Mapping[str, Parameter]]
@@ -170,6 +191,7 @@ class ParameterSet(Mapping[str, Any]):
         if not isinstance(values, Mapping):
             raise ParameterError(
                 f'{source}: {shown(values)}: must be a mapping of names to values')
+        self.source = source
         for name in values:
             self.declared(name, source)
         self._given = {
@@ -285,10 +307,7 @@ class ParameterSet(Mapping[str, Any]):
         if isinstance(name, str) and name in cls.table:
             return cls.table[name]
         text = shown_name(name)
-        words = set(re.findall('[a-z]+', text))
-        near = [each for each in cls.table if words <= set(re.findall('[a-z]+', each))]
-        if not words or not 1 <= len(near) <= _MOST_SUGGESTED:
-            near = difflib.get_close_matches(text, cls.table, n=1)
+        near = _similar(text, cls.table)
         hint = f'; do you mean {" or ".join(near)}?' if near else ''
         raise ParameterError(f'{source}: {text}: unknown parameter{hint}')
 

@@ -51,7 +51,7 @@ from stewart_dynamics.reporting.pages import (
     base64_of, link, link_to_other, page, plotly_script)
 from stewart_dynamics.reporting.plots import (
     base_wrench_plots, measured_plots, motion_plots, spectrum_plots)
-from stewart_dynamics.reporting.results_folder import DATASHEET_PAGE, DATASHEETS
+from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
 from stewart_dynamics.setpoints.rejections import stamp_of
@@ -154,7 +154,8 @@ class Report:
             name=Path(summary['bag']).name or summary['bag'], plotly=script,
             plotly_file=None if plotly is None else link(path, plotly),
             datasheet=link_to_other(
-                path, [Path(DATASHEET_PAGE), Path(DATASHEETS, DATASHEET_PAGE)]),
+                path, [Path(DATASHEET_PAGE), Path(DATASHEETS, DATASHEET_PAGE)], DATASHEET,
+                summary['parameters']),
             data=self._data(summary), sources=sources_of(self._parameters),
             cards=cards(summary), margins=smallest_margins(summary),
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),

@@ -23,10 +23,11 @@ their digests. Names given by users are text, never markup.
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 import functools
 import hashlib
 import importlib.util
+import json
 import math
 import os
 from pathlib import Path
@@ -126,15 +127,30 @@ def link(path: Path, to: Path) -> str:
     return quote(os.fsencode(Path(os.path.relpath(to, path.parent)).as_posix()))
 
 
-def link_to_other(path: Path, names: Sequence[Path]) -> str | None:
+def link_to_other(path: Path, names: Sequence[Path], document: str,
+                  parameters: Mapping[str, Any]) -> str | None:
     """
-    Return the relative address of the page of another program, if it exists.
+    Return the relative address of the page of another program with the same parameters, or None.
 
     It is searched beside the folder of the page at a path, and beside the folder around that.
+
+    document: name of the JSON document beside the other page, which has its parameters.
+    parameters: all values, as in that document.
     """
     folders = path.absolute().parents[1:3]
     return next((link(path.absolute(), found) for folder in folders for name in names
-                 if (found := folder / name).is_file()), None)
+                 if (found := folder / name).is_file()
+                 and _of_same_hexapod(found.with_name(document), parameters)), None)
+
+
+def _of_same_hexapod(document: Path, parameters: Mapping[str, Any]) -> bool:
+    """Return whether a JSON document has these parameters."""
+    try:
+        others = json.loads(document.read_bytes())['parameters']
+        # which the options of a program may change
+        return bool(dict(parameters) | {'setpoint.source': others['setpoint.source']} == others)
+    except (OSError, ValueError, LookupError, TypeError):
+        return False
 
 
 def base64_of(numbers: ArrayLike, kind: str) -> str:

@@ -96,11 +96,11 @@ class SimulatorNode(Node):
         self._log = RepeatedLog(self.get_logger())
         if machine_code.HINT:
             self.get_logger().warning(machine_code.HINT)
+        for mistake in likely_mistakes(self._settings):
+            self.get_logger().warning(mistake)
         begun = time.monotonic()
         self._plant = SIGNALS.interruptible(partial(type(self).plant, self._settings))
         self._state_messages = StateMessages(self._settings)
-        for mistake in likely_mistakes(self._settings):
-            self.get_logger().warning(mistake)
         self._rejections = Rejections(self._on_rejection)
         self._wrench_input = WrenchInput(self._settings, self._rejections)
         source = self._settings['base_motion.source']

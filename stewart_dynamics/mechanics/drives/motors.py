@@ -354,8 +354,8 @@ def _universal_axes(p: Parameters) -> Array:
         sine = np.linalg.norm(np.cross(axes, s), axis=1)
         if np.any(sine < _ALONG_A_LEG):
             raise ParameterError(
-                f'drive.{end}_universal_axes: {p["joints"][int(np.argmin(sine))]}: along the leg '
-                'at the home pose: must be across it')
+                f'{p.source}: drive.{end}_universal_axes: {p["joints"][int(np.argmin(sine))]}: '
+                'along the leg at the home pose: must be across it')
     # The axis of a joint has no sense: of its two directions the one with the smaller twist.
     cosine = np.sum(base * w, axis=1) - np.sum(base * s, axis=1) * np.sum(w * s, axis=1)
     return np.column_stack([base, np.where(cosine < 0.0, -1.0, 1.0)[:, None] * platform])

@@ -115,11 +115,12 @@ class BaseMotion(RowSamples):
 
         """
         check_kind(motion, Motion)
+        given = as_array('gravity', gravity, (3,))
+        common_shape(motion=motion.shape, gravity=given.shape[:-1])
         rotation, acceleration, spin, spin_rate = (motion.rows[..., part] for part in (
             ROTATION, LINEAR_ACCELERATION, ANGULAR_VELOCITY, ANGULAR_ACCELERATION))
         return cls._of_columns(row_of_motion, motion=rotation, acceleration=acceleration,
-                               spin=spin, spin_rate=spin_rate,
-                               gravity=as_array('gravity', gravity, (3,)))
+                               spin=spin, spin_rate=spin_rate, gravity=given)
 
     @classmethod
     def from_imu(

@@ -174,20 +174,23 @@ class Posed(RowSamples):
             for where, value in others:
                 if value is not None:
                     numbers[where] = value
-        except Exception:  # an arbitrary object may raise any; the check of all kinds names it
-            self._fill(position, rotation, *(value for _, value in others))
-            return
-        sample = row.tolist()
-        a, b, c, d, e, f, g, h, i = sample[ROTATION]
-        if (abs(a * a + d * d + g * g - 1.0) < _WELL and abs(b * b + e * e + h * h - 1.0) < _WELL
-                and abs(c * c + f * f + i * i - 1.0) < _WELL
-                and abs(a * b + d * e + g * h) < _WELL and abs(a * c + d * f + g * i) < _WELL
-                and abs(b * c + e * f + h * i) < _WELL
-                and a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0.0
-                and math.isfinite(sum(sample)) and rotation.shape == (3, 3)):
-            self.rows, self.shape = row, ()
+        except Exception:  # an arbitrary object may raise any
+            pass
         else:
-            self._fill(position, rotation, *(value for _, value in others))
+            sample = row.tolist()
+            a, b, c, d, e, f, g, h, i = sample[ROTATION]
+            if (abs(a * a + d * d + g * g - 1.0) < _WELL
+                    and abs(b * b + e * e + h * h - 1.0) < _WELL
+                    and abs(c * c + f * f + i * i - 1.0) < _WELL
+                    and abs(a * b + d * e + g * h) < _WELL
+                    and abs(a * c + d * f + g * i) < _WELL
+                    and abs(b * c + e * f + h * i) < _WELL
+                    and a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0.0
+                    and math.isfinite(sum(sample)) and rotation.shape == (3, 3)):
+                self.rows, self.shape = row, ()
+                return
+        # Behind the handler, so that an error of a check is shown alone.
+        self._fill(position, rotation, *(value for _, value in others))
 
     def _in_words(self) -> str:
         return f'position {listed(self.position)} m, quaternion {listed(self.quaternion)}'

@@ -104,13 +104,14 @@ def home_pose(parameters: Parameters) -> Pose:
     """
     home = home_of(parameters)
     if not home.reachable:
-        raise ParameterError('home pose: no level pose has all legs between limits.length_min and '
-                             'limits.length_max on the '
-                             f'{POSITIVE if home.side > 0.0 else NEGATIVE} side of the base')
+        raise ParameterError(
+            f'{parameters.source}: home pose: no level pose has all legs between '
+            'limits.length_min and limits.length_max on the '
+            f'{POSITIVE if home.side > 0.0 else NEGATIVE} side of the base')
     if home.length is None:
         raise ParameterError(
-            'home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
-            'must give a length that the legs can have in a level pose')
+            f'{parameters.source}: home pose: limits.length_min and limits.length_max, or '
+            'geometry.zero_length, must give a length that the legs can have in a level pose')
     positions, rotations = home.poses(parameters)
     return Pose(positions[0], rotations[0])
 

@@ -207,7 +207,7 @@ def _at_home(p: Parameters, missing: Sequence[str]) -> HomeDirections:
         try:
             home_pose(p)
         except ParameterError as exc:
-            raise ParameterError(f'{missing[0]}: missing, and {exc}') from exc
+            raise ParameterError(f'{exc}; needed without {missing[0]}') from exc
     return home_directions(p)
 
 

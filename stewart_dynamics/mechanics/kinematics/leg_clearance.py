@@ -234,8 +234,8 @@ class LegClearance:
     def __init__(self, parameters: Parameters) -> None:
         missing = [name for name in LEG_SHAPE if parameters[name] is None]
         if missing:
-            raise ParameterError(f'parameters: {", ".join(missing)}: not set: needed by the '
-                                 'clearance of the legs')
+            raise ParameterError(f'{parameters.source}: {", ".join(missing)}: not set: needed by '
+                                 'the clearance of the legs')
         self.shapes = np.column_stack([parameters[name] for name in LEG_SHAPE])
         self.base, self.platform = (
             np.empty((0, 3)) if parameters[name] is None else parameters[name].copy()

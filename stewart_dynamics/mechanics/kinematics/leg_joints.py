@@ -141,8 +141,8 @@ def joint_names(parameters: Parameters) -> tuple[str, ...]:
     twice = [name for n, name in enumerate(names) if name in names[:n]]
     if twice:
         raise ParameterError(
-            f'joints: {shown(list(parameters["joints"]))}, platform_frame: {shown(platform)}: two '
-            f'joints of the tree would have the name {shown(twice[0])}')
+            f'{parameters.source}: joints: {shown(list(parameters["joints"]))}, platform_frame: '
+            f'{shown(platform)}: two joints of the tree would have the name {shown(twice[0])}')
     return tuple(names)
 
 

@@ -31,7 +31,7 @@ from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, OF_MOTORS,
-    QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
+    position_in_mm, QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
@@ -46,8 +46,6 @@ _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singular
 _OF_MOTORS = {SPEED_MAX: SPEEDS, TORQUE_MAX: DEMANDED_TORQUES, TEMPERATURE_RISE_MAX: RISES}
 _DEMANDED = FORCE_MAX, TORQUE_MAX
 _LIMITS = *LIMITS, *OF_MOTORS, JUMP
-# Factor by which legs exceed their maximum length if positions are in mm instead of m.
-_MILLIMETRES = 1000.0
 
 
 @dataclass
@@ -275,8 +273,8 @@ class LimitsDiagnostics(StatusPart):
             words = self._words(worst, len(exceeded) - 1)
             if suppressed and name not in CLIPPED:
                 words += '; forces suppressed'
-            if name in (LENGTH_MAX, JUMP):
-                words = mistake + words
+            if mistake and name in (LENGTH_MAX, JUMP):
+                words = f'{mistake}; {words}'
             self.held.see(Level(ERROR, words), now, name)
             self._setpoints[name] += 1
             self._worst[name] = max(worst, self._worst.get(name, worst), key=_excess)
@@ -323,13 +321,10 @@ class LimitsDiagnostics(StatusPart):
         return lines
 
     def _mistake(self, output: Output) -> str:
-        """Return the likely mistake where legs are too long, as words that precede others."""
+        """Return the likely mistake where legs are too long."""
         longest = self._answers.parameters['limits.length_max']
-        reference = output.state.lengths if longest is None else longest.tolist()
-        if reference and all(0.3 < length / (_MILLIMETRES * most) < 1.5 for length, most in zip(
-                output.lengths, reference, strict=True)):
-            return 'likely mistake: position in mm; '
-        return ''
+        return position_in_mm(
+            output.lengths, output.state.lengths if longest is None else longest.tolist())
 
     def _words(self, worst: Exceedance, others: int = 0) -> str:
         words = worst.words(self._joints) + ', clipped' * (worst.limit in CLIPPED)
