@@ -117,7 +117,8 @@ def test_within_the_limits_of_a_hexapod_all_legs_stay_away_from_the_singular_dir
 def test_upright_legs_have_a_mount_of_their_own_place():
     ring = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi / 3])
     for off in (0.0, 8e-4):  # nearly upright legs, too
-        p = Parameters({'geometry.base_joints': ring, 'geometry.platform_joints': ring + off * X,
+        turned = ring @ rotation_about(Z, off).T
+        p = Parameters({'geometry.base_joints': ring, 'geometry.platform_joints': turned,
                         'geometry.zero_length': 1.0, 'platform.mass': 1.0,
                         'platform.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]})
         joints = TreeJoints(p)
