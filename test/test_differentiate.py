@@ -350,8 +350,8 @@ def test_a_pose_far_out_of_range_is_left_out_alone(far: float) -> None:
     batch = batch_of(times, motion_at(times).rows, [200])
     batch.motions[200, 2] = far
     differentiator, others = Differentiator(10.0, 0.1), np.arange(400) != 200
-    # the first piece ends with the far pose: its restart passes to the next pose
-    done = differentiated(differentiator, pieces(batch, [100, 201]))
+    # a piece ends with the far pose: its restart passes over an empty one to the next pose
+    done = differentiated(differentiator, pieces(batch, [100, 201, 201]))
     assert differentiator.left_out == {TOO_FAR: 1}
     restarts = batch.restarts.copy()
     restarts[201] = True

@@ -142,10 +142,9 @@ def restarts_of(restarts: Flags, kept: Flags, waiting: bool = False) -> tuple[Fl
     A restart that is left out passes to the next setpoint that is kept; one was already waiting
     or not. ``DynamicsNode`` and ``published_forces`` do so setpoint by setpoint.
     """
-    counts = np.cumsum(restarts) + waiting
-    of_kept = counts[kept]
-    return (np.diff(of_kept, prepend=0) > 0,
-            bool(counts[-1] > (of_kept[-1] if len(of_kept) else 0)))
+    of_kept = np.cumsum(restarts)[kept] + waiting
+    still = np.count_nonzero(restarts) + waiting > of_kept.max(initial=0)
+    return np.diff(of_kept, prepend=0) > 0, bool(still)
 
 
 class Outputs(NamedTuple):
