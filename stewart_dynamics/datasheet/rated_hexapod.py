@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -80,7 +81,6 @@ class RatedHexapod:
         self._limits = Capability(whole)
         self.platform = StewartPlatform(_moved(self.given, self.pivot))
         self.loads = Capability(self.platform)
-        self._held = Capability(StewartPlatform(self.platform.parameters.replaced(HELD_MOTORS)))
         self.pose = Pose(self.origin.position + self.origin.rotation @ self.pivot,
                          self.origin.rotation)
         self._check(whole, self.origin)
@@ -111,6 +111,10 @@ class RatedHexapod:
     def section(self, normal: str) -> Section:
         """Return ``Capability.section`` through the pose."""
         return self._limits.section(self.origin, normal)
+
+    @cached_property
+    def _held(self) -> Capability:
+        return Capability(StewartPlatform(self.platform.parameters.replaced(HELD_MOTORS)))
 
     def frequencies(self, poses: Pose, leg_stiffness: float) -> Array:
         """

@@ -65,7 +65,7 @@ from stewart_dynamics.parameters.table import Parameters
 
 # Under the node's name.
 EXTERNAL_WRENCH = 'external_wrench'
-LIMITS = {f'{EXTERNAL_WRENCH}.{part}_max': part for part in PARTS_OF_WRENCH}
+WRENCH_LIMITS = {f'{EXTERNAL_WRENCH}.{part}_max': part for part in PARTS_OF_WRENCH}
 
 # The outcome of a measurement, besides the codes of forward_kinematics.
 _OUT_OF_RANGE = 3
@@ -94,7 +94,7 @@ class Measurement(NamedTuple):
 class Overload(NamedTuple):
     """A threshold that the external wrench exceeds."""
 
-    limit: str  # one of LIMITS
+    limit: str  # one of WRENCH_LIMITS
     value: float
     bound: float
 
@@ -219,7 +219,7 @@ class ExternalWrench:
         self._numbers[_PLATFORM] = StewartPlatform(parameters).constants
         self._longest_gap = round(parameters['setpoint.timeout'] * SECOND)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
-        self._bounds = [(limit, part, parameters[limit]) for limit, part in LIMITS.items()
+        self._bounds = [(limit, part, parameters[limit]) for limit, part in WRENCH_LIMITS.items()
                         if parameters[limit] is not None]
 
     def __call__(self, measurement: Measurement, before: Estimate | None, known: Six,

@@ -49,8 +49,8 @@ WIDE, SAMPLES = 2.5, 4.0
 _TRANSITION = 1.0
 ORDERS = 4  # number of columns of an effort: its value and its first ORDERS - 1 derivatives
 # Distance from a length limit within which an end stop may be touched, relative to the platform's
-# size; fraction of force_max above which an effort may be saturated. A
-# live measurement is judged more widely: ``external_wrench.payload``.
+# size; fraction of force_max above which an effort may be saturated. A live measurement is judged
+# more widely: ``external_wrench.payload``.
 _STOP, _SATURATED = 1e-4, 0.999
 # Least noise of lengths, relative to the platform's size, and of rates per sample.
 _ROUNDING = 1e-12

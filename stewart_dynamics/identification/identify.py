@@ -217,8 +217,9 @@ class Identification:
             window = window.with_lag(lag)
             last = self._read_window(path, extraction, window, last)
             speeds = np.abs(last.extract.legs[..., 1])
-            if motion is None or np.sum(speeds ** 2) > motion.squares:
-                motion = _Motion(len(self.extracts), window, last, float(np.sum(speeds ** 2)))
+            squares = float(np.sum(speeds ** 2))
+            if motion is None or squares > motion.squares:
+                motion = _Motion(len(self.extracts), window, last, squares)
             self.extracts.add(len(self.bags), (window.begin - begin) * NANOSECOND, last.extract)
             counts.update({
                 'samples': len(window.positions), 'stops': last.stops,

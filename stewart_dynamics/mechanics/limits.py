@@ -48,6 +48,9 @@ TOLERANCE = 1e-9
 # time before a setpoint counts as a jump.
 JITTER = 1e-3
 
+# Factor by which legs exceed their maximum length if positions are in mm instead of m.
+_MILLIMETRES = 1000.0
+
 # Thresholds in a row, in the order of OF_RESULTS.
 _SHORTEST, _LONGEST, _FASTEST, _STRONGEST = consecutive(6, 6, 6, 6)
 
@@ -79,10 +82,6 @@ CLIPPED = FORCE_MAX, TORQUE_MAX, TORQUE_SPEED
 
 ANGLES = {BASE_ANGLE_MAX: BASE_JOINT_ANGLES, PLATFORM_ANGLE_MAX: PLATFORM_JOINT_ANGLES}
 """Where in a row of joint angles the values of a limit are."""
-
-
-# Factor by which legs exceed their maximum length if positions are in mm instead of m.
-_MILLIMETRES = 1000.0
 
 
 def short_name(limit: str) -> str:

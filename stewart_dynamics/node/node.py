@@ -34,7 +34,8 @@ from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.external_wrench import estimate as external_wrench, payload
-from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH, ExternalWrench, LIMITS
+from stewart_dynamics.external_wrench.estimate import (
+    EXTERNAL_WRENCH, ExternalWrench, WRENCH_LIMITS)
 from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
@@ -472,7 +473,7 @@ class DynamicsNode(LifecycleNode):
 def _expects_measured_legs(parameters: Parameters) -> bool:
     """Return whether parameters announce measured legs."""
     return (parameters['joint_states.source'] == AS_MEASURED
-            or any(parameters[limit] is not None for limit in LIMITS))
+            or any(parameters[limit] is not None for limit in WRENCH_LIMITS))
 
 
 def main() -> int:

@@ -179,8 +179,7 @@ def _limits(summary: Summary) -> Iterator[Statement]:
                                   for number, cause in causes if number)
         yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
     problems = points['jumps'] or summary['limits'] or summary['limits_not_checked']
-    if not problems and any(leg[key] is not None for leg in summary['legs'].values()
-                            for key in leg if '_margin_' in key):
+    if not problems and _has_margins(summary['legs']):
         yield Statement(LIMITS, 'good', 'all limits held')
 
 
@@ -255,10 +254,15 @@ def _motors(summary: Summary) -> Iterator[Statement]:
 
 def _motors_hold(summary: Summary) -> bool:
     """Return whether a limit of the motors is given, and all are checked and held."""
-    given = any(load[key] is not None for load in summary['motors']['legs'].values()
-                for key in load if '_margin_' in key)
     problems = [*(each['limit'] for each in summary['limits']), *summary['limits_not_checked']]
-    return given and not any(limit in OF_MOTORS for limit in problems)
+    return _has_margins(summary['motors']['legs']) and not any(
+        limit in OF_MOTORS for limit in problems)
+
+
+def _has_margins(legs: Summary) -> bool:
+    """Return whether a limit is given of what legs or their motors have."""
+    return any(each[key] is not None for each in legs.values()
+               for key in each if '_margin_' in key)
 
 
 def needed_words(needed: Summary) -> str:

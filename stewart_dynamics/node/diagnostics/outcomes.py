@@ -25,7 +25,7 @@ from collections import Counter
 from collections.abc import Sequence
 import math
 
-from stewart_dynamics.external_wrench.estimate import Estimate, LIMITS, Overload
+from stewart_dynamics.external_wrench.estimate import Estimate, Overload, WRENCH_LIMITS
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome, rows_of
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
@@ -131,7 +131,7 @@ def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, flo
 
 
 def _words(overload: Overload) -> str:
-    quantity = LIMITS[overload.limit]
+    quantity = WRENCH_LIMITS[overload.limit]
     unit = PARTS_OF_WRENCH[quantity]
     return (f'{quantity} {overload.value:.6g} {unit} is {overload.value - overload.bound:.6g} '
             f'{unit} above {overload.limit}')
