@@ -17,8 +17,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from importlib import import_module
 import io
 import os
@@ -26,6 +26,7 @@ from pathlib import Path
 import re
 import signal
 import sys
+from threading import current_thread, main_thread
 from typing import Any, TextIO, TYPE_CHECKING
 
 from stewart_dynamics import __version__
@@ -222,6 +223,37 @@ def _interrupted(number: int, frame: object) -> None:
     for each in _SIGNALS:
         signal.signal(each, signal.SIG_IGN)
     raise KeyboardInterrupt
+
+
+@contextmanager
+def signals_wait() -> Iterator[Callable[[], None]]:
+    """
+    Yield a function that calls the handlers of the signals received since its last call.
+
+    For libraries that an exception in the middle of their functions leaves with a lock taken.
+    """
+    received: list[int] = []
+
+    def wait(number: int, frame: object) -> None:
+        received.append(number)
+
+    def handle() -> None:
+        while received:
+            handlers[number := received.pop()](number, None)
+
+    # Only the main thread handles signals, and may change how.
+    handled = _SIGNALS if current_thread() is main_thread() else ()
+    handlers = {int(each): handler for each in handled
+                if callable(handler := signal.getsignal(each))}
+    for each in handlers:
+        signal.signal(each, wait)
+    try:
+        yield handle
+    finally:
+        for each, handler in handlers.items():
+            if signal.getsignal(each) is wait:
+                signal.signal(each, handler)
+        handle()
 
 
 def unexpected(exc: BaseException) -> str:

@@ -23,13 +23,14 @@ middle of a bag.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import csv
 import errno
 import fcntl
 import json
 import logging
 import math
+import multiprocessing
 import os
 from pathlib import Path
 import pickle
@@ -540,6 +541,31 @@ def test_an_interrupt_leaves_no_partial_results(
     # finished results are complete
     for folder in (path.parent for path in output.rglob('summary.json')):
         check_whole(folder, huge / folder.relative_to(output))
+
+
+@pytest.mark.slow
+def test_a_signal_while_a_process_starts_is_not_in_its_way(
+        bags: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The signal comes between the start of a process and that of the thread that ends it."""
+    start = ProcessPoolExecutor._start_executor_manager_thread
+
+    def interrupted(pool: ProcessPoolExecutor) -> None:
+        signal.raise_signal(signal.SIGINT)
+        start(pool)
+
+    monkeypatch.setattr(ProcessPoolExecutor, '_start_executor_manager_thread', interrupted)
+    output = tmp_path / 'out'
+    handler, others = signal.getsignal(signal.SIGINT), set(multiprocessing.active_children())
+    try:
+        with pytest.raises(KeyboardInterrupt, match='^0 of 11 bags are done; the same command '):
+            replay_fleet(folders_of_results([bags], output), PARAMETERS, output, PLAIN, jobs=2)
+        assert set(multiprocessing.active_children()) == others
+        assert hidden(output) == []
+        assert signal.getsignal(signal.SIGINT) is handler
+    finally:
+        # The end of the tests would wait for them.
+        for left in set(multiprocessing.active_children()) - others:
+            left.kill()
 
 
 @pytest.mark.slow

@@ -30,6 +30,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.program import signals_wait
 from stewart_dynamics.replay.bag_task import (
     At, Cancelled, Ended, LOCAL_INTERVAL, replay_task, Replayed, Task)
 
@@ -67,6 +68,7 @@ def processes(jobs: int, at: At) -> Iterator[Replayed]:
                 counts[2 * n:2 * n + 2] = 0, 0
                 running[submitted(n, task)] = task, n
             done, _ = wait(running, LOCAL_INTERVAL, FIRST_COMPLETED)
+            handle_signals()
             for task, n in running.values():
                 at(task.number, *counts[2 * n:2 * n + 2])
             for future in done:
@@ -75,12 +77,15 @@ def processes(jobs: int, at: At) -> Iterator[Replayed]:
                 died = isinstance(future.exception(), BrokenProcessPool)
                 yield task, None if died else future.result()
 
-    try:
-        yield replayed
-    finally:
-        stopped.value = 1
-        for pool in pools.values():
-            pool.shutdown()  # waits until partial results are removed
+    # An exception between the start of a process and that of the thread which ends it would let
+    # this process wait for it forever.
+    with signals_wait() as handle_signals:
+        try:
+            yield replayed
+        finally:
+            stopped.value = 1
+            for pool in pools.values():
+                pool.shutdown()  # waits until partial results are removed
 
 
 def _start_server() -> None:
