@@ -68,6 +68,7 @@ class Program:
             epilog='\n'.join([files, '', 'exit codes:', *lines]),
             formatter_class=argparse.RawDescriptionHelpFormatter)
         parser.register('action', None, _StoreOnce)
+        parser.add_argument('--version', action='version', version=SOFTWARE)
         return parser
 
     def add_results(self, parser: argparse.ArgumentParser, default: str = '') -> None:

@@ -129,7 +129,7 @@ def test_axes_may_have_any_length(scale: float) -> None:
 
 @pytest.mark.parametrize(('changes', 'said'), [
     ({BASE_ANGLE_MAX: 25.0}, 'limits.base_joint_angle_max: 25.0 rad: must be more than 0, at most '
-     '3.14159'),
+     '3.14159: in degrees?'),
     ({PLATFORM_ANGLE_MAX: 0.0}, 'must be more than 0'),
     ({BASE_AXES: [0.0, 0.0, 1.0] * 5 + [0.0] * 3}, 'geometry.base_joint_axes: [[0.0, 0.0, 1.0]'),
     ({PLATFORM_AXES: [0.0, 0.0, 1.0]}, 'must have 18 entries, has 3'),

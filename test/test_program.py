@@ -23,6 +23,7 @@ from typing import TextIO
 
 import pytest
 
+from stewart_dynamics import __version__
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.program import BAD_INPUT, Program, STRICT
 
@@ -70,3 +71,10 @@ def test_a_full_disk_is_reported_once(monkeypatch: pytest.MonkeyPatch,
         assert PROGRAM.exit_code(found) == STRICT
     assert capsys.readouterr().err == (
         'some_program: standard output: cannot be written: No space left on device\n')
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        PROGRAM.parser('Does something.', 'no files').parse_args(['--version'])
+    assert end.value.code == 0
+    assert capsys.readouterr().out == f'stewart_dynamics {__version__}\n'

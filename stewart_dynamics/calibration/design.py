@@ -121,8 +121,7 @@ def _within_limits(platform: StewartPlatform, random: np.random.Generator, count
     poses = poses[np.flatnonzero(sound)[:count]]
     known, motions = PoseLimits(p), motion_rows(poses)
     side, results = (platform.solve(rows) for rows in (motion_rows(home), motions))
-    values = {**known.values(motions, results), **known.clearances(motions),
-              limits.FORCE_MAX: results[:, FORCES]}
+    values = {**known.values(motions, results), limits.FORCE_MAX: results[:, FORCES]}
     return poses[known.regular(results, side[0, DETERMINANT]) & (
         results[:, CONDITION] < p['singularity.warn_condition'])
         & ~known.exceeded(values, len(poses))]

@@ -580,7 +580,7 @@ class Capability:
         """
         results, motions = solved.rows.reshape(-1, RESULT), motion_rows(motion)
         of_poses = self._pose_limits
-        values = {**of_poses.values(motions, results), **of_poses.clearances(motions)}
+        values = of_poses.values(motions, results)
         exceeded = [(limits.short_name(name), self._limits.exceeds(name, values[name]))
                     for name in _OF_PATHS if name in values]
         regular = of_poses.regular(results, results[:1, DETERMINANT])

@@ -155,7 +155,8 @@ class RatedHexapod:
             raise SingularityError(
                 f'pose: singular: the condition number of J_inv is {condition:.6g}, '
                 f'must be less than singularity.stop_condition, {stop:g}{mistake}')
-        values = {**known.values(motions, results), FORCE_MAX: results[:, FORCES]}
+        values = {**known.lengths_and_angles(motions, results),
+                  FORCE_MAX: results[:, FORCES]}
         found = known.limits.exceeded({name: each[0].tolist() for name, each in values.items()})
         if not found and known.clearance is not None:
             clearances, nearest = known.clearance.nearest(motions)

@@ -129,8 +129,7 @@ class DesignLimits:
         results = self._platform.solve(motions)
         found = {**self._limits.values(motions, results),
                  VELOCITY_MAX: np.abs(results[:, RATES]), FORCE_MAX: np.abs(results[:, FORCES]),
-                 _WARN_CONDITION: results[:, CONDITION, None],
-                 **self._limits.clearances(motions)}
+                 _WARN_CONDITION: results[:, CONDITION, None]}
         if CLEARANCE_MIN in found:
             found[CLEARANCE_MIN] = found[CLEARANCE_MIN].min(axis=1, keepdims=True)
         return {name: values.reshape(*rows.shape[:2], -1) for name, values in found.items()}

@@ -44,7 +44,11 @@ class PoseLimits:
         self.stop_condition = stop_condition_of(parameters)
 
     def values(self, motions: Array, results: Array) -> dict[str, Array]:
-        """Return the values (N, 6) of limits of lengths and angles at rows of motion, results."""
+        """Return the values (N, 6) of all limits at rows of motion and their results."""
+        return {**self.lengths_and_angles(motions, results), **self.clearances(motions)}
+
+    def lengths_and_angles(self, motions: Array, results: Array) -> dict[str, Array]:
+        """Return the values (N, 6) of all limits but that of the clearance, which takes long."""
         lengths = results[:, LENGTHS]
         found = {name: lengths for name in (LENGTH_MIN, LENGTH_MAX) if name in self.limits.bounds}
         if self.angles is not None:

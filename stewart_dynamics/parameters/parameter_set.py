@@ -137,7 +137,8 @@ def _broken_rule(parameter: Parameter, entry: Any) -> str:
         entry < parameter.minimum or entry > parameter.maximum
         or (parameter.above and entry == parameter.minimum))
     if out_of_range or (parameter.choices and entry not in parameter.choices):
-        return f'must be {parameter.rule}'
+        degrees = ': in degrees?' if parameter.unit == 'rad' and entry > parameter.maximum else ''
+        return f'must be {parameter.rule}{degrees}'
     return ''
 
 

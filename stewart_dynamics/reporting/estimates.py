@@ -146,7 +146,7 @@ def not_identifiable_lines(result: Mapping[str, Any], source: str) -> list[str]:
 
 def rounded(value: float, error: float) -> str:
     """Return a number as text with two digits of its standard error."""
-    digits = decimals(error)
+    digits = error_decimals(error)
     if value == 0.0 or error == 0.0 or (abs(value) < 1e9 and (
             digits < _MOST_DECIMALS or abs(value) > _SMALL)):
         return f'{value:.{digits}f}'
@@ -154,7 +154,7 @@ def rounded(value: float, error: float) -> str:
     return f'{value:.{min(max(0, places), _MOST_DECIMALS)}e}'
 
 
-def decimals(error: float) -> int:
+def error_decimals(error: float) -> int:
     """Return the number of decimals that show two digits of a standard error."""
     digits = 0
     while digits < _MOST_DECIMALS and error * 10 ** digits < 1.95:
@@ -184,7 +184,7 @@ def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
     def drawn(each: Mapping[str, Any]) -> dict[str, Any]:
         error = each['standard_error']
         return {**each, 'half': None if error is None else TWO_SIDED * error,
-                'digits': decimals(error) if error else 4}
+                'digits': error_decimals(error) if error else 4}
 
     def changed(each: Mapping[str, Any]) -> dict[str, Any]:
         row = drawn(each)
