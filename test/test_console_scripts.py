@@ -27,6 +27,7 @@ from stewart_dynamics import StewartError
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.executables import executable
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.console_scripts import check_arguments, usage
 from stewart_dynamics.simulator.parameters import SimulatorParameters
@@ -61,9 +62,10 @@ def run(arguments: str = '', ros: str = 'with ROS') -> tuple[str, list[str]]:
     return done.stdout, done.stderr.splitlines()
 
 
-def test_help_is_answered_without_ros_and_without_a_compiler() -> None:
+def test_help_and_version_are_answered_without_ros_and_without_a_compiler() -> None:
     assert run('--help', 'without ROS') == (
         ''.join(f'{usage(kind)}\n' for kind in PROGRAMS.values()) + '[0, 0, 0] []\n', [])
+    assert run('--version', 'without ROS') == (f'{SOFTWARE}\n' * 3 + '[0, 0, 0] []\n', [])
 
 
 @pytest.mark.parametrize('program', PROGRAMS)

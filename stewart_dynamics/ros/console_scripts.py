@@ -15,7 +15,7 @@
 """
 The console scripts of the nodes; whatever needs no ROS is answered before rclpy is imported.
 
-``--help``, a parameter file that breaks a rule, and that ROS is missing.
+``--help``, ``--version``, a parameter file that breaks a rule, and that ROS is missing.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from typing import Any, NoReturn, TYPE_CHECKING
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros, parameters_of, read_document
+from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.ros.signals import SIGNALS
 
 if TYPE_CHECKING:
@@ -120,6 +121,9 @@ def _run(module: str, name: str, node: str) -> int:
     kind: type[ParameterSet] = getattr(_imported(module), name)
     if {'-h', '--help'} & set(sys.argv[1:]):
         print(usage(kind))
+        return 0
+    if '--version' in sys.argv[1:]:
+        print(SOFTWARE)
         return 0
     try:
         check_arguments(sys.argv, kind)
