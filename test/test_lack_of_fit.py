@@ -87,24 +87,84 @@ def test_noise_of_lengths_in_the_columns_is_no_lack_of_fit(motion: MotionAt) -> 
     assert identify(simulated(Case(true_hexapod(1)), 1, motion)).lack_of_fit is None
 
 
+def of_pieces(*bags: list[Recorded]) -> Identified:
+    """Return the identification from bags of pieces with gaps between them."""
+    with closing(Identification(GIVEN, IdentificationOptions(hold_out=0.0))) as work:
+        for n, pieces in enumerate(bags):
+            work.add(Path(f'bag {n}'), [Window(
+                round(1e11 * n), 1.0 / RATE, each.positions, each.rates, each.efforts,
+                np.zeros(each.efforts.shape, dtype=bool)) for n, each in enumerate(pieces)])
+        assert len(work.extracts) == sum(map(len, bags))
+        return work.result()
+
+
+def standing(seconds: float, moving: Recorded) -> Recorded:
+    """Return a recording with the brakes on, before one that moves."""
+    shape = (round(seconds * RATE), 6)
+    lengths, rates = rng(5).normal(size=(2, *shape))
+    return Recorded(np.arange(shape[0]) / RATE, moving.positions[0] + NOISE.length * lengths,
+                    None if moving.rates is None else NOISE.rate * rates,
+                    900.0 + NOISE.effort * rng(6).normal(size=shape))
+
+
+def parked(seconds: float, moving: Recorded) -> Recorded:
+    """Return a recording at the ends of the legs, of which nothing is used."""
+    end = GIVEN['limits.length_min'] - GIVEN['geometry.zero_length']
+    still = standing(seconds, moving)
+    return still._replace(positions=still.positions - moving.positions[0] + end)
+
+
 @pytest.mark.parametrize('pieces', [1, 3])
 def test_short_recordings_are_not_tested(pieces: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wrong_models, 'SECONDS', 3.5 * pieces)  # 24 cut-off periods are left
     (whole,) = simulated(Case(true_hexapod(1)), 1)
     assert whole.rates is not None
-    gaps = np.array_split(np.arange(len(whole.times)), pieces)
-    options = IdentificationOptions(hold_out=0.0)
-    with closing(Identification(GIVEN, options)) as work:
-        work.add(Path('a bag'), [Window(
-            round(1e9 * (whole.times[part[0]] + n)), 1.0 / RATE, whole.positions[part],
-            whole.rates[part], whole.efforts[part], np.zeros((len(part), 6), dtype=bool))
-            for n, part in enumerate(gaps)])
-        assert len(work.extracts) == pieces
-        found = work.result()
-    assert (found.tested, found.lack_of_fit) == (False, None)
-    result = document(found, options)
-    assert (result['tested_for_lack_of_fit'], result['lack_of_fit']) == (False, None)
-    assert result_text(result).startswith('not tested for a lack of fit: the recording is too sh')
+    parts = [Recorded(*each) for each in zip(
+        *(np.array_split(each, pieces) for each in whole if each is not None), strict=True)]
+    for bag in (parts, [parked(10.0, parts[0]), *parts], [standing(10.0, parts[0]), *parts]):
+        found = of_pieces(bag)
+        assert (found.tested, found.lack_of_fit) == (False, None)
+        result = document(found, IdentificationOptions())
+        assert (result['tested_for_lack_of_fit'], result['lack_of_fit']) == (False, None)
+        assert result_text(result).startswith('not tested for a lack of fit: what can be used')
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.09])
+def test_pieces_at_rest_before_a_motion_are_no_lack_of_fit(
+        delay: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    noise = NOISE._replace(delay=delay)
+    monkeypatch.setattr(wrong_models, 'NOISE', noise)
+    true = true_hexapod(2)
+    (moving,) = simulated(Case(true), 2)
+    begin = fourier(2)(np.zeros(1))
+    held = recorded(true, lambda times: Motion(
+        np.repeat(begin.position, len(times), axis=0),
+        np.repeat(begin.rotation, len(times), axis=0)), 5.0, RATE, 1001, noise)
+    for still in (held, standing(3.0, moving)):
+        found = of_pieces([still, moving])
+        assert (found.tested, found.lack_of_fit, found.likely) == (True, None, ())
+        (bag,) = document(found, IdentificationOptions())['bags']
+        assert bag['delay_s'] == pytest.approx(delay, abs=2e-4)
+        off = np.abs(found.fit.values - Unknowns(true).start)
+        assert np.mean(off < TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))) > 0.8
+
+
+def test_a_bag_of_which_nothing_is_used_changes_nothing() -> None:
+    (moving,) = simulated(Case(true_hexapod(2)), 2)
+    alone, both = of_pieces([moving]), of_pieces([parked(20.0, moving)], [moving])
+    np.testing.assert_allclose(both.fit.values, alone.fit.values, rtol=1e-3)
+    np.testing.assert_allclose(both.errors.covariance, alone.errors.covariance, rtol=0.1, atol=0.0)
+
+
+def test_stribeck_friction_is_named_behind_a_piece_at_rest() -> None:
+    (moving,) = simulated(CAUSES['Stribeck friction'][0](true_hexapod(1), rng(1001)), 1)
+    noisier = moving._replace(rates=None, positions=moving.positions + 3e-5 * rng(8).normal(
+        size=moving.positions.shape))
+    for pieces in ([noisier], [standing(3.0, noisier)._replace(
+            positions=noisier.positions[0] + 3e-5 * rng(9).normal(size=(750, 6))), noisier]):
+        lack = of_pieces(pieces).lack_of_fit
+        assert lack is not None
+        assert lack.causes[0].what == 'stribeck_friction'
 
 
 def test_mistakes_in_short_recordings_are_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,6 +63,8 @@ _TOGETHER = 4096
 # window that moves, and at least this multiple of the change of the rate between two samples at a
 # reversal.
 _STRIBECK, _RESOLVED = (0.1, 0.3), 4.0
+# A leg moves if its length changes by more than this multiple of its noise.
+_MOVES = 10.0
 SLIP = 1 + len(_STRIBECK)
 """Number of friction shapes over the rate: Coulomb friction, Stribeck friction."""
 
@@ -102,6 +104,7 @@ class WindowRead(NamedTuple):
     """Standard deviations of the white noise of lengths [m] and rates [m/s]; nan: no rates."""
     stops: int  # number of recorded samples at an end stop or a force limit
     end: Pose  # last pose
+    moves: bool  # whether legs move by more than noise
 
 
 class Extracts:
@@ -112,14 +115,17 @@ class Extracts:
         self._bags: list[int] = []
         self.samples = 0
         self.used: list[Flags] = []  # (N, 6) of each extract; may be changed
+        self.moves: list[bool] = []  # of each extract
 
-    def add(self, bag: int, begin: float, extract: Extract) -> None:
+    def add(self, bag: int, begin: float, read: WindowRead) -> None:
         """Add the extract of a window of a bag that begins at a time [s]."""
+        extract = read.extract
         for array in (begin + extract.times, extract.columns, extract.legs, extract.slip,
                       extract.poses):
             np.save(self._file, array)
         self._bags.append(bag)
         self.used.append(extract.used)
+        self.moves.append(read.moves)
         self.samples += len(extract.times)
 
     def __iter__(self) -> Iterator[Extract]:
@@ -177,14 +183,15 @@ class Extraction:
         wrong, stops = self._wrong(window)
         count = len(columns)
         times = self._period * (self.margin + self.step * np.arange(count)).astype(float)
-        speeds = self.speeds or self._chosen_speeds(rates, accelerations)
+        moves = self._moves(lengths, rates, deviations[0])
+        speeds = self.speeds or self._chosen_speeds(rates, accelerations, moves)
         taps = self._narrow.taps()
         legs = np.stack([decimated(each, taps, self.step)
                          for each in (lengths, rates, accelerations)], axis=-1)
         at = self._narrow.half + self.step * np.arange(count)
         slip = decimated(self._slip(rates, speeds), taps, self.step)
         extract = Extract(times, columns, ~wrong[:count], legs, slip, found.rows[at][:, POSE])
-        return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]))
+        return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]), moves)
 
     def lag(self, window: Window, guess: Pose, longest: float) -> tuple[int, float]:
         """
@@ -218,12 +225,21 @@ class Extraction:
             best = 0
         return int(lags[best]), misfits[best]
 
-    def _chosen_speeds(self, rates: Array, accelerations: Array) -> tuple[float, ...]:
+    @property
+    def _band(self) -> float:
+        return float(np.mean(self.platform.parameters['actuator.coulomb_velocity']))
+
+    def _moves(self, lengths: Array, rates: Array, deviation: float) -> bool:
+        """Return whether legs move by more than noise: else nothing slips."""
+        return _rms(rates) > self._band and bool(
+            np.ptp(lengths, axis=0).max() > _MOVES * deviation)
+
+    def _chosen_speeds(self, rates: Array, accelerations: Array, moves: bool,
+                       ) -> tuple[float, ...]:
         """Return the rates of the friction shapes; later windows have those of one that moves."""
-        band = float(np.mean(self.platform.parameters['actuator.coulomb_velocity']))
-        step = self._period * _rms(accelerations) + band
+        step = self._period * _rms(accelerations) + self._band
         speeds = tuple(max(part * _rms(rates), _RESOLVED * step) for part in _STRIBECK)
-        if _rms(rates) > band:  # at rest, as with the brakes on, nothing slips
+        if moves:
             self.speeds = speeds
         return speeds
 

@@ -203,7 +203,7 @@ def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, v
         steps.append((alone, along, float(normal[-1, -1] ** -0.5) if observable else 0.0))
     if noise is None:
         return total, steps, None
-    mean = np.average(1.0 / variances, axis=0, weights=np.maximum(sums.counts.sum(axis=1), 1))
+    mean = np.average(1.0 / variances, axis=0, weights=sums.counts)
     of_noise = derivative.T @ np.tensordot(mean, noise, axes=1) @ derivative
     return total, steps, of_noise
 

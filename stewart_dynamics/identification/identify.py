@@ -191,6 +191,7 @@ class Identification:
         """Add the windows of a bag; return None if none of them is usable."""
         options = self._options
         lag = begin = end = 0
+        lag_is_known = not options.delay
         counts: Counter[str] = Counter()
         notices: list[str] = []
         extraction: Extraction | None = None
@@ -210,17 +211,18 @@ class Identification:
                 notices.append('geometry.platform_side: the efforts are those of a platform on '
                                f'the {NEGATIVE} side of its base')
                 extraction = self._extraction(window)
-            if last is None and options.delay:
+            if not lag_is_known:
                 lag, _ = self._lag(extraction, window)
                 if len(window.positions) < fewest + lag:
                     lag = 0
             window = window.with_lag(lag)
             last = self._read_window(path, extraction, window, last)
+            lag_is_known = lag_is_known or last.moves
             speeds = np.abs(last.extract.legs[..., 1])
             squares = float(np.sum(speeds ** 2))
             if motion is None or squares > motion.squares:
                 motion = _Motion(len(self.extracts), window, last, squares)
-            self.extracts.add(len(self.bags), (window.begin - begin) * NANOSECOND, last.extract)
+            self.extracts.add(len(self.bags), (window.begin - begin) * NANOSECOND, last)
             counts.update({
                 'samples': len(window.positions), 'stops': last.stops,
                 'outliers': int(np.count_nonzero(window.outliers)), 'speeds': speeds.size,
@@ -312,9 +314,10 @@ class Identification:
     def _add_noise(self, extraction: Extraction, motion: _Motion) -> None:
         """Determine the information due to noise alone in a window."""
         window, extract = motion.window, motion.read.extract
-        noisy = extraction(window, first_pose(self.platform, window),
-                           np.random.default_rng(_SEED)).extract
-        self._noisy.add(len(self.bags), 0.0, noisy)
+        read = extraction(window, first_pose(self.platform, window),
+                          np.random.default_rng(_SEED))
+        self._noisy.add(len(self.bags), 0.0, read)
+        noisy = read.extract
         self._moving.append(motion.number)
         change = noisy.regressor - extract.regressor
         self._noises.append((

@@ -246,8 +246,13 @@ def deviations(statistic: float, freedom: int) -> float:
 
 
 def long_pieces(extracts: Extracts) -> list[int]:
-    """Return the numbers of the extracts that can be tested; none if all are too short."""
-    lengths = [len(used) / SAMPLES for used in extracts.used]
+    """
+    Return the numbers of the extracts that can be tested; none if too little of all is used.
+
+    Pieces at rest are tested only if nothing else is there: friction has any value in them.
+    """
+    lengths = [used.sum(axis=0).min() / SAMPLES if moves or not any(extracts.moves) else 0.0
+               for moves, used in zip(extracts.moves, extracts.used, strict=True)]
     numbers = [n for n, periods in enumerate(lengths) if periods >= PIECE]
     return numbers if sum(lengths[n] for n in numbers) >= WHOLE else []
 

@@ -60,7 +60,7 @@ from tqdm import tqdm
 VERSION = 1
 
 _TEMPLATES = Path(__file__).with_name('templates')
-NOT_TESTED = ('not tested for a lack of fit: the recording is too short: '
+NOT_TESTED = ('not tested for a lack of fit: what can be used of the motion is too short: '
               f'{WHOLE} cut-off periods are needed, in pieces of at least {PIECE}, besides the '
               'ends that the filters take')
 # Largest number of samples in the curves of the report; later samples are not drawn.
