@@ -29,9 +29,11 @@ import sys
 from typing import Any
 from urllib.parse import unquote
 
+import messages
 import numpy as np
 import pytest
 from referees import random_direction, rng, rotation_about
+from rosbags.rosbag2 import StoragePlugin, Writer
 
 from stewart_dynamics import (
     BaseMotion, Capability, Motion, Parameters, Pose, PoseError, StewartPlatform)
@@ -46,7 +48,7 @@ from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads, stiffness
 from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, RecordedMotion, uses
 from stewart_dynamics.replay import main as replay
-from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.replay.replay_options import NODE, Options
 from stewart_dynamics.reporting.vector_picture import hull, ticks
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -255,6 +257,24 @@ def test_the_motion_between_setpoints_is_judged_where_it_is_known(
         assert text in judgement['between_setpoints']['reason']
         assert text in between_setpoints(judgement)
     assert 'as in a planned trajectory: ' in between_setpoints(found)
+    # poses alone end at no speed, what is between them does
+    still = between(coarse._replace(motion=Motion(
+        coarse.motion.position, coarse.motion.rotation)))
+    assert still['factor'] is None
+    assert still['between_setpoints']['factor'] > 0.0
+
+
+def test_poses_far_out_of_range_are_counted_as_rejected(tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        poses = writer.add_connection(f'{NODE}/setpoint/pose', messages.POSE,
+                                      typestore=messages.STORE)
+        for n in range(100):
+            stamp = 1_000_000_000 + n * 10_000_000
+            writer.write(poses, stamp, messages.pose(
+                stamp, (0.0, 0.0, 1e10 if n == 50 else 1.1)))
+    found = read_motion(bag, PARAMETERS, Options(cutoff=5.0), lambda size: None)
+    assert (len(found.seconds), found.rejected) == (99, 1)
 
 
 @pytest.mark.parametrize(('changes', 'limit'), [

@@ -547,10 +547,11 @@ def test_an_interrupt_leaves_no_partial_results(
 def test_a_signal_while_a_process_starts_is_not_in_its_way(
         bags: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The signal comes between the start of a process and that of the thread that ends it."""
-    start = ProcessPoolExecutor._start_executor_manager_thread
+    start, begun = ProcessPoolExecutor._start_executor_manager_thread, set()
 
     def interrupted(pool: ProcessPoolExecutor) -> None:
         signal.raise_signal(signal.SIGINT)
+        begun.add(pool)
         start(pool)
 
     monkeypatch.setattr(ProcessPoolExecutor, '_start_executor_manager_thread', interrupted)
@@ -559,6 +560,7 @@ def test_a_signal_while_a_process_starts_is_not_in_its_way(
     try:
         with pytest.raises(KeyboardInterrupt, match='^0 of 11 bags are done; the same command '):
             replay_fleet(folders_of_results([bags], output), PARAMETERS, output, PLAIN, jobs=2)
+        assert len(begun) == 1  # others are not waited for
         assert set(multiprocessing.active_children()) == others
         assert hidden(output) == []
         assert signal.getsignal(signal.SIGINT) is handler

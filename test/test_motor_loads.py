@@ -28,6 +28,7 @@ from referees import Array, rng, ROOT
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
+from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.replay.index import row_of, write_fleet
 from stewart_dynamics.replay.motor_charts import Deliverable, OperatingPoints
 from stewart_dynamics.replay.motor_loads import MARGIN, needed
@@ -153,10 +154,13 @@ def test_without_drives_there_are_no_motors_and_without_velocities_no_speeds() -
 def test_the_card_of_the_motors_says_whether_their_limits_are_held() -> None:
     motion = fourier(3, size=0.5)(TIMES[:20])
 
-    def card(**changes: Any) -> Card:
-        found = summary_of(P.replaced({f'drive.{k}': v for k, v in changes.items()}), motion,
+    def of_limits(p: Parameters, **changes: Any) -> dict[str, Card]:
+        found = summary_of(p.replaced({f'drive.{k}': v for k, v in changes.items()}), motion,
                            TIMES[:20], [])
-        return cards({**found, 'missing': [], 'rejected': [], 'measured': None})['motors']
+        return cards({**found, 'missing': [], 'rejected': [], 'measured': None})
+
+    def card(**changes: Any) -> Card:
+        return of_limits(P, **changes)['motors']
 
     limits = ('torque_max', 'torque_speed', 'speed_max', 'temperature_rise_max')
     ample = {'torque_max': 1e3, 'torque_continuous': 1e2, 'speed_max': 1e4, 'torque_speed': None}
@@ -167,6 +171,11 @@ def test_the_card_of_the_motors_says_whether_their_limits_are_held() -> None:
     assert exceeded.level == 'bad'
     assert any(each.line.startswith('drive.torque_max, ') for each in exceeded.statements)
     assert card(**dict.fromkeys([*limits, 'torque_continuous'])).level == 'none'
+    # a continuous torque bounds the RMS: it is no limit
+    unlimited = P.replaced(dict.fromkeys(name for name in LIMITS if P[name] is not None))
+    for continuous, level in ((1e-3, 'warn'), (1e2, 'good')):
+        found = of_limits(unlimited, **dict.fromkeys(limits), torque_continuous=continuous)
+        assert (found['limits'].level, found['motors'].level) == ('none', level)
 
 
 def rows_of(speeds: Array, torques: Array) -> Array:

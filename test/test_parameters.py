@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+import pickle
 from typing import Any
 
 from hypothesis import given, HealthCheck, settings
@@ -136,6 +137,10 @@ def test_replaced_changes_these_alone_and_checks_the_whole(p: Parameters) -> Non
         p.replaced({'limits.length_max': 0.7})
     with pytest.raises(ParameterError, match=r'^a node: platform\.mass: -1\.0 kg: '):
         p.replaced({'platform.mass': -1.0}, 'a node')
+    read = Parameters(GIVEN, 'a file')
+    for same in (read.replaced({}), pickle.loads(pickle.dumps(read))):
+        assert same.source == 'a file'
+    assert read.replaced({}, 'identified').source == 'identified'
 
 
 def test_a_later_section_overrides_an_earlier_one_and_other_nodes_are_ignored(

@@ -99,7 +99,8 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
     steps = np.maximum(np.diff(stamps, prepend=stamps[0]), 0)  # a bag that loops
     return RecordedMotion(np.cumsum(steps) * NANOSECOND, Motion.of_rows(rows), wrenches,
                           None if bases is None else BaseMotion.of_rows(bases), missing,
-                          sum(setpoints.counts.values()))
+                          sum(setpoints.counts.values())
+                          + (0 if splines is None else splines.left_out.total()))
 
 
 def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array]:
@@ -167,7 +168,7 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
         speed = c.speed_factor(recorded.motion, recorded.wrench, recorded.base)
         found |= _named('factor', speed, recorded, joints)
     amplitude = payload = between = None
-    if found['factor']:
+    if found['factor'] != 0.0 and (c.limits_rates or c.limits_forces):
         between = _between(c, recorded, joints)
     if len(recorded.seconds) <= _MOST and not singular:
         larger = c.amplitude_factor(recorded.motion, None, recorded.wrench, recorded.base)

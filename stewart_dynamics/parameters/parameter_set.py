@@ -227,9 +227,9 @@ class ParameterSet(Mapping[str, Any]):
         """Return the number of values that were given."""
         return f'<{type(self).__name__}: {len(self._given)} of {len(self)} given>'
 
-    def __reduce__(self) -> tuple[type[Self], tuple[dict[str, Any]]]:
+    def __reduce__(self) -> tuple[type[Self], tuple[dict[str, Any], str]]:
         """Return how to make a copy, which is checked and read-only as well."""
-        return type(self), (self._given,)
+        return type(self), (self._given, self.source)
 
     @property
     def given(self) -> Mapping[str, Any]:
@@ -245,13 +245,16 @@ class ParameterSet(Mapping[str, Any]):
         return tuple(tuple(value.ravel()) if isinstance(value, np.ndarray) else value
                      for value in self._values.values())
 
-    def replaced(self, changes: Mapping[str, Any], source: str = 'parameters', *,
+    def replaced(self, changes: Mapping[str, Any], source: str = '', *,
                  exact_types: bool = False) -> Self:
-        """Return a copy with these values changed, checked as a whole."""
+        """Return a copy with these values changed, checked as a whole; ``source``: of them."""
         if not isinstance(changes, Mapping):
-            raise ParameterError(
-                f'{source}: {shown(changes)}: must be a mapping of names to values')
-        return type(self)({**self._given, **changes}, source, exact_types=exact_types)
+            raise ParameterError(f'{source or "parameters"}: {shown(changes)}: must be a mapping '
+                                 'of names to values')
+        changed = type(self)({**self._given, **changes}, source or 'parameters',
+                             exact_types=exact_types)
+        changed.source = source or self.source
+        return changed
 
     @classmethod
     def from_yaml(cls, path: str | Path, node: str = '') -> Self:

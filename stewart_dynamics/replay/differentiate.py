@@ -130,15 +130,15 @@ class Differentiator:
         batch: stamps increase, except at jumps back in time. Positions beyond LARGEST are left
             out: they would disturb the splines of all poses around them.
         """
+        batch = batch._replace(
+            wrenches=np.broadcast_to(batch.wrenches, (len(batch.stamps), WRENCH)))
         near = np.all(np.abs(batch.motions[:, POSITION]) <= LARGEST, axis=1)
         if self._restart_before or not near.all():
             restarts, self._restart_before = restarts_of(
                 batch.restarts, near, self._restart_before)
             self.left_out[TOO_FAR] += int(np.count_nonzero(~near))
             batch = batch.chosen(near)._replace(restarts=restarts)
-        wrenches = np.broadcast_to(batch.wrenches, (len(batch.stamps), WRENCH))
-        self._pending.append(Batch(
-            batch.stamps, batch.motions, wrenches, batch.restarts, batch.times, batch.bases))
+        self._pending.append(batch)
         self._held += len(batch.stamps)
         # not at every batch: joining the pending ones takes time
         return self._done() if self._held >= self._due else _joined([])

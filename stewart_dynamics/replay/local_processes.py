@@ -67,6 +67,7 @@ def processes(jobs: int, at: At) -> Iterator[Replayed]:
                 task, n = waiting.popleft(), idle.popleft()
                 counts[2 * n:2 * n + 2] = 0, 0
                 running[submitted(n, task)] = task, n
+                handle_signals()
             done, _ = wait(running, LOCAL_INTERVAL, FIRST_COMPLETED)
             handle_signals()
             for task, n in running.values():

@@ -232,7 +232,9 @@ def _motors(summary: Summary) -> Iterator[Statement]:
         yield Statement(
             MOTORS, 'warn', f'drive.torque_continuous, exceeded by the RMS torque of {worst}'
             f'{others}: {legs[worst]["torque_rms_n_m"]:.4g} N m, by {-margin:.4g} N m')
-    elif _motors_hold(summary):
+    elif values_of(legs, 'torque_continuous_margin_n_m'):
+        yield Statement(MOTORS, 'good', 'drive.torque_continuous held')
+    if _motors_hold(summary):
         yield Statement(MOTOR_LIMITS, 'good', 'all limits of the motors held')
     for name, peak, of in ((TORQUE_MAX, 'torque_peak', ''), (SPEED_MAX, 'speed_peak', ''),
                            (TEMPERATURE_RISE_MAX, 'temperature_rise_max', ' of the winding')):
@@ -262,7 +264,7 @@ def _motors_hold(summary: Summary) -> bool:
 def _has_margins(legs: Summary) -> bool:
     """Return whether a limit is given of what legs or their motors have."""
     return any(each[key] is not None for each in legs.values()
-               for key in each if '_margin_' in key)
+               for key in each if '_margin_' in key and not key.startswith('torque_continuous'))
 
 
 def needed_words(needed: Summary) -> str:
