@@ -30,7 +30,7 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import Motion, ParameterError, Parameters, SingularityError, StewartPlatform
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
-from stewart_dynamics.mechanics.drives.motor_limits import force_limits
+from stewart_dynamics.mechanics.drives.motor_limits import force_limits, rate_limits
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions
 from stewart_dynamics.mechanics.rows import ACCELERATION, TWIST
@@ -292,6 +292,7 @@ def test_torque_speed_curve() -> None:
     assert force_limits(p, speeds / motor_ratio(p)) == pytest.approx(
         motor_ratio(p) * 0.8 * np.array([8.0, 8.0, 7.0, 6.0, 3.5, 1.0]))
     assert not force_limits(p, np.full(6, 401.0) / motor_ratio(p)).any()
+    assert rate_limits(p) == pytest.approx(400.0 / motor_ratio(p))
     motion = Motion(pose.position, pose.rotation, 1.001 * twist[:3], 1.001 * twist[3:])
     assert platform.motors(motion).available_torques[5] == 0.0
 
