@@ -102,7 +102,7 @@ def test_units_and_angles(table: Path, tmp_path: Path) -> None:
     given = read_poses(table, JOINTS)
     angles = np.random.default_rng(1).uniform(-0.3, 0.3, (40, 3))
     path = tmp_path / 'angles.csv'
-    lines = [';'.join(['note', *reversed(JOINTS), 'z', 'y', 'x', 'gamma', 'alpha', 'beta'])]
+    lines = ['', ';'.join(['note', *reversed(JOINTS), 'z', 'y', 'x', 'gamma', 'alpha', 'beta'])]
     for lengths, position, turn in zip(1e3 * given.lengths, 1e3 * given.poses.position,
                                        np.degrees(angles), strict=True):
         lines.append(';'.join(['a b', *map(repr, map(float, (
@@ -112,7 +112,7 @@ def test_units_and_angles(table: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(found.lengths, given.lengths, atol=1e-15)
     np.testing.assert_allclose(found.poses.position, given.poses.position, atol=1e-15)
     np.testing.assert_allclose(found.poses.rotation, from_euler(angles), atol=1e-15)
-    assert found.names[:2] == ('row 2', 'row 3')
+    assert found.names[:2] == ('row 3', 'row 4')  # as an editor counts them
     # Lines can end in any way.
     path.write_bytes(path.read_bytes().replace(b'\r\n', b'\r'))
     np.testing.assert_array_equal(

@@ -305,6 +305,8 @@ def test_outliers_do_not_hide_one_another(seed: int) -> None:
     ('sign', 'leg positions have the opposite sign'),
     ('quaternion', 'quaternions have w first'),
     ('whole lengths', 'the leg positions are whole lengths between the joints'),
+    ('home', 'are the leg positions relative to home'),
+    ('home of one leg', 'geometry.zero_length of leg_3 would become 1.2'),
     ('frames', 'of other frames: --frames unknown'),
     ('shuffled', 'lengths and poses must be of the same instants')])
 def test_likely_mistakes_are_named(what: str, words: str) -> None:
@@ -340,6 +342,8 @@ def test_likely_mistakes_are_named(what: str, words: str) -> None:
         rotation = Pose.from_quaternion(position, np.roll(seen.quaternion, 1, axis=1)).rotation
     if what == 'whole lengths':
         lengths = lengths + 0.95
+    if what.startswith('home'):
+        lengths = lengths - (0.2776 * np.eye(6)[2] if what.endswith('leg') else 0.2776)
     if what == 'shuffled':
         position = rng.permutation(position)
     pose = Pose(position, rotation)
@@ -348,6 +352,13 @@ def test_likely_mistakes_are_named(what: str, words: str) -> None:
     with pytest.raises(StewartError) as caught:
         calibrate(HEXAPOD, lengths, pose, angles=given, degrees=what.startswith('read'))
     assert words in str(caught.value) and 'nothing is calibrated' in str(caught.value)
+
+
+def test_exact_poses_of_the_drawing_have_no_lack_of_fit() -> None:
+    rng = np.random.default_rng(8)
+    poses = random_poses(rng, 40)
+    lengths = HEXAPOD.inverse_kinematics(poses) - HEXAPOD.parameters['geometry.zero_length']
+    assert calibrate(HEXAPOD, lengths, poses).lack_of_fit == ()
 
 
 def test_all_poses_are_used_where_none_is_held_out_and_some_noise_is_needed() -> None:

@@ -70,6 +70,30 @@ def test_filters_give_derivatives_without_phase(frequency: float) -> None:
         assert np.abs(both - wave(frequency, order, INNER)).max() < 2e-3 * w ** order
 
 
+@pytest.mark.parametrize(('period', 'cutoff'), [(4e-3, 10.0), (4e-3, 25.0), (2e-2, 5.0)])
+@pytest.mark.parametrize('rates', [5e-6, 5e-4])
+def test_derivatives_have_the_gain_of_the_filter(
+        period: float, cutoff: float, rates: float) -> None:
+    band = LowPass.of(period, cutoff, 0.4 * cutoff)
+    at = period * np.arange(-band.half, band.half + 1)
+    for w in 2.0 * np.pi * cutoff * np.array([0.02, 0.1, 0.2, 0.4]):
+        waves = np.exp(1j * w * at)
+        gain = band.taps() @ waves
+        for order in (1, 2):
+            assert abs(band.taps(order) @ waves / (1j * w) ** order - gain) < 5e-4
+            of_positions, of_rates = band.fused(order, 5e-6, rates)
+            both = of_positions @ waves + 1j * w * (of_rates @ waves)
+            assert abs(both / (1j * w) ** order - gain) < 2e-3
+
+
+@pytest.mark.parametrize('later', [0.3 * PERIOD, -0.7 * PERIOD])
+def test_a_filter_gives_earlier_samples(later: float) -> None:
+    for order in (0, 1, 2):
+        found = convolved(wave(5.0), FILTER._replace(later=later).taps(order))
+        np.testing.assert_allclose(found, wave(5.0, order, INNER - later), rtol=0.0,
+                                   atol=1e-4 * (10.0 * np.pi) ** order)
+
+
 def test_filters_remove_frequencies_above_the_band() -> None:
     assert np.abs(convolved(wave(40.0) - 1.0, FILTER.taps())).max() < 1e-3
 

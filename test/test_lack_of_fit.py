@@ -190,10 +190,12 @@ def test_identified_offsets_are_no_lack_of_fit() -> None:
     assert identify(simulated(case, 1), GIVEN, kinds).lack_of_fit is None
 
 
-@pytest.mark.parametrize('delay', [0.0, 0.09])
+@pytest.mark.parametrize('effort', [0.1, 2.5])
+@pytest.mark.parametrize('delay', [-0.09, -0.015, 0.0, 0.003, 0.09])
 def test_delays_of_the_efforts_up_to_a_tenth_of_a_second_are_found(
-        delay: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wrong_models, 'NOISE', wrong_models.NOISE._replace(delay=delay))
+        delay: float, effort: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wrong_models, 'NOISE', NOISE._replace(
+        delay=delay, effort=effort, coloured=0.8 * effort))
     case = Case(true_hexapod(2))
     found = identify(simulated(case, 2))
     assert (found.likely, found.lack_of_fit) == ((), None)
@@ -203,11 +205,42 @@ def test_delays_of_the_efforts_up_to_a_tenth_of_a_second_are_found(
     assert np.mean(off < TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))) > 0.8
 
 
-def test_longer_delays_are_a_likely_mistake(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wrong_models, 'NOISE', wrong_models.NOISE._replace(delay=0.13))
+@pytest.mark.parametrize(('delay', 'word'), [(0.13, 'later'), (-0.13, 'earlier')])
+def test_longer_delays_are_a_likely_mistake(
+        delay: float, word: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wrong_models, 'NOISE', NOISE._replace(delay=delay))
     likely = identify(simulated(Case(true_hexapod(2)), 2)).likely
     assert likely[0].what == 'delay'
-    assert 'later than the positions by 0.1 s or more' in likely[0].text
+    assert f'{word} than the positions by 0.1 s or more' in likely[0].text
+
+
+@pytest.mark.parametrize('seed', [2, 3])
+def test_rest_before_and_after_a_motion_is_no_lack_of_fit(seed: int) -> None:
+    true, moving = true_hexapod(seed), fourier(seed)
+
+    def motion(times: Array) -> Motion:
+        # along its path at a rate that rises from and falls to zero between 10 and 30 s
+        phase = 2.0 * np.pi * np.clip((times - 10.0) / 20.0, 0.0, 1.0)
+        m = moving(10.0 / np.pi * (phase - np.sin(phase)))
+        rate, change = (1.0 - np.cos(phase))[:, None], (np.pi / 10.0 * np.sin(phase))[:, None]
+        return Motion(
+            m.position, m.rotation, rate * m.linear_velocity, rate * m.angular_velocity,
+            rate ** 2 * m.linear_acceleration + change * m.linear_velocity,
+            rate ** 2 * m.angular_acceleration + change * m.angular_velocity)
+
+    found = identify([recorded(true, motion, 40.0, RATE, seed, NOISE)])
+    assert (found.tested, found.lack_of_fit, found.likely) == (True, None, ())
+
+
+def test_a_motion_above_the_cutoff_is_reported() -> None:
+    (given,) = simulated(Case(true_hexapod(1)), 1)
+    for cutoff, said in ((0.8, True), (10.0, False)):
+        options = IdentificationOptions(hold_out=0.0, cutoff=cutoff)
+        with closing(Identification(GIVEN, options)) as work:
+            work.add(Path('a bag'), [Window(0, 1.0 / RATE, given.positions, given.rates,
+                                            given.efforts, np.zeros((5000, 6), dtype=bool))])
+            assert any('of the motion is above the cut-off frequency' in notice
+                       for notice in work.bags[0].notices) == said
 
 
 @pytest.mark.parametrize(('velocity', 'said'), [(1e-3, False), (2.0, True)])

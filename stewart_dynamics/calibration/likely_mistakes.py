@@ -50,6 +50,8 @@ _WHOLE = 0.1
 # A lack of fit is significant if noise has it with a smaller probability; deviations of a leg
 # above this multiple of the others' are large.
 _PROBABILITY, _LARGE = 1e-6, 2.0
+# Smaller deviations, by the characteristic length, are rounding.
+_ROUNDING = 1e-12
 _FIXED, _SCALE, _POSE, _PLAY, _NOISE = 'fixed', 'scale', 'pose', 'play', 'noise'
 _LACKS = {
     _FIXED: 'the fixed values are not those of the hexapod: {}',
@@ -102,10 +104,17 @@ def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, 
         where = 'base' if worst < BASE.stop // 3 else 'platform'
         yield LikelyMistake('far', f'the {where} joint of {joints[worst % 6]} would move by '
                             f'{_mm(moved[worst])} mm: the poses are not those of this hexapod')
+    off = np.abs(values[ZERO] - zero)
     if (zero > _FARTHEST * size).all() and (np.abs(values[ZERO]) < _WHOLE * zero).all():
         yield LikelyMistake(
             'zero_length', 'the leg positions are whole lengths between the joints, not positions '
             'from geometry.zero_length; if the hexapod publishes them so, it is zero')
+    elif off.max() > _FARTHEST * size:
+        worst = int(off.argmax())
+        yield LikelyMistake(
+            'zero_length', f'geometry.zero_length of {joints[worst]} would become '
+            f'{values[ZERO][worst]:.4g} m in place of {zero[worst]:.4g} m: are the leg positions '
+            'relative to home, or to another length?')
 
 
 def _without_mistakes(parameters: Parameters, given: Equations,
@@ -194,9 +203,11 @@ def lack_of_fit(parameters: Parameters, equations: Equations, found: Outliers,
     deviations = np.sqrt(np.sum(r ** 2, axis=0) / free)
     usual = float(np.median(deviations))
     named = [name.split(' ')[0] for each in causes.values() for _, name in each]
+    rounding = _ROUNDING * parameters['singularity.characteristic_length']
     for deviation, joint in zip(deviations, joints, strict=True):
         ratio = deviation / max(usual, 1e-300)
-        if joint not in named and ratio > _LARGE and f.sf(ratio ** 2, free, free) < _PROBABILITY:
+        if joint not in named and ratio > _LARGE and deviation > rounding and (
+                f.sf(ratio ** 2, free, free) < _PROBABILITY):
             causes.setdefault(_PLAY, []).append((
                 float(free * deviation ** 2), f'{joint} (residuals of {1e6 * deviation:.3g} um, '
                 f'{1e6 * usual:.3g} um in the median leg)'))

@@ -66,17 +66,18 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
     """
     # Lines end in any way: newline=None reads them as '\n'.
     lines = io.StringIO(read_text(path, _LARGEST, StewartError).lstrip('\ufeff'), newline=None)
-    first = lines.readline()
+    first = next((line for line in lines if line.strip()), '')
     lines.seek(0)
     separator = next((each for each in (';', '\t') if each in first), ',')
     try:
-        rows = [row for row in csv.reader(lines, delimiter=separator, strict=True)
-                if any(cell.strip() for cell in row)]
+        reader = csv.reader(lines, delimiter=separator, strict=True)
+        numbered = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except csv.Error as exc:
         raise StewartError(f'{path}: not a CSV file: {exc}') from exc
-    if not rows:
+    if not numbered:
         raise StewartError(f'{path}: is empty: row 1 must name the columns')
-    header = [cell.strip() for cell in rows[0]]
+    (_, first_row), *numbered = numbered
+    header = [cell.strip() for cell in first_row]
     rotation = max((QUATERNION, ANGLES), key=lambda names: bool(set(names) & set(header)))
     wanted = (*joints, *POSITION, *rotation)
     missing = [name for name in wanted if name not in header]
@@ -87,26 +88,26 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
     double = [name for name in wanted if header.count(name) > 1]
     if double:
         raise StewartError(f'{path}: column {double[0]}: is there {header.count(double[0])} times')
-    if len(rows) - 1 > _MOST:
-        raise StewartError(f'{path}: {len(rows) - 1} poses: at most {_MOST}')
+    if len(numbered) > _MOST:
+        raise StewartError(f'{path}: {len(numbered)} poses: at most {_MOST}')
     places = [header.index(name) for name in wanted]
-    values = np.empty((len(rows) - 1, len(wanted)))
-    for n, row in enumerate(rows[1:]):
+    names = tuple(f'row {line}' for line, _ in numbered)
+    values = np.empty((len(names), len(wanted)))
+    for n, (_, row) in enumerate(numbered):
         if len(row) != len(header):
-            raise StewartError(f'{path}: row {n + 2}: has {len(row)} cells, row 1 has '
+            raise StewartError(f'{path}: {names[n]}: has {len(row)} cells, row 1 has '
                                f'{len(header)}')
         for column, place in enumerate(places):
-            values[n, column] = _number(row[place], f'{path}: row {n + 2}: '
-                                        f'{shown_name(header[place])}')
+            values[n, column] = _number(
+                row[place], f'{path}: {names[n]}: {shown_name(header[place])}')
     unit = 1e-3 if millimeters else 1.0
     lengths, positions, turns = unit * values[:, :6], unit * values[:, 6:9], values[:, 9:]
-    names = tuple(f'row {n + 2}' for n in range(len(values)))
     if rotation == ANGLES:
         return MeasuredPoses(lengths, Pose.from_euler(positions, turns, degrees=degrees), names,
                              turns)
     sizes = np.linalg.norm(turns, axis=1)
     for n in np.flatnonzero(~is_unit(sizes))[:1]:
-        raise StewartError(f'{path}: row {n + 2}: quaternion: {unit_rule(sizes[n])}')
+        raise StewartError(f'{path}: {names[n]}: quaternion: {unit_rule(sizes[n])}')
     return MeasuredPoses(lengths, Pose.from_quaternion(positions, turns), names)
 
 

@@ -33,7 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.identification.filters import convolved, decimated, LowPass, white_deviation
 from stewart_dynamics.identification.kinematics import motions, poses
 from stewart_dynamics.identification.unknowns import regression, Unknowns
@@ -105,6 +105,7 @@ class WindowRead(NamedTuple):
     stops: int  # number of recorded samples at an end stop or a force limit
     end: Pose  # last pose
     moves: bool  # whether legs move by more than noise
+    above: float  # share of the RMS rate that is above the cut-off; 0 if nothing moves
 
 
 class Extracts:
@@ -160,6 +161,8 @@ class Extraction:
         self._wide = LowPass.of(period, WIDE * cutoff, _TRANSITION * cutoff)
         self._narrow = LowPass.of(period, cutoff, _TRANSITION * cutoff)
         self.cutoff, self.speeds = cutoff, speeds
+        self.later = 0.0
+        """Time by which the efforts are later than the positions, less than the lag [s]."""
         self.step = max(1, int(1.0 / (SAMPLES * cutoff * period)))
         self.margin = self._wide.half + self._narrow.half
         """Number of samples at each end of a window without an output."""
@@ -191,11 +194,12 @@ class Extraction:
         at = self._narrow.half + self.step * np.arange(count)
         slip = decimated(self._slip(rates, speeds), taps, self.step)
         extract = Extract(times, columns, ~wrong[:count], legs, slip, found.rows[at][:, POSE])
-        return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]), moves)
+        return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]), moves,
+                          1.0 - _rms(legs[..., 1]) / _rms(rates[at]) if moves else 0.0)
 
     def lag(self, window: Window, guess: Pose, longest: float) -> tuple[int, float]:
         """
-        Return a coarse lag of the efforts behind the positions, and the squared misfit.
+        Return a coarse lag of the efforts behind the positions, or before, and the squared misfit.
 
         It is the lag in samples with the smallest residual, in steps of a fraction of a cut-off
         period; 0 unless the residual is much smaller than without a lag. The misfit is relative
@@ -204,9 +208,10 @@ class Extraction:
         extract = self(window, guess).extract
         efforts = convolved(window.efforts[self._wide.half:-self._wide.half], self._narrow.taps())
         steps = max(1, round(_LAG_STEP / (self.cutoff * self._period)))
-        lags = np.arange(0, round(longest / self._period) + steps, steps)
-        at = self.step * np.arange(len(extract.times))
-        used = at + lags[-1] < len(efforts)
+        most = -(-round(longest / self._period) // steps) * steps
+        lags: Integers = np.arange(-most, most + 1, steps)
+        at: Integers = self.step * np.arange(len(extract.times))
+        used = (at + most < len(efforts)) & (at >= most)
         at = at[used]
         if len(at) < extract.regressor.shape[-1]:
             return 0, 1.0
@@ -220,9 +225,9 @@ class Extraction:
             squares = float(forces @ forces)
             misfits.append(1.0 - float(np.sum((basis.T @ forces) ** 2)) / squares
                            if squares > 0.0 else 1.0)
-        best = int(np.argmin(misfits))
-        if misfits[best] > _LESS * misfits[0]:
-            best = 0
+        best, none = int(np.argmin(misfits)), len(lags) // 2
+        if misfits[best] > _LESS * misfits[none]:
+            best = none
         return int(lags[best]), misfits[best]
 
     @property
@@ -271,12 +276,12 @@ class Extraction:
             positions = positions + deviations[0] * noise.normal(size=positions.shape)
             rates = None if rates is None else (
                 rates + deviations[1] * noise.normal(size=rates.shape))
-        derivatives = []
+        derivatives, wide = [], self._wide._replace(later=self.later)
         for order in range(3):
             if rates is None:
-                derivatives.append(convolved(positions, self._wide.taps(order)))
+                derivatives.append(convolved(positions, wide.taps(order)))
                 continue
-            of_positions, of_rates = self._wide.fused(
+            of_positions, of_rates = wide.fused(
                 order, max(deviations[0], _ROUNDING * self._size), deviations[1])
             derivatives.append(convolved(positions, of_positions) + convolved(rates, of_rates))
         return derivatives[0], derivatives[1], derivatives[2]

@@ -37,6 +37,12 @@ from stewart_dynamics.arrays import Array
 # Width of the Blackman window's main lobe between its first zeros, times the window length.
 _TRANSITION = 5.5
 
+# Frequencies at which derivatives are exact, relative to the cut-off.
+_EXACT = np.array([0.0, 0.05, 0.15, 0.3, 0.45, 0.6])
+
+# Lowest frequency from which measured rates replace differentiated positions, by the cut-off.
+_LEAST = 0.2
+
 
 class LowPass(NamedTuple):
     """A low-pass filter for a sampling period."""
@@ -44,6 +50,7 @@ class LowPass(NamedTuple):
     period: float  # [s]
     cutoff: float  # frequency at which the amplitude is one half [Hz]
     half: int  # number of samples before and after an output on which it depends
+    later: float = 0.0  # time by which outputs are those of earlier inputs [s]
 
     @classmethod
     def of(cls, period: float, cutoff: float, transition: float) -> LowPass:
@@ -56,6 +63,9 @@ class LowPass(NamedTuple):
 
     def fused(self, order: int, deviation: float, rate_deviation: float) -> tuple[Array, Array]:
         """Return the taps for positions and for rates, given their standard deviations."""
+        # The impulse must not be longer than the filter.
+        rate_deviation = max(rate_deviation, 2.0 * np.pi * _LEAST * self.cutoff * deviation)
+
         def of_positions(w: Array) -> Any:
             return rate_deviation ** 2 / (rate_deviation ** 2 + (w * deviation) ** 2)
 
@@ -76,19 +86,27 @@ class LowPass(NamedTuple):
         circle = np.zeros(count)
         circle[lags] = pulse
         w = np.asarray(2.0 * np.pi * np.fft.rfftfreq(count, self.period), dtype=np.float64)
-        impulse = np.fft.irfft(np.fft.rfft(circle) * response(w), count)
+
+        def whole(w: Array) -> Any:
+            return response(w) * np.exp(-1j * w * self.later)
+
+        impulse = np.fft.irfft(np.fft.rfft(circle) * whole(w), count)
         # y(t) = sum h(k) x(t - k): the newest sample, k = -half, last
         taps: Array = impulse[lags[::-1]]
-        # Truncation must not affect slow signals: make the response exact at 0 and at a low
-        # frequency by adding multiples of the pulse and of its differences.
-        low = 0.05 * 2.0 * np.pi * self.cutoff
-        parts = np.column_stack([pulse, np.gradient(pulse), np.gradient(np.gradient(pulse))])
-        wave = np.exp(1j * low * self.period * lags)  # in the order of the taps: the newest last
-        should, is_now = response(np.array([0.0, low])), np.array([taps.sum(), taps @ wave])
-        of_parts = np.array([parts.sum(axis=0), wave @ parts])
-        system = np.array([of_parts[0].real, of_parts[1].real, of_parts[1].imag])
-        off = should * np.array([1.0, pulse @ wave]) - is_now
-        right: Array = np.linalg.solve(system, np.array([off[0].real, off[1].real, off[1].imag]))
+        # Truncation must not affect slow signals: make the response exact at some low frequencies
+        # by adding multiples of the pulse and of its differences.
+        low = 2.0 * np.pi * self.cutoff * _EXACT
+        columns = [pulse]
+        while len(columns) < 2 * len(low) - 1:
+            following = np.gradient(columns[-1])
+            columns.append(following / np.abs(following).max() * pulse.max())
+        parts = np.column_stack(columns)
+        waves = np.exp(1j * self.period * np.outer(low, lags))  # the newest last, as the taps
+        off = whole(low) * (waves @ pulse) - waves @ taps
+        of_parts = waves @ parts
+        right: Array = np.linalg.lstsq(
+            np.concatenate([of_parts.real, of_parts[1:].imag]),
+            np.concatenate([off.real, off[1:].imag]), rcond=None)[0]
         return taps + parts @ right
 
 

@@ -59,6 +59,10 @@ _FEWEST_SAMPLES = 10.0
 _OUTLIER = 8.0
 # If a larger fraction exceeds it, no residual counts as an outlier.
 _MOST_OUTLIERS = 0.2
+# Number of times that the delay of a bag is refined.
+_REFINED = 3
+# A notice is given if a larger share of the RMS rate is above the cut-off.
+_MOST_ABOVE = 0.03
 # Minimum number of filtered samples.
 _FEWEST = 20
 # Below this number of cut-off periods the correlations of the residuals are not well known.
@@ -191,6 +195,7 @@ class Identification:
         """Add the windows of a bag; return None if none of them is usable."""
         options = self._options
         lag = begin = end = 0
+        above = 0.0
         lag_is_known = not options.delay
         counts: Counter[str] = Counter()
         notices: list[str] = []
@@ -204,7 +209,7 @@ class Identification:
             if self._per_effort is not None:
                 window = window._replace(efforts=window.efforts * self._per_effort)
             fewest = 2 * extraction.margin + 2 * extraction.step
-            if len(window.positions) < fewest + lag:
+            if len(window.positions) < fewest + abs(lag):
                 counts['left out'] += 1
                 continue
             if last is None and not self.bags and self._is_on_other_side(window):
@@ -213,13 +218,17 @@ class Identification:
                 extraction = self._extraction(window)
             if not lag_is_known:
                 lag, _ = self._lag(extraction, window)
-                if len(window.positions) < fewest + lag:
+                if len(window.positions) < fewest + abs(lag):
                     lag = 0
             window = window.with_lag(lag)
-            last = self._read_window(path, extraction, window, last)
-            lag_is_known = lag_is_known or last.moves
+            read = self._read_window(path, extraction, window, last)
+            if read.moves and not lag_is_known:
+                lag_is_known = True
+                read = self._delayed(path, extraction, window, last, read)
+            last = read
             speeds = np.abs(last.extract.legs[..., 1])
             squares = float(np.sum(speeds ** 2))
+            above = max(above, last.above)
             if motion is None or squares > motion.squares:
                 motion = _Motion(len(self.extracts), window, last, squares)
             self.extracts.add(len(self.bags), (window.begin - begin) * NANOSECOND, last)
@@ -235,16 +244,27 @@ class Identification:
         period, rates = window.period, window.rates is not None
         notices += self._notices(
             extraction, period, (self.extracts.samples - before) * extraction.step * period,
-            counts['slow'] / counts['speeds'])
+            counts['slow'] / counts['speeds'], above)
         self.bags.append(BagRead(
             path, counts['samples'], (end - begin) * NANOSECOND, period, extraction.cutoff,
             rates, counts['left out'], counts['stops'], counts['outliers'], last.deviations[0],
-            last.deviations[1] if rates else None, lag * period, {}, [], notices))
+            last.deviations[1] if rates else None, lag * period + extraction.later,
+            {}, [], notices))
         return self.bags[-1]
 
     def _notices(self, extraction: Extraction, period: float, filtered: float, inside: float,
-                 ) -> Iterator[str]:
-        """Yield notices on a bag by its filtered time [s] and the share of rates in the band."""
+                 above: float) -> Iterator[str]:
+        """
+        Yield notices on a bag.
+
+        filtered: its time that the filters leave [s].
+        inside, above: shares of the rates in the band of friction, and above the cut-off.
+        """
+        if above > _MOST_ABOVE:
+            yield (f'{100.0 * above:.0f} % of the motion is above the cut-off frequency of '
+                   f'{extraction.cutoff:.3g} Hz: values and intervals are wrong; '
+                   + ('raise --cutoff' if extraction.cutoff == self._options.cutoff else
+                      'a slower motion or a faster recording is needed'))
         if extraction.cutoff < self._options.cutoff:
             yield (f'sampled at {1.0 / period:.4g} Hz: the cut-off frequency is '
                    f'{extraction.cutoff:.3g} Hz')
@@ -310,6 +330,20 @@ class Identification:
             return extraction(window, first_pose(self.platform, window))
         except (PoseError, SingularityError) as exc:
             raise BagError(f'{path}: {of_no_pose(self.parameters, window.positions)}') from exc
+
+    def _delayed(self, path: Path, extraction: Extraction, window: Window,
+                 last: WindowRead | None, read: WindowRead) -> WindowRead:
+        """
+        Return a window read with its positions delayed as its efforts are, and so from now on.
+
+        Filters of the efforts cannot do that: friction that jumps between two samples aliases.
+        """
+        for _ in range(_REFINED):
+            sums = Sums.of(read.extract.columns, read.extract.used)
+            extraction.later += float(fit(
+                sums, self.unknowns, None, np.array([extraction.cutoff])).delays[0])
+            read = self._read_window(path, extraction, window, last)
+        return read
 
     def _add_noise(self, extraction: Extraction, motion: _Motion) -> None:
         """Determine the information due to noise alone in a window."""

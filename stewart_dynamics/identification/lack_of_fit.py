@@ -69,8 +69,6 @@ _SUSPICIOUS = 4.0
 # Highest frequency used, relative to the cut-off; half width of the smoothing of spectra, relative
 # to the sampling rate, and its minimum in frequencies.
 _BAND, _SMOOTHING, _FEWEST = 0.9, 0.0125, 8
-# Number of instants at which products of factors over time are averaged.
-_INSTANTS = 1000
 # Least variance of a residual that the fit of all causes leaves, of 2 in each frequency.
 _LEAST_FREE = 2e-3
 # The form of a cause, as that of Stribeck's curve, is known less well than its amount: intervals
@@ -281,8 +279,8 @@ def _scores(causes: Causes, extracts: Extracts, chosen: Container[int], moving: 
     factors: Factors = np.ones_like
     inner = known.shape[1] + len(fit.delays)  # known directions, then the delays
 
-    def spectra_of(extract: Extract, at: Array | None) -> Array:
-        """Return the spectra of an extract at times, as fractions; None: without the factors."""
+    def spectra_of(extract: Extract, at: Array) -> Array:
+        """Return the spectra of an extract at times, as fractions of all."""
         nonlocal of_causes, factors
         bag, used = extract.bag, extract.used[..., None]
         columns = extract.columns * used
@@ -291,14 +289,14 @@ def _scores(causes: Causes, extracts: Extracts, chosen: Container[int], moving: 
         delays = np.zeros((*e.shape[:2], len(fit.delays)))
         delays[..., bag] = e[..., -1]
         added, of_causes, factors = causes.columns(extract)
-        if at is not None:
-            added *= factors(at)[:, None]
+        added *= factors(at)[:, None]
         residuals = columns @ residual_of(unknowns.theta(fit.values), fit.delays[bag])
         return _spectra(np.concatenate([
             e[..., :-1] @ known, delays, added * used, residuals[..., None]],
             axis=-1) / np.sqrt(fit.variances[bag])[:, None])
 
     lengths: list[int] = []
+    spans: dict[int, tuple[float, float]] = {}  # of each bag, as fractions of all times
     gram: Array = np.zeros(())
     plain: Array = np.zeros(())
     weighted: Array = np.zeros(())
@@ -307,6 +305,7 @@ def _scores(causes: Causes, extracts: Extracts, chosen: Container[int], moving: 
         for extract in _of(extracts, chosen):
             first, count = sum(lengths), len(extract.times)
             ends = first / causes.samples, (first + count) / causes.samples
+            spans[extract.bag] = spans.get(extract.bag, ends)[0], ends[1]
             spectra = spectra_of(extract, _between(*ends, count))
             gram = gram + _gram(spectra)
             plain = plain + _gram(np.sqrt(fit.variances[extract.bag])[:, None] * spectra)
@@ -318,17 +317,18 @@ def _scores(causes: Causes, extracts: Extracts, chosen: Container[int], moving: 
         for samples in lengths:
             spectra = np.load(file)
             weighted = weighted + _gram(_whitened(spectra, spectra, rest, inverse, samples))
-    noisy_samples = 0
+    share = 0.0
     clean_ones = zip(_of(extracts, moving), noisy, strict=True)
     for clean, more in _selected(clean_ones, len(noisy)):
-        spectra = spectra_of(clean, None)
-        of_noise = of_noise + _gram(_whitened(
-            spectra_of(more._replace(used=clean.used), None) - spectra, spectra, rest, inverse,
+        # Over the time of the whole bag: at rest friction is noise, in motion it is not.
+        begin, end = spans.get(clean.bag, (0.0, 1.0))
+        at = _between(begin, end, len(clean.times))
+        spectra = spectra_of(clean, at)
+        of_noise = of_noise + (end - begin) * causes.samples / len(clean.times) * _gram(_whitened(
+            spectra_of(more._replace(used=clean.used), at) - spectra, spectra, rest, inverse,
             len(clean.times)))
-        noisy_samples += len(clean.times)
-    of_noise *= causes.samples / noisy_samples
-    over_time = factors(_between(0.0, 1.0, _INSTANTS))
-    of_noise[inner:-1, inner:-1] *= over_time.T @ over_time / _INSTANTS
+        share += end - begin
+    of_noise /= share
     follow = -_inverse(gram[:inner, :inner]) @ gram[:inner, inner:-1]
     return (of_causes, _Scores.of(weighted, of_noise, inner), known @ follow[:known.shape[1]],
             _Scores.of(plain, np.zeros_like(plain), inner))

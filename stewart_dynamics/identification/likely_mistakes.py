@@ -84,9 +84,11 @@ def of_no_pose(p: Parameters, positions: Array) -> str:
 
 def of_delay(delays: Iterable[float]) -> Iterator[LikelyMistake]:
     """Yield a likely mistake for bags with these delays of the efforts [s]."""
-    if max(delays) >= LONGEST_LAG:
+    longest = max(delays, key=abs)
+    if abs(longest) >= LONGEST_LAG:
         yield LikelyMistake(
-            'delay', f'the efforts are later than the positions by {LONGEST_LAG:g} s or more: '
+            'delay', f'the efforts are {"later" if longest > 0.0 else "earlier"} than the '
+            f'positions by {LONGEST_LAG:g} s or more: '
             'stamps of both must be of one clock')
 
 

@@ -238,8 +238,9 @@ def _bags(result: Mapping[str, Any]) -> list[str]:
     lines = ['']
     for bag in result['bags']:
         delay = '' if bag['delay_s'] is None else (
-            f', efforts {1e3 * bag["delay_s"]:.2f} +- '
-            f'{1e3 * TWO_SIDED * bag["delay_standard_error_s"]:.2f} ms later than positions')
+            f', efforts {1e3 * abs(bag["delay_s"]):.2f} +- '
+            f'{1e3 * TWO_SIDED * bag["delay_standard_error_s"]:.2f} ms '
+            f'{"earlier" if bag["delay_s"] < 0.0 else "later"} than positions')
         lines.append(f'{bag["bag"]}: {plural(bag["samples"], "sample")} in '
                      f'{bag["seconds"]:.1f} s of {bag["legs"]}{delay}')
         left = [(bag['samples_outliers'], 'wild value', 'replaced'),

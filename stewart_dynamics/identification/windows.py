@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, NANOSECOND, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 
 # Minimum number of samples of a window.
@@ -68,6 +68,12 @@ class Window(NamedTuple):
         """Return the window with efforts taken ``lag`` samples later."""
         if not lag:
             return self
+        if lag < 0:
+            return self._replace(
+                begin=self.begin + round(-lag * self.period * SECOND),
+                positions=self.positions[-lag:], efforts=self.efforts[:lag],
+                rates=None if self.rates is None else self.rates[-lag:],
+                outliers=self.outliers[:lag] | self.outliers[-lag:])
         return self._replace(
             positions=self.positions[:-lag], efforts=self.efforts[lag:],
             rates=None if self.rates is None else self.rates[:-lag],
