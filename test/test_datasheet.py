@@ -257,7 +257,7 @@ def test_the_motion_between_setpoints_is_judged_where_it_is_known(
         assert text in judgement['between_setpoints']['reason']
         assert text in between_setpoints(judgement)
     assert 'as in a planned trajectory: ' in between_setpoints(found)
-    # poses alone end at no speed, what is between them does
+    # without velocities no speed ends the setpoints, but the motion between them
     still = between(coarse._replace(motion=Motion(
         coarse.motion.position, coarse.motion.rotation)))
     assert still['factor'] is None

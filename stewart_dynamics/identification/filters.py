@@ -39,7 +39,6 @@ _TRANSITION = 5.5
 
 # Frequencies at which derivatives are exact, relative to the cut-off.
 _EXACT = np.array([0.0, 0.05, 0.15, 0.3, 0.45, 0.6])
-
 # Lowest frequency from which measured rates replace differentiated positions, by the cut-off.
 _LEAST = 0.2
 

@@ -248,11 +248,11 @@ class ParameterSet(Mapping[str, Any]):
     def replaced(self, changes: Mapping[str, Any], source: str = '', *,
                  exact_types: bool = False) -> Self:
         """Return a copy with these values changed, checked as a whole; ``source``: of them."""
+        named = source or 'parameters'
         if not isinstance(changes, Mapping):
-            raise ParameterError(f'{source or "parameters"}: {shown(changes)}: must be a mapping '
-                                 'of names to values')
-        changed = type(self)({**self._given, **changes}, source or 'parameters',
-                             exact_types=exact_types)
+            raise ParameterError(
+                f'{named}: {shown(changes)}: must be a mapping of names to values')
+        changed = type(self)({**self._given, **changes}, named, exact_types=exact_types)
         changed.source = source or self.source
         return changed
 

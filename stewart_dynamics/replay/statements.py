@@ -262,7 +262,7 @@ def _motors_hold(summary: Summary) -> bool:
 
 
 def _has_margins(legs: Summary) -> bool:
-    """Return whether a limit is given of what legs or their motors have."""
+    """Return whether a limit of the legs, or of their motors, is given."""
     return any(each[key] is not None for each in legs.values()
                for key in each if '_margin_' in key and not key.startswith('torque_continuous'))
 
