@@ -40,7 +40,7 @@ from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import (
-    DRIVE_INERTIAS, FIXED, inertia_matrix, Parameters, STANDARD_GRAVITY)
+    DRIVE_INERTIAS, FIXED, inertia_matrix, NO_MASS, Parameters, STANDARD_GRAVITY)
 
 # Digits of the position of a joint in a message.
 _DIGITS = 5
@@ -55,6 +55,8 @@ _LARGEST_RATIO = 300.0
 # at least 5 mm that is given in mm has 1e-9 of that. Small ones without mass are not checked.
 _SMALL_RADIUS = 5.0  # [m]
 _THINNEST = 0.01  # [kg/m^3]
+# Less stands for no mass, as stewart_describe --geometry-only writes it.
+_NO_BODY = 10.0 * NO_MASS  # [kg/m^3]
 
 # A body's radius of gyration divided by the radius of its joints: 0.1 to 3 for all hexapods known.
 # With kg cm^2 for kg m^2 it is 100 times as large, with kg mm^2 1000 times, g mm^2 3e4 times.
@@ -101,6 +103,8 @@ _LARGEST_PLATFORM_RATIO = 1.2
 _HANGING = 0.5
 # Points are in the base frame if they are this near to home, in terms of its height.
 _AT_HOME = 0.2
+# The frames of base and platform differ at home by more than this, in terms of its height.
+_APART = 0.7
 # The center of mass of a piston behind its joint, in terms of the longest leg.
 _BEHIND = 0.02
 
@@ -139,6 +143,10 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
 def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
     base, platform = shape.base_radius, shape.platform_radius
     mass = p['platform.mass']
+    if mass < _NO_BODY * platform * platform * platform:
+        yield (f'platform.mass: {mass:.3g} kg stands for none: forces are those of a hexapod '
+               'without masses: write the mass of the platform')
+        return
     if base > _LARGEST_RADIUS:
         yield (f'geometry.base_joints: {base:.3g} m from their center: larger than any hexapod '
                'known: in mm?')
@@ -194,16 +202,21 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
     center = p['platform.center_of_mass']
     middle = p['geometry.platform_joints'].mean(axis=0)
     height = abs(float(home.heights[0]))
-    from_base = p['geometry.base_joints'].mean(axis=0) + height * away
+    base_middle = p['geometry.base_joints'].mean(axis=0)
+    from_base = base_middle + height * away
     if home.length is None:
         return  # heights are guesses
-    if np.linalg.norm(middle - from_base) < _AT_HOME * height and (
-            np.linalg.norm(center) < 0.5 * np.linalg.norm(center - middle)):
+    # A base frame away from its joints may be where the platform frame is at home: then both
+    # frames give the same numbers.
+    if (np.linalg.norm(middle - from_base) < _AT_HOME * height
+            and np.linalg.norm(base_middle) < _APART * height < np.linalg.norm(middle)
+            and np.linalg.norm(center) < 0.5 * np.linalg.norm(center - middle)):
         yield (f'geometry.platform_joints: {_listed(middle.round(9))} m is their center, '
                'where it is at home in the base frame, but platform.center_of_mass is '
                f'{np.linalg.norm(center - middle):.3g} m away from it: are the joints given in '
                'the base frame?')
     in_base_frame = bool(np.linalg.norm(center - from_base) < _AT_HOME * height
+                         and np.linalg.norm(middle - from_base) > _APART * height
                          and np.linalg.norm(middle) < 0.5 * height)
     if in_base_frame:
         yield (f'platform.center_of_mass: {_listed(center)} m is where the platform is at home '
