@@ -117,7 +117,7 @@ class Joint:
             most, math.inf if known is None else known))
 
     def symmetric(self, field: str, key: str, lower: float, upper: float) -> float:
-        """Return the bound of a range that holds both ways; infinity for one that has none."""
+        """Return the bound of a range that holds both ways; infinity if it is one-sided."""
         if not lower < 0.0 < upper:
             self.remarks.append(f'{key} {lower:.6g} {upper:.6g} is one-sided: left out')
             self.without.add(field)

@@ -227,7 +227,7 @@ def _loop(mujoco: Any, model: Any, data: Any, n: int, mechanism: Mechanism) -> N
 
 
 def _tendons(mujoco: Any, model: Any, mechanism: Mechanism) -> None:
-    """Name what tendons do: there are none in this model."""
+    """Name the properties of tendons, which this model does not have."""
     for n in range(model.ntendon):
         name = model.tendon(n).name or f'tendon {n + 1}'
         stiffness = float(model.tendon_stiffness[n].item())
@@ -243,7 +243,7 @@ def _tendons(mujoco: Any, model: Any, mechanism: Mechanism) -> None:
 
 
 def _actuators(mujoco: Any, model: Any, mechanism: Mechanism) -> None:
-    """Take the order of the legs, and what their actuators add: largest forces and inertia."""
+    """Take the order of the legs, and the largest forces and the inertia of actuators."""
     joints = {joint.name: joint for joint in mechanism.joints}
     order = []
     bounds: dict[str, list[float]] = {}  # the largest force of each actuator, by its joint
@@ -275,7 +275,8 @@ def _actuators(mujoco: Any, model: Any, mechanism: Mechanism) -> None:
             continue
         together = [sum(bounds.get(joint.name, [math.inf]))]
         if model.jnt_actfrclimited[n]:
-            together.append(joint.symmetric('force_max', 'actuatorfrcrange', *model.jnt_actfrcrange[n]))
+            together.append(joint.symmetric(
+                'force_max', 'actuatorfrcrange', *model.jnt_actfrcrange[n]))
         if min(together) < math.inf:
             joint.force_max = min(together)
             joint.without.discard('force_max')
@@ -287,12 +288,14 @@ def _largest_force(mujoco: Any, model: Any, n: int, joint: Joint) -> float:
     gear = abs(float(model.actuator_gear[n, 0]))
     found = [math.inf]
     if model.actuator_forcelimited[n]:
-        found.append(gear * joint.symmetric('force_max', 'forcerange', *model.actuator_forcerange[n]))
+        found.append(gear * joint.symmetric(
+            'force_max', 'forcerange', *model.actuator_forcerange[n]))
     gain = abs(float(model.actuator_gainprm[n, 0]))
     of_forces = (int(model.actuator_biastype[n]) == int(mujoco.mjtBias.mjBIAS_NONE)
                  and int(model.actuator_dyntype[n]) != int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
                  and gain > 0.0)
     if (model.actuator_ctrllimited[n] and of_forces
             and not _switched_off(mujoco, model, 'CLAMPCTRL')):
-        found.append(gear * gain * joint.symmetric('force_max', 'ctrlrange', *model.actuator_ctrlrange[n]))
+        found.append(gear * gain * joint.symmetric(
+            'force_max', 'ctrlrange', *model.actuator_ctrlrange[n]))
     return min(found)

@@ -441,7 +441,7 @@ def _grouped(names: list[str], of_legs: list[list[str]]) -> list[str]:
 
 
 _LARGEST = 20_000_000  # bytes
-# How files of other kinds begin, and what to do with them.
+# First bytes of files of other kinds, and the advice about them.
 _KINDS = (
     (b'version https://git-lfs.github.com/spec/', 'a Git LFS pointer, not the file: run git lfs '
      'pull first'),
