@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from distutils.core import run_setup  # of setuptools, where Python has none
+from distutils.core import run_setup  # from Python 3.12 on it is in setuptools
 import sys
 
 

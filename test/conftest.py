@@ -73,7 +73,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 def pytest_make_collect_report(
         collector: pytest.Collector,
         ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
-    """Skip a module of tests that imports ROS where there is none."""
+    """Skip a module of tests that imports ROS if it is not installed."""
     report = yield
     error = report.call.excinfo.value.__cause__ if report.failed else None
     if isinstance(error, ModuleNotFoundError) and find_spec('rclpy') is None and (
