@@ -80,7 +80,7 @@ def combined(what: Identifiability, names: Sequence[str], units: Sequence[str], 
     for each in combinations(what):
         places = list(each.parameters)
         c = each.coefficients
-        variance: float = c @ covariance[np.ix_(places, places)] @ c
+        variance = float(c @ covariance[np.ix_(places, places)] @ c)
         result.append({
             'parameters': [names[n] for n in places], 'coefficients': c,
             'unit': units[places[0]], 'value': c @ values[places],
