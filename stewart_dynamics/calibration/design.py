@@ -121,10 +121,10 @@ def _within_limits(platform: StewartPlatform, random: np.random.Generator, count
     poses = poses[np.flatnonzero(sound)[:count]]
     known, motions = PoseLimits(p), motion_rows(poses)
     side, results = (platform.solve(rows) for rows in (motion_rows(home), motions))
-    values = {**known.values(motions, results), limits.FORCE_MAX: results[:, FORCES]}
+    exceeded = known.exceeded(known.values(motions, results), len(poses))
     return poses[known.regular(results, side[0, DETERMINANT]) & (
         results[:, CONDITION] < p['singularity.warn_condition'])
-        & ~known.exceeded(values, len(poses))]
+        & ~exceeded & ~known.overloaded(motions, results)]
 
 
 def _exchange(rows: Array, chosen: Integers) -> Integers:
