@@ -758,7 +758,7 @@ class Capability:
     @property
     def limits_forces(self) -> bool:
         """Return whether there is a limit of the legs' forces or of the motors' torques."""
-        return bool(np.isfinite(self.forces_at_rest).any())
+        return self.limits_held or bool(np.isfinite(self.forces_at_rest).any())
 
     def _in_every_direction(self, pose: Pose | Motion, part: slice, continuous: bool,
                             ) -> Array | float:

@@ -125,11 +125,10 @@ def _loads(hexapod: RatedHexapod, poses: Pose) -> dict[str, Any]:
         found['velocity'] = _smallest(c.velocity(at, DIRECTIONS), joints, KEYS)
     if c.limits_forces:
         found['acceleration'] = _smallest(c.acceleration(at, DIRECTIONS), joints, KEYS)
-    found |= _held(hexapod, all_poses, False) if c.limits_forces else {}
-    if c.limits_held:
-        of_motors = _held(hexapod, all_poses, True)
-        for name, each in of_motors.items():
-            found.setdefault(name, {})['continuous'] = each
+        found |= _held(hexapod, all_poses, False)
+        if c.limits_held:
+            for name, each in _held(hexapod, all_poses, True).items():
+                found[name]['continuous'] = each
     return found
 
 
