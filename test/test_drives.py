@@ -409,5 +409,5 @@ def test_motors_are_columns_and_curves_as_results_are() -> None:
         assert [each.get_text() for each in legend.get_texts()][:2] == ['leg_1', 'leg_2']
         figure.canvas.draw()
         assert legend.get_window_extent().y0 >= figure.axes[0].get_window_extent().y1
-    with pytest.raises(MotionError, match='must be'):
+    with pytest.raises(MotionError, match='times: shape'):
         motors.plot(np.arange(4.0))

@@ -41,7 +41,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR, TWO_SIDED
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
-from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.approach import approach, TimedMotion
 

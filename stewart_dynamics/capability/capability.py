@@ -691,7 +691,7 @@ class Capability:
         Return the largest multiple of a change of leg forces that forces and torques permit.
 
         ``directions`` (..., 6): the change is that of this acceleration.
-        continuous: what is held without end.
+        continuous: the load is held without end.
         """
         found: list[tuple[Array, Any]] = []
         if continuous:
@@ -740,7 +740,7 @@ class Capability:
 
     @property
     def limits_held(self) -> bool:
-        """Return whether there is a limit of what motors can hold without end."""
+        """Return whether there is a limit of the torques that motors can hold without end."""
         return self._motors is not None and self._motors.continuous_forces is not None
 
     @property

@@ -140,8 +140,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         motion=(chart.svg() if (chart := pictures.motion()) else None),
         between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
         dashes={name: charts.DASHES[name] for name in pictures.limits()},
-        payloads=payloads_in_words(sheet), limit_name=limit_name, setpoints_used=setpoints_used, down=down, span=span, MM=MM,
-        DEGREE=DEGREE, names=_NAMES)
+        payloads=payloads_in_words(sheet), limit_name=limit_name,
+        setpoints_used=setpoints_used, down=down, span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 
@@ -307,10 +307,11 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
             rows.append((name, numbers(value, DEGREE.factor, DEGREE.name) if unit == 'rad' else
                          numbers(value, 1.0, f' {unit}')))
     if p.drives:
-        rows += [(name, numbers(value, 1.0, f' {PARAMETERS[name].unit}'.rstrip()).replace('^2', '²')
-                  if isinstance(value, np.ndarray) else str(value))
-                 for name, value in p.items() if value is not None and (
-                     name.startswith('drive.') or name == 'actuator.screw_lead')]
+        for name, value in p.items():
+            if value is not None and (name.startswith('drive.') or name == 'actuator.screw_lead'):
+                unit = PARAMETERS[name].unit.replace('^2', '²')
+                rows.append((name, numbers(value, 1.0, f' {unit}'.rstrip())
+                             if isinstance(value, np.ndarray) else str(value)))
     if sheet['leg_clearance'] is not None:
         rows.append(('Clearance between legs at the pose',
                      numbers(sheet['leg_clearance'], 1e3, ' mm')))
