@@ -159,7 +159,8 @@ def _free(at: Array, size: Array, outward: Array, taken: Array, picture: Picture
             way = np.array([math.cos(first + turn), math.sin(first + turn)])
             # the side of the label that is toward the point
             corner = at + radius * way + size * (0.5 * way - 0.5)
-            corner = np.clip(corner, [2.0, 20.0], [picture.width, picture.height] - size - 2.0)
+            corner = np.asarray(np.clip(
+                corner, [2.0, 20.0], [picture.width, picture.height] - size - 2.0), dtype=float)
             inside = ((taken > corner - 2.0) & (taken < corner + size + 2.0)).all(axis=1).sum()
             if inside < fewest:
                 best, fewest = corner, inside

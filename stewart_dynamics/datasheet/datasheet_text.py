@@ -226,7 +226,7 @@ def box_verdict(found: dict[str, Any]) -> str:
     return text + (f'; reachable {factor}' if factor else '')
 
 
-def _limit(found: dict[str, Any]) -> str:
+def _limit(found: Mapping[str, Any]) -> str:
     text = limit_name(found['limit'])
     return f'{text} ({found["leg"]})' if found['leg'] else text
 

@@ -94,9 +94,9 @@ class Drawing:
         self._arms = np.asarray(parameters['geometry.platform_joints'])
         self._base = np.asarray(parameters['geometry.base_joints']) @ self._upright.T
         self._platform = self._placed(pose, self._arms)
-        marked = pivot is not None and bool(np.any(pivot))
-        self._pivot = self._placed(pose, np.reshape(pivot, (1, 3))) if marked else (
-            np.empty((0, 3)))
+        self._pivot: Array = np.empty((0, 3))
+        if pivot is not None and np.any(pivot):
+            self._pivot = self._placed(pose, pivot[None])
         everything = np.concatenate([self._base, self._platform])
         self._size = float(np.linalg.norm(np.ptp(everything, axis=0))) / 2.0
         base = parameters[BASE_OUTLINE]
