@@ -153,14 +153,15 @@ def _view(found: Calibration, part: slice, title: str, times: float) -> str:
 def _free(at: Array, size: Array, outward: Array, taken: Array, picture: Picture) -> Array:
     """Return the corner of a label next to a point with the fewest taken points (N, 2) in it."""
     first = math.atan2(outward[1], outward[0])
-    best, fewest = at, math.inf
+    best: Array = at
+    fewest = math.inf
     for radius in (14.0, 26.0, 40.0):
         for turn in (0.0, 0.6, -0.6, 1.2, -1.2, 1.8, -1.8, 2.4, -2.4, 3.1):
             way = np.array([math.cos(first + turn), math.sin(first + turn)])
             # the side of the label that is toward the point
-            corner = at + radius * way + size * (0.5 * way - 0.5)
-            corner = np.asarray(np.clip(
-                corner, [2.0, 20.0], [picture.width, picture.height] - size - 2.0), dtype=float)
+            free = at + radius * way + size * (0.5 * way - 0.5)
+            corner: Array = np.asarray(np.clip(
+                free, [2.0, 20.0], [picture.width, picture.height] - size - 2.0), dtype=float)
             inside = ((taken > corner - 2.0) & (taken < corner + size + 2.0)).all(axis=1).sum()
             if inside < fewest:
                 best, fewest = corner, inside
