@@ -131,7 +131,7 @@ def _view(found: Calibration, part: slice, title: str, times: float) -> str:
         f'arrows {digits(float(f"{times:.2g}"))} times as long' if times else
         'no change above the noise'), css='view')
     points = chart.at(start), chart.at(start + times * moved)
-    way: Array = np.linspace(0.0, 1.0, 33)[:, None, None]
+    way: Array = np.linspace(0.0, 1.0, 33, dtype=float)[:, None, None]
     taken = [(points[0] + way * (points[1] - points[0])).reshape(-1, 2)]
     for leg, (at, to) in enumerate(zip(*points, strict=True)):
         picture.circle(at, 5.0, css='joint')
