@@ -303,6 +303,7 @@ class DynamicsNode(LifecycleNode):
             self._diagnostics.base.answered(setpoint, now)
         if self._diagnostics.answered(output, came, now):
             self._report()
+        self._setpoints.judge()
 
     def _moved(self, stamp: int, pose: Sequence[float]) -> None:
         """Publish the transform of a pose, a row of motion; note it for the joint states."""
@@ -443,6 +444,7 @@ class DynamicsNode(LifecycleNode):
             TF in publishers and publishers[TF].get_subscription_count() > 0)
         if notice := self._travel.look():
             self._log.write([LogLine(WARN, notice)])
+        self._diagnostics.mistaken(self._setpoints.mistakes(), now)
         if self._diagnostics.due_at_tick(now):
             self._report()
 

@@ -213,6 +213,8 @@ class _Run:
             missing.append('no setpoint could be answered')
         elif values['setpoints']['base_unknown'] == values['setpoints']['answered']:
             missing.append("the base's motion is not known at any setpoint: there are no forces")
+        mistakes = self._setpoints.mistakes(ever=True)
+        values['limit_met'] = values['limit_met'] or bool(mistakes)
         measured = None if self._comparison is None else self._comparison.values()
         if measured and not measured['setpoints_compared']:
             missing.append(f'nothing could be compared with {self._options.measured}: no '
@@ -238,6 +240,10 @@ class _Run:
                               self._firsts[rejection], values['setpoints'])}
                          for rejection, number in sorted(self._setpoints.counts.items())],
             **values,
+            'mistakes': [
+                {'topic': each.topic, 'text': each.text,
+                 'first_at_s': self._mistaken_at(each.first, values['setpoints'])}
+                for each in mistakes],
             'measured': measured and {'headline': measured_headline(measured), **measured},
             'parameters': self._parameters.plain(),
         }
@@ -255,6 +261,13 @@ class _Run:
         if self._first_time is not None and first.recorded is not None:
             return (first.recorded - self._first_time) * NANOSECOND
         return None
+
+    def _mistaken_at(self, stamp: int | None, setpoints: Mapping[str, Any]) -> float | None:
+        """Return the time of a stamp since the first setpoint [s]; None: not known."""
+        begin = setpoints['first_stamp_ns']
+        if stamp is None or begin is None or setpoints['restarts']:
+            return None
+        return (stamp - int(begin)) * NANOSECOND
 
     def _notice(self, text: str) -> None:
         if len(self.notices) < LISTED:

@@ -27,6 +27,7 @@ from stewart_dynamics.node.diagnostics.levels import LogLine, PERIOD, REJECTED, 
 from stewart_dynamics.node.diagnostics.outcomes import (
     ExternalWrenchDiagnostics, PayloadDiagnostics, PlannedTrajectoryDiagnostics)
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.consistency import Mistake
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 from stewart_dynamics.setpoints.step import Output
 
@@ -77,6 +78,12 @@ class DynamicsDiagnostics:
                 INCOMPLETE if rejection.reason == NOT_JOINED else REJECTED))
             if rejection.reason == DROPPED:
                 self.timing.rejected(rejection, details, now)
+
+    def mistaken(self, mistakes: Sequence[Mistake], now: float) -> None:
+        """Note the likely mistakes in setpoints and base motion."""
+        of_base = [each for each in mistakes if each.topic in self.base.heard]
+        self.base.mistaken(of_base, now)
+        self.setpoints.mistaken([each for each in mistakes if each not in of_base], now)
 
     def level_changed(self, now: float) -> bool:
         """Return whether a level has changed since the last report."""
