@@ -301,6 +301,8 @@ class DynamicsNode(LifecycleNode):
         now = time.monotonic()
         if setpoint.base is not None:
             self._diagnostics.base.answered(setpoint, now)
+        if not self._diagnostics.answers.number:
+            self._diagnostics.begins(setpoint.motion, output.determinant)
         if self._diagnostics.answered(output, came, now):
             self._report()
         self._setpoints.judge()

@@ -95,8 +95,9 @@ class BaseInput:
         """Return the likely mistakes in the motion of the base, as ``Setpoints.mistakes`` does."""
         found = inconsistencies(self.consistency, ever, dict.fromkeys(
             QUANTITIES, BASE_TWIST) | dict.fromkeys(RATES, BASE_ACCEL))
-        if self._gravity is not None and (text := self._gravity.mistake):
-            found.append(Mistake(self.topics[0], text))
+        if self._gravity is not None:
+            of_gravity = self._gravity.found.values() if ever else [self._gravity.present]
+            found += [Mistake(self.topics[0], *each) for each in of_gravity if each]
         return found
 
     def at_rest(self, known: bool) -> Array | None:

@@ -521,7 +521,7 @@ def _reason(quantity: str, sums: _Sums, frame: tuple[str, str]) -> str:
     """Return the likeliest reason, with a question mark; empty if none is clear."""
     axes, body = frame
     dd, uu, difference = sums.squares.tolist()
-    if uu <= 1e-6 * dd:
+    if uu <= 1e-14 * dd:
         return 'it is zero, never filled?'
     found: list[tuple[float, str]] = []  # what is left of the difference, and the reason
     similar = sums.product * sums.product / (dd * uu) if dd > 0.0 else 0.0

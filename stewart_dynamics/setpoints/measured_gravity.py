@@ -15,33 +15,38 @@
 """
 Checks the measured gravity in base axes by the rules for the parameter, and the gyro against it.
 
-The mean over each second is checked, and a mistake is likely only while it is that of every
-second so far: a base may move, but it does not fall forever. A gyro whose integral turns gravity
-many times as far as the accelerometer sees it turn is in deg/s.
+Means over half a second are checked, and a mistake is likely if two in a row have it: a base may
+move, but it does not fall for a second. A gyro whose integral turns gravity many times as far as
+the accelerometer sees it turn is in deg/s.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, NANOSECOND, SECOND
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.gravity_mistakes import AWAY, IN_G, likely_mistake, NONE
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of
 from stewart_dynamics.mechanics.rows import BASE_ANGULAR_VELOCITY, GRAVITY
 from stewart_dynamics.parameters.table import BY_IMU, Parameters, STANDARD_GRAVITY
 
-# Samples of a second that are enough for a mean.
-_FEWEST = 5
-# No base turns as fast as this for seconds [rad/s].
+_WINDOW = SECOND // 2  # [ns]
+# Samples of a window that are enough for a mean.
+_FEWEST = 2
+# Windows that must agree; windows in which gyro and accelerometer are compared.
+_LAST, _COMPARED = 2, 6
+# No base turns as fast as this for a second [rad/s].
 _FASTEST = 2.0 * math.pi
 # The turn of gravity by the gyro divided by that seen: 57 for deg/s.
 _TIMES_AS_FAR = 10.0
-# Change of gravity in a second by the gyro from which it is compared [m/s^2].
-_CHANGE = 0.3 * -STANDARD_GRAVITY[2]
+# Change of gravity by the gyro from which it is compared [m/s^2].
+_CHANGE = 0.15 * -STANDARD_GRAVITY[2]
 
 _OF_IMU = {
     NONE: 'removed by the driver? linear_acceleration is the specific force, upward at rest',
@@ -53,6 +58,17 @@ _OF_POSE = {
           'first? For a hexapod that hangs, or whose axes point down, set '
           'geometry.platform_side'}
 _IN_DEGREES = 'likely mistake: angular_velocity in deg/s?'
+
+
+class _Window(NamedTuple):
+    """Means of half a second."""
+
+    stamp: int  # its beginning [ns]
+    gravity: Array  # (3,) [m/s^2]
+    mistake: str  # kind of the likely mistake
+    speed: float  # of the base's turning [rad/s]
+    by_gyro: float  # change of gravity by the angular velocity [m/s^2]
+    seen: float  # change of gravity as measured [m/s^2]
 
 
 class MeasuredGravity:
@@ -68,54 +84,61 @@ class MeasuredGravity:
         self._texts = _OF_IMU if self._is_imu else _OF_POSE
         self._stamps: list[int] = []
         self._rows: list[Sequence[float]] = []
-        self._seconds = 0
-        self._kinds: set[str] = set()  # of mistakes; one alone is likely
-        self._sum = np.zeros(3)
-        self._speed = 0.0  # sum over seconds of the mean [rad/s]
-        self._turns = np.zeros(2)  # squares of changes of gravity, by gyro and seen
+        self._windows: deque[_Window] = deque(maxlen=_COMPARED)
+        self.present: tuple[str, int] | None = None
+        """The likely mistake in the last second, and the stamp of its beginning [ns]."""
+        self.found: dict[str, tuple[str, int]] = {}
+        """The first of each kind."""
 
     def add(self, stamp: int, row: Sequence[float]) -> None:
         """Add a sample: stamp [ns], row (BASE,)."""
-        if self._stamps and not 0 <= stamp - self._stamps[0] < SECOND:
-            if SECOND <= stamp - self._stamps[0] < 2 * SECOND and len(self._stamps) >= _FEWEST:
-                self._add_second(np.array(self._stamps), np.array(self._rows))
+        if self._stamps and not 0 <= stamp - self._stamps[0] < _WINDOW:
+            if _WINDOW <= stamp - self._stamps[0] < 2 * _WINDOW and len(self._stamps) >= _FEWEST:
+                self._add_window(np.array(self._stamps), np.array(self._rows))
+            else:
+                self._windows.clear()
             self._stamps, self._rows = [], []
         self._stamps.append(stamp)
         self._rows.append(row)
 
-    def _add_second(self, stamps: Array, rows: Array) -> None:
+    def _add_window(self, stamps: Stamps, rows: Array) -> None:
         with np.errstate(all='ignore'):
             gravity, spin = rows[:, GRAVITY], rows[:, BASE_ANGULAR_VELOCITY]
             mean = gravity.mean(axis=0)
-            self._seconds += 1
-            self._sum += mean
-            self._kinds.add(likely_mistake(mean, self._home))
-            if not self._is_imu:
-                return
-            self._speed += float(np.linalg.norm(spin, axis=1).mean())
-            rates = np.cross(gravity, spin)  # of a constant vector in turning axes
+            rates = np.cross(gravity, spin)  # of a constant vector, in turning axes
             steps = np.diff(stamps)[:, None] * NANOSECOND
-            change = np.sum(0.5 * steps * (rates[1:] + rates[:-1]), axis=0)
-            seen = gravity[-1] - gravity[0]
-            self._turns += float(change @ change), float(seen @ seen)
+            self._windows.append(_Window(
+                int(stamps[0]), mean, likely_mistake(mean, self._home),
+                float(np.linalg.norm(spin, axis=1).mean()),
+                float(np.linalg.norm(np.sum(0.5 * steps * (rates[1:] + rates[:-1]), axis=0))),
+                float(np.linalg.norm(gravity[-1] - gravity[0]))))
+        kind, text = self._mistake()
+        self.present = (text, self._windows[-1].stamp) if kind else None
+        if self.present:
+            self.found.setdefault(kind, self.present)
 
-    @property
-    def mistake(self) -> str:
-        """Return the likely mistake; empty without one."""
-        if not self._seconds:
-            return ''
-        mean = self._sum / self._seconds
-        kind = next(iter(self._kinds)) if len(self._kinds) == 1 else ''
-        if kind in self._texts:
-            size = f'{float(np.linalg.norm(mean)):.3g}'
-            value = f'{listed((mean + 0.0).round(3), 3)}' if kind == AWAY else size
-            return (f'measured gravity, base axes: {value} m/s^2'
-                    f'{" " if kind == AWAY else ": "}{self._texts[kind]}')
-        speed = self._speed / self._seconds
+    def _mistake(self) -> tuple[str, str]:
+        """Return kind and words of the likely mistake, empty without one."""
+        windows = list(self._windows)
+        last = windows[-_LAST:]
+        kind = last[-1].mistake
+        if len(last) < _LAST:
+            return '', ''
+        if kind in self._texts and all(each.mistake == kind for each in last):
+            mean = last[-1].gravity
+            value = (listed((mean + 0.0).round(3) + 0.0, 3) if kind == AWAY
+                     else f'{float(np.linalg.norm(mean)):.3g}')
+            return kind, (f'measured gravity, base axes: {value} m/s^2'
+                          f'{" " if kind == AWAY else ": "}{self._texts[kind]}')
+        if not self._is_imu:
+            return '', ''
+        speed = min(each.speed for each in last)
         if speed > _FASTEST:
-            return f'angular velocity of the base, {speed:.3g} rad/s on average: {_IN_DEGREES}'
-        by_gyro, seen = np.sqrt(self._turns / self._seconds).tolist()
-        if by_gyro > _CHANGE and by_gyro > _TIMES_AS_FAR * seen:
-            return (f'angular velocity of the base turns gravity by {by_gyro:.3g} m/s^2 in a '
-                    f'second, the accelerometer sees {seen:.3g} m/s^2: {_IN_DEGREES}')
-        return ''
+            return _IN_DEGREES, f'angular velocity of {speed:.3g} rad/s for a second: {_IN_DEGREES}'
+        by_gyro, seen = (math.sqrt(sum(each[at] ** 2 for each in windows) / len(windows))
+                         for at in (4, 5))
+        if len(windows) == _COMPARED and by_gyro > max(_CHANGE, _TIMES_AS_FAR * seen):
+            return _IN_DEGREES, (
+                f'angular velocity turns gravity by {by_gyro:.3g} m/s^2 in half a second, the '
+                f'accelerometer sees {seen:.3g} m/s^2: {_IN_DEGREES}')
+        return '', ''

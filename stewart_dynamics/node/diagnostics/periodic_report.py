@@ -18,7 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
+from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
 from stewart_dynamics.node.diagnostics.answers import (
     Answers, LimitsDiagnostics, SingularityDiagnostics, TimingDiagnostics)
 from stewart_dynamics.node.diagnostics.inputs import (
@@ -55,6 +60,15 @@ class DynamicsDiagnostics:
         self._levels_of = [part.level for part in self.parts]
         self._made = now
         self._levels: list[int] = []  # those of the last report
+
+    def begins(self, motion: Sequence[float], determinant: float) -> None:
+        """Note the first setpoint, a row of motion, and its det(J) [m^3]."""
+        pose = np.array(motion[POSE])
+        parameters = self.answers.parameters
+        mistake = pose_mistake(parameters, pose[POSITION], pose[ROTATION].reshape(3, 3))
+        self.limits.begins(mistake)
+        self.singularity.begins(
+            mistake, determinant * determinant_at_home(parameters) < 0.0)
 
     def answered(self, output: Output, came: float, now: float) -> bool:
         """
