@@ -132,7 +132,7 @@ def sheet_text(sheet: dict[str, Any]) -> str:
     motion = sheet['motion']
     if motion:
         lines.append(f'  {setpoints_used(motion)}')
-        if not motion['mistakes'] and motion['payload'] and (
+        if not motion.get('mistakes') and motion['payload'] and (
                 motion['payload']['value'] is not None):
             lines.append('  payload at the pivot that can be added in the motion: '
                          f'{down(motion["payload"]["value"])} kg')
@@ -162,7 +162,7 @@ def setpoints_used(motion: Mapping[str, Any]) -> str:
 
 def motion_verdict(found: dict[str, Any]) -> str:
     """Return how much faster a motion can be, and its limit; or why it is not judged."""
-    if found['mistakes']:
+    if found.get('mistakes'):
         return '; '.join(found['mistakes'])
     text = _fastest(found)
     if found['factor'] == 0.0:

@@ -154,8 +154,8 @@ def _interruptions(points: Summary) -> str:
 
 
 def _inputs(summary: Summary) -> Iterator[Statement]:
-    """Yield the likely mistakes in the messages, whatever the limits say."""
-    for each in summary['mistakes']:
+    """Yield the likely mistakes in the messages; a motion without a bag has none."""
+    for each in summary.get('mistakes', ()):
         begun = each['first_at_s'] or None
         yield Statement(INPUTS, 'bad', f'{each["topic"]}: {each["text"]}'
                         + '; begins' * (begun is not None), begun)
@@ -187,7 +187,7 @@ def _limits(summary: Summary) -> Iterator[Statement]:
             why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
                                   for number, cause in causes if number)
         yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
-    problems = points['jumps'] or summary['mistakes'] or summary['limits'] or summary['limits_not_checked']
+    problems = points['jumps'] or summary.get('mistakes', ()) or summary['limits'] or summary['limits_not_checked']
     if not problems and _has_margins(summary['legs']):
         yield Statement(LIMITS, 'good', 'all limits held')
 

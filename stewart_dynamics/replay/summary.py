@@ -232,7 +232,6 @@ class Summary:
             'limits': limits,
             'limits_not_checked': not_checked,
             'singularity': self._singularity(),
-            'mistakes': [],  # in the messages, which the replay fills in
             'force_breakdown': self._force_breakdown(),
             'base_wrench': self._base_wrench.values(),
             'limit_met': bool(

@@ -46,7 +46,7 @@ _FASTEST = 2.0 * math.pi
 # The turn of gravity by the gyro divided by that seen: 57 for deg/s.
 _TIMES_AS_FAR = 10.0
 # Change of gravity by the gyro from which it is compared [m/s^2].
-_CHANGE = 0.15 * -STANDARD_GRAVITY[2]
+_CHANGE = 0.5 * -STANDARD_GRAVITY[2]
 
 _OF_IMU = {
     NONE: 'removed by the driver? linear_acceleration is the specific force, upward at rest',
