@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import messages
-from messages import MS, SECOND
+from messages import SECOND
 import numpy as np
 import pytest
 from referees import rng, symmetric_parameters
@@ -251,7 +251,8 @@ WRONG: dict[str, tuple[Callable[[Array], None], dict[str, str]]] = {
     'per millisecond': (scaled(TWIST, 1e-3), {
         VELOCITY: '0.001 times: in m/ms?', SPIN: '0.001 times: in rad/ms?'}),
     'not divided': (scaled(TWIST, 0.005), dict.fromkeys(
-        (VELOCITY, SPIN), '0.005 times: differences not divided by the time between two samples?')),
+        (VELOCITY, SPIN),
+        '0.005 times: differences not divided by the time between two samples?')),
     'platform axes': (in_platform_axes, {
         VELOCITY: 'in platform axes? It is expected in base axes'}),
     'Euler rates': (euler_rates, {
@@ -316,7 +317,7 @@ def test_pieces_give_the_same_as_the_whole(rate: float) -> None:
         begin = end
     for stamp, row, restart in zip(stamps.tolist(), rows.tolist(), restarts.tolist(),
                                    strict=True):
-        ones.add_one(stamp, row, restart)
+        ones.noted.append((stamp, row, restart))
         ones.judge()
     for each in (whole, pieces, ones):
         each.finish()

@@ -117,7 +117,7 @@ class BaseInput:
             self._samples.clear()
         self._note(sample.stamp, self._row_of(sample.stamp, sample.values))
         if self.consistency is not None:
-            self.consistency.add_one(sample.stamp, sample.values, sample.restart)
+            self.consistency.noted.append((sample.stamp, sample.values, sample.restart))
         return True
 
     def _note(self, stamp: int, row: _Row) -> None:

@@ -185,7 +185,8 @@ class Consistency:
         self._radius = radius
         self._frame = frame
         self._pending: list[tuple[Stamps, Array, Flags]] = []
-        self._ones: list[tuple[int, Sequence[float], bool]] = []
+        self.noted: list[tuple[int, Sequence[float], bool]] = []
+        """Single samples for ``judge``: stamp [ns], row of motion, whether time jumped back."""
         self._held = 0
         self._due = _GATHERED
         # Tick of the last period's beginning, and that of the next one's at the earliest.
@@ -198,13 +199,9 @@ class Consistency:
         self.present: dict[str, Inconsistency] = {}
         """Those of the last periods with enough motion."""
 
-    def add_one(self, stamp: int, motion: Sequence[float], restart: bool) -> None:
-        """Note a sample; ``judge`` checks it later."""
-        self._ones.append((stamp, motion, restart))
-
     def judge(self) -> None:
         """Check the samples noted so far, if they are enough."""
-        if len(self._ones) >= _GATHERED:
+        if len(self.noted) >= _GATHERED:
             self._take_ones()
 
     def add(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
@@ -218,9 +215,9 @@ class Consistency:
         self._periods(ended=True)
 
     def _take_ones(self) -> None:
-        if self._ones:
-            stamps, motions, restarts = zip(*self._ones, strict=True)
-            self._ones = []
+        if self.noted:
+            stamps, motions, restarts = zip(*self.noted, strict=True)
+            self.noted = []
             self._add(np.array(stamps, dtype=np.int64), np.array(motions), np.array(restarts))
 
     def _add(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:

@@ -116,7 +116,7 @@ class Setpoints:
         if restart:
             self.base.restarted(stamp)
         if self._consistency is not None:
-            self._consistency.add_one(stamp, motion, restart)
+            self._consistency.noted.append((stamp, motion, restart))
         return Setpoint(stamp, motion, self.wrench, restart, stamped=stamped)
 
     def on_base(self, setpoint: Setpoint) -> Setpoint:
