@@ -38,8 +38,8 @@ from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.consistency import (
     ACCELERATION as ACCEL, Consistency, Inconsistency, SPIN, SPIN_RATE, VELOCITY)
-from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_POSE, BASE_TWIST, POSE as POSES
-from stewart_dynamics.setpoints.inputs import ACCEL as ACCELS, TWIST as TWISTS
+from stewart_dynamics.setpoints.inputs import (
+    ACCEL as ACCELS, BASE_ACCEL, BASE_POSE, BASE_TWIST, POSE as POSES, TWIST as TWISTS)
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
 RADIUS = 0.3
@@ -68,7 +68,7 @@ def stamps_of(times: Array) -> Stamps:
 
 
 def found(given: Stream, radius: float = RADIUS) -> dict[str, Inconsistency]:
-    """Return what is found in a whole stream."""
+    """Return the inconsistencies of a whole stream."""
     check = Consistency(radius)
     check.add(*given, np.zeros(len(given[0]), dtype=bool))
     check.finish()

@@ -134,8 +134,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         motion=(chart.svg() if (chart := pictures.motion()) else None),
         between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
         dashes={name: charts.DASHES[name] for name in pictures.limits()},
-        limit_name=limit_name, possible=possible, setpoints_used=setpoints_used, down=down, span=span, MM=MM,
-        DEGREE=DEGREE, names=_NAMES)
+        limit_name=limit_name, possible=possible, setpoints_used=setpoints_used, down=down,
+        span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 

@@ -38,8 +38,8 @@ Summary = Mapping[str, Any]  # the content of summary.json
 
 (READING, MISSING, REJECTED, INPUTS, LIMITS, MOTOR_LIMITS, JOINTS, LOADS, MOTORS, SINGULARITY,
  MEASURED) = (
-    'reading', 'missing', 'rejected', 'inputs', 'limits', 'motor limits', 'joints', 'loads', 'motors',
-    'singularity', 'measured')
+    'reading', 'missing', 'rejected', 'inputs', 'limits', 'motor limits', 'joints', 'loads',
+    'motors', 'singularity', 'measured')
 LEVELS = ('none', 'good', 'warn', 'bad')  # the worst last; the first: information
 _CARDS = {
     (READING, MISSING, REJECTED): {
@@ -88,8 +88,9 @@ def motion_statements(summary: Summary) -> list[Statement]:
     """Return the statements about the answered setpoints, for which no bag is needed."""
     points = summary['setpoints']
     found = [
-        *_inputs(summary), *_limits(summary), *_joints(summary['legs']), *_loads(summary['base_wrench']),
-        *_motors(summary), *_singularity(summary['singularity'])] if points['answered'] else []
+        *_inputs(summary), *_limits(summary), *_joints(summary['legs']),
+        *_loads(summary['base_wrench']), *_motors(summary),
+        *_singularity(summary['singularity'])] if points['answered'] else []
     return [*found, *_answered(points)]
 
 
@@ -157,7 +158,7 @@ def _interruptions(points: Summary) -> str:
 
 
 def _inputs(summary: Summary) -> Iterator[Statement]:
-    """Yield the likely mistakes in the messages; a motion without a bag has none."""
+    """Yield the likely mistakes in the messages; not known of a motion without a bag."""
     for each in summary.get('mistakes', ()):
         begun = each['first_at_s'] or None
         yield Statement(INPUTS, 'bad', f'{each["topic"]}: {each["text"]}'
@@ -190,7 +191,8 @@ def _limits(summary: Summary) -> Iterator[Statement]:
             why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
                                   for number, cause in causes if number)
         yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
-    problems = points['jumps'] or summary.get('mistakes', ()) or summary['limits'] or summary['limits_not_checked']
+    problems = points['jumps'] or summary.get('mistakes', ()) or (
+        summary['limits'] or summary['limits_not_checked'])
     if not problems and _has_margins(summary['legs']):
         yield Statement(LIMITS, 'good', 'all limits held')
 

@@ -122,7 +122,6 @@ class Inconsistency(NamedTuple):
                 f'differences of {of} {self.expected:.3g} {unit}, they differ by '
                 f'{self.difference:.3g} {unit}{reason}')
 
-
     @property
     def values(self) -> tuple[tuple[str, str], ...]:
         """Return keys with their units, and values."""
@@ -253,7 +252,7 @@ class Consistency:
         self._due = self._held + _GATHERED
         if ended:
             for quantity in QUANTITIES:
-                # Of a short stream one period is all there is.
+                # A short stream has only one period.
                 if self._row[quantity] == self._judged[quantity]:
                     self._report(quantity)
 
@@ -515,7 +514,7 @@ class _Periods:
 
 
 def _reason(quantity: str, sums: _Sums, frame: tuple[str, str]) -> str:
-    """Return the likeliest reason, with a question mark; empty if none is clear."""
+    """Return the likeliest reason, with a question mark; empty if it is not clear."""
     axes, body = frame
     dd, uu, difference = sums.squares.tolist()
     if uu <= 1e-14 * dd:
@@ -538,9 +537,10 @@ def _reason(quantity: str, sums: _Sums, frame: tuple[str, str]) -> str:
                       f'{abs(late) * 1e3:.3g} ms {"late" if late > 0.0 else "early"}?'))
     if quantity in (VELOCITY, ACCELERATION):
         matrix, right = sums.point
-        place, *_ = np.linalg.lstsq(matrix, right, rcond=1e-6)
+        place: Array = np.asarray(
+            np.linalg.lstsq(matrix, right, rcond=1e-6)[0].round(6), dtype=np.float64)
         found.append((1.0 - float(right @ place) / difference,
-                      f'of another point, {listed(place.round(6), 3)} m in the {body} frame?'))
+                      f'of another point, {listed(place, 3)} m in the {body} frame?'))
     if quantity == ACCELERATION:
         total, mean = sums.gravity
         constant = mean / total if total > 0.0 else np.zeros(3)
@@ -580,8 +580,7 @@ def _turn(rotations: Array) -> Array:
     size = _norm(sine)
     angle = np.arctan2(size, 0.5 * (r[..., 0, 0] + r[..., 1, 1] + r[..., 2, 2] - 1.0))
     scale = np.divide(angle, size, out=np.ones(size.shape), where=size > 1e-9)
-    turn: Array = sine * scale[..., None]
-    return turn
+    return np.asarray(sine * scale[..., None], dtype=np.float64)
 
 
 def _crossed(vectors: Array, matrices: Array) -> Array:

@@ -134,9 +134,10 @@ class MeasuredGravity:
             return '', ''
         speed = min(each.speed for each in last)
         if speed > _FASTEST:
-            return _IN_DEGREES, f'angular velocity of {speed:.3g} rad/s for a second: {_IN_DEGREES}'
-        by_gyro, seen = (math.sqrt(sum(each[at] ** 2 for each in windows) / len(windows))
-                         for at in (4, 5))
+            return _IN_DEGREES, (
+                f'angular velocity of {speed:.3g} rad/s for a second: {_IN_DEGREES}')
+        by_gyro = math.hypot(*(each.by_gyro for each in windows)) / math.sqrt(len(windows))
+        seen = math.hypot(*(each.seen for each in windows)) / math.sqrt(len(windows))
         if len(windows) == _COMPARED and by_gyro > max(_CHANGE, _TIMES_AS_FAR * seen):
             return _IN_DEGREES, (
                 f'angular velocity turns gravity by {by_gyro:.3g} m/s^2 in half a second, the '

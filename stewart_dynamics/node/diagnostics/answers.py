@@ -30,7 +30,8 @@ from statistics import median
 from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS,
-    OF_MOTORS, position_in_mm, QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
+    OF_MOTORS, position_in_mm, QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX,
+    VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
