@@ -32,7 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -580,7 +580,8 @@ def _turn(rotations: Array) -> Array:
     size = _norm(sine)
     angle = np.arctan2(size, 0.5 * (r[..., 0, 0] + r[..., 1, 1] + r[..., 2, 2] - 1.0))
     scale = np.divide(angle, size, out=np.ones(size.shape), where=size > 1e-9)
-    return np.asarray(sine * scale[..., None], dtype=np.float64)
+    turn: Any = sine * scale[..., None]
+    return np.asarray(turn, dtype=np.float64)
 
 
 def _crossed(vectors: Array, matrices: Array) -> Array:
