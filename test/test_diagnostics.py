@@ -319,6 +319,7 @@ def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None
     below = output_of(HOME._replace(motion=(x, y, -z, *others)))
     assert below.lengths == pytest.approx(CLEAR.lengths, rel=1e-12)
     diagnostics = begun(**around)
+    diagnostics.begins((x, y, -z, *others), below.determinant)
     for n in range(2):
         answered(diagnostics, BEGIN + n, below)
         of = status(diagnostics, 'singularity', BEGIN + n)
@@ -326,7 +327,9 @@ def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None
         assert re.fullmatch(
             rf'det\(J\) is -{CLEAR.determinant:.3g} m\^3, at home \+[\d.]+ m\^3: the motion '
             'begins beyond a .*likely mistake: an axis of the other sign, or .*', of.message)
-    answered(above := begun(**around), BEGIN)
+    above = begun(**around)
+    above.begins(HOME.motion, CLEAR.determinant)
+    answered(above, BEGIN)
     assert status(above, 'singularity', BEGIN).message == 'clear'
 
 

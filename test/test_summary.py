@@ -618,6 +618,7 @@ def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
 
     assert shown() == {
         'reading': ('warn', 'Not all messages could be used'),
+        'inputs': ('none', 'Inputs'),
         'limits': ('bad', 'Limits are exceeded'),
         'singularity': ('bad', 'A singularity is reached'),
         'motors': ('none', 'Motors'),
@@ -627,7 +628,7 @@ def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
     assert shown(limits=[])['limits'] == ('good', 'All limits are held')
     assert shown(limits=[], limits_not_checked=['limits.velocity_max'])['limits'][0] == 'warn'
     empty = {**Summary(hexapod()).values(), 'missing': [], 'rejected': [], 'measured': None}
-    assert [card.level for card in cards(empty).values()] == ['good', *['none'] * 4]
+    assert [card.level for card in cards(empty).values()] == ['good', *['none'] * 5]
     lines = [each.line for each in cards(found)['reading'].statements]
     assert lines == ['2 setpoints in 1.00 s', '5: 5 rejected: late', '4: 4 rejected: late',
                      '3: 3 rejected: late', '3 not used for other reasons']

@@ -125,7 +125,8 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
         platform = StewartPlatform(hexapod.given)
         used = uses(platform, recorded)
         sheet['motion'] = {'bag': str(order.bag)} | judged(platform, recorded, used) | {
-            'rejected': recorded.rejected, 'missing': recorded.missing}
+            'rejected': recorded.rejected, 'missing': recorded.missing,
+            'mistakes': list(recorded.mistakes)}
     progress.stage('page')
     sheet['parameters'] = hexapod.given.plain()
     pictures = Pictures(hexapod, sheet, sections, modes, tilts, ranges,
@@ -206,8 +207,9 @@ def _smallest_tilt(boundary: workspace.Boundary, hexapod: RatedHexapod) -> dict[
 
 
 def is_possible(sheet: dict[str, Any]) -> bool:
-    """Return whether the box and the motion are possible, as far as they are asked for."""
-    return all(sheet[name] is None or sheet[name]['possible'] for name in ('box', 'motion'))
+    """Return whether the box and the motion are possible, and do not contradict themselves."""
+    return all(sheet[name] is None or sheet[name]['possible'] and not sheet[name].get('mistakes')
+               for name in ('box', 'motion'))
 
 
 def check_order(order: Order) -> None:

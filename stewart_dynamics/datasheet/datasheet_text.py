@@ -132,12 +132,12 @@ def sheet_text(sheet: dict[str, Any]) -> str:
                          f'{down(value)} kg{limit}')
     for name, words in (('box', box_verdict), ('motion', motion_verdict)):
         if sheet[name]:
-            possible = 'possible' if sheet[name]['possible'] else 'not possible'
-            lines.append(f'{name} {possible}: {words(sheet[name])}')
+            lines.append(f'{name} {possible(sheet[name])}: {words(sheet[name])}')
     motion = sheet['motion']
     if motion:
         lines.append(f'  {setpoints_used(motion)}')
-        if motion['payload'] and motion['payload']['value'] is not None:
+        if not motion.get('mistakes') and motion['payload'] and (
+                motion['payload']['value'] is not None):
             lines.append('  payload at the pivot that can be added in the motion: '
                          f'{down(motion["payload"]["value"])} kg')
     return '\n'.join(lines)
@@ -169,6 +169,13 @@ def rated_payload(sheet: Mapping[str, Any], payload: Mapping[str, Any],
     return '', payload['value']
 
 
+def possible(found: Mapping[str, Any]) -> str:
+    """Return whether a box or motion is possible, in words."""
+    if found.get('mistakes'):
+        return 'not judged, its messages contradict each other'
+    return 'possible' if found['possible'] else 'not possible'
+
+
 def setpoints_used(motion: Mapping[str, Any]) -> str:
     """Return how many setpoints a motion has, and how many messages were rejected."""
     text = f'{motion["samples"]} setpoints'
@@ -176,7 +183,9 @@ def setpoints_used(motion: Mapping[str, Any]) -> str:
 
 
 def motion_verdict(found: dict[str, Any]) -> str:
-    """Return how much faster a motion can be, and its limit."""
+    """Return how much faster a motion can be, and its limit; or why it is not judged."""
+    if found.get('mistakes'):
+        return '; '.join(found['mistakes'])
     text = _fastest(found)
     if found['factor'] == 0.0:
         return text

@@ -28,10 +28,10 @@ from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
-from stewart_dynamics.mechanics.limits import (
-    LENGTH_MAX, LIMITS, position_in_mm)
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
-from stewart_dynamics.mechanics.rows import CONDITION, LENGTHS
+from stewart_dynamics.mechanics.rows import CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import HELD_MOTORS
 from stewart_dynamics.parameters.table import (
@@ -147,9 +147,7 @@ class RatedHexapod:
         known, motions = PoseLimits(self.given), motion_rows(pose)
         results = whole.solve(motions)
         condition, stop = float(results[0, CONDITION]), known.stop_condition
-        longest = self.given[LENGTH_MAX]
-        mistake = position_in_mm(
-            results[0, LENGTHS].tolist(), None if longest is None else longest.tolist())
+        mistake = pose_mistake(whole.parameters, pose.position, pose.rotation)
         mistake = f'; {mistake}' if mistake else ''
         if not condition < stop:
             raise SingularityError(

@@ -60,6 +60,7 @@ class RecordedMotion(NamedTuple):
     base: BaseMotion | None
     missing: list[str]  # parts of the bag that could not be read
     rejected: int = 0  # number of rejected messages
+    mistakes: tuple[str, ...] = ()  # likely mistakes in the setpoints, or in the base's motion
 
 
 def read_motion(bag: Path, parameters: Parameters, options: Options,
@@ -101,7 +102,8 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
     return RecordedMotion(np.cumsum(steps) * NANOSECOND, Motion.of_rows(rows), wrenches,
                           None if bases is None else BaseMotion.of_rows(bases), missing,
                           sum(setpoints.counts.values())
-                          + (0 if splines is None else splines.left_out.total()))
+                          + (0 if splines is None else splines.left_out.total()),
+                          tuple(each.words for each in setpoints.mistakes(ever=True)))
 
 
 def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array]:

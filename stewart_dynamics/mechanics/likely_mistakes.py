@@ -30,6 +30,7 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics import gravity_mistakes
 from stewart_dynamics.mechanics.drives import likely_mistakes as drives
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics import lagrange
@@ -94,14 +95,11 @@ _ROUNDING = 0.02
 # The largest distance of the center of mass, in larger radii: a mast of ten times the radius.
 _FARTHEST_CENTER = 10.0
 
-_LARGEST_GRAVITY = 100.0  # [m/s^2]; Jupiter has 25
 # A hundred times what hexapods with joints 1 m from their center reach [m/s]; larger ones more.
 _FASTEST = 100.0
 
 # The base joints of hexapods are as far from their center as the platform joints, or farther.
 _LARGEST_PLATFORM_RATIO = 1.2
-# Share of gravity that pulls the platform away from the base.
-_HANGING = 0.5
 # Points are in the base frame if they are this near to home, in terms of its height.
 _AT_HOME = 0.2
 # A rate that needs this many times the possible acceleration along the whole stroke: 1e-4 to 0.5,
@@ -201,9 +199,8 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
     if shape.platform_radius > _LARGEST_PLATFORM_RATIO * shape.base_radius:
         yield (f'geometry.platform_joints: {shape.platform_radius:.3g} m from their center, the '
                f'base joints only {shape.base_radius:.3g} m: base and platform exchanged?')
-    size = float(np.linalg.norm(p['gravity']))
-    if not home.certain and p['base.source'] == FIXED and (
-            p['gravity'] @ away > _HANGING * size > 0.0):
+    if p['base.source'] == FIXED and gravity_mistakes.likely_mistake(
+            p['gravity'], home) == gravity_mistakes.AWAY:
         yield (f'gravity: {_listed(p["gravity"])} m/s^2 pulls the platform away from the base: a '
                'sign? For a hexapod that hangs, or whose axes point down, set '
                'geometry.platform_side')
@@ -308,13 +305,16 @@ def _reflected_mass(p: Parameters, shape: Shape) -> Iterator[str]:
 
 def _others(p: Parameters, shape: Shape) -> Iterator[str]:
     gravity = float(np.linalg.norm(p['gravity']))
-    if gravity > _LARGEST_GRAVITY:
+    wrong = gravity_mistakes.likely_mistake(p['gravity'])
+    if wrong == gravity_mistakes.IN_MM:
         yield f'gravity: {gravity:.6g} m/s^2: four times that of Jupiter: in mm/s^2?'
-    if math.isclose(gravity, 1.0, rel_tol=1e-3):
-        yield (f'gravity: {gravity:.6g} m/s^2: in g? The earth has '
+    elif wrong and p['base.source'] != BY_IMU:
+        suspected = {gravity_mistakes.IN_G: 'in g?',
+                     gravity_mistakes.NONE: 'none, as in orbit?'}[wrong]
+        yield (f'gravity: {gravity:.6g} m/s^2: {suspected} The earth has '
                f'{-STANDARD_GRAVITY[2]:g}')
     weight, most = p['platform.mass'] * gravity, p['limits.force_max']
-    if most is not None and gravity <= _LARGEST_GRAVITY and weight > most.sum():
+    if most is not None and wrong != gravity_mistakes.IN_MM and weight > most.sum():
         yield (f'limits.force_max: {_listed(np.unique(most))} N: six such legs cannot carry the '
                f'platform, {weight:.3g} N: in kN?')
     friction = p['actuator.coulomb_friction']

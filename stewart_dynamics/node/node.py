@@ -301,8 +301,11 @@ class DynamicsNode(LifecycleNode):
         now = time.monotonic()
         if setpoint.base is not None:
             self._diagnostics.base.answered(setpoint, now)
+        if not self._diagnostics.answers.number:
+            self._diagnostics.begins(setpoint.motion, output.determinant)
         if self._diagnostics.answered(output, came, now):
             self._report()
+        self._setpoints.judge()
 
     def _moved(self, stamp: int, pose: Sequence[float]) -> None:
         """Publish the transform of a pose, a row of motion; note it for the joint states."""
@@ -443,6 +446,7 @@ class DynamicsNode(LifecycleNode):
             TF in publishers and publishers[TF].get_subscription_count() > 0)
         if notice := self._travel.look():
             self._log.write([LogLine(WARN, notice)])
+        self._diagnostics.mistaken(self._setpoints.mistakes(), now)
         if self._diagnostics.due_at_tick(now):
             self._report()
 

@@ -36,8 +36,9 @@ from stewart_dynamics.bags import recording as bag_recording
 from stewart_dynamics.bags.find import bytes_of, RESULT
 from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
-from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.program import SOFTWARE
@@ -213,6 +214,8 @@ class _Run:
             missing.append('no setpoint could be answered')
         elif values['setpoints']['base_unknown'] == values['setpoints']['answered']:
             missing.append("the base's motion is not known at any setpoint: there are no forces")
+        mistakes = self._setpoints.mistakes(ever=True)
+        values['limit_met'] = values['limit_met'] or bool(mistakes)
         measured = None if self._comparison is None else self._comparison.values()
         if measured and not measured['setpoints_compared']:
             missing.append(f'nothing could be compared with {self._options.measured}: no '
@@ -238,6 +241,10 @@ class _Run:
                               self._firsts[rejection], values['setpoints'])}
                          for rejection, number in sorted(self._setpoints.counts.items())],
             **values,
+            'mistakes': [
+                {'topic': each.topic, 'text': each.text,
+                 'first_at_s': self._mistaken_at(each.first, values['setpoints'])}
+                for each in mistakes],
             'measured': measured and {'headline': measured_headline(measured), **measured},
             'parameters': self._parameters.plain(),
         }
@@ -255,6 +262,13 @@ class _Run:
         if self._first_time is not None and first.recorded is not None:
             return (first.recorded - self._first_time) * NANOSECOND
         return None
+
+    def _mistaken_at(self, stamp: int | None, setpoints: Mapping[str, Any]) -> float | None:
+        """Return the time of a stamp since the first setpoint [s]; None: not known."""
+        begin = setpoints['first_stamp_ns']
+        if stamp is None or begin is None or setpoints['restarts']:
+            return None
+        return (stamp - int(begin)) * NANOSECOND
 
     def _notice(self, text: str) -> None:
         if len(self.notices) < LISTED:
@@ -279,9 +293,10 @@ class _Run:
         self._state = outputs.state
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
-            at_home = determinant_at_home(self._parameters)
-            if mistake := other_side(float(outputs.determinants[0]), at_home):
-                self._notice(mistake)
+            first = setpoints.motions[0]
+            if mistake := pose_mistake(
+                    self._parameters, first[POSITION], first[ROTATION].reshape(3, 3)):
+                self._notice(f'first setpoint: {mistake}')
         block = Answered(self._seconds(setpoints.stamps), setpoints, outputs,
                          self._base_wrench.many(setpoints))
         self._files.write(block)

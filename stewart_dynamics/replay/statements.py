@@ -36,15 +36,16 @@ from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, Rejection
 
 Summary = Mapping[str, Any]  # the content of summary.json
 
-(READING, MISSING, REJECTED, LIMITS, MOTOR_LIMITS, JOINTS, LOADS, MOTORS, SINGULARITY,
+(READING, MISSING, REJECTED, INPUTS, LIMITS, MOTOR_LIMITS, JOINTS, LOADS, MOTORS, SINGULARITY,
  MEASURED) = (
-    'reading', 'missing', 'rejected', 'limits', 'motor limits', 'joints', 'loads', 'motors',
-    'singularity', 'measured')
+    'reading', 'missing', 'rejected', 'inputs', 'limits', 'motor limits', 'joints', 'loads',
+    'motors', 'singularity', 'measured')
 LEVELS = ('none', 'good', 'warn', 'bad')  # the worst last; the first: information
 _CARDS = {
     (READING, MISSING, REJECTED): {
         'good': 'The whole bag was read', 'warn': 'Not all messages could be used',
         'bad': 'The bag could not be read completely'},
+    (INPUTS,): {'none': 'Inputs', 'bad': 'Inputs contradict each other'},
     (LIMITS, MOTOR_LIMITS): {
         'none': 'No limits are given', 'good': 'All limits are held',
         'warn': 'Not all limits could be checked', 'bad': 'Limits are exceeded'},
@@ -87,8 +88,9 @@ def motion_statements(summary: Summary) -> list[Statement]:
     """Return the statements about the answered setpoints, for which no bag is needed."""
     points = summary['setpoints']
     found = [
-        *_limits(summary), *_joints(summary['legs']), *_loads(summary['base_wrench']),
-        *_motors(summary), *_singularity(summary['singularity'])] if points['answered'] else []
+        *_inputs(summary), *_limits(summary), *_joints(summary['legs']),
+        *_loads(summary['base_wrench']), *_motors(summary),
+        *_singularity(summary['singularity'])] if points['answered'] else []
     return [*found, *_answered(points)]
 
 
@@ -155,6 +157,14 @@ def _interruptions(points: Summary) -> str:
     return text
 
 
+def _inputs(summary: Summary) -> Iterator[Statement]:
+    """Yield the likely mistakes in the messages; not known of a motion without a bag."""
+    for each in summary.get('mistakes', ()):
+        begun = each['first_at_s'] or None
+        yield Statement(INPUTS, 'bad', f'{each["topic"]}: {each["text"]}'
+                        + '; begins' * (begun is not None), begun)
+
+
 def _limits(summary: Summary) -> Iterator[Statement]:
     points = summary['setpoints']
     for name in dict.fromkeys(each['limit'] for each in summary['limits']):
@@ -181,7 +191,8 @@ def _limits(summary: Summary) -> Iterator[Statement]:
             why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
                                   for number, cause in causes if number)
         yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
-    problems = points['jumps'] or summary['limits'] or summary['limits_not_checked']
+    problems = points['jumps'] or summary.get('mistakes', ()) or (
+        summary['limits'] or summary['limits_not_checked'])
     if not problems and _has_margins(summary['legs']):
         yield Statement(LIMITS, 'good', 'all limits held')
 

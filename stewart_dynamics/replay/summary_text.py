@@ -24,7 +24,7 @@ from typing import Any
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
-    JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING, SINGULARITY)
+    INPUTS, JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING, SINGULARITY)
 from stewart_dynamics.setpoints.rejections import Rejection
 
 _LISTED = 5
@@ -61,7 +61,7 @@ def summary_lines(summary: Mapping[str, Any]) -> list[str]:
     if any(clipped):
         lines.append('* reaches limits.force_max: the published force is clipped to it')
     lines += [each.line for each in about if each.topic in (
-        LIMITS, MOTOR_LIMITS, JOINTS, LOADS, MOTORS)]
+        INPUTS, LIMITS, MOTOR_LIMITS, JOINTS, LOADS, MOTORS)]
     lines += [*reading, '', *(each.line for each in about if each.topic == SINGULARITY)]
     return [textwrap.fill(line, _WIDTH, subsequent_indent='  ') if len(line) > _WIDTH else line
             for line in lines]

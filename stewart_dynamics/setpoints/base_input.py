@@ -37,7 +37,10 @@ from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import BASE, GRAVITY, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import BY_IMU, MOVING, Parameters
-from stewart_dynamics.setpoints.inputs import BASE_SOURCES
+from stewart_dynamics.setpoints.consistency import (
+    Consistency, inconsistencies, Mistake, QUANTITIES, RATES)
+from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_SOURCES, BASE_TWIST
+from stewart_dynamics.setpoints.measured_gravity import MeasuredGravity
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.setpoints.sample_joining import Joined, SampleJoining
 
@@ -77,11 +80,25 @@ class BaseInput:
             _OfImu(parameters) if source == BY_IMU else
             of_motion if source == MOVING else of_pose)
         self._samples: deque[tuple[int, _Row]] = deque(maxlen=_KEPT)
+        self._gravity = MeasuredGravity(parameters) if self.topics else None
+        self.consistency = Consistency(
+            parameters['singularity.characteristic_length'],
+            (parameters['world_frame'], parameters['base_frame'])) if source == MOVING else None
+        """The check of the samples' twists and accelerations; None if there are none."""
 
     @property
     def last(self) -> tuple[int, _Row] | None:
         """Return stamp [ns] and row (BASE,) of the last sample."""
         return self._samples[-1] if self._samples else None
+
+    def mistakes(self, ever: bool) -> list[Mistake]:
+        """Return the likely mistakes in the motion of the base, as ``Setpoints.mistakes`` does."""
+        found = inconsistencies(self.consistency, ever, dict.fromkeys(
+            QUANTITIES, BASE_TWIST) | dict.fromkeys(RATES, BASE_ACCEL))
+        if self._gravity is not None:
+            of_gravity = self._gravity.found.values() if ever else [self._gravity.present]
+            found += [Mistake(self.topics[0], *each) for each in of_gravity if each]
+        return found
 
     def at_rest(self, known: bool) -> Array | None:
         """Return the row (BASE,) at rest, last gravity, nan if unknown; None if base is fixed."""
@@ -98,8 +115,15 @@ class BaseInput:
             return False
         if sample.restart or (self._samples and sample.stamp <= self._samples[-1][0]):
             self._samples.clear()
-        self._samples.append((sample.stamp, self._row_of(sample.stamp, sample.values)))
+        self._note(sample.stamp, self._row_of(sample.stamp, sample.values))
+        if self.consistency is not None:
+            self.consistency.noted.append((sample.stamp, sample.values, sample.restart))
         return True
+
+    def _note(self, stamp: int, row: _Row) -> None:
+        self._samples.append((stamp, row))
+        if self._gravity is not None:
+            self._gravity.add(stamp, row)
 
     def at(self, stamp: int) -> _Row | None:
         """Return the row (BASE,) at a stamp [ns], nan if unknown; None if the base is fixed."""
@@ -150,7 +174,11 @@ class BaseInput:
         new = [(stamp, self._row_of(stamp, tuple(values))) for stamp, values in zip(
             joined.stamps.tolist(), joined.motions.tolist(), strict=True)]
         kept = [*self._samples, *new]
-        self._samples.extend(new)
+        for each in new:
+            self._note(*each)
+        if self.consistency is not None and new:
+            self.consistency.add(
+                joined.stamps, joined.motions, np.zeros(len(new), dtype=bool))
         rows = np.full((len(stamps), BASE), np.nan)
         if not kept:
             return rows

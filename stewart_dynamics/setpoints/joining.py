@@ -32,9 +32,12 @@ import numpy as np
 from stewart_dynamics.arrays import Six
 from stewart_dynamics.mechanics.rows import BASE, MOTION
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.inputs import SOURCES, TopicSamples, WRENCH, WrenchInput
+from stewart_dynamics.setpoints.consistency import (
+    Consistency, inconsistencies, Mistake, QUANTITIES, RATES)
+from stewart_dynamics.setpoints.inputs import (
+    ACCEL, COMBINED, SOURCES, TopicSamples, TWIST, WRENCH, WrenchInput)
 from stewart_dynamics.setpoints.rejections import Rejection, Rejections
 from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining
 from stewart_dynamics.setpoints.step import Batch, Setpoint
@@ -61,6 +64,11 @@ class Setpoints:
         self._joining = SampleJoining(
             self.topics, parameters['base_frame'], parameters['setpoint.sync_tolerance'],
             parameters['setpoint.timeout'], self._rejections, noticed)
+        self._consistency = None if parameters['setpoint.source'] == POSES_ALONE else Consistency(
+            parameters['singularity.characteristic_length'],
+            (parameters['base_frame'], parameters['platform_frame']))
+        self._topic_of = dict.fromkeys(QUANTITIES, COMBINED) if COMBINED in self.topics else (
+            dict.fromkeys(QUANTITIES, TWIST) | dict.fromkeys(RATES, ACCEL))
         self.recorded: int | None = None
         """Time of recording [ns] of the message being processed by ``take_many``."""
 
@@ -73,6 +81,21 @@ class Setpoints:
     def wrench(self) -> Six:
         """Return the known load on the platform, from the last ``~/wrench`` [N, N m]."""
         return self._wrench_input.wrench
+
+    def mistakes(self, ever: bool = False) -> list[Mistake]:
+        """
+        Return the likely mistakes in setpoints and base motion.
+
+        ever: all that were found; by default the present ones.
+        """
+        return (inconsistencies(self._consistency, ever, self._topic_of)
+                + self.base.mistakes(ever))
+
+    def judge(self) -> None:
+        """Check the samples noted by ``take``, if there are enough; called when there is time."""
+        for consistency in (self._consistency, self.base.consistency):
+            if consistency is not None:
+                consistency.judge()
 
     def take_wrench(self, data: bytes) -> None:
         """Use this geometry_msgs/WrenchStamped for all later setpoints, if it is valid."""
@@ -92,6 +115,8 @@ class Setpoints:
         motion = values + _STANDSTILL + _STANDSTILL if len(values) == 12 else values
         if restart:
             self.base.restarted(stamp)
+        if self._consistency is not None:
+            self._consistency.noted.append((stamp, motion, restart))
         return Setpoint(stamp, motion, self.wrench, restart, stamped=stamped)
 
     def on_base(self, setpoint: Setpoint) -> Setpoint:
@@ -123,6 +148,7 @@ class Setpoints:
             if setpoint is not None:
                 setpoints.append(self.on_base(setpoint))
                 times.append(time)
+            self.judge()
         return Batch(
             np.array([each.stamp for each in setpoints], dtype=np.int64),
             np.array([each.motion for each in setpoints], dtype=float).reshape(-1, MOTION),
@@ -137,6 +163,9 @@ class Setpoints:
         """Drop and count waiting samples: no more messages arrive."""
         self._joining.end(why)
         self.base.joining.end(why)
+        for consistency in (self._consistency, self.base.consistency):
+            if consistency is not None:
+                consistency.finish()
 
     def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
         """Count and report messages that are not used."""
@@ -158,6 +187,9 @@ class Setpoints:
         if joined is None or base is None:
             return None
         self._joining.accept(joined, places)
+        if self._consistency is not None and len(joined.stamps):
+            self._consistency.add(
+                joined.stamps, joined.motions, np.zeros(len(joined.stamps), dtype=bool))
         return Batch(
             joined.stamps, joined.motions, self._wrench_input.at(wrenches, joined.places),
             np.zeros(len(joined.stamps), dtype=bool), messages.times[joined.places],

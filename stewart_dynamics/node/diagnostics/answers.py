@@ -28,10 +28,10 @@ import math
 from statistics import median
 
 from stewart_dynamics.arrays import NANOSECOND, SECOND
-from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home, other_side
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, OF_MOTORS,
-    position_in_mm, QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS,
+    OF_MOTORS, position_in_mm, QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX,
+    VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
@@ -156,17 +156,19 @@ class SingularityDiagnostics(StatusPart):
     def __init__(self, answers: Answers) -> None:
         super().__init__(_CROSSING, _NEARNESS)
         self._answers = answers
-        self._at_home, self._other_side = determinant_at_home(answers.parameters), ''
+        self._other_side = ''  # the likely mistake with which the motion begins there
         self._crossed = False  # with the last setpoint
         self._crossings: list[str] = []  # since the last report
         self._crossing_logged_at = -PERIOD
         self._largest = 1.0
 
+    def begins(self, mistake: str, other_side: bool) -> None:
+        """Note the likely mistake in the first pose, and whether it is beyond a singularity."""
+        self._other_side = mistake if other_side else ''
+
     def answered(self, output: Output, now: float) -> bool:
         """Note an output; return whether it must be reported at once, at any level."""
         before = self._answers.output_before
-        if before is None:
-            self._other_side = other_side(output.determinant, self._at_home)
         if output.condition > self._largest:
             self._largest = output.condition
         state = singularity_state(output, self._answers.parameters)
@@ -244,7 +246,12 @@ class LimitsDiagnostics(StatusPart):
         self._worst: dict[str, Exceedance] = {}
         self._suppressed = 0
         self._exceeding = False
+        self._first_mistake = ''  # in the first pose, until a pose is within the limits
         self._largest_force, self._its_leg = 0.0, 0
+
+    def begins(self, mistake: str) -> None:
+        """Note the likely mistake in the first pose; empty without one."""
+        self._first_mistake = mistake
 
     def answered(self, output: Output, now: float) -> None:
         """Note an output."""
@@ -255,6 +262,8 @@ class LimitsDiagnostics(StatusPart):
             if max(forces) > largest or min(forces) < -largest:
                 self._largest_force = max(forces, key=abs)
                 self._its_leg = forces.index(self._largest_force)
+        if not output.exceedances:
+            self._first_mistake = ''
         if output.exceedances or self._exceeding:
             self._exceeding = bool(output.exceedances)
             self._note_exceedances(output, now)
@@ -273,7 +282,7 @@ class LimitsDiagnostics(StatusPart):
             words = self._words(worst, len(exceeded) - 1)
             if suppressed and name not in CLIPPED:
                 words += '; forces suppressed'
-            if mistake and name in (LENGTH_MAX, JUMP):
+            if mistake and name in (LENGTH_MIN, LENGTH_MAX, JUMP):
                 words = f'{mistake}; {words}'
             self.held.see(Level(ERROR, words), now, name)
             self._setpoints[name] += 1
@@ -321,7 +330,9 @@ class LimitsDiagnostics(StatusPart):
         return lines
 
     def _mistake(self, output: Output) -> str:
-        """Return the likely mistake where legs are too long."""
+        """Return the likely mistake in the first pose, or where legs are too long."""
+        if self._first_mistake:
+            return self._first_mistake
         longest = self._answers.parameters['limits.length_max']
         return position_in_mm(
             output.lengths, output.state.lengths if longest is None else longest.tolist())

@@ -28,7 +28,7 @@ from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
 from stewart_dynamics.node.diagnostics.answers import Answers
 from stewart_dynamics.node.diagnostics.levels import (
-    ERROR, Level, LogLine, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
+    ERROR, Level, LogLine, MISTAKEN, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import SECONDS
 from stewart_dynamics.setpoints.base_input import BaseInput
@@ -48,7 +48,7 @@ class SetpointDiagnostics(StatusPart):
     name = 'setpoints'
 
     def __init__(self, answers: Answers, topics: Sequence[str]) -> None:
-        super().__init__(REJECTED, INCOMPLETE)
+        super().__init__(REJECTED, INCOMPLETE, MISTAKEN)
         self._answers = answers
         self.heard = dict.fromkeys(topics, NEVER)  # when the last message came on each topic
         self._writers: dict[str, int] = {}
@@ -97,7 +97,8 @@ class SetpointDiagnostics(StatusPart):
             found.append(self._no_setpoint(now))
         if not found:
             found = [self.held.of(REJECTED, now).message
-                     or self.held.of(INCOMPLETE, now).message or 'answered']
+                     or self.held.of(INCOMPLETE, now).message
+                     or self.held.of(MISTAKEN, now).message or 'answered']
         number = len(answers.second_before.times) + len(answers.second.times)
         seconds = now - answers.second_before.begin
         rate = number / seconds if seconds > 0.0 else 0.0
@@ -107,17 +108,17 @@ class SetpointDiagnostics(StatusPart):
         values += _last_heard(self.heard, now)
         values += [(f'{topic}: writers', str(n)) for topic, n in self._writers.items()]
         values += [(f'{topic}: readers', str(n)) for topic, n in self._readers.items()]
-        values += self._rejection_values()
+        values += self._mistake_values() + self._rejection_values()
         return Status(self.name, self.level(now), ', '.join(found), values)
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """
-        Return warnings of another node of this name and of messages that complete no setpoint.
+        Return warnings of another node of this name, mistakes, and messages without a setpoint.
 
         Nothing else: rejections are logged one by one, and without setpoints there is no
         fault.
         """
-        lines, self._lines = self._lines, []
+        lines, self._lines = self._lines + self._mistake_lines(now), []
         last = max(self.heard.values())
         if last <= self._answers.at:
             self._incomplete_since = math.inf
@@ -146,7 +147,7 @@ class BaseDiagnostics(StatusPart):
     name = 'base'
 
     def __init__(self, parameters: Parameters, topics: Sequence[str]) -> None:
-        super().__init__(REJECTED, _UNKNOWN)
+        super().__init__(REJECTED, _UNKNOWN, MISTAKEN)
         self._timeout: float = parameters['base.timeout']
         self.heard = dict.fromkeys(topics, NEVER)  # when the last message came on each topic
         self._samples = 0
@@ -188,14 +189,19 @@ class BaseDiagnostics(StatusPart):
         values += _last_heard(self.heard, now)
         values += [(f'{name} {axis} ({unit})', f'{number:.6g}') for name, unit, part in _OF_BASE
                    for axis, number in zip('xyz', self._row[part], strict=False)]
-        lack, rejected = self._lack(now), self.held.of(REJECTED, now)
-        return Status(self.name, *(rejected if rejected.level > lack.level else lack),
-                      values + self._rejection_values())
+        # The first of the highest level; a known motion is the last.
+        found = [self.held.of(REJECTED, now), self.held.of(MISTAKEN, now), self._lack(now)]
+        worst = max(found, key=lambda each: each.level) if any(
+            each.level for each in found) else found[-1]
+        return Status(self.name, *worst,
+                      values + self._mistake_values() + self._rejection_values())
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """Return that there are no forces, and that there are again; rejections are logged."""
         # Where nothing has begun, nothing is wrong.
-        return self._changed(*self._lack(now)) if self._samples or self._unknown else []
+        if not self._samples and not self._unknown:
+            return []
+        return self._changed(*self._lack(now)) + self._mistake_lines(now)
 
     def _lack(self, now: float) -> Level:
         """Return whether the base's motion is missing."""

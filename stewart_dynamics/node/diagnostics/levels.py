@@ -17,10 +17,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 import math
 from typing import NamedTuple
 
+from stewart_dynamics.setpoints.consistency import Mistake
 from stewart_dynamics.setpoints.rejections import Rejection
 
 # Levels of diagnostic_msgs/DiagnosticStatus.
@@ -37,6 +38,7 @@ NEVER = -math.inf
 _HOLD_SECONDS = 1.0
 
 REJECTED = ''  # the cause of a level that every status has
+MISTAKEN = 'mistaken'  # that of likely mistakes in messages
 
 
 class Level(NamedTuple):
@@ -138,6 +140,7 @@ class StatusPart:
         self.held = Held(*causes)
         self.rejections = Counter[Rejection]()
         self._logged: dict[str, int] = {}
+        self._mistakes: Sequence[Mistake] = ()
 
     def rejected(self, rejection: Rejection, details: str, now: float,
                  cause: str = REJECTED) -> None:
@@ -145,6 +148,12 @@ class StatusPart:
         self.rejections[rejection] += 1
         self.held.happened(
             Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now, cause)
+
+    def mistaken(self, mistakes: Sequence[Mistake], now: float) -> None:
+        """Note the likely mistakes in the messages; they last until the next call."""
+        self._mistakes = mistakes
+        self.held.see(Level(WARN if mistakes else OK, '; '.join(
+            each.words for each in mistakes)), now, MISTAKEN)
 
     def level(self, now: float) -> int:
         """Return the present level."""
@@ -164,6 +173,14 @@ class StatusPart:
             return []
         self._logged[cause] = level
         return [LogLine(level, f'{self.name}: {message}')]
+
+    def _mistake_lines(self, now: float) -> list[LogLine]:
+        """Return the log line where likely mistakes begin or end."""
+        level, message = self.held.of(MISTAKEN, now)
+        return self._changed(level, message or 'no likely mistakes in the messages', MISTAKEN)
+
+    def _mistake_values(self) -> Values:
+        return [value for each in self._mistakes for value in each.values]
 
     def _rejection_values(self) -> Values:
         return [(f'rejected, {topic}: {reason}', str(n))

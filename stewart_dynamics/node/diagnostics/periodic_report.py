@@ -18,7 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
+from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
 from stewart_dynamics.node.diagnostics.answers import (
     Answers, LimitsDiagnostics, SingularityDiagnostics, TimingDiagnostics)
 from stewart_dynamics.node.diagnostics.inputs import (
@@ -27,6 +32,7 @@ from stewart_dynamics.node.diagnostics.levels import LogLine, PERIOD, REJECTED, 
 from stewart_dynamics.node.diagnostics.outcomes import (
     ExternalWrenchDiagnostics, PayloadDiagnostics, PlannedTrajectoryDiagnostics)
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.consistency import Mistake
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 from stewart_dynamics.setpoints.step import Output
 
@@ -55,6 +61,15 @@ class DynamicsDiagnostics:
         self._made = now
         self._levels: list[int] = []  # those of the last report
 
+    def begins(self, motion: Sequence[float], determinant: float) -> None:
+        """Note the first setpoint, a row of motion, and its det(J) [m^3]."""
+        pose = np.array(motion[POSE])
+        parameters = self.answers.parameters
+        mistake = pose_mistake(parameters, pose[POSITION], pose[ROTATION].reshape(3, 3))
+        self.limits.begins(mistake)
+        self.singularity.begins(
+            mistake, determinant * determinant_at_home(parameters) < 0.0)
+
     def answered(self, output: Output, came: float, now: float) -> bool:
         """
         Note an output and the time of arrival of its setpoint.
@@ -77,6 +92,12 @@ class DynamicsDiagnostics:
                 INCOMPLETE if rejection.reason == NOT_JOINED else REJECTED))
             if rejection.reason == DROPPED:
                 self.timing.rejected(rejection, details, now)
+
+    def mistaken(self, mistakes: Sequence[Mistake], now: float) -> None:
+        """Note the likely mistakes in setpoints and base motion."""
+        of_base = [each for each in mistakes if each.topic in self.base.heard]
+        self.base.mistaken(of_base, now)
+        self.setpoints.mistaken([each for each in mistakes if each not in of_base], now)
 
     def level_changed(self, now: float) -> bool:
         """Return whether a level has changed since the last report."""

@@ -1,0 +1,51 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Likely mistakes in a gravity vector in base axes, given as a parameter or measured."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.kinematics.home_pose import Home
+
+# Kinds of mistakes.
+NONE, IN_G, IN_MM, AWAY = 'none', 'in g', 'in mm/s^2', 'away'
+
+_LARGEST = 100.0  # [m/s^2]; Jupiter has 25
+_SMALLEST = 0.2  # [m/s^2]; the moon has 1.6, the largest asteroid 0.28
+_ROUND_1 = 0.05  # an accelerometer measures 1 g with a smaller error
+# Share of gravity that pulls the platform away from the base.
+_HANGING = 0.5
+
+
+def likely_mistake(gravity: Array, home: Home | None = None) -> str:
+    """
+    Return the kind of the likely mistake, empty without one.
+
+    gravity (3,): base axes [m/s^2].
+    home: for the side of the platform; None: the direction is not checked.
+    """
+    size = float(np.linalg.norm(gravity))
+    if size > _LARGEST:
+        return IN_MM
+    if size < _SMALLEST:
+        return NONE
+    if abs(size - 1.0) <= _ROUND_1:
+        return IN_G
+    if home is None or home.certain:
+        return ''
+    away = home.shape.axes[2] * home.side  # from the base to the platform
+    return AWAY if gravity @ away > _HANGING * size else ''

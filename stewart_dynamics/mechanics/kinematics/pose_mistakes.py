@@ -1,0 +1,95 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The likely mistake in a pose that the hexapod cannot have: the one without which it can.
+
+A pose may be counted from home, its position in mm, its quaternion in the order w x y z. Each is a
+hypothesis: the pose without the mistake has all legs within their limits, and det(J) has the sign
+that it has at home.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.kinematics.home_pose import (
+    determinant_at_home, home_pose, other_side)
+from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, TOLERANCE
+from stewart_dynamics.parameters.table import Parameters
+
+_MILLIMETRE = 1e-3
+# Lengths of legs without limits, in terms of those at home.
+_SHORTEST, _LONGEST = 0.3, 2.0
+# Smallest distance that may be in mm, in terms of the longest leg.
+_FAR = 2.0
+
+_MM, _FROM_HOME, _W_FIRST = (
+    'position in mm', 'a pose counted from home', 'a quaternion in the order w x y z')
+
+
+def pose_mistake(parameters: Parameters, position: Array, rotation: Array) -> str:
+    """
+    Return the likely mistake in a pose, position (3,) [m] and rotation (3, 3); empty without one.
+
+    A pose on the other side of a singularity is one as well. Nothing is said without a home pose.
+    """
+    try:
+        home = home_pose(parameters)
+    except ParameterError:
+        return ''
+    at_home = determinant_at_home(parameters)
+    lengths_at_home, _ = _legs(parameters, home.position, home.rotation)
+    low, high = parameters[LENGTH_MIN], parameters[LENGTH_MAX]
+    shortest = _SHORTEST * lengths_at_home if low is None else low * (1.0 - TOLERANCE)
+    longest = _LONGEST * lengths_at_home if high is None else high * (1.0 + TOLERANCE)
+
+    def is_possible(at: Array, turned: Array) -> bool:
+        lengths, determinant = _legs(parameters, at, turned)
+        return determinant * at_home > 0.0 and bool(
+            np.all(lengths >= shortest) and np.all(lengths <= longest))
+
+    with np.errstate(all='ignore'):
+        if is_possible(position, rotation):
+            return ''
+        known = _MM, _FROM_HOME, _W_FIRST
+        # The fewest mistakes first.
+        for each in (each for number in (1, 2, 3) for each in combinations(known, number)):
+            at, turned = position, rotation
+            if _MM in each:
+                if np.linalg.norm(at) < _FAR * longest.max():
+                    continue  # in m it is not far off, in mm it is hardly a motion
+                at = _MILLIMETRE * at
+            if _W_FIRST in each:
+                w, x, y, z = to_quaternion(turned).tolist()
+                if 2.0 * w * w < 1.0:
+                    continue  # no platform turns so far
+                turned = np.reshape(from_quaternion(x, y, z, w), (3, 3))
+            if _FROM_HOME in each:
+                at, turned = home.position + at, turned @ home.rotation
+            if is_possible(at, turned):
+                return f'likely mistake: {" and ".join(each)}'
+        return other_side(_legs(parameters, position, rotation)[1], at_home)
+
+
+def _legs(parameters: Parameters, position: Array, rotation: Array) -> tuple[Array, float]:
+    """Return the lengths of the legs (6,) [m], and det(J) [m^3]."""
+    legs = lagrange.unchecked_legs(parameters, position, rotation)
+    return legs.lengths, float(np.linalg.det(lagrange.inverse_jacobian(legs)))

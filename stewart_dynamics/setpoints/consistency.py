@@ -1,0 +1,598 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Checks that twists are the derivatives of poses, and accelerations the derivatives of twists.
+
+Samples are thinned to knots, at least TICK apart, and the knots are grouped into periods. In a
+period the change of a pose over windows of a few knots is compared with the integral of the twist
+by the trapezoidal rule, and the change of the twist with the integral of the acceleration. A
+difference counts where it exceeds what stamps that jitter, noise or quantization of the poses, and
+a delay of one or two samples explain; all three are estimated from the samples. A quantity is
+inconsistent if most windows with enough motion are, in two periods in a row.
+
+The likeliest reason is the one under which the difference vanishes: each is a hypothesis with a
+residual, computed from sums over all windows of inconsistent periods.
+
+Arrays in, no clock. The result does not depend on how samples are split into batches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, Stamps
+from stewart_dynamics.mechanics.frames.motion import listed
+from stewart_dynamics.mechanics.frames.rotation import euler_rate_matrix, to_euler
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
+    POSITION, ROTATION, TWIST)
+from stewart_dynamics.parameters.table import STANDARD_GRAVITY
+
+VELOCITY, SPIN, ACCELERATION, SPIN_RATE = (
+    'velocity', 'angular velocity', 'acceleration', 'angular acceleration')
+QUANTITIES = VELOCITY, SPIN, ACCELERATION, SPIN_RATE
+_TWISTS, RATES = (VELOCITY, SPIN), (ACCELERATION, SPIN_RATE)
+_TWIST_OF = {ACCELERATION: VELOCITY, SPIN_RATE: SPIN}
+UNITS = {VELOCITY: 'm/s', SPIN: 'rad/s', ACCELERATION: 'm/s^2', SPIN_RATE: 'rad/s^2'}
+_COLUMNS = {VELOCITY: LINEAR_VELOCITY, SPIN: ANGULAR_VELOCITY, ACCELERATION: LINEAR_ACCELERATION,
+            SPIN_RATE: ANGULAR_ACCELERATION}
+
+# Shortest time between two knots [ns]; the knot is the first sample after a multiple of it.
+TICK = 5_000_000
+# Intervals between the knots of a period; smallest number of those of the last period.
+PERIOD, _FEWEST = 64, 12
+# Periods begin at least this far apart, in ticks: one second.
+_INTERVAL = 200
+# Lengths of windows that are tried, in intervals.
+_LAGS = 1, 3, 9, 27
+# Samples that are gathered before they are looked at.
+_GATHERED = 64
+
+# Relative difference that is consistent, besides noise, jitter and delay.
+_TOLERANCE = 0.06
+# Delay of a derivative that is consistent: in samples, and at least in seconds.
+_DELAY_IN_SAMPLES, _DELAY = 1.5, 0.004
+# Largest noise of a window, as part of its motion, with which it is judged.
+_NOISE_SHARE = 0.25
+# A pause this many times as long as usual is a gap.
+_GAP = 3.0
+# Share of the windows with motion that must differ, and their smallest number.
+_SHARE, _WINDOWS = 0.4, 6
+# Inconsistent periods in a row before anything is reported.
+_PERSISTENT = 2
+# Inconsistent periods whose windows are added up to find the reason.
+_MOST_PERIODS = 100
+
+# Slowest motion that is judged: velocity in platform radii per second (or rad/s), and
+# acceleration [m/s^2] (of a point at the platform radius): half a percent of gravity.
+_SLOWEST, _WEAKEST = 2e-3, 0.05
+# Smallest changes of a window: in platform radii (or rad) of the pose, of the integrated twist.
+_SMALLEST, _SMALLEST_INTEGRAL = 1e-5, 5e-3
+
+# A reason explains a difference if its residual is at most this part of it (both squared); of
+# those whose residuals are alike, or below _EXACT, the simplest is named.
+_EXPLAINED, _CLEAR, _EXACT = 0.05, 0.3, 1e-4
+# Relative difference of a factor from a known one.
+_NEAR = 0.03
+_FACTORS = {
+    VELOCITY: {1e3: 'in mm/s?', 100.0: 'in cm/s?', 1e-3: 'in m/ms?', -1.0: 'a sign?'},
+    SPIN: {180.0 / math.pi: 'in deg/s?', math.pi / 180.0: 'converted to radians twice?',
+           30.0 / math.pi: 'in rpm?', 0.5 / math.pi: 'in turns per second?', 1e3: 'in mrad/s?',
+           1e-3: 'in rad/ms?', -1.0: 'a sign?'},
+    ACCELERATION: {1e3: 'in mm/s^2?', 100.0: 'in cm/s^2?', 1e-6: 'in m/ms^2?', -1.0: 'a sign?',
+                   1.0 / -STANDARD_GRAVITY[2]: 'in g?'},
+    SPIN_RATE: {180.0 / math.pi: 'in deg/s^2?', math.pi / 180.0: 'converted to radians twice?',
+                1e3: 'in mrad/s^2?', 1e-6: 'in rad/ms^2?', -1.0: 'a sign?'},
+}
+
+
+class Inconsistency(NamedTuple):
+    """A quantity that is not the derivative of the other one."""
+
+    quantity: str  # one of QUANTITIES
+    given: float  # RMS of the given values, mean values of windows [m/s, rad/s, ...]
+    expected: float  # RMS of the differences of the poses, or of the twists
+    difference: float  # RMS
+    reason: str  # likeliest reason, with a question mark; empty if it is not known
+    first: int  # stamp of the beginning [ns]
+
+    @property
+    def words(self) -> str:
+        """Return the difference and the reason in one line."""
+        of = 'the poses' if self.quantity in (VELOCITY, SPIN) else 'the twists'
+        unit = UNITS[self.quantity]
+        reason = f': likely mistake: {self.reason}' if self.reason else ''
+        return (f'{self.quantity} is not the derivative of {of}: {self.given:.3g} {unit} RMS, by '
+                f'differences of {of} {self.expected:.3g} {unit}, they differ by '
+                f'{self.difference:.3g} {unit}{reason}')
+
+    @property
+    def values(self) -> tuple[tuple[str, str], ...]:
+        """Return keys with their units, and values."""
+        unit = UNITS[self.quantity]
+        return ((f'{self.quantity} given, RMS ({unit})', f'{self.given:.6g}'),
+                (f'{self.quantity} by differences, RMS ({unit})', f'{self.expected:.6g}'),
+                (f'likely mistake in {self.quantity}', self.reason or 'not known'))
+
+
+class Mistake(NamedTuple):
+    """A likely mistake in the messages of a topic."""
+
+    topic: str
+    text: str
+    first: int | None = None  # stamp from which it is found [ns]; None: all messages have it
+    values: tuple[tuple[str, str], ...] = ()  # keys with units, and values, for diagnostics
+
+    @property
+    def words(self) -> str:
+        """Return the mistake in one line."""
+        return f'{self.topic}: {self.text}'
+
+
+class _Windows(NamedTuple):
+    """Windows of n periods for one quantity, and their verdicts."""
+
+    moving: Flags  # (n,): there are enough windows with motion
+    bad: Flags  # (n,): most of these differ
+    lag: Integers  # (n,): length of a window in intervals
+
+
+class _Sums:
+    """Sums over the windows of inconsistent periods of one quantity."""
+
+    def __init__(self, first: int) -> None:
+        self.first = first
+        self.periods = 0
+        self.windows = 0
+        self.seconds = 0.0
+        self.squares = np.zeros(3)  # of changes d, of integrals u, of their difference
+        self.rates = np.zeros(3)  # the same divided by the times of the windows
+        self.product = 0.0  # d u
+        self.candidates: dict[str, float] = {}  # squares of the residual of each
+        self.late = np.zeros(2)  # normal equation of a delay
+        self.point = np.zeros((3, 3)), np.zeros(3)  # that of another point
+        self.gravity = 0.0, np.zeros(3)  # that of a constant acceleration
+        self.step = 0.0  # seconds between two samples, the sum over periods
+        self.tolerance = 0.0  # squares of what is consistent
+
+
+class Consistency:
+    """
+    The check of a stream of motions.
+
+    radius: size of the platform [m]; smaller motions are not judged, in terms of it.
+    frame: name of the axes in which twists are expected, and of those of the body, for words.
+    """
+
+    def __init__(self, radius: float, frame: tuple[str, str] = ('base', 'platform')) -> None:
+        self._radius = radius
+        self._frame = frame
+        self._pending: list[tuple[Stamps, Array, Flags]] = []
+        self.noted: list[tuple[int, Sequence[float], bool]] = []
+        """Single samples for ``judge``: stamp [ns], row of motion, whether time jumped back."""
+        self._held = 0
+        self._due = _GATHERED
+        # Tick of the last period's beginning, and that of the next one's at the earliest.
+        self._begun: tuple[int, int] | None = None
+        self._judged = dict.fromkeys(QUANTITIES, 0)  # periods
+        self._row = dict.fromkeys(QUANTITIES, 0)  # inconsistent periods in a row
+        self._sums: dict[str, _Sums] = {}  # of the present inconsistency
+        self.found: dict[str, Inconsistency] = {}
+        """The first inconsistency of each quantity, with all of the same that followed."""
+        self.present: dict[str, Inconsistency] = {}
+        """Those of the last periods with enough motion."""
+
+    def judge(self) -> None:
+        """Check the samples noted so far, if they are enough."""
+        if len(self.noted) >= _GATHERED:
+            self._take_ones()
+
+    def add(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
+        """Add N samples: stamps [ns], rows of motion (N, MOTION), whether time jumped back."""
+        self._take_ones()
+        self._add(stamps, motions, restarts)
+
+    def finish(self) -> None:
+        """Judge the remaining samples."""
+        self._take_ones()
+        self._periods(ended=True)
+
+    def _take_ones(self) -> None:
+        if self.noted:
+            stamps, motions, restarts = zip(*self.noted, strict=True)
+            self.noted = []
+            self._add(np.array(stamps, dtype=np.int64), np.array(motions), np.array(restarts))
+
+    def _add(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
+        self._pending.append((stamps, motions, restarts))
+        self._held += len(stamps)
+        if self._held >= self._due:
+            self._periods()
+
+    def _periods(self, ended: bool = False) -> None:
+        """Judge all complete periods."""
+        if not self._held:
+            return
+        stamps, motions, restarts = (np.concatenate(each) for each in zip(
+            *self._pending, strict=True))
+        cells = stamps // TICK
+        knots = np.concatenate([[0], np.flatnonzero(cells[1:] != cells[:-1]) + 1])
+        at, kept = self._begin(cells[knots]), []
+        while at is not None and at + PERIOD < len(knots):
+            kept.append(knots[at:at + PERIOD + 1])
+            begun = int(cells[knots[at]])
+            self._begun = begun, begun + _INTERVAL
+            knots = knots[at + PERIOD:]
+            at = self._begin(cells[knots])
+        with np.errstate(all='ignore'):  # numbers that overflow are not judged
+            if kept:
+                self._judge(stamps, motions, restarts, np.array(kept))
+            if ended and at is not None and len(knots) - at > _FEWEST:
+                self._judge(stamps, motions, restarts, knots[None, at:])
+        # Without a period that has begun, the last sample shows whether the next one is a knot.
+        begin = len(stamps) if ended else len(stamps) - 1 if at is None else int(knots[at])
+        self._pending = [(stamps[begin:], motions[begin:], restarts[begin:])]
+        self._held = len(stamps) - begin
+        self._due = self._held + _GATHERED
+        if ended:
+            for quantity in QUANTITIES:
+                # A short stream has only one period.
+                if self._row[quantity] == self._judged[quantity]:
+                    self._report(quantity)
+
+    def _begin(self, cells: Integers) -> int | None:
+        """Return the first of these knots at which a period begins; None if it is not there."""
+        if self._begun is None:
+            return 0
+        begun, following = self._begun
+        may = np.flatnonzero((cells >= following) | (cells < begun))
+        return int(may[0]) if len(may) else None
+
+    def _judge(self, stamps: Stamps, motions: Array, restarts: Flags, at: Integers) -> None:
+        """Judge periods, given by their knots (n, length + 1)."""
+        periods = _Periods(stamps, motions, restarts, at)
+        radius = self._radius
+        twists = periods.windows(_TWISTS, None, [
+            (size * _SMALLEST, size * _SMALLEST_INTEGRAL, size * _SLOWEST)
+            for size in (radius, 1.0)])
+        rates = periods.windows(RATES, {
+            twist: found.bad for twist, found in twists.items()}, [
+            (size * _WEAKEST * 1e-3, size * _WEAKEST, size * _WEAKEST)
+            for size in (1.0, 1.0 / radius)])
+        for n in range(len(at)):
+            for quantity, found in (twists | rates).items():
+                if found.moving[n]:
+                    twist = _TWIST_OF.get(quantity, quantity)
+                    self._note(quantity, bool(found.bad[n]), periods, n, int(found.lag[n]),
+                               bool(twists[twist].bad[n]))
+
+    def _note(self, quantity: str, bad: bool, periods: _Periods, n: int, lag: int,
+              twist_bad: bool) -> None:
+        self._judged[quantity] += 1
+        if not bad:
+            self._row[quantity] = 0
+            self._sums.pop(quantity, None)
+            self.present.pop(quantity, None)
+            return
+        self._row[quantity] += 1
+        sums = self._sums.get(quantity)
+        if sums is None:
+            sums = self._sums[quantity] = _Sums(periods.first(n))
+        if sums.periods < _MOST_PERIODS:
+            periods.add_windows(quantity, n, lag, twist_bad, sums)
+            if self._row[quantity] >= _PERSISTENT:
+                self._report(quantity)
+
+    def _report(self, quantity: str) -> None:
+        sums = self._sums.get(quantity)
+        if sums is None or not sums.windows:
+            return
+        expected, given, difference = np.sqrt(sums.rates / sums.windows).tolist()
+        found = Inconsistency(
+            quantity, given, expected, difference,
+            _reason(quantity, sums, self._frame), sums.first)
+        self.present[quantity] = found
+        if quantity not in self.found or self.found[quantity].first == found.first:
+            self.found[quantity] = found
+
+
+def inconsistencies(
+        consistency: Consistency | None, ever: bool, topics: Mapping[str, str]) -> list[Mistake]:
+    """
+    Return the inconsistencies of a stream as mistakes.
+
+    ever: all that were found, else the present ones.
+    topics: the topic of each quantity.
+    """
+    if consistency is None:
+        return []
+    found = consistency.found if ever else consistency.present
+    return [Mistake(topics[name], each.words, each.first, each.values)
+            for name, each in found.items()]
+
+
+class _Periods:
+    """n periods of the same number of intervals."""
+
+    def __init__(self, stamps: Stamps, motions: Array, restarts: Flags, at: Integers) -> None:
+        self._stamps, self._motions, self._at = stamps, motions, at
+        self._number, self._length = len(at), at.shape[1] - 1
+        # Each pair of samples, one after the other; pairs of a period follow those of the last.
+        counts = at[:, -1] - at[:, 0]
+        ends = np.cumsum(counts)
+        before = np.arange(ends[-1]) + np.repeat(at[:, 0] - (ends - counts), counts)
+        after = before + 1
+        self._starts = (at[:, :-1] - at[:, :1] + (ends - counts)[:, None]).ravel()
+        steps = (stamps[after] - stamps[before]) * NANOSECOND
+        broken = (steps <= 0.0) | restarts[after]
+        steps[broken] = 0.0
+        # (n, length): of each interval
+        seconds = self._of_intervals(steps)
+        samples = np.diff(at, axis=1)
+        usual = np.median(seconds, axis=1, keepdims=True)
+        interrupted = (self._of_intervals(broken.astype(float)) > 0.0) | (seconds > _GAP * usual)
+        self._times = _summed(seconds)
+        self._broken = _summed(interrupted)
+        self.step = usual[:, 0] / np.median(samples, axis=1)  # between samples (n,) [s]
+        changes = self._of_intervals(np.abs(np.diff(steps, prepend=steps[:1]))) / samples
+        self._jitter = 2.0 * np.median(changes, axis=1)
+        self._delay = np.maximum(_DELAY_IN_SAMPLES * self.step, _DELAY)
+        rows = motions[at]
+        self._rows = rows
+        rotations = rows[..., ROTATION].reshape(self._number, -1, 3, 3)
+        self._turned = _summed(_turn(
+            rotations[:, 1:] @ rotations[:, :-1].transpose(0, 1, 3, 2)))
+        halves = motions[before, TWIST.start:]
+        halves += motions[after, TWIST.start:]
+        halves *= 0.5 * steps[:, None]
+        self._integrals = _summed(self._of_intervals(halves))
+
+    def first(self, n: int) -> int:
+        """Return the first stamp of a period [ns]."""
+        return int(self._stamps[self._at[n, 0]])
+
+    def _of_intervals(self, values: Array) -> Array:
+        """Return the sums over the samples of each interval, (n, length, ...)."""
+        found = (values if len(values) == len(self._starts)
+                 else np.add.reduceat(values, self._starts, axis=0))
+        return found.reshape(self._number, self._length, *values.shape[1:])
+
+    def _given(self, quantity: str) -> Array:
+        """Return a quantity at the knots, (n, length + 1, 3)."""
+        values: Array = self._rows[..., _COLUMNS[quantity]]
+        return values
+
+    def paths(self, quantity: str, by_poses: Flags | None = None) -> Array:
+        """
+        Return what a quantity is the derivative of, at the knots, (n, length + 1, 3).
+
+        by_poses (n,): periods in which the twist is not that of the poses: that of the poses.
+        """
+        if quantity == VELOCITY:
+            places: Array = self._rows[..., POSITION]
+            return places - places[:, :1]
+        if quantity == SPIN:
+            return self._turned
+        twist = _TWIST_OF[quantity]
+        found = self._given(twist)
+        if by_poses is not None and by_poses.any():
+            found = found.copy()
+            found[by_poses] = self._slopes(self.paths(twist), by_poses)
+        return found
+
+    def _slopes(self, paths: Array, which: Flags) -> Array:
+        """Return central differences of paths at the knots; nan at both ends of a period."""
+        paths, times = paths[which], self._times[which]
+        found = np.full(paths.shape, np.nan)
+        found[:, 1:-1] = (paths[:, 2:] - paths[:, :-2]) / (times[:, 2:] - times[:, :-2])[..., None]
+        return found
+
+    def windows(self, quantities: Sequence[str], by_poses: Mapping[str, Flags] | None,
+                floors: Sequence[tuple[float, float, float]]) -> dict[str, _Windows]:
+        """
+        Judge windows of the length that has most of those with motion.
+
+        by_poses: of each twist, the periods in which it is not the derivative of the poses.
+        floors: of each quantity, the smallest change, integral and mean value of a window.
+        """
+        count = len(quantities)
+        # One row for each quantity and period: (m, length + 1, 3).
+        paths = np.concatenate([self.paths(each, None if by_poses is None else by_poses[
+            _TWIST_OF[each]]) for each in quantities])
+        integrals = np.concatenate([self._integral(each) for each in quantities])
+        given = np.concatenate([self._given(each) for each in quantities])
+        times, broken = np.tile(self._times, (count, 1)), np.tile(self._broken, (count, 1))
+        smallest, smallest_integral, slowest = np.repeat(
+            np.array(floors), self._number, axis=0).T[..., None]
+        step, jitter, delay = (np.tile(each, count)[:, None] for each in (
+            self.step, self._jitter, self._delay))
+        third = _norm(np.diff(paths, n=3, axis=1))
+        third[(broken[:, 3:] != broken[:, :-3]) | np.isnan(third)] = 0.0
+        of_path = 3.0 * np.max(third, axis=1)[:, None] / 4.0  # half the height of a step
+        of_given = 3.0 * np.sqrt(np.mean(  # white noise
+            np.sum(np.diff(given, n=3, axis=1) ** 2, axis=-1), axis=1) / 20.0)[:, None]
+        best, moves, bads, lags = np.zeros((4, len(paths)), dtype=int)
+        for lag in _LAGS:
+            if 2 * lag > self._length:
+                break
+            lasts = times[:, lag:] - times[:, :-lag]
+            d, u = paths[:, lag:] - paths[:, :-lag], integrals[:, lag:] - integrals[:, :-lag]
+            change, integral = _norm(d), _norm(u)
+            size = np.maximum(change, integral)
+            uncertain = of_path + of_given * np.sqrt(lasts * step) + jitter * size / lasts
+            moving = (broken[:, lag:] == broken[:, :-lag]) & (
+                (change >= smallest) | (integral >= smallest_integral)) & (
+                size >= slowest * lasts) & (uncertain <= _NOISE_SHARE * size)
+            shifted = delay * _norm(given[:, lag:] - given[:, :-lag])
+            bad = moving & (_norm(d - u) > _TOLERANCE * size + uncertain + shifted)
+            # Reasons are found the better, the smaller the noise is.
+            moved = moving.sum(axis=1)
+            score = moved + (moving & (10.0 * of_path <= change)).sum(axis=1)
+            better = score > best
+            best[better], lags[better], moves[better] = score[better], lag, moved[better]
+            bads[better] = bad.sum(axis=1)[better]
+        enough = moves >= _WINDOWS
+        found = np.array([enough, enough & (bads >= _SHARE * moves), lags]).reshape(
+            3, count, self._number)
+        return {each: _Windows(found[0, n] > 0, found[1, n] > 0, found[2, n])
+                for n, each in enumerate(quantities)}
+
+    def _integral(self, quantity: str) -> Array:
+        columns = _COLUMNS[quantity]
+        return self._integrals[..., columns.start - TWIST.start:columns.stop - TWIST.start]
+
+    def add_windows(self, quantity: str, n: int, lag: int, twist_bad: bool, sums: _Sums) -> None:
+        """Add the windows of a period to the sums from which the reason is found."""
+        one = np.arange(self._number) == n
+        paths = self.paths(quantity, one if twist_bad else None)[n]
+        at = self._at[n]
+        rows = self._motions[at[0]:at[-1] + 1]
+        steps = np.maximum(np.diff(self._stamps[at[0]:at[-1] + 1]) * NANOSECOND, 0.0)
+        given, rotations = rows[:, _COLUMNS[quantity]], rows[:, ROTATION].reshape(-1, 3, 3)
+        knots = at - at[0]
+
+        def windows(values: Array) -> Array:
+            return values[lag:] - values[:-lag]
+
+        def integral(values: Array) -> Array:
+            halves = (values[1:] + values[:-1]) * (0.5 * steps[:, None])
+            return windows(np.concatenate([np.zeros((1, 3)), np.cumsum(halves, axis=0)])[knots])
+
+        d, u, times = windows(paths), integral(given), windows(self._times[n])[:, None]
+        kept = np.isfinite(d).all(axis=1) & np.isfinite(u).all(axis=1) & (
+            windows(self._broken[n]) == 0) & (times[:, 0] > 0.0)
+        d, times = d[kept], times[kept]
+
+        def residual(integrated: Array) -> float:
+            return _square(d - integrated[kept])
+
+        late = windows(given[knots])[kept]
+        candidates = {'body': residual(integral((rotations @ given[..., None])[..., 0]))}
+        if quantity == SPIN:
+            rates = euler_rate_matrix(to_euler(rotations))
+            candidates['euler'] = residual(integral((rates @ given[..., None])[..., 0]))
+        if quantity in (ACCELERATION, SPIN_RATE) and twist_bad:
+            candidates['same'] = _square(
+                windows(self.paths(quantity)[n])[kept] - u[kept])
+        u = u[kept]
+        off = u - d
+        if quantity in (VELOCITY, ACCELERATION):
+            arms = rotations[knots]
+            if quantity == ACCELERATION:
+                arms = _crossed(rows[knots][:, ANGULAR_VELOCITY], arms)
+            arms = windows(arms)[kept]
+            matrix, right = sums.point
+            sums.point = (matrix + np.einsum('nki,nkj->ij', arms, arms),
+                          right + np.einsum('nki,nk->i', arms, off))
+            total, mean = sums.gravity
+            sums.gravity = total + _square(times), mean + np.sum(times * off, axis=0)
+        sums.windows += len(d)
+        sums.periods += 1
+        sums.step += float(self.step[n])
+        sums.squares += [_square(d), _square(u), _square(off)]
+        sums.rates += [_square(d / times), _square(u / times), _square(off / times)]
+        sums.product += float(np.sum(d * u))
+        sums.late += [np.sum(late * off), np.sum(late * late)]
+        for name, square in candidates.items():
+            sums.candidates[name] = sums.candidates.get(name, 0.0) + square
+
+
+def _reason(quantity: str, sums: _Sums, frame: tuple[str, str]) -> str:
+    """Return the likeliest reason, with a question mark; empty if it is not clear."""
+    axes, body = frame
+    dd, uu, difference = sums.squares.tolist()
+    if uu <= 1e-14 * dd:
+        return 'it is zero, never filled?'
+    found: list[tuple[float, str]] = []  # what is left of the difference, and the reason
+    similar = sums.product * sums.product / (dd * uu) if dd > 0.0 else 0.0
+    if similar > 0.0:
+        # Noise is in the differences of poses, rather than in the integral.
+        found.append((1.0 - similar, _factor(
+            quantity, uu / sums.product, sums.step / sums.periods)))
+    of = _TWIST_OF.get(quantity, '')
+    names = {'body': f'in {body} axes? It is expected in {axes} axes',
+             'euler': 'rates of Euler angles? An angular velocity is expected',
+             'same': f'the derivative of the given {of}, which is wrong?'}
+    found += [(square / difference, names[name]) for name, square in sums.candidates.items()]
+    product, square = sums.late.tolist()
+    if square > 0.0:
+        late = -product / square
+        found.append((1.0 - product * product / square / difference,
+                      f'{abs(late) * 1e3:.3g} ms {"late" if late > 0.0 else "early"}?'))
+    if quantity in (VELOCITY, ACCELERATION):
+        matrix, right = sums.point
+        place: Array = np.asarray(
+            np.linalg.lstsq(matrix, right, rcond=1e-6)[0].round(6), dtype=np.float64)
+        found.append((1.0 - float(right @ place) / difference,
+                      f'of another point, {listed(place, 3)} m in the {body} frame?'))
+    if quantity == ACCELERATION:
+        total, mean = sums.gravity
+        constant = mean / total if total > 0.0 else np.zeros(3)
+        if abs(float(np.linalg.norm(constant)) / -STANDARD_GRAVITY[2] - 1.0) < 0.1:
+            found.append((1.0 - float(mean @ constant) / difference,
+                          f'gravity is in it, {listed(constant.round(2), 3)} m/s^2?'))
+    best = min(left for left, _ in found)
+    if best > _EXPLAINED:
+        return ''
+    # The first of those that explain the difference as well as the best one: simpler ones first.
+    return next(words for left, words in found if left <= max(best / _CLEAR, _EXACT))
+
+
+def _factor(quantity: str, factor: float, step: float) -> str:
+    """Return a constant factor in words, with the mistake that has it."""
+    words = next((words for known, words in _FACTORS[quantity].items()
+                  if abs(factor / known - 1.0) < _NEAR), '')
+    if abs(factor / step - 1.0) < _NEAR:
+        words = 'differences not divided by the time between two samples?'
+    rounded = float(f'{factor:.3g}')
+    return f'{rounded:g} times: {words}' if words else f'{rounded:g} times what is expected'
+
+
+def _summed(values: Array) -> Array:
+    """Return the sums up to each knot (n, length + 1, ...) of intervals (n, length, ...)."""
+    shape = (values.shape[0], values.shape[1] + 1, *values.shape[2:])
+    found = np.zeros(shape)
+    np.cumsum(values, axis=1, out=found[:, 1:])
+    return found
+
+
+def _turn(rotations: Array) -> Array:
+    """Return rotation vectors (..., 3) of rotation matrices (..., 3, 3) [rad]."""
+    r = rotations
+    sine = 0.5 * np.stack([r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0],
+                           r[..., 1, 0] - r[..., 0, 1]], axis=-1)
+    size = _norm(sine)
+    angle = np.arctan2(size, 0.5 * (r[..., 0, 0] + r[..., 1, 1] + r[..., 2, 2] - 1.0))
+    scale = np.divide(angle, size, out=np.ones(size.shape), where=size > 1e-9)
+    turns: Array = sine * scale[..., None]
+    return turns
+
+
+def _crossed(vectors: Array, matrices: Array) -> Array:
+    """Return the cross products of vectors (N, 3) with the columns of matrices (N, 3, 3)."""
+    return np.cross(vectors[:, :, None], matrices, axis=1)
+
+
+def _norm(vectors: Array) -> Array:
+    found: Array = np.sqrt(np.einsum('...i,...i->...', vectors, vectors))
+    return found
+
+
+def _square(values: Array) -> float:
+    return float(np.sum(values * values))

@@ -1,0 +1,74 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A pose that the hexapod cannot have: the mistake without which it can is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from referees import rng
+
+from stewart_dynamics import StewartPlatform
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+
+CONFIG = Path(__file__).resolve().parents[1] / 'config'
+PLATFORM = StewartPlatform.from_yaml(CONFIG / 'platform.yaml')
+SIZE = PLATFORM.parameters['singularity.characteristic_length']
+
+
+def w_first(rotation: Array) -> Array:
+    """Return the rotation that is read where x y z w are taken for w x y z."""
+    x, y, z, w = to_quaternion(rotation).tolist()
+    return np.reshape(from_quaternion(w, x, y, z), (3, 3))
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_the_mistake_in_a_pose_is_named(seed: int) -> None:
+    home, random = PLATFORM.home_pose(), rng(seed)
+    # The first ones at home itself.
+    move, turn = random.normal(0.0, 0.04 * SIZE, 3), from_euler(random.normal(0.0, 0.08, 3))
+    if seed < 2:
+        move, turn = np.zeros(3), np.eye(3)
+    position, rotation = home.position + move, turn @ home.rotation
+    expected = {
+        '': (position, rotation),
+        'likely mistake: position in mm': (1e3 * position, rotation),
+        'likely mistake: a pose counted from home': (move, turn),
+        'likely mistake: a quaternion in the order w x y z': (position, w_first(rotation)),
+        'likely mistake: a pose counted from home and a quaternion in the order w x y z':
+            (move, w_first(turn)),
+        'likely mistake: an axis of the other sign, or geometry.platform_side':
+            (position * [1.0, 1.0, -1.0], rotation)}
+    if np.linalg.norm(move) > 0.01:
+        expected['likely mistake: position in mm and a pose counted from home'] = 1e3 * move, turn
+    for text, pose in expected.items():
+        assert pose_mistake(PLATFORM.parameters, *pose).split('; ')[-1] == text
+
+
+def test_a_pose_just_outside_the_limits_has_no_likely_mistake() -> None:
+    home = PLATFORM.home_pose()
+    for by in (-0.3, 0.3):
+        assert pose_mistake(
+            PLATFORM.parameters, home.position + [0.0, 0.0, by], home.rotation) == ''
+
+
+def test_without_a_home_pose_nothing_is_said() -> None:
+    parameters = PLATFORM.parameters.replaced({
+        'limits.length_min': None, 'limits.length_max': None, 'geometry.zero_length': 0.0})
+    assert pose_mistake(parameters, np.array([0.0, 0.0, 1e3]), np.eye(3)) == ''
