@@ -35,18 +35,20 @@ from stewart_dynamics.reporting.results_folder import (
 KILLED = """\
 import os, pathlib, signal, sys
 from stewart_dynamics.replay.replay_options import Options
-from stewart_dynamics.reporting.results_folder import whole_folder
+from stewart_dynamics.reporting.results_folder import check_free, whole_folder
 def rename(self, to):
     os.rename(self, to)
     os.kill(os.getpid(), signal.SIGKILL)
 final, run, where = sys.argv[1:]
-with whole_folder(pathlib.Path(final), Options(force=True, run=run)) as folder:
-    (folder / 'summary.json').write_text('new')
+final, options = pathlib.Path(final), Options(force=True, run=run)
+with whole_folder(final, options, before=check_free(final, options)) as folder:
+    (folder / 'summary.json').write_text('{"software": "stewart_dynamics 2"}')
     if where == 'writing':
         os.kill(os.getpid(), signal.SIGKILL)
     pathlib.Path.rename = rename
 """
 RUN = 32 * 'a'
+OLD, NEW = (f'{{"version": 1, "software": "stewart_dynamics {n}"}}' for n in (1, 2))
 
 
 def kill(final: Path, run: str, where: str) -> None:
@@ -82,21 +84,22 @@ def test_what_a_killed_run_left_is_removed(tmp_path: Path) -> None:
 def test_results_that_a_killed_run_was_replacing_are_put_back(tmp_path: Path) -> None:
     bag = tmp_path / 'bag'
     bag.mkdir()
-    (bag / 'summary.json').write_text('old')
+    (bag / 'summary.json').write_text(OLD)
     kill(bag, RUN, 'replacing')
     assert len(names(tmp_path)) == 2
     assert not bag.exists()
     remove_abandoned([bag])
     assert names(tmp_path) == {'bag'}
-    assert (bag / 'summary.json').read_text() == 'old'
+    assert (bag / 'summary.json').read_text() == OLD
 
 
 def test_results_are_replaced_while_another_run_begins(tmp_path: Path) -> None:
     bag = tmp_path / 'bag'
     with whole_folder(bag, Options()) as folder:
-        (folder / 'summary.json').write_text('old')
-    with whole_folder(bag, Options(force=True)) as folder:
-        (folder / 'summary.json').write_text('new')
+        (folder / 'summary.json').write_text(OLD)
+    options = Options(force=True)
+    with whole_folder(bag, options, before=check_free(bag, options)) as folder:
+        (folder / 'summary.json').write_text(NEW)
         remove_abandoned([bag])
         # As between the renames, and after them.
         replaced = bag.rename(folder.with_name(f'{folder.name}.replaced'))
@@ -108,7 +111,7 @@ def test_results_are_replaced_while_another_run_begins(tmp_path: Path) -> None:
         bag.rename(folder)
         replaced.rename(bag)
     assert names(tmp_path) == {'bag'}
-    assert (bag / 'summary.json').read_text() == 'new'
+    assert (bag / 'summary.json').read_text() == NEW
 
 
 @pytest.mark.parametrize('main', [each.main for each in (
@@ -128,7 +131,10 @@ def test_files_of_others_are_not_replaced(tmp_path: Path, other: str) -> None:
     for force in (False, True):  # --force is advised only where it helps
         with pytest.raises(BagError, match='is not a folder of a datasheet'):
             check_free(sheet, Options(force=force), DATASHEET)
-    (sheet / DATASHEET).touch()
+    (sheet / DATASHEET).write_text('{"name": "mine"}')
+    with pytest.raises(BagError, match='is not a folder of a datasheet'):
+        check_free(sheet, Options(force=True), DATASHEET)
+    (sheet / DATASHEET).write_text(OLD)
     check_free(sheet, Options(force=True), DATASHEET)
     (sheet / other).parent.mkdir(exist_ok=True)
     (sheet / other).touch()

@@ -42,12 +42,15 @@ FULL = 2000  # [bytes]
 def full_disk(room: int = FULL) -> Iterator[None]:
     """Let no file grow beyond ``room`` bytes: writing fails halfway, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # Python would cut its own files
+    # Python would cut its own files, here and in the processes that compile.
+    kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    os.environ['PYTHONDONTWRITEBYTECODE'] = '1'
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
     try:
         yield
     finally:
         sys.dont_write_bytecode = kept
+        del os.environ['PYTHONDONTWRITEBYTECODE']
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 

@@ -24,7 +24,8 @@ from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.program import add_node, add_parameters, DONE, Program, STRICT
-from stewart_dynamics.whole_file import check_new, write_new
+from stewart_dynamics.signals import interrupt_on_signals
+from stewart_dynamics.whole_file import FilesOfFolder
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -86,6 +87,8 @@ def _write(given: argparse.Namespace) -> int:
     from stewart_dynamics.description.urdf import Ros2Control, urdf
     from stewart_dynamics.parameters.table import Parameters
 
+    interrupt_on_signals()
+    files = FilesOfFolder(given.output, given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
     hexapod, name = Hexapod(parameters), given.name or given.params.stem
     control = None
@@ -93,7 +96,7 @@ def _write(given: argparse.Namespace) -> int:
         control = Ros2Control(given.ros2_control, given.hardware)
     texts = {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
              f'{name}.xml': mjcf(hexapod, name)}
-    for path in write_new(given.output, texts, given.force):
+    for path in files.write(texts):
         _PROGRAM.say(str(path))
     return _judge(parameters, given)
 
@@ -101,14 +104,14 @@ def _write(given: argparse.Namespace) -> int:
 def _read(given: argparse.Namespace) -> int:
     from stewart_dynamics.description.recognition import read_hexapod
 
+    interrupt_on_signals()
     if given.ros2_control is not None:
         raise StewartError('--ros2-control: not with --from')
+    files = FilesOfFolder(given.output, given.force)
     found = read_hexapod(given.source)
-    path = given.output / f'{given.name or given.source.stem}.yaml'
-    check_new([path], given.force)
-    given.output.mkdir(parents=True, exist_ok=True)
-    found.parameters.to_yaml(path)
-    _PROGRAM.say(str(path))
+    for path in files.write({
+            f'{given.name or given.source.stem}.yaml': found.parameters.yaml_text()}):
+        _PROGRAM.say(str(path))
     for remark in found.remarks:
         _PROGRAM.complain(remark)
     return _judge(found.parameters, given)

@@ -20,7 +20,8 @@ import argparse
 from collections.abc import Sequence
 
 from stewart_dynamics.program import add_node, add_parameters, DONE, Program
-from stewart_dynamics.whole_file import write_new
+from stewart_dynamics.signals import interrupt_on_signals
+from stewart_dynamics.whole_file import FilesOfFolder
 
 _PROGRAM = Program('stewart_export', 'parameters, or files that exist or cannot be written')
 
@@ -57,6 +58,8 @@ def _export(given: argparse.Namespace) -> int:
     from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
+    interrupt_on_signals()
+    files_of_folder = FilesOfFolder(given.output, given.force)
     name = check_name(given.name)
     parameters = Parameters.from_yaml(given.params, given.node)
     for mistake in likely_mistakes(parameters):
@@ -68,6 +71,6 @@ def _export(given: argparse.Namespace) -> int:
         if compiler is None:
             _PROGRAM.complain(f'warning: {name}.fmu has no binary: no C compiler for this '
                               'computer is found ($CC, cc, gcc, clang)')
-    for path in write_new(given.output, files, given.force):
+    for path in files_of_folder.write(files):
         _PROGRAM.say(str(path))
     return DONE

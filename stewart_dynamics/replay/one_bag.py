@@ -95,13 +95,13 @@ def replay(
     Raises StewartError if a library needed for an option is missing.
     """
     options = options or Options()
-    check_free(folder, options)
+    before = check_free(folder, options)
     made_of = fingerprint(bag, parameters, options)
     parameters = options.applied_to(parameters)
     with closing(Recording(bag)) as recording:
         topics = find_topics(recording, parameters, options)
         notices = notices_of(recording, topics, parameters, options)
-        with whole_folder(folder, options) as partial, ExitStack() as stack:
+        with whole_folder(folder, options, before=before) as partial, ExitStack() as stack:
             run = _Run(recording, topics, parameters, options, partial, stack)
             run.notices += [*likely_mistakes(parameters), *notices]
             for messages, size in recording.messages({name: key for key, name in topics.items()}):
