@@ -17,7 +17,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import os
 from pathlib import Path
+import stat
 import subprocess
 import sys
 
@@ -26,10 +28,10 @@ from referees import ROOT
 
 from stewart_dynamics import (
     calibration, datasheet, description, export, identification, replay)
-from stewart_dynamics.errors import BagError
+from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import (
-    check_free, DATASHEET, remove_abandoned, whole_folder)
+    check_free, DATASHEET, DESIGNED_MOTION, DESIGNED_POSES, remove_abandoned, whole_folder)
 
 # Killed before the folder is complete, or between the two renames.
 KILLED = """\
@@ -112,6 +114,67 @@ def test_results_are_replaced_while_another_run_begins(tmp_path: Path) -> None:
         replaced.rename(bag)
     assert names(tmp_path) == {'bag'}
     assert (bag / 'summary.json').read_text() == NEW
+
+
+def write(folder: Path, text: str) -> None:
+    """Write results that are known as such."""
+    (folder / 'summary.json').write_text(text)
+
+
+@pytest.mark.parametrize('force', [False, True])
+def test_of_two_runs_at_once_one_is_rejected(tmp_path: Path, force: bool) -> None:
+    bag, options = tmp_path / 'bag', Options(force=force)
+    if force:
+        with whole_folder(bag, Options()) as folder:
+            write(folder, OLD)
+    before = check_free(bag, options)
+    with (pytest.raises(BagError, match='bag: (exists already; --force|another run has written)'),
+          whole_folder(bag, options, before=before) as second):
+        write(second, OLD)
+        with whole_folder(bag, options, before=before) as first:
+            write(first, NEW)
+    assert names(tmp_path) == {'bag'}
+    assert (bag / 'summary.json').read_text() == NEW
+
+
+def test_a_link_to_nowhere_is_not_free(tmp_path: Path) -> None:
+    (tmp_path / 'bag').symlink_to(tmp_path / 'nowhere')
+    with pytest.raises(BagError, match='bag: exists already and is not a folder of replay'):
+        check_free(tmp_path / 'bag', Options(force=True))
+
+
+def test_folders_have_the_rights_that_the_mask_of_the_process_leaves(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        with whole_folder(tmp_path / 'bag', Options()) as folder:
+            write(folder, OLD)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / 'bag').stat().st_mode) == 0o750
+    assert stat.S_IMODE((tmp_path / 'bag' / 'summary.json').stat().st_mode) == 0o640
+
+
+@pytest.mark.parametrize('error', [
+    lambda path: StewartError(f'{path}: cannot be written'),
+    lambda path: OSError(28, 'No space left', str(path)), lambda path: OSError(28, 'No space left'),
+    lambda path: RuntimeError(f'{path.name} is odd')])
+def test_no_error_has_the_name_of_the_partial_folder(
+        tmp_path: Path, error: Callable[[Path], Exception]) -> None:
+    with (pytest.raises((StewartError, OSError, RuntimeError)) as caught,
+          whole_folder(tmp_path / 'bag', Options()) as folder):
+        raise error(folder)
+    assert 'partial' not in str(caught.value)
+    assert 'bag' in str(caught.value)
+
+
+@pytest.mark.parametrize('known, text', [
+    (DESIGNED_MOTION, '/**:\n  ros__parameters:\n    motion.type: sine\n'),
+    (DESIGNED_POSES, 'leg_1,leg_2,leg_3,leg_4,leg_5,leg_6,x,y,z,qx,qy,qz,qw\n')])
+def test_a_file_of_the_user_with_the_name_of_a_design_is_not_replaced(
+        tmp_path: Path, known: str, text: str) -> None:
+    (tmp_path / known).write_text(text)
+    with pytest.raises(BagError, match='is not a folder of'):
+        check_free(tmp_path, Options(force=True), known)
 
 
 @pytest.mark.parametrize('main', [each.main for each in (
