@@ -176,7 +176,8 @@ class _Run:
             self.report = Report(parameters, options.measured is not None, folder)
             self._breakdown = ForceBreakdownRows(parameters)
         files = OutputProcess if bytes_of(recording.path) > _LARGE else OutputFiles
-        self._files = files(folder, parameters, options, self._quasi_static)
+        self._files = files(folder, parameters, options, self._quasi_static,
+                            [topic for topic in topics if topic != MEASURED])
         stack.callback(self._files.abandon)
 
     def take(self, messages: Messages) -> int:
@@ -186,6 +187,7 @@ class _Run:
             if measured.any():
                 self._take_measured(messages, measured)
                 messages = messages.chosen(~measured)
+        self._files.write_inputs(messages)
         setpoints = self._setpoints.take_many(messages)
         if self._differentiator is not None:
             setpoints = self._differentiator.add(setpoints)
