@@ -219,6 +219,7 @@ def test_the_bag_has_the_topics_and_types_of_the_node(
     with AnyReader([replayed[name].folder / 'bag']) as reader:
         assert {c.topic: c.msgtype for c in reader.connections} == {
             **{f'{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()},
+            **{f'{NODE}/{topic}': INPUT_TYPES[topic] for topic in (POSE, TWIST, ACCEL)},
             **{topic if topic.startswith('/') else f'{NODE}/{topic}': kind
                for topic, kind in RECORDED_TYPES.items()}}
     assert not list(replayed[name].folder.parent.glob('.*'))
@@ -515,7 +516,8 @@ def test_another_name_of_the_node(tmp_path: Path) -> None:
     assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE
     assert set(outputs_of(tmp_path / 'out' / 'bag').messages) == {
         TF, TF_STATIC, ROBOT_DESCRIPTION,
-        *(f'/cell/hexapod/{topic}' for topic in (*OUTPUT_TYPES, JOINT_STATES))}
+        *(f'/cell/hexapod/{topic}' for topic in (*OUTPUT_TYPES, JOINT_STATES,
+                                                   POSE, TWIST, ACCEL))}
 
 
 def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:
