@@ -190,7 +190,7 @@ def test_nothing_is_logged_while_a_late_topic_completes_each_setpoint() -> None:
         # each second setpoint comes later than setpoint.timeout after the one before
         late = 0.071 if n % 2 else 0.069
         if n and n % 2:
-            assert status(diagnostics, 'setpoints', now + 0.0705).message == (
+            assert diagnostics.setpoints.status(now + 0.0705).message == (
                 'no setpoint: setpoint/accel silent for 0.1 s')
         answered(diagnostics, now + late, CLEAR, (ACCEL,))
 
