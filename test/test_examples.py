@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 import gc
 from pathlib import Path
 import re
@@ -42,7 +43,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 EXAMPLES = ROOT / 'examples'
 sys.path.insert(0, str(EXAMPLES))
-from stream_setpoints import RATE, setpoint  # noqa: E402, I100, I202
+from stream_setpoints import height, RATE, setpoint  # noqa: E402, I100, I202
 
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]
 THERE = [0.1, -0.05, 1.2, 0.0, 0.1, 0.3]
@@ -163,9 +164,10 @@ def test_a_stream_begins_with_an_approach_from_the_measured_legs(
     legs = node.peer.writer('/joint_states', JointState)
     measured = serialize_message(JointState(
         name=platform.parameters['joints'], position=(lengths - zero).tolist()))
-    before = approach(platform, platform.forward_kinematics(lengths), setpoint(0.0), rate=RATE)
+    stream = partial(setpoint, platform.home_pose(), height(platform))
+    before = approach(platform, platform.forward_kinematics(lengths), stream(0.0), rate=RATE)
     expected = [platform.inverse_dynamics(motion) for motion in (
-        before.motion, *(setpoint(n / RATE) for n in range(1, 200)))]
+        before.motion, *(stream(n / RATE) for n in range(1, 200)))]
     rows = np.vstack([np.column_stack([
         np.atleast_2d(each.lengths) - zero, np.atleast_2d(each.rates),
         np.atleast_2d(each.forces)]) for each in expected])
