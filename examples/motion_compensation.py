@@ -41,6 +41,7 @@ import rclpy
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
@@ -77,9 +78,10 @@ class MotionCompensation(Node):
     def __init__(self) -> None:
         super().__init__('motion_compensation')
         file = self.constant('params_file', '', 'of the hexapod: its home position is the default')
-        home = StewartPlatform.from_yaml(file).home_pose().position.tolist() if file else [0.0] * 3
+        home = (StewartPlatform.from_yaml(file).home_pose().position.tolist() if file
+                else Parameter.Type.DOUBLE_ARRAY)
         position = self.constant('position', home, 'of the platform in the world [m]')
-        if not any(position):
+        if position is None:
             raise StewartError('position or params_file: one must be given')
         angles = self.constant('angles', [0.0, 0.0, 0.0],
                                'alpha, beta, gamma of the platform in the world [rad]')

@@ -182,7 +182,7 @@ def test_the_policy_is_what_the_other_programs_do(
     union: dict[str, set[str]] = {}
     for number, (overrides, topics) in enumerate(runs):
         program = Program(
-            [*COMMANDS.get(name, [executable(name)]), '--ros-args',
+            [*(COMMANDS.get(name) or [executable(name)]), '--ros-args',
              *(part for file in files for part in ('--params-file', ROOT / 'config' / file)),
              *(part for each in overrides for part in ('-p', each))],
             domain, tmp_path / str(number))

@@ -120,7 +120,8 @@ def replay_fleet(
         raise KeyboardInterrupt(f'{len(ended)} of {len(tasks)} bags are done; the same command '
                                 'continues with the others') from None
     finally:
-        remove_abandoned(task.folder for task in tasks)  # of processes that died
+        # of processes that died
+        remove_abandoned((task.folder for task in tasks), options.run)
     fleet = Fleet(tuple(ended[number] for number in range(len(tasks))))
     write_fleet(output, [_row(each, output) for each in fleet.ended], files)
     return fleet

@@ -30,6 +30,7 @@ from pathlib import Path
 import re
 import secrets
 import shutil
+import time
 from typing import NamedTuple, Protocol
 
 from stewart_dynamics.bags.find import METADATA, OUTPUT_BAG, RESULT
@@ -89,8 +90,9 @@ _KINDS = {
                           {DESIGNED_POSES, WAY_THROUGH_POSES}, WAY_THROUGH_POSES)}
 
 _REPLACED = '.replaced'
+_SECONDS_TO_DIE, _LOOK = 5.0, 0.05
 _PARTIAL = re.compile(
-    rf'(\..+\.)(?:[0-9a-f]{{32}}|one)\.partial\.\w{{8}}(?:{re.escape(_REPLACED)})?', re.DOTALL)
+    rf'(\..+\.)([0-9a-f]{{32}}|one)\.partial\.\w{{8}}(?:{re.escape(_REPLACED)})?', re.DOTALL)
 
 
 class Writing(Protocol):
@@ -176,8 +178,14 @@ def _try_to_lock(descriptor: int) -> bool | None:
     return True
 
 
-def remove_abandoned(folders: Iterable[Path]) -> None:
-    """Remove partial results of killed runs beside these folders."""
+def remove_abandoned(folders: Iterable[Path], ended: str = '') -> None:
+    """
+    Remove partial results of killed runs beside these folders.
+
+    ended: identifier of a run that has ended: what is left of it is removed as soon as its
+        processes have died.
+    """
+    until = time.monotonic() + _SECONDS_TO_DIE
     finals: dict[Path, dict[str, Path]] = {}
     for final in folders:
         finals.setdefault(final.parent, {})[_beginning(final)] = final
@@ -186,11 +194,18 @@ def remove_abandoned(folders: Iterable[Path]) -> None:
         for path in sorted(parent.iterdir()) if parent.is_dir() else ():
             found = _PARTIAL.fullmatch(path.name)
             if found and found[1] in of_names:
-                _remove_if_abandoned(path, of_names[found[1]])
+                final = of_names[found[1]]
+                while (not _remove_if_abandoned(path, final) and found[2] == ended
+                       and time.monotonic() < until):
+                    time.sleep(_LOOK)
 
 
-def _remove_if_abandoned(path: Path, final: Path) -> None:
-    """Remove partial results or restore the results they were to replace, unless in use."""
+def _remove_if_abandoned(path: Path, final: Path) -> bool:
+    """
+    Remove partial results or restore the results they were to replace, unless in use.
+
+    Returns whether it has done so.
+    """
     partial = path.with_name(path.name.removesuffix(_REPLACED))
     locked = partial if partial.exists() else final
     try:
@@ -198,10 +213,11 @@ def _remove_if_abandoned(path: Path, final: Path) -> None:
     except FileNotFoundError:
         with suppress(OSError):
             path.rename(final)
-        return
+        return True
     try:
-        if _try_to_lock(descriptor):
+        if unused := bool(_try_to_lock(descriptor)):
             shutil.rmtree(path, ignore_errors=True)
+        return unused
     finally:
         os.close(descriptor)
 
