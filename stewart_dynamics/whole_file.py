@@ -105,7 +105,7 @@ class FilesOfFolder:
         """
         Make the folder if it is missing, write the files and return their paths.
 
-        All of them are complete, or none is there.
+        Either all of them are written, or the folder stays as it was.
         """
         self.check(files)
         paths = {self._folder / name: content for name, content in files.items()}

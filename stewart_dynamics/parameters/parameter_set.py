@@ -281,7 +281,7 @@ class ParameterSet(Mapping[str, Any]):
 
     def _for_yaml(self, comments: Mapping[str, str] | None,
                   ) -> tuple[dict[str, Any], dict[str, str]]:
-        """Return the values to write, and what stands behind each."""
+        """Return the values to write, and the comment behind each."""
         values = {name: self._given.get(name, parameter.default)
                   for name, parameter in self.table.items()
                   if name in self._given or not name.startswith(self.described)}

@@ -203,7 +203,7 @@ def write_fleet(output: Path, rows: Sequence[Row], files: FilesOfFolder | None =
     """
     Write fleet.csv and index.html into a folder, both complete or not at all.
 
-    ``files`` holds what was in the folder when the run began; by default what is there now.
+    ``files`` knows the content of the folder when the run began; by default the present one.
     """
     text = io.StringIO(newline='')
     # All text in quotes: spreadsheets that separate by semicolon do not split names.

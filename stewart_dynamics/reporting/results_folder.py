@@ -182,8 +182,8 @@ def remove_abandoned(folders: Iterable[Path], ended: str = '') -> None:
     """
     Remove partial results of killed runs beside these folders.
 
-    ended: identifier of a run that has ended: what is left of it is removed as soon as its
-        processes have died.
+    ended: identifier of a run that has ended: its partial results are removed as soon as
+        its processes have died.
     """
     until = time.monotonic() + _SECONDS_TO_DIE
     finals: dict[Path, dict[str, Path]] = {}

@@ -144,7 +144,7 @@ class SetpointDiagnostics(StatusPart):
     def _no_setpoint(self, now: float) -> str:
         """Return why there is no setpoint: silence, rejections or stamps."""
         parameters = self._answers.parameters
-        # Only what has come since the last setpoint could have been joined.
+        # Only messages since the last setpoint could have been joined.
         missing = {topic: at for topic, at in self.heard.items() if at <= self._answers.at}
         return 'no setpoint: ' + (
             _silent_topics(self.heard, parameters['setpoint.timeout'], now)
