@@ -38,7 +38,8 @@ _INTERFACES = ('position', 'velocity', 'effort')
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
     given = _arguments().parse_args(arguments)
-    return _PROGRAM.exit_code(lambda: _read(given) if given.source else _write(given))
+    work = _read if given.source else _write
+    return _PROGRAM.exit_code(lambda: work(given, FilesOfFolder(given.output, given.force)))
 
 
 def _arguments() -> argparse.ArgumentParser:
@@ -79,7 +80,7 @@ def _interfaces(text: str) -> list[str]:
     return found
 
 
-def _write(given: argparse.Namespace) -> int:
+def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.description.hexapod import Hexapod
     from stewart_dynamics.description.mjcf import mjcf
@@ -88,7 +89,6 @@ def _write(given: argparse.Namespace) -> int:
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
-    files = FilesOfFolder(given.output, given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
     hexapod, name = Hexapod(parameters), given.name or given.params.stem
     control = None
@@ -101,13 +101,12 @@ def _write(given: argparse.Namespace) -> int:
     return _judge(parameters, given)
 
 
-def _read(given: argparse.Namespace) -> int:
+def _read(given: argparse.Namespace, files: FilesOfFolder) -> int:
     from stewart_dynamics.description.recognition import read_hexapod
 
     interrupt_on_signals()
     if given.ros2_control is not None:
         raise StewartError('--ros2-control: not with --from')
-    files = FilesOfFolder(given.output, given.force)
     found = read_hexapod(given.source)
     for path in files.write({
             f'{given.name or given.source.stem}.yaml': found.parameters.yaml_text()}):

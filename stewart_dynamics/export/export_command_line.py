@@ -29,7 +29,7 @@ _PROGRAM = Program('stewart_export', 'parameters, or files that exist or cannot 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
     given = _arguments().parse_args(arguments)
-    return _PROGRAM.exit_code(lambda: _export(given))
+    return _PROGRAM.exit_code(lambda: _export(given, FilesOfFolder(given.output, given.force)))
 
 
 def _arguments() -> argparse.ArgumentParser:
@@ -51,7 +51,7 @@ def _arguments() -> argparse.ArgumentParser:
     return parser
 
 
-def _export(given: argparse.Namespace) -> int:
+def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.export.c_project import c_project, check_name
     from stewart_dynamics.export.fmu import find_compiler, fmu, has_binaries
@@ -59,7 +59,6 @@ def _export(given: argparse.Namespace) -> int:
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
-    files_of_folder = FilesOfFolder(given.output, given.force)
     name = check_name(given.name)
     parameters = Parameters.from_yaml(given.params, given.node)
     for mistake in likely_mistakes(parameters):
