@@ -23,8 +23,9 @@ with measured length q and rate v, and q_d, v_d, effort_d as published by stewar
 these stop, it holds the last q_d at rest, with the forces that carry the weight there.
 
 Its parameters are those of ROS: --ros-args -p params_file:=FILE, proportional_gain [N/m],
-derivative_gain [N s/m], timeout [s], feed_forward. Without gains they follow from params_file: 8 Hz
-and a damping ratio of 1 with the mass that a leg moves at home while the other five are held.
+derivative_gain [N s/m], timeout [s], feed_forward. Gains that are not given follow from
+params_file: 8 Hz and a damping ratio of 1 with the mass that a leg moves at home while the other
+five are held.
 """
 
 import argparse

@@ -179,8 +179,8 @@ def main() -> None:
                         'legs, on stewart_dynamics/measured_legs', **pose)
     parser.add_argument('--params', type=Path, default=CONFIG / 'platform.yaml', metavar='FILE',
                         help="the node's parameters, for the pose of the measured legs and home")
-    parser.add_argument('--to', help='[m, rad]; default: 60 mm above the home pose, or a quarter of '
-                        'the way that is free there', **pose)
+    parser.add_argument('--to', help='[m, rad]; default: 60 mm above the home pose, or a quarter '
+                        'of the way that is free there', **pose)
     parser.add_argument('--file', type=Path, metavar='CSV',
                         help='trajectory.csv of stewart_calibrate --design, instead of two poses')
     parser.add_argument('--duration', type=float, default=2.0, help='[s]')

@@ -63,7 +63,7 @@ def _without_waiting(path: str, flags: int) -> int:
 
 
 Identity = tuple[int, int, int]
-"""What tells a file or folder from another one of its name: device, number, time of change [ns]."""
+"""Device, number and time of modification [ns]: of another file of the name they differ."""
 
 
 def identity(path: Path) -> Identity | None:
@@ -120,7 +120,7 @@ class FilesOfFolder:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep other runs from giving names in a folder; does nothing on file systems without locks."""
+    """Keep other runs from renaming files in a folder; without effect if it has no locks."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         with suppress(OSError):

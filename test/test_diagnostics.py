@@ -28,7 +28,8 @@ from stewart_dynamics.node.diagnostics.levels import ERROR, OK, STALE, Status, W
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.ros.repeated_log import RepeatedLog, SECONDS
 from stewart_dynamics.setpoints.inputs import ACCEL, POSE, TWIST
-from stewart_dynamics.setpoints.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE, UNSTAMPED
+from stewart_dynamics.setpoints.rejections import (
+    DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE, UNSTAMPED)
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 

@@ -516,8 +516,8 @@ def test_another_name_of_the_node(tmp_path: Path) -> None:
     assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE
     assert set(outputs_of(tmp_path / 'out' / 'bag').messages) == {
         TF, TF_STATIC, ROBOT_DESCRIPTION,
-        *(f'/cell/hexapod/{topic}' for topic in (*OUTPUT_TYPES, JOINT_STATES,
-                                                   POSE, TWIST, ACCEL))}
+        *(f'/cell/hexapod/{topic}' for topic in (
+            *OUTPUT_TYPES, JOINT_STATES, POSE, TWIST, ACCEL))}
 
 
 def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:

@@ -402,8 +402,8 @@ def test_the_output_bag_gives_the_same_output_bag(
     if given.get('setpoint.source') == 'combined':
         of = [(COMBINED, RECORDED + n * MS, messages.combined(n * MS)) for n in range(1, 400)]
     of = sorted([
-        *of, *((WRENCH, RECORDED + n * 100 * MS + 1, messages.wrench(0, (n, 2.0, 3.0, 4.0, 5.0, 6.0)))
-               for n in range(20)),
+        *of, *((WRENCH, RECORDED + n * 100 * MS + 1,
+                messages.wrench(0, (n, 2.0, 3.0, 4.0, 5.0, 6.0))) for n in range(20)),
         (POSE, RECORDED + 150 * MS, messages.pose(150 * MS)[:40]),
         (POSE, RECORDED + 170 * MS, messages.pose(150 * MS, (math.nan, 0.0, 1.0)))],
         key=lambda each: each[1])

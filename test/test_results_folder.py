@@ -156,7 +156,8 @@ def test_folders_have_the_rights_that_the_mask_of_the_process_leaves(tmp_path: P
 
 @pytest.mark.parametrize('error', [
     lambda path: StewartError(f'{path}: cannot be written'),
-    lambda path: OSError(28, 'No space left', str(path)), lambda path: OSError(28, 'No space left'),
+    lambda path: OSError(28, 'No space left', str(path)),
+    lambda path: OSError(28, 'No space left'),
     lambda path: RuntimeError(f'{path.name} is odd')])
 def test_no_error_has_the_name_of_the_partial_folder(
         tmp_path: Path, error: Callable[[Path], Exception]) -> None:

@@ -35,7 +35,7 @@ from typing import NamedTuple, Protocol
 
 from stewart_dynamics.bags.find import METADATA, OUTPUT_BAG, RESULT
 from stewart_dynamics.errors import BagError
-from stewart_dynamics.whole_file import identity, Identity, locked, named
+from stewart_dynamics.whole_file import Identity, identity, locked, named
 
 # The files by which folders of results are known, as RESULT is that of a replay.
 IDENTIFICATION, DATASHEET, CALIBRATION = (

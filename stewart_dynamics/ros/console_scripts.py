@@ -15,8 +15,8 @@
 """
 The console scripts of the nodes; whatever needs no ROS is answered before rclpy is imported.
 
-``--help``, ``--version``, a parameter file that breaks a rule, and that ROS is missing. Signals are
-handled before anything else is imported.
+``--help``, ``--version``, a parameter file that breaks a rule, and that ROS is missing.
+Signals are handled before anything else is imported.
 """
 
 from __future__ import annotations
