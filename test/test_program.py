@@ -106,6 +106,7 @@ def test_the_end_of_the_terminal_is_an_interrupt_but_not_under_nohup() -> None:
 def test_signals_are_handled_before_anything_large_is_imported(module: str) -> None:
     done = subprocess.run(
         [sys.executable, '-I', '-c',
-         f'import stewart_dynamics.{module}, sys; print(*sys.modules)'], capture_output=True, text=True, timeout=300, check=True)
+         f'import stewart_dynamics.{module}, sys; print(*sys.modules)'],
+        capture_output=True, text=True, timeout=300, check=True)
     assert not {'argparse', 'numpy', 'yaml', 'threading', 'stewart_dynamics.program'} & set(
         done.stdout.split())
