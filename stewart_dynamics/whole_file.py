@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import datetime, timezone
 import errno
@@ -32,12 +32,14 @@ from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.signals import signals_wait
 
 
-def read_text(path: str | Path, largest: int, error: type[StewartError]) -> str:
+def read_text(path: str | Path, largest: int, error: type[StewartError],
+              check: Callable[[Any, bytes], None] | None = None) -> str:
     """
     Return the text of a regular file of UTF-8.
 
     path: the file; a pipe or a device is rejected without waiting for it.
     largest: largest size [bytes].
+    check: is called with path and bytes before they are decoded, to reject them.
     Raises StewartError: in one line: the file cannot be read, is too large or is not UTF-8.
     """
     try:
@@ -51,6 +53,8 @@ def read_text(path: str | Path, largest: int, error: type[StewartError]) -> str:
         raise error(f'{shown(str(path))}: cannot be read: {exc}') from exc
     if len(data) > largest:
         raise error(f'{path}: larger than {largest} bytes')
+    if check is not None:
+        check(path, data)
     try:
         return data.decode('utf-8')
     except UnicodeDecodeError as exc:
@@ -181,8 +185,29 @@ def now() -> str:
 
 def write_json(path: Path, document: Any) -> None:
     """Write a document as JSON, complete or not at all."""
-    write_files({path: json.dumps(
-        document, indent=2, allow_nan=False, ensure_ascii=False) + '\n'})
+    write_files({path: to_json(document, indent=2) + '\n'})
+
+
+def to_json(document: Any, indent: int | None = None) -> str:
+    """
+    Return a document as JSON, on one line unless lines are indented.
+
+    Numpy scalars and arrays are written as numbers and lists.
+
+    Raises ValueError: a number is not finite.
+    """
+    # Not orjson: it writes null for NaN, and takes no names that are not UTF-8.
+    return json.dumps(document, indent=indent, separators=None if indent else (',', ':'),
+                      allow_nan=False, ensure_ascii=False, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    """Return a numpy scalar or array as Python's own numbers."""
+    import numpy as np  # late, so that --help is fast
+
+    if not isinstance(value, (np.generic, np.ndarray)):
+        raise TypeError(f'{value!r}: {type(value).__name__} has no form in JSON')
+    return value.tolist()
 
 
 @contextmanager
