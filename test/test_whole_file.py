@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+import compileall
 from contextlib import contextmanager
 import json
 import math
@@ -48,14 +49,13 @@ def full_disk(room: int = FULL) -> Iterator[None]:
     """Let no file grow beyond ``room`` bytes: writing fails halfway, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     # Python would cut its own files, here and in the processes that compile.
+    compileall.compile_dir(ROOT / 'stewart_dynamics', quiet=2)
     kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True
-    os.environ['PYTHONDONTWRITEBYTECODE'] = '1'
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
     try:
         yield
     finally:
         sys.dont_write_bytecode = kept
-        del os.environ['PYTHONDONTWRITEBYTECODE']
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
