@@ -39,10 +39,12 @@ the legs' axes, force times lead / (2 pi), are not part of the leg forces.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import entry_point, inlined
@@ -52,6 +54,7 @@ from stewart_dynamics.mechanics.dynamics.bodies import leg_line
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, mounts
+from stewart_dynamics.mechanics.leg_curves import columns, figure, LEGS
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, consecutive, FORCES, LINEAR_ACCELERATION,
@@ -59,6 +62,9 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, read3, read9, rotate, scale, subtract, Vector3)
 from stewart_dynamics.parameters.table import Parameters, RIGHT, UNIVERSAL
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @inlined
@@ -119,6 +125,11 @@ _DRIVE = 15
 _ALONG_A_LEG = 0.1
 
 
+# Columns of a table of motors, in the order of Motors.
+_COLUMNS = ('angle', 'speed', 'acceleration', 'torque', 'current', 'power', 'copper_heat',
+            'breakaway_torque', 'available_torque')
+
+
 class Motors(NamedTuple):
     """
     The six motors in a motion, (..., 6) each; nan where ``drive.*`` does not give them.
@@ -166,6 +177,25 @@ class Motors(NamedTuple):
         """Return available less breakaway torques (..., 6) [N m]; negative where exceeded."""
         margins: Array = self.available_torques - np.abs(self.breakaway_torques)
         return margins
+
+    def to_dict(self) -> dict[str, Array]:
+        """
+        Return the numbers as columns, each (N,), as ``pandas.DataFrame`` takes them.
+
+        Leading shapes are flattened; SI units. The columns of the motors end in _1 to _6.
+        """
+        return columns(dict(zip(_COLUMNS, self, strict=True)))
+
+    def plot(self, times: ArrayLike | None = None, joints: Sequence[str] = LEGS) -> Figure:
+        """
+        Return a matplotlib figure of speeds and torques, and of currents and power if known.
+
+        Arguments and errors are those of ``InverseDynamics.plot``.
+        """
+        curves = {'speed [rad/s]': self.speeds, 'torque [N m]': self.torques,
+                  'current [A]': self.currents, 'power [W]': self.power}
+        known = {name: each for name, each in curves.items() if np.isfinite(each).any()}
+        return figure(known or curves, times, joints)
 
     def __repr__(self) -> str:
         """Return the shape, not the arrays."""
