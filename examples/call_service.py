@@ -20,6 +20,7 @@ std_srvs/srv/Trigger. Exit code: 0 success, 1 not.
 """
 
 import argparse
+import signal
 import sys
 
 import rclpy
@@ -53,6 +54,8 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.exit(130)
     finally:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         rclpy.try_shutdown()
     print(answer.result().message)
     sys.exit(not answer.result().success)

@@ -21,8 +21,14 @@ It is not a part of the package, which computes forces and controls nothing. For
 
 with measured length q and rate v, and q_d, v_d, effort_d as published by stewart_dynamics. When
 these stop, it holds the last q_d at rest, with the forces that carry the weight there.
+
+Its parameters are those of ROS: --ros-args -p params_file:=FILE, proportional_gain [N/m],
+derivative_gain [N s/m], timeout [s], feed_forward. Gains that are not given follow from
+params_file: 8 Hz and a damping ratio of 1 with the mass that a leg moves at home while the other
+five are held.
 """
 
+import argparse
 import math
 import signal
 import sys
@@ -35,10 +41,26 @@ from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Motion, StewartError, StewartPlatform
+
+
+FREQUENCY, DAMPING_RATIO = 8.0, 1.0  # [Hz], 1
+# By the same rule, with the 160 kg of config/platform.yaml 1.1 m above its base.
+EXAMPLE_GAINS = 4.0e5, 1.6e4
+
+
+def gains(platform: StewartPlatform) -> tuple[float, float]:
+    """Return proportional [N/m] and derivative gain [N s/m] for the largest mass of a leg."""
+    home = platform.home_pose()
+    to_twist = np.linalg.inv(platform.inverse_jacobian(home))
+    # The mass that a leg moves while the other five are held.
+    mass = np.diag(to_twist.T @ platform.mass_matrix(home) @ to_twist).max()
+    omega = 2.0 * math.pi * FREQUENCY
+    return float(mass * omega ** 2), float(2.0 * DAMPING_RATIO * mass * omega)
 
 
 class LegController(Node):
@@ -53,15 +75,14 @@ class LegController(Node):
 
     def __init__(self) -> None:
         super().__init__('leg_controller')
-        # 8 Hz and a damping ratio of 1 with 160 kg, the mass that one leg of
-        # config/platform.yaml moves at home while the other five are held.
-        self.k_p = self.positive('proportional_gain', 4.0e5, 'force per length [N/m]')
-        self.k_d = self.positive('derivative_gain', 1.6e4, 'force per rate [N s/m]')
         self.timeout = self.positive('timeout', 0.05, 'oldest desired state to follow [s]')
         self.feed_forward = self.constant('feed_forward', True, 'add the desired effort')
         self.stepped = self.get_parameter('use_sim_time').value
         self.platform = self.platform_of(self.constant(
             'params_file', '', 'of the hexapod, for the forces at rest'))
+        k_p, k_d = gains(self.platform) if self.platform else EXAMPLE_GAINS
+        self.k_p = self.positive('proportional_gain', k_p, 'force per length [N/m]')
+        self.k_d = self.positive('derivative_gain', k_d, 'force per rate [N s/m]')
         self.measured = self.desired = self.answered = self.held = None
         self.commands = self.create_publisher(
             Float64MultiArray, 'stewart_simulator/commands', 1)
@@ -155,6 +176,8 @@ class LegController(Node):
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: signals.append(number))
@@ -163,6 +186,7 @@ def main() -> None:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as exc:  # bad ROS arguments
         sys.exit(f'leg_controller: {exc}')
+    parser.parse_args(remove_ros_args(sys.argv)[1:])
     executor = EventsExecutor()
     try:
         executor.add_node(LegController())
@@ -171,6 +195,8 @@ def main() -> None:
     except (InvalidParameterTypeException, StewartError, ValueError) as exc:
         sys.exit(f'leg_controller: {exc}')
     finally:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         executor.shutdown()
         rclpy.try_shutdown()
 

@@ -23,8 +23,13 @@ stewart_dynamics, the exact inverse with its derivatives: the platform as the mo
 Setpoints go on from wherever the base is: start it while the platform is near its target. When
 the motion of the base stops for the timeout, setpoints stop, and begin again with a restart only:
 by then the base may be elsewhere, and the first setpoint would be a step.
+
+Its parameters are those of ROS: --ros-args -p position:=[X,Y,Z] (of the platform in the world, m)
+or -p params_file:=FILE (of the hexapod: its home position), angles (alpha, beta, gamma [rad]),
+timeout [s], base_frame.
 """
 
+import argparse
 import signal
 import sys
 import time
@@ -36,9 +41,11 @@ import rclpy
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
-from stewart_dynamics import Motion, Pose, StewartError
+from stewart_dynamics import Motion, Pose, StewartError, StewartPlatform
 
 TYPES = {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
 
@@ -70,7 +77,12 @@ class MotionCompensation(Node):
 
     def __init__(self) -> None:
         super().__init__('motion_compensation')
-        position = self.constant('position', [0.0, 0.0, 1.1], 'of the platform in the world [m]')
+        file = self.constant('params_file', '', 'of the hexapod: its home position is the default')
+        home = (StewartPlatform.from_yaml(file).home_pose().position.tolist() if file
+                else Parameter.Type.DOUBLE_ARRAY)
+        position = self.constant('position', home, 'of the platform in the world [m]')
+        if position is None:
+            raise StewartError('position or params_file: one must be given')
         angles = self.constant('angles', [0.0, 0.0, 0.0],
                                'alpha, beta, gamma of the platform in the world [rad]')
         self.target = Pose.from_euler(position, angles)
@@ -150,6 +162,8 @@ def vector(three: np.ndarray) -> Vector3:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: signals.append(number))
@@ -158,6 +172,7 @@ def main() -> None:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as exc:  # bad ROS arguments
         sys.exit(f'motion_compensation: {exc}')
+    parser.parse_args(remove_ros_args(sys.argv)[1:])
     executor = EventsExecutor()
     try:
         node = MotionCompensation()
@@ -168,6 +183,8 @@ def main() -> None:
     except (InvalidParameterTypeException, StewartError) as exc:
         sys.exit(f'motion_compensation: {exc}')
     finally:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         executor.shutdown()
         rclpy.try_shutdown()
 

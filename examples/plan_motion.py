@@ -28,6 +28,7 @@ Exit code: 0 accepted, 1 not.
 import argparse
 from collections.abc import Callable
 from pathlib import Path
+import signal
 import sys
 import time
 
@@ -41,7 +42,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
-from stewart_dynamics import Motion, StewartPlatform
+from stewart_dynamics import Capability, Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_euler, to_quaternion
 from stewart_dynamics.reference_motion.motion import motion_at, sample_times
@@ -161,6 +162,15 @@ def present_pose(planner: Planner, params: Path, timeout: float) -> list:
     return [*pose.position.tolist(), *to_euler(pose.rotation).tolist()]
 
 
+def above_home(params: Path) -> list:
+    """Return X Y Z alpha beta gamma of a pose that is reached from the home pose."""
+    platform = StewartPlatform.from_yaml(params)
+    home = platform.home_pose()
+    free = float(Capability(platform).travel(home, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]).value)
+    x, y, z = home.position.tolist()
+    return [x, y, z + min(0.06, 0.25 * free), *to_euler(home.rotation).tolist()]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -168,8 +178,9 @@ def main() -> None:
     parser.add_argument('--from', dest='start', help='[m, rad]; default: the pose of the measured '
                         'legs, on stewart_dynamics/measured_legs', **pose)
     parser.add_argument('--params', type=Path, default=CONFIG / 'platform.yaml', metavar='FILE',
-                        help="the node's parameters, for the pose of the measured legs")
-    parser.add_argument('--to', default=[0.1, -0.05, 1.2, 0.0, 0.1, 0.3], help='[m, rad]', **pose)
+                        help="the node's parameters, for the pose of the measured legs and home")
+    parser.add_argument('--to', help='[m, rad]; default: 60 mm above the home pose, or a quarter '
+                        'of the way that is free there', **pose)
     parser.add_argument('--file', type=Path, metavar='CSV',
                         help='trajectory.csv of stewart_calibrate --design, instead of two poses')
     parser.add_argument('--duration', type=float, default=2.0, help='[s]')
@@ -187,13 +198,16 @@ def main() -> None:
             motion = from_file(options.file)
         else:
             start = options.start or present_pose(planner, options.params, options.timeout)
-            motion = trajectory(start, options.to, options.duration)
+            end = options.to or above_home(options.params)
+            motion = trajectory(start, end, options.duration)
         answer = ask(planner, motion, options.timeout)
     except KeyboardInterrupt:
         sys.exit(130)
     except StewartError as exc:
         sys.exit(str(exc))
     finally:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         rclpy.try_shutdown()
     last = answer.points[-1].time_from_start
     line = f'accepted: {len(answer.points)} points over {last.sec + 1e-9 * last.nanosec:g} s'

@@ -21,6 +21,7 @@ moves the hexapod: brakes that hold appear as a load, too.
 """
 
 import argparse
+import signal
 import sys
 import time
 
@@ -100,6 +101,8 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.exit(130)
     finally:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         rclpy.try_shutdown()
 
 

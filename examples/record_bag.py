@@ -15,15 +15,17 @@
 """
 Example: record topics into a bag, where there is no ros2 bag record. Copy what you need.
 
-Without TOPIC it records /joint_states and all topics of stewart_dynamics and stewart_simulator,
-those that appear later, too. It ends with Ctrl-C, or after --duration; the bag is an MCAP for
-stewart_replay and stewart_identify. Only types of ROS itself can be recorded.
+Without TOPIC it records joint_states and all topics of stewart_dynamics and stewart_simulator, in
+any namespace, those that appear later, too; with --ros-args -r __ns:=/cell only those in /cell. It
+ends with Ctrl-C, or after --duration; the bag is an MCAP for stewart_replay and stewart_identify.
+Only types of ROS itself can be recorded. Exit code: 0 recorded, 1 not, as without any message.
 """
 
 import argparse
 from functools import partial
 import importlib
 from pathlib import Path
+import shutil
 import signal
 import sys
 import time
@@ -38,7 +40,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from rosbags.typesys import get_typestore, Stores
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
-PREFIXES = ('/stewart_dynamics/', '/stewart_simulator/')
+NODES = ('/stewart_dynamics/', '/stewart_simulator/')
 DEPTH = 1000  # messages that wait while the disk is slow
 
 
@@ -55,7 +57,8 @@ class Recorder(Node):
         """Subscribe to topics that have appeared."""
         for topic, types in self.get_topic_names_and_types():
             is_wanted = topic in self.wanted if self.wanted else (
-                topic == '/joint_states' or topic.startswith(PREFIXES))
+                topic.startswith(self.get_namespace()) and (
+                    topic.endswith('/joint_states') or any(node in topic for node in NODES)))
             if is_wanted and topic not in self.counts and self.count_publishers(topic):
                 self.counts[topic] = 0
                 if len(types) == 1 and types[0] in TYPES.types:
@@ -112,7 +115,13 @@ def main() -> None:
     except (OSError, WriterError) as exc:
         sys.exit(f'record_bag: {exc}')
     finally:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         rclpy.try_shutdown()
+    if not any(recorder.counts.values()):
+        shutil.rmtree(options.output)  # which it has made
+        sys.exit('record_bag: no message was received on ' + (
+            ', '.join(options.topics) or 'a topic of stewart_dynamics or stewart_simulator'))
     for topic, count in sorted(recorder.counts.items()):
         print(f'{count:8} {topic}')
     for topic in sorted(set(options.topics) - set(recorder.counts)):

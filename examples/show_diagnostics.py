@@ -71,6 +71,8 @@ def main() -> None:
         while not signals:
             rclpy.spin_once(monitor, timeout_sec=0.1)
     finally:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         rclpy.try_shutdown()
 
 

@@ -26,6 +26,7 @@ Exit code: 0 ended with Ctrl-C, 1 not started.
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 import math
 from pathlib import Path
 import signal
@@ -41,17 +42,23 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
-from stewart_dynamics import approach, Motion, Pose, StewartError, StewartPlatform
+from stewart_dynamics import approach, Capability, Motion, Pose, StewartError, StewartPlatform
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
 RATE = 100.0  # setpoints per second
 
 
-def setpoint(seconds: float) -> Motion:
-    """Return the setpoint at a time of the stream: here up and down by 60 mm, at 0.2 Hz."""
-    w, up = 2.0 * math.pi * 0.2, np.array([0.0, 0.0, 0.03])
+def height(platform: StewartPlatform) -> float:
+    """Return how far the stream goes up: 60 mm, at most a quarter of the way that is free [m]."""
+    up = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    return min(0.06, 0.25 * float(Capability(platform).travel(platform.home_pose(), up).value))
+
+
+def setpoint(home: Pose, most: float, seconds: float) -> Motion:
+    """Return the setpoint at a time of the stream: here up from home and back, at 0.2 Hz."""
+    w, up = 2.0 * math.pi * 0.2, np.array([0.0, 0.0, 0.5 * most])
     return Motion(
-        position=[0.02, 0.0, 1.13] - up * math.cos(w * seconds), rotation=np.eye(3),
+        position=home.position + up * (1.0 - math.cos(w * seconds)), rotation=home.rotation,
         linear_velocity=up * w * math.sin(w * seconds),
         linear_acceleration=up * w * w * math.cos(w * seconds))
 
@@ -62,6 +69,7 @@ class Stream(Node):
     def __init__(self, platform: StewartPlatform) -> None:
         super().__init__('stream')
         self.platform, self.answered, self.sent = platform, False, 0
+        self.setpoint = partial(setpoint, platform.home_pose(), height(platform))
         self.legs: dict[str, float] = {}
         self.measured = self.create_subscription(
             JointState, 'stewart_dynamics/measured_legs', self.on_legs, qos_profile_sensor_data)
@@ -97,7 +105,7 @@ class Stream(Node):
         """Publish the approach and then the stream; exit with one line without an answer."""
         # Give a wrench or a base here if the node has one: forces have a limit.
         _, self.before = approach(
-            self.platform, self.present_pose(timeout), setpoint(0.0), rate=RATE)
+            self.platform, self.present_pose(timeout), self.setpoint(0.0), rate=RATE)
         self.index, self.first_stamp = 0, self.get_clock().now().nanoseconds
         self.create_timer(1.0 / RATE, self.publish_next)
         if not self.until(lambda: self.answered, timeout):
@@ -108,7 +116,7 @@ class Stream(Node):
         if self.index < len(self.before):
             motion = self.before[self.index]
         else:
-            motion = setpoint((self.index - len(self.before) + 1) / RATE)
+            motion = self.setpoint((self.index - len(self.before) + 1) / RATE)
         pose, twist, accel = messages = PoseStamped(), TwistStamped(), AccelStamped()
         # Stamps follow the motion, not the clock: a late timer causes no jump in the setpoints.
         stamp = Time(nanoseconds=self.first_stamp + round(self.sent * 1e9 / RATE)).to_msg()
@@ -159,6 +167,8 @@ def main() -> None:
     except StewartError as exc:  # parameters, measured legs or approach
         sys.exit(str(exc))
     finally:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         rclpy.try_shutdown()
 
 

@@ -33,6 +33,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.ros.launch_arguments import check_launch_arguments
 
 FILES = {
     'params_file': ('platform.yaml', 'YAML file with the parameters of the hexapod'),
@@ -88,7 +89,7 @@ def nodes(context: LaunchContext) -> list[Action]:
 def generate_launch_description() -> LaunchDescription:
     """Return the four nodes and the arguments."""
     share = FindPackageShare('stewart_dynamics')
-    return LaunchDescription([
+    description = LaunchDescription([
         *(DeclareLaunchArgument(
             name, default_value=PathJoinSubstitution([share, 'config', file]), description=text)
           for name, (file, text) in FILES.items()),
@@ -107,3 +108,6 @@ def generate_launch_description() -> LaunchDescription:
             'namespace', default_value='', description='namespace of all nodes'),
         OpaqueFunction(function=nodes),
     ])
+    check_launch_arguments(
+        __file__, sys.argv, [each.name for each in description.get_launch_arguments()])
+    return description

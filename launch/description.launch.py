@@ -22,6 +22,7 @@ its joints on joint_states. It needs robot_state_publisher and rviz2.
 """
 
 from pathlib import Path
+import sys
 
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
@@ -34,6 +35,7 @@ from launch_ros.substitutions import FindPackageShare
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.ros.launch_arguments import check_launch_arguments
 
 PACKAGES = ('robot_state_publisher', 'rviz2')
 JOINT_STATES = '/stewart_dynamics/joint_states'
@@ -64,7 +66,7 @@ def nodes(context: LaunchContext) -> list[Action]:
 def generate_launch_description() -> LaunchDescription:
     """Return the programs and the arguments."""
     config = PathJoinSubstitution([FindPackageShare('stewart_dynamics'), 'config'])
-    return LaunchDescription([
+    description = LaunchDescription([
         DeclareLaunchArgument(
             'params_file', default_value=PathJoinSubstitution([config, 'platform.yaml']),
             description='YAML file with the parameters of the hexapod'),
@@ -75,3 +77,6 @@ def generate_launch_description() -> LaunchDescription:
             description='configuration of RViz; its fixed frame is base_frame'),
         OpaqueFunction(function=nodes),
     ])
+    check_launch_arguments(
+        __file__, sys.argv, [each.name for each in description.get_launch_arguments()])
+    return description

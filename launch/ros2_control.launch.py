@@ -28,6 +28,7 @@ ros2_controllers and robot_state_publisher.
 """
 
 from pathlib import Path
+import sys
 
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
@@ -39,6 +40,7 @@ from launch_ros.substitutions import FindPackageShare
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.ros.launch_arguments import check_launch_arguments
 
 PACKAGES = ('controller_manager', 'joint_state_broadcaster', 'joint_trajectory_controller',
             'robot_state_publisher')
@@ -95,7 +97,7 @@ def nodes(context: LaunchContext) -> list[Action]:
 def generate_launch_description() -> LaunchDescription:
     """Return the nodes and the arguments."""
     share = FindPackageShare('stewart_dynamics')
-    return LaunchDescription([
+    description = LaunchDescription([
         *(DeclareLaunchArgument(
             name, default_value=PathJoinSubstitution([share, 'config', file]), description=text)
           for name, (file, text) in FILES.items()),
@@ -105,3 +107,6 @@ def generate_launch_description() -> LaunchDescription:
                         'params_file with mock hardware'),
         OpaqueFunction(function=nodes),
     ])
+    check_launch_arguments(
+        __file__, sys.argv, [each.name for each in description.get_launch_arguments()])
+    return description

@@ -16,12 +16,15 @@
 """Start the node with its parameters from a file; it becomes active by itself."""
 
 from pathlib import Path
+import sys
 
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
+
+from stewart_dynamics.ros.launch_arguments import check_launch_arguments
 
 TOPICS = {
     'leg_forces': 'topic of the leg forces, as the commands of an effort controller',
@@ -46,7 +49,7 @@ def node(context: LaunchContext) -> list[Action]:
 
 def generate_launch_description() -> LaunchDescription:
     """Return the node and the arguments."""
-    return LaunchDescription([
+    description = LaunchDescription([
         DeclareLaunchArgument(
             'params_file',
             default_value=PathJoinSubstitution(
@@ -58,3 +61,6 @@ def generate_launch_description() -> LaunchDescription:
           for topic, text in TOPICS.items()),
         OpaqueFunction(function=node),
     ])
+    check_launch_arguments(
+        __file__, sys.argv, [each.name for each in description.get_launch_arguments()])
+    return description

@@ -12,33 +12,30 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Exit codes, messages in one line and signals of the programs without ROS."""
+"""Exit codes, options and messages in one line of the programs without ROS."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from importlib import import_module
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from contextlib import suppress
 import io
 import os
 from pathlib import Path
 import re
-import signal
 import sys
-from threading import current_thread, main_thread
 from typing import Any, TextIO, TYPE_CHECKING
 
-from stewart_dynamics import __version__
+from stewart_dynamics import __version__, signals
 from stewart_dynamics.errors import one_line, StewartError
 
 if TYPE_CHECKING:
     from stewart_dynamics.compilation.functions import EntryPoint
 
-DONE, STRICT, BAD_INPUT, PARTLY_READ, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, STRICT, PARTLY_READ = 0, 1, 3
+BAD_INPUT, INTERRUPTED = signals.BAD_INPUT, signals.INTERRUPTED
 NODE = '/stewart_dynamics'  # name of the node if no other is given
 SOFTWARE = f'stewart_dynamics {__version__}'  # name and version, as results have it
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Program:
@@ -184,77 +181,6 @@ class _StoreOnce(argparse.Action):
             raise argparse.ArgumentError(self, 'given twice')
         self._stored = True
         setattr(namespace, self.dest, values)
-
-
-def run_program(name: str, module: str, arguments: Sequence[str] | None) -> int:
-    """
-    Import a module, run its ``main``, and return the exit code; report a missing library.
-
-    Without arguments, those of the command line, signals are ignored afterwards: the process ends.
-    OpenBLAS, which numpy loads, gets one thread unless the environment says otherwise: the
-    matrices are small, and its threads wait for each other on a busy computer.
-    """
-    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
-    def end_at_once(number: int, frame: object) -> None:
-        """End while libraries are imported: numpy turns an exception into another one."""
-        os.write(2, f'{name}: interrupted\n'.encode())
-        os._exit(INTERRUPTED)
-
-    before = {each: signal.signal(each, end_at_once) for each in _SIGNALS}
-    try:
-        code: int = import_module(module).main(arguments)
-        return code
-    except ModuleNotFoundError as exc:
-        print(f'{name}: needs {exc.name}: pip install {exc.name}', file=sys.stderr)
-        return BAD_INPUT
-    finally:
-        for each, handler in before.items():
-            signal.signal(each, signal.SIG_IGN if arguments is None else handler)
-
-
-def interrupt_on_signals() -> None:
-    """From now on raise KeyboardInterrupt on the first signal that ends programs."""
-    for each in _SIGNALS:
-        signal.signal(each, _interrupted)
-
-
-def _interrupted(number: int, frame: object) -> None:
-    """Stop; further signals are ignored while partial results are removed."""
-    for each in _SIGNALS:
-        signal.signal(each, signal.SIG_IGN)
-    raise KeyboardInterrupt
-
-
-@contextmanager
-def signals_wait() -> Iterator[Callable[[], None]]:
-    """
-    Yield a function that calls the handlers of the signals received since its last call.
-
-    For libraries that an exception in the middle of their functions leaves with a lock taken.
-    """
-    received: list[int] = []
-
-    def wait(number: int, frame: object) -> None:
-        received.append(number)
-
-    def handle() -> None:
-        while received:
-            handlers[number := received.pop()](number, None)
-
-    # Only the main thread handles signals, and may change how.
-    handled = _SIGNALS if current_thread() is main_thread() else ()
-    handlers = {int(each): handler for each in handled
-                if callable(handler := signal.getsignal(each))}
-    for each in handlers:
-        signal.signal(each, wait)
-    try:
-        yield handle
-    finally:
-        for each, handler in handlers.items():
-            if signal.getsignal(each) is wait:
-                signal.signal(each, handler)
-        handle()
 
 
 def unexpected(exc: BaseException) -> str:

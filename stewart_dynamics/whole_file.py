@@ -17,9 +17,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime, timezone
 import errno
+import fcntl
 import json
 import os
 from pathlib import Path
@@ -27,8 +28,8 @@ import secrets
 import stat
 from typing import Any
 
-import numpy as np
 from stewart_dynamics.errors import shown, StewartError
+from stewart_dynamics.signals import signals_wait
 
 
 def read_text(path: str | Path, largest: int, error: type[StewartError],
@@ -65,49 +66,116 @@ def _without_waiting(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NONBLOCK)
 
 
-def write_new(folder: Path, files: Mapping[str, str | bytes], replace: bool) -> list[Path]:
+Identity = tuple[int, int, int]
+"""Device, number and time of modification [ns]: of another file of the name they differ."""
+
+
+def identity(path: Path) -> Identity | None:
+    """Return the identity of a file, folder or link; None if there is no such name."""
+    try:
+        found = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    return found.st_dev, found.st_ino, found.st_mtime_ns
+
+
+class FilesOfFolder:
     """
-    Write files into a folder, which is made if it is missing, as ``write_files`` does.
+    The files that a program adds to a folder, in which there may be others.
 
-    Returns their paths; StewartError if a file exists that may not be replaced.
+    Existing ones are replaced only if ``replace``. What another run has written since this object
+    was made is never replaced. A link is replaced, not followed: nothing outside is written.
     """
-    paths = {folder / name: content for name, content in files.items()}
-    check_new(paths, replace)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_files(paths)
-    return list(paths)
+
+    def __init__(self, folder: Path, replace: bool) -> None:
+        self._folder, self._replace = folder, replace
+        self._before: dict[str, Identity | None] = {}
+        with suppress(FileNotFoundError, NotADirectoryError), named(folder):
+            self._before = {path.name: identity(path) for path in folder.iterdir()}
+
+    def check(self, names: Iterable[str]) -> None:
+        """Raise StewartError where a file exists that may not be replaced."""
+        for path in (self._folder / name for name in names):
+            found = identity(path)
+            if found is None:
+                continue
+            if not self._replace:
+                raise StewartError(f'{path}: exists; --force replaces it')
+            if found != self._before.get(path.name):
+                raise StewartError(f'{path}: another run has written it meanwhile: it is not '
+                                   'replaced')
+
+    def write(self, files: Mapping[str, str | bytes]) -> list[Path]:
+        """
+        Make the folder if it is missing, write the files and return their paths.
+
+        Either all of them are written, or the folder stays as it was.
+        """
+        self.check(files)
+        paths = {self._folder / name: content for name, content in files.items()}
+        with named(self._folder):
+            self._folder.mkdir(parents=True, exist_ok=True)
+        with _partial_files({path: path for path in paths}, paths) as partial, locked(
+                self._folder), signals_wait():
+            self.check(files)
+            _rename(partial)
+        return list(paths)
 
 
-def check_new(paths: Iterable[Path], replace: bool) -> None:
-    """Raise StewartError where a file exists that may not be replaced."""
-    for path in paths:
-        if path.exists() and not replace:
-            raise StewartError(f'{path}: exists; --force replaces it')
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Keep other runs from renaming files in a folder; without effect if it has no locks."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def write_files(files: Mapping[Path, str | bytes]) -> None:
     """
     Write files, all of them complete or none.
 
-    Each is written to the disk under another name in its folder; when all are complete, they take
-    their names. Existing files are replaced, and kept where writing fails. Text is UTF-8; names in
-    it that are not UTF-8 are written with escapes.
+    Existing files are replaced, and kept where writing fails; of a link the target is replaced.
+    Text is UTF-8; names in it that are not UTF-8 are written with escapes.
 
     Raises OSError: with the name of the file that cannot be written.
+    """
+    finals = {}
+    for path in files:
+        with named(path):
+            finals[path] = Path(path).resolve()
+    with _partial_files(finals, files) as partial, signals_wait():
+        _rename(partial)
+
+
+@contextmanager
+def _partial_files(finals: Mapping[Path, Path], files: Mapping[Path, str | bytes],
+                   ) -> Iterator[dict[Path, Path]]:
+    """
+    Write each file to the disk under another name in its folder; yield these by final name.
+
+    Those that have not been renamed are removed.
     """
     partial: dict[Path, Path] = {}
     try:
         for path, content in files.items():
             with named(path):
-                final = Path(path).resolve()  # the target of a link is replaced, not the link
+                final = finals[path]
                 partial[final] = final.with_name(f'.{secrets.token_hex(8)}.partial')
                 _write(partial[final], final, content)
-        for final, complete in partial.items():
-            with named(final):
-                complete.replace(final)
+        yield partial
     finally:
         for left in partial.values():
             left.unlink(missing_ok=True)
+
+
+def _rename(partial: Mapping[Path, Path]) -> None:
+    for final, complete in partial.items():
+        with named(final):
+            complete.replace(final)
 
 
 def now() -> str:
@@ -135,6 +203,8 @@ def to_json(document: Any, indent: int | None = None) -> str:
 
 def _plain(value: Any) -> Any:
     """Return a numpy scalar or array as Python's own numbers."""
+    import numpy as np  # late, so that --help is fast
+
     if not isinstance(value, (np.generic, np.ndarray)):
         raise TypeError(f'{value!r}: {type(value).__name__} has no form in JSON')
     return value.tolist()
@@ -150,13 +220,14 @@ def named(path: str | Path) -> Iterator[None]:
 
 
 def _write(partial: Path, final: Path, content: str | bytes) -> None:
-    if final.is_dir():
+    mode = final.lstat().st_mode if identity(final) else None
+    if mode is not None and stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-    if final.exists() and not final.is_file():
+    if mode is not None and not (stat.S_ISREG(mode) or stat.S_ISLNK(mode)):
         raise OSError(errno.EINVAL, 'not a regular file')
     with partial.open('xb') as file:
-        if final.exists():
-            os.fchmod(file.fileno(), stat.S_IMODE(final.stat().st_mode))
+        if mode is not None and stat.S_ISREG(mode):
+            os.fchmod(file.fileno(), stat.S_IMODE(mode))
         file.write(content.encode('utf-8', 'backslashreplace') if isinstance(content, str)
                    else content)
         file.flush()

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -30,6 +31,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.console_scripts import check_arguments, usage
+from stewart_dynamics.ros.launch_arguments import check_launch_arguments
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,
@@ -185,3 +187,15 @@ def test_a_missing_one_is_an_error_with_the_folders(workspaces: list[Path]) -> N
         executable('stewart_nothing')
     for path in workspaces:
         assert str(path.parent) in str(error.value)
+
+
+@pytest.mark.parametrize('name, hint', [
+    ('param_file', 'did you mean params_file?'), ('hexapod', 'known are params_file, namespace')])
+def test_an_argument_that_a_launch_file_does_not_have_is_rejected(name: str, hint: str) -> None:
+    known = 'params_file', 'namespace'
+    line = ['ros2', 'launch', 'stewart_dynamics', 'demo.launch.py', f'{name}:=mine.yaml']
+    with pytest.raises(StewartError, match=f'^{name}: unknown argument; {re.escape(hint)}$'):
+        check_launch_arguments('/share/launch/demo.launch.py', line, known)
+    # included by a launch file that has this argument
+    check_launch_arguments('/share/launch/stewart_dynamics.launch.py', line, known)
+    check_launch_arguments('/share/launch/demo.launch.py', [*line[:-1], 'namespace:=cell'], known)

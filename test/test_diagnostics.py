@@ -28,7 +28,8 @@ from stewart_dynamics.node.diagnostics.levels import ERROR, OK, STALE, Status, W
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.ros.repeated_log import RepeatedLog, SECONDS
 from stewart_dynamics.setpoints.inputs import ACCEL, POSE, TWIST
-from stewart_dynamics.setpoints.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
+from stewart_dynamics.setpoints.rejections import (
+    DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE, UNSTAMPED)
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
@@ -169,6 +170,30 @@ def test_stamps_that_are_never_equal_are_logged() -> None:
     assert come(diagnostics, 3.0, TOPICS) == [
         'setpoints: no setpoint: all topics arrive, but none is joined: their stamps differ by '
         'more than setpoint.sync_tolerance, 0 s']
+
+
+def test_zero_stamps_that_are_never_joined_are_named() -> None:
+    diagnostics = begun()
+    diagnostics.rejected(Rejection(POSE, NOT_JOINED), UNSTAMPED, BEGIN)
+    assert come(diagnostics, 3.0, TOPICS) == [
+        'setpoints: no setpoint: all topics arrive, but none is joined: header stamps of '
+        'setpoint/pose are zero: such messages are joined in order of arrival, one of each topic']
+
+
+def test_nothing_is_logged_while_a_late_topic_completes_each_setpoint() -> None:
+    diagnostics = begun()
+    for n in range(250):  # 10 Hz; the acceleration 70 ms after pose and twist
+        now = BEGIN + 0.1 * n
+        for topic in (POSE, TWIST):
+            diagnostics.setpoints.heard[topic] = now
+        if n % 10 == 5:  # reports of each second fall between the two
+            assert logged(diagnostics, now + 0.03) == []
+        # each second setpoint comes later than setpoint.timeout after the one before
+        late = 0.071 if n % 2 else 0.069
+        if n and n % 2:
+            assert diagnostics.setpoints.status(now + 0.0705).message == (
+                'no setpoint: setpoint/accel silent for 0.1 s')
+        answered(diagnostics, now + late, CLEAR, (ACCEL,))
 
 
 def test_nothing_is_logged_without_setpoints_or_when_all_are_answered() -> None:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 import gc
 from pathlib import Path
 import re
@@ -26,6 +27,7 @@ import sys
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
 import numpy as np
 import pytest
+import rclpy
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.highlevel import AnyReader
 from running import (
@@ -33,7 +35,7 @@ from running import (
     own_domain, Peer, PLATFORM, Program, ROOT)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
-from stewart_dynamics import approach, Capability, Motion, Pose
+from stewart_dynamics import approach, Capability, Motion, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.setpoint import pose, StampedWriter, twist
 from stewart_dynamics.reference_motion.motion import motion_at, sample_times
@@ -42,7 +44,8 @@ from trajectory_msgs.msg import JointTrajectory
 
 EXAMPLES = ROOT / 'examples'
 sys.path.insert(0, str(EXAMPLES))
-from stream_setpoints import RATE, setpoint  # noqa: E402, I100, I202
+from leg_controller import gains  # noqa: E402, I100, I202
+from stream_setpoints import height, RATE, setpoint  # noqa: E402, I100, I202
 
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]
 THERE = [0.1, -0.05, 1.2, 0.0, 0.1, 0.3]
@@ -163,9 +166,10 @@ def test_a_stream_begins_with_an_approach_from_the_measured_legs(
     legs = node.peer.writer('/joint_states', JointState)
     measured = serialize_message(JointState(
         name=platform.parameters['joints'], position=(lengths - zero).tolist()))
-    before = approach(platform, platform.forward_kinematics(lengths), setpoint(0.0), rate=RATE)
+    stream = partial(setpoint, platform.home_pose(), height(platform))
+    before = approach(platform, platform.forward_kinematics(lengths), stream(0.0), rate=RATE)
     expected = [platform.inverse_dynamics(motion) for motion in (
-        before.motion, *(setpoint(n / RATE) for n in range(1, 200)))]
+        before.motion, *(stream(n / RATE) for n in range(1, 200)))]
     rows = np.vstack([np.column_stack([
         np.atleast_2d(each.lengths) - zero, np.atleast_2d(each.rates),
         np.atleast_2d(each.forces)]) for each in expected])
@@ -235,6 +239,80 @@ def test_bad_ros_arguments_end_it_with_one_line(domain: int, name: str) -> None:
     line = line_at_the_end(name, domain, '--ros-args', '-r', 'no rule')
     assert line.startswith(f'{name.removesuffix(".py")}: ')
     assert 'remap rule' in line
+
+
+@pytest.mark.parametrize('name', sorted(path.name for path in EXAMPLES.glob('*.py')))
+def test_help_and_unknown_arguments_start_nothing(
+        domain: int, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for argument, code in (('--help', 0), ('--no-such-option', 2)):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv('ROS_DOMAIN_ID', str(domain))
+            patch.setattr(sys, 'argv', [name, argument])
+            with pytest.raises(SystemExit, match=f'^{code}$'):
+                runpy.run_path(str(EXAMPLES / name), run_name='__main__')
+        rclpy.try_shutdown()
+        said = capsys.readouterr()
+        assert f'usage: {name}' in said.out + said.err
+
+
+def test_without_a_position_the_base_is_not_compensated(domain: int) -> None:
+    assert line_at_the_end('motion_compensation.py', domain) == (
+        'motion_compensation: position or params_file: one must be given')
+
+
+def test_nothing_recorded_is_no_success(domain: int, tmp_path: Path) -> None:
+    assert line_at_the_end(
+        'record_bag.py', domain, '--duration', '0.1', '--output', str(tmp_path / 'bag')) == (
+        'record_bag: no message was received on a topic of stewart_dynamics or stewart_simulator')
+    assert not (tmp_path / 'bag').exists()
+
+
+@pytest.mark.parametrize('arguments', [(), ('--ros-args', '-r', '__ns:=/cell')])
+def test_nodes_in_a_namespace_are_recorded(
+        domain: int, run: Run, tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    peer = Peer(domain)
+    topic = '/cell/stewart_dynamics/leg_states'
+    writer = peer.writer(topic, JointState)
+    program = run('record_bag.py', domain, '--output', tmp_path / 'bag', *arguments)
+    peer.watched = program
+    try:
+        peer.until(lambda: writer.get_subscription_count() == 1, 'it is recorded')
+        writer.publish(serialize_message(JointState(name=['leg_1'])))
+        peer.until(lambda: (tmp_path / 'bag').exists(), 'the bag is there')
+        peer.spin(0.5)
+    finally:
+        peer.watched = None
+        code = program.stop()
+        peer.close()
+    assert code == 0, program.stderr
+    assert re.search(rf'^ +1 {topic}$', program.stdout, re.MULTILINE), program.stdout
+
+
+def test_gains_and_heights_are_those_of_the_hexapod() -> None:
+    for name in ('platform', 'telescope'):
+        platform = StewartPlatform.from_yaml(ROOT / 'config' / f'{name}.yaml')
+        home = platform.home_pose()
+        most = height(platform)
+        assert 0.0 < most <= 0.06
+        lengths = platform.inverse_kinematics(home)
+        p = platform.parameters
+        top = platform.inverse_kinematics(setpoint(home, most, 2.5))
+        assert np.all(top <= p['limits.length_max'])
+        assert np.all(lengths >= p['limits.length_min'])
+        k_p, k_d = gains(platform)
+        omega = 2.0 * np.pi * 8.0
+        assert k_d == pytest.approx(2.0 * k_p / omega)
+        masses = []  # the force for an acceleration of one leg, the others held
+        for leg in range(6):
+            acceleration = np.zeros(6)
+            acceleration[leg] = 1.0
+            twist_rate = np.linalg.solve(platform.inverse_jacobian(home), acceleration)
+            moved = Motion(home.position, home.rotation, linear_acceleration=twist_rate[:3],
+                           angular_acceleration=twist_rate[3:])
+            force = platform.inverse_dynamics(moved).forces - platform.inverse_dynamics(
+                Motion.from_pose(home)).forces
+            masses.append(force[leg])
+        assert k_p == pytest.approx(max(masses) * omega ** 2)
 
 
 @pytest.mark.slow

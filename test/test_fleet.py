@@ -547,16 +547,19 @@ def group_is_gone(leader: int) -> bool:
     return False
 
 
-@pytest.mark.parametrize('where', ['here', 'processes', 'cluster'])
+@pytest.mark.parametrize('where, sent', [
+    ('here', signal.SIGINT), ('processes', signal.SIGINT), ('processes', signal.SIGHUP),
+    ('cluster', signal.SIGINT)])
 @pytest.mark.slow
 def test_an_interrupt_leaves_no_partial_results(
-        huge: Path, tmp_path: Path, where: str, cluster: LocalCluster) -> None:
+        huge: Path, tmp_path: Path, where: str, sent: signal.Signals,
+        cluster: LocalCluster) -> None:
     output = tmp_path / 'out'
     options = {'here': (), 'processes': ('--jobs', '2'),
                'cluster': ('--scheduler', cluster.scheduler_address)}[where]
     running = program(huge, output, *options)
     until(lambda: process_in(output, 'huge'), 'the middle of a bag')
-    os.killpg(running.pid, signal.SIGINT)
+    os.killpg(running.pid, sent)
     out, err = running.communicate(timeout=300)
     # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
     assert running.returncode in (130, -signal.SIGINT)

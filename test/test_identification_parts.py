@@ -268,7 +268,7 @@ def test_joint_states_of_the_node_are_not_measured_legs(tmp_path: Path, name: st
 
 def test_small_matrices_are_multiplied_in_one_thread() -> None:
     code = ('import os, sys, types\n'
-            'from stewart_dynamics.program import run_program\n'
+            'from stewart_dynamics.signals import run_program\n'
             'def threads(arguments):\n'
             '    import numpy\n'
             '    return len(os.listdir("/proc/self/task"))\n'

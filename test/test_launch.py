@@ -125,6 +125,14 @@ def test_a_missing_file_is_named(launch: Launch, file: str) -> None:
     assert 'process started' not in said(program)
 
 
+@pytest.mark.parametrize('file', FILES)
+def test_an_unknown_argument_starts_nothing(launch: Launch, file: str) -> None:
+    program = launch(file, 'param_file:=/my/hexapod.yaml')
+    assert program.wait() == 1
+    assert 'param_file: unknown argument; did you mean params_file?' in said(program)
+    assert 'process started' not in said(program)
+
+
 @pytest.mark.slow
 def test_topics_of_the_node_are_remapped(launch: Launch, peer: Peer) -> None:
     program = launch(

@@ -33,7 +33,7 @@ BLOCK = 100
 def started(kind: type[OutputFiles] | type[OutputProcess], folder: Path,
             parameters: Parameters = PARAMETERS) -> OutputFiles | OutputProcess:
     folder.mkdir(exist_ok=True)
-    return kind(folder, parameters, Options(), False)
+    return kind(folder, parameters, Options(), False, [])
 
 
 def write_block(files: OutputFiles | OutputProcess, first: int = 0) -> None:

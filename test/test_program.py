@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import signal
+import subprocess
 import sys
 from typing import TextIO
 
@@ -26,6 +28,7 @@ import pytest
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.program import BAD_INPUT, Program, STRICT
+from stewart_dynamics.signals import ending_signals, interrupt_on_signals
 
 PROGRAM = Program('some_program', 'parameters', 'something is found')
 
@@ -78,3 +81,32 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         PROGRAM.parser('Does something.', 'no files').parse_args(['--version'])
     assert end.value.code == 0
     assert capsys.readouterr().out == f'stewart_dynamics {__version__}\n'
+
+
+def test_the_end_of_the_terminal_is_an_interrupt_but_not_under_nohup() -> None:
+    before = signal.getsignal(signal.SIGHUP)
+    try:
+        assert signal.SIGHUP in ending_signals()
+        interrupt_on_signals()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGHUP)
+        # and is ignored from then on, while partial results are removed
+        signal.raise_signal(signal.SIGHUP)
+        assert signal.SIGHUP not in ending_signals()
+        interrupt_on_signals()
+        signal.raise_signal(signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.mark.parametrize('module', ['ros.console_scripts', *(
+    'calibration', 'datasheet', 'description', 'export', 'identification', 'replay')])
+def test_signals_are_handled_before_anything_large_is_imported(module: str) -> None:
+    done = subprocess.run(
+        [sys.executable, '-I', '-c',
+         f'import stewart_dynamics.{module}, sys; print(*sys.modules)'],
+        capture_output=True, text=True, timeout=300, check=True)
+    assert not {'argparse', 'numpy', 'yaml', 'threading', 'stewart_dynamics.program'} & set(
+        done.stdout.split())

@@ -219,6 +219,7 @@ def test_the_bag_has_the_topics_and_types_of_the_node(
     with AnyReader([replayed[name].folder / 'bag']) as reader:
         assert {c.topic: c.msgtype for c in reader.connections} == {
             **{f'{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()},
+            **{f'{NODE}/{topic}': INPUT_TYPES[topic] for topic in (POSE, TWIST, ACCEL)},
             **{topic if topic.startswith('/') else f'{NODE}/{topic}': kind
                for topic, kind in RECORDED_TYPES.items()}}
     assert not list(replayed[name].folder.parent.glob('.*'))
@@ -270,7 +271,7 @@ def test_the_bag_shows_the_hexapod_as_a_model(name: str, replayed: dict[str, Out
         expected = dict(zip(whens, map(bytes, written[topic]), strict=True))
         found = {when: data for each, when, data in of if each == topic}
         assert found == {when: expected[when] for when in joints}
-    first = min(when for _, when, _ in of)
+    first = min(when for topic, when, _ in of if 'setpoint/' not in topic)
     for topic in (TF_STATIC, ROBOT_DESCRIPTION):
         assert [when for each, when, _ in of if each == topic] == [first]
     with AnyReader([replayed[name].folder / 'bag']) as reader:
@@ -515,7 +516,8 @@ def test_another_name_of_the_node(tmp_path: Path) -> None:
     assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE
     assert set(outputs_of(tmp_path / 'out' / 'bag').messages) == {
         TF, TF_STATIC, ROBOT_DESCRIPTION,
-        *(f'/cell/hexapod/{topic}' for topic in (*OUTPUT_TYPES, JOINT_STATES))}
+        *(f'/cell/hexapod/{topic}' for topic in (
+            *OUTPUT_TYPES, JOINT_STATES, POSE, TWIST, ACCEL))}
 
 
 def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:
@@ -829,10 +831,12 @@ def test_a_killed_replay_leaves_nothing_under_the_final_name(
 
 
 @pytest.mark.slow
-def test_an_interrupted_replay_leaves_nothing(long_bag: Path, tmp_path: Path) -> None:
-    """By SIGTERM; by SIGINT in test_fleet.py."""
+@pytest.mark.parametrize('sent', [signal.SIGTERM, signal.SIGHUP])
+def test_an_interrupted_replay_leaves_nothing(
+        long_bag: Path, tmp_path: Path, sent: signal.Signals) -> None:
+    """By SIGINT in test_fleet.py."""
     with begun(long_bag, tmp_path / 'out') as process:
-        process.send_signal(signal.SIGTERM)
+        process.send_signal(sent)
         _, text = process.communicate(timeout=300)
         # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
         assert process.returncode in (130, -signal.SIGINT)
@@ -1055,7 +1059,9 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
     ('SIGTERM', "sys.meta_path.insert(0, type('Finder', (), {'find_spec': staticmethod(lambda "
      "name, *_: end() if name.endswith('replay_command_line') else None)}))", 130, 'interrupted'),
     ('SIGINT', 'atexit.register(end)', BAD_INPUT,
-     'nowhere: not a bag that can be read: no such file or folder')])
+     'nowhere: not a bag that can be read: no such file or folder'),
+    ('SIGHUP', "sys.meta_path.insert(0, type('Finder', (), {'find_spec': staticmethod(lambda "
+     "name, *_: end() if name == 'argparse' else None)}))", 130, 'interrupted')])
 def test_a_signal_at_the_start_or_end_is_no_traceback(
         sent: str, when: str, code: int, text: str) -> None:
     done = subprocess.run(

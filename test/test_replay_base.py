@@ -32,11 +32,13 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
+from stewart_dynamics.replay import one_bag
 from stewart_dynamics.replay.replay_command_line import main
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.inputs import (
-    ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, INPUT_TYPES, POSE, TWIST)
+    ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
+    TWIST, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
@@ -379,3 +381,42 @@ def test_measured_forces_on_a_base_that_moves_differ_by_a_missing_mass_and_nothi
                 -20.0 * 9.8, rel=0.05)
         else:
             assert found['residual_rms_n'] == 0.0
+
+
+def all_of(folder: Path) -> dict[str, bytes]:
+    """Return the content of the output bag and of the table of a replay."""
+    return {name: (folder / name).read_bytes() for name in ('bag/bag.mcap', 'legs.csv')}
+
+
+@pytest.mark.parametrize('given, options', [
+    *(({'base.source': source, **MOUNTING}, ()) for source in MOVING),
+    ({'setpoint.source': 'pose'}, ()), ({'setpoint.source': 'combined'}, ()),
+    ({}, ('--differentiate',)), ({'setpoint.sync_tolerance': 0.001}, ('--pose', '/mine'))])
+def test_the_output_bag_gives_the_same_output_bag(
+        given: dict[str, Any], options: tuple[str, ...], tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """The setpoints in it, with base and wrench, some of them rejected, under other names."""
+    parameters = PARAMETERS.replaced(given)
+    of = at_sea(given.get('base.source', 'motion'))
+    of = [*of[:300], *of[290:]]  # some are there twice
+    if given.get('setpoint.source') == 'combined':
+        of = [(COMBINED, RECORDED + n * MS, messages.combined(n * MS)) for n in range(1, 400)]
+    of = sorted([
+        *of, *((WRENCH, RECORDED + n * 100 * MS + 1,
+                messages.wrench(0, (n, 2.0, 3.0, 4.0, 5.0, 6.0))) for n in range(20)),
+        (POSE, RECORDED + 150 * MS, messages.pose(150 * MS)[:40]),
+        (POSE, RECORDED + 170 * MS, messages.pose(150 * MS, (math.nan, 0.0, 1.0)))],
+        key=lambda each: each[1])
+    if '/mine' in options:
+        of = [('/mine' if topic == POSE else topic, time, data) for topic, time, data in of]
+    bag = write_bag(tmp_path / 'bag', of, **TYPES, mine=INPUT_TYPES[POSE])
+    if '/mine' in options:
+        monkeypatch.setattr(one_bag, '_LARGE', 0)  # written by a process of its own
+    first = run(bag, parameters, tmp_path, *options)
+    monkeypatch.undo()
+    assert first in (DONE, LIMIT_MET)
+    again = tmp_path / 'again'
+    assert run(tmp_path / 'out' / 'bag' / 'bag', parameters, again,
+               *(each for each in options if each == '--differentiate')) == first
+    assert summary_of(tmp_path)['setpoints'] == summary_of(again)['setpoints']
+    assert all_of(tmp_path / 'out' / 'bag') == all_of(again / 'out' / 'bag')

@@ -17,7 +17,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import os
 from pathlib import Path
+import stat
 import subprocess
 import sys
 
@@ -26,27 +28,29 @@ from referees import ROOT
 
 from stewart_dynamics import (
     calibration, datasheet, description, export, identification, replay)
-from stewart_dynamics.errors import BagError
+from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import (
-    check_free, DATASHEET, remove_abandoned, whole_folder)
+    check_free, DATASHEET, DESIGNED_MOTION, DESIGNED_POSES, remove_abandoned, whole_folder)
 
 # Killed before the folder is complete, or between the two renames.
 KILLED = """\
 import os, pathlib, signal, sys
 from stewart_dynamics.replay.replay_options import Options
-from stewart_dynamics.reporting.results_folder import whole_folder
+from stewart_dynamics.reporting.results_folder import check_free, whole_folder
 def rename(self, to):
     os.rename(self, to)
     os.kill(os.getpid(), signal.SIGKILL)
 final, run, where = sys.argv[1:]
-with whole_folder(pathlib.Path(final), Options(force=True, run=run)) as folder:
-    (folder / 'summary.json').write_text('new')
+final, options = pathlib.Path(final), Options(force=True, run=run)
+with whole_folder(final, options, before=check_free(final, options)) as folder:
+    (folder / 'summary.json').write_text('{"software": "stewart_dynamics 2"}')
     if where == 'writing':
         os.kill(os.getpid(), signal.SIGKILL)
     pathlib.Path.rename = rename
 """
 RUN = 32 * 'a'
+OLD, NEW = (f'{{"version": 1, "software": "stewart_dynamics {n}"}}' for n in (1, 2))
 
 
 def kill(final: Path, run: str, where: str) -> None:
@@ -82,21 +86,22 @@ def test_what_a_killed_run_left_is_removed(tmp_path: Path) -> None:
 def test_results_that_a_killed_run_was_replacing_are_put_back(tmp_path: Path) -> None:
     bag = tmp_path / 'bag'
     bag.mkdir()
-    (bag / 'summary.json').write_text('old')
+    (bag / 'summary.json').write_text(OLD)
     kill(bag, RUN, 'replacing')
     assert len(names(tmp_path)) == 2
     assert not bag.exists()
     remove_abandoned([bag])
     assert names(tmp_path) == {'bag'}
-    assert (bag / 'summary.json').read_text() == 'old'
+    assert (bag / 'summary.json').read_text() == OLD
 
 
 def test_results_are_replaced_while_another_run_begins(tmp_path: Path) -> None:
     bag = tmp_path / 'bag'
     with whole_folder(bag, Options()) as folder:
-        (folder / 'summary.json').write_text('old')
-    with whole_folder(bag, Options(force=True)) as folder:
-        (folder / 'summary.json').write_text('new')
+        (folder / 'summary.json').write_text(OLD)
+    options = Options(force=True)
+    with whole_folder(bag, options, before=check_free(bag, options)) as folder:
+        (folder / 'summary.json').write_text(NEW)
         remove_abandoned([bag])
         # As between the renames, and after them.
         replaced = bag.rename(folder.with_name(f'{folder.name}.replaced'))
@@ -108,7 +113,69 @@ def test_results_are_replaced_while_another_run_begins(tmp_path: Path) -> None:
         bag.rename(folder)
         replaced.rename(bag)
     assert names(tmp_path) == {'bag'}
-    assert (bag / 'summary.json').read_text() == 'new'
+    assert (bag / 'summary.json').read_text() == NEW
+
+
+def write(folder: Path, text: str) -> None:
+    """Write results that are known as such."""
+    (folder / 'summary.json').write_text(text)
+
+
+@pytest.mark.parametrize('force', [False, True])
+def test_of_two_runs_at_once_one_is_rejected(tmp_path: Path, force: bool) -> None:
+    bag, options = tmp_path / 'bag', Options(force=force)
+    if force:
+        with whole_folder(bag, Options()) as folder:
+            write(folder, OLD)
+    before = check_free(bag, options)
+    with (pytest.raises(BagError, match='bag: (exists already; --force|another run has written)'),
+          whole_folder(bag, options, before=before) as second):
+        write(second, OLD)
+        with whole_folder(bag, options, before=before) as first:
+            write(first, NEW)
+    assert names(tmp_path) == {'bag'}
+    assert (bag / 'summary.json').read_text() == NEW
+
+
+def test_a_link_to_nowhere_is_not_free(tmp_path: Path) -> None:
+    (tmp_path / 'bag').symlink_to(tmp_path / 'nowhere')
+    with pytest.raises(BagError, match='bag: exists already and is not a folder of replay'):
+        check_free(tmp_path / 'bag', Options(force=True))
+
+
+def test_folders_have_the_rights_that_the_mask_of_the_process_leaves(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        with whole_folder(tmp_path / 'bag', Options()) as folder:
+            write(folder, OLD)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / 'bag').stat().st_mode) == 0o750
+    assert stat.S_IMODE((tmp_path / 'bag' / 'summary.json').stat().st_mode) == 0o640
+
+
+@pytest.mark.parametrize('error', [
+    lambda path: StewartError(f'{path}: cannot be written'),
+    lambda path: OSError(28, 'No space left', str(path)),
+    lambda path: OSError(28, 'No space left'),
+    lambda path: RuntimeError(f'{path.name} is odd')])
+def test_no_error_has_the_name_of_the_partial_folder(
+        tmp_path: Path, error: Callable[[Path], Exception]) -> None:
+    with (pytest.raises((StewartError, OSError, RuntimeError)) as caught,
+          whole_folder(tmp_path / 'bag', Options()) as folder):
+        raise error(folder)
+    assert 'partial' not in str(caught.value)
+    assert 'bag' in str(caught.value)
+
+
+@pytest.mark.parametrize('known, text', [
+    (DESIGNED_MOTION, '/**:\n  ros__parameters:\n    motion.type: sine\n'),
+    (DESIGNED_POSES, 'leg_1,leg_2,leg_3,leg_4,leg_5,leg_6,x,y,z,qx,qy,qz,qw\n')])
+def test_a_file_of_the_user_with_the_name_of_a_design_is_not_replaced(
+        tmp_path: Path, known: str, text: str) -> None:
+    (tmp_path / known).write_text(text)
+    with pytest.raises(BagError, match='is not a folder of'):
+        check_free(tmp_path, Options(force=True), known)
 
 
 @pytest.mark.parametrize('main', [each.main for each in (
@@ -128,7 +195,10 @@ def test_files_of_others_are_not_replaced(tmp_path: Path, other: str) -> None:
     for force in (False, True):  # --force is advised only where it helps
         with pytest.raises(BagError, match='is not a folder of a datasheet'):
             check_free(sheet, Options(force=force), DATASHEET)
-    (sheet / DATASHEET).touch()
+    (sheet / DATASHEET).write_text('{"name": "mine"}')
+    with pytest.raises(BagError, match='is not a folder of a datasheet'):
+        check_free(sheet, Options(force=True), DATASHEET)
+    (sheet / DATASHEET).write_text(OLD)
     check_free(sheet, Options(force=True), DATASHEET)
     (sheet / other).parent.mkdir(exist_ok=True)
     (sheet / other).touch()

@@ -121,6 +121,10 @@ def done_beside(peer: Peer) -> dict[str, set[str]]:
 
 
 DRIVES = 'actuator.screw_lead:=0.005', 'drive.torque_max:=100.0'
+SWAY = 'base_motion.amplitude:=[0.0, 0.01, 0.0, 0.0, 0.0, 0.0]', 'base_motion.frequency:=[0.2]'
+COMMANDS = {'leg_controller': [sys.executable, ROOT / 'examples' / 'leg_controller.py']}
+LAST = {'stewart_simulator': '/stewart_simulator/wrench',
+        'leg_controller': '/stewart_dynamics/leg_states'}
 
 
 def test_the_policy_is_one_of_sros2() -> None:
@@ -145,7 +149,7 @@ def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
     for begin, overrides in (
             (fresh, ('setpoint.source:=separate', 'base.source:=motion', *DRIVES)),
             (fresh, ('setpoint.source:=combined', 'base.source:=imu')),
-            (start, ('setpoint.source:=pose', 'use_sim_time:=true'))):
+            (start, ('setpoint.source:=pose', 'base.source:=pose', 'use_sim_time:=true'))):
         node = begin(*overrides)
         node.until_active()
         of_inputs = {f'{NODE}/{topic}' for topic in (
@@ -155,6 +159,7 @@ def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
         for right, names in done_beside(node.peer).items():
             union.setdefault(right, set()).update(names)
     union['publish'].add('/tf')  # publish_tf, which ROS's wheels on PyPI cannot publish
+    union['subscribe'].add('/stewart_simulator/leg_states')  # as demo.launch.py remaps
     assert union == granted('/stewart_dynamics')
     assert {f'{NODE}/{topic}' for topic in OUTPUTS} < union['publish']
     assert {f'{NODE}/{topic}' for topic in INPUTS} < union['subscribe']
@@ -166,7 +171,10 @@ def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
         (['output:=separate', 'start_timeout:=1000.0'], 5),
         (['output:=combined', 'start_timeout:=1000.0', 'use_sim_time:=true'], 3)]),
     ('stewart_simulator', ['platform.yaml', 'simulator.yaml'], [
-        (['use_sim_time:=false', *DRIVES], 7), (['use_sim_time:=true'], 7)])])
+        (['use_sim_time:=false', *DRIVES], 7), (['use_sim_time:=true'], 7),
+        (['base_motion.source:=sine', *SWAY], 10), (['base_motion.source:=sea', *SWAY], 10),
+        (['base_motion.source:=topics'], 7)]),
+    ('leg_controller', [], [([f'params_file:={PLATFORM}'], 3), (['use_sim_time:=true'], 3)])])
 def test_the_policy_is_what_the_other_programs_do(
         domain: int, tmp_path: Path, name: str, files: list[str],
         runs: list[tuple[list[str], int]]) -> None:
@@ -174,16 +182,19 @@ def test_the_policy_is_what_the_other_programs_do(
     union: dict[str, set[str]] = {}
     for number, (overrides, topics) in enumerate(runs):
         program = Program(
-            [executable(name), '--ros-args',
+            [*(COMMANDS.get(name) or [executable(name)]), '--ros-args',
              *(part for file in files for part in ('--params-file', ROOT / 'config' / file)),
              *(part for each in overrides for part in ('-p', each))],
             domain, tmp_path / str(number))
         peer.watched = program
         try:
-            # The simulator's subscription to wrenches is created last, and /clock.
-            peer.until(lambda topics=topics: len(done_beside(peer).get(
-                'publish', ())) == topics and (name == 'stewart_trajectory' or (
-                    f'/{name}/wrench' in done_beside(peer).get('subscribe', ()))),
+            # Subscriptions are created last, and /clock; of the simulator that to the base.
+            last = LAST.get(name, '')
+            if 'base_motion.source:=topics' in overrides:
+                last = f'/{name}/base/accel'
+            peer.until(lambda topics=topics, last=last: len(done_beside(peer).get(
+                'publish', ())) == topics and (
+                    not last or last in done_beside(peer).get('subscribe', ())),
                 'its topics are known')
             for right, names in done_beside(peer).items():
                 union.setdefault(right, set()).update(names)

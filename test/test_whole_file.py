@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+import compileall
 from contextlib import contextmanager
 import json
 import math
@@ -36,7 +37,8 @@ from stewart_dynamics.description.describe_command_line import main as describe
 from stewart_dynamics.replay.index import write_fleet
 from stewart_dynamics.replay.replay_command_line import main as replay
 from stewart_dynamics.reporting.results_folder import RESULT, whole_folder
-from stewart_dynamics.whole_file import read_text, to_json, write_files, write_json
+from stewart_dynamics.whole_file import (
+    FilesOfFolder, read_text, to_json, write_files, write_json)
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 FULL = 2000  # [bytes]
@@ -46,7 +48,9 @@ FULL = 2000  # [bytes]
 def full_disk(room: int = FULL) -> Iterator[None]:
     """Let no file grow beyond ``room`` bytes: writing fails halfway, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # Python would cut its own files
+    # Python would cut its own files, here and in the processes that compile.
+    compileall.compile_dir(ROOT / 'stewart_dynamics', quiet=2)
+    kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
     try:
         yield
@@ -182,6 +186,35 @@ def test_pipes_and_devices_are_rejected_without_waiting(tmp_path: Path) -> None:
             read_text(path, 100, ParameterError)
     with pytest.raises(ParameterError, match='cannot be read: Is a directory'):
         read_text(tmp_path, 100, ParameterError)
+
+
+def test_two_programs_at_once_never_lose_a_result(tmp_path: Path) -> None:
+    for replace in (False, True):
+        first, second = (FilesOfFolder(tmp_path / 'out', replace) for _ in range(2))
+        first.write({'a': 'first', 'b': 'first'})
+        # without b: a name that is not shared is not written either
+        with pytest.raises(StewartError, match='out/a: (exists; --force|another run has written)'):
+            second.write({'c': 'second', 'a': 'second'})
+        assert contents(tmp_path / 'out') == {'a': 'first', 'b': 'first'}
+    FilesOfFolder(tmp_path / 'out', True).write({'b': 'third'})
+    assert contents(tmp_path / 'out') == {'a': 'first', 'b': 'third'}
+
+
+def test_links_lead_to_no_file_outside_the_folder(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / 'out'
+    folder.mkdir()
+    (tmp_path / 'mine').write_text('mine')
+    (folder / 'platform.sdf').symlink_to(tmp_path / 'mine')
+    (folder / 'platform.xml').symlink_to(tmp_path / 'nowhere')
+    arguments = ['--params', f'{PLATFORM}', '--output', f'{folder}']
+    assert describe(arguments) == 2
+    assert capsys.readouterr().err == (
+        f'stewart_describe: {folder / "platform.sdf"}: exists; --force replaces it\n')
+    assert describe([*arguments, '--force']) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {'mine', 'out'}
+    assert (tmp_path / 'mine').read_text() == 'mine'
+    assert not any(path.is_symlink() for path in folder.iterdir())
 
 
 def test_json_takes_numpy_scalars_and_arrays(tmp_path: Path) -> None:

@@ -22,10 +22,11 @@ from pathlib import Path
 
 from stewart_dynamics.calibration import design_command
 from stewart_dynamics.program import (
-    add_accepted, add_node, add_parameters, add_report, between, DONE, interrupt_on_signals,
-    names_of, Program)
+    add_accepted, add_node, add_parameters, add_report, between, DONE, names_of,
+    Program)
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 from stewart_dynamics.reporting.results_folder import CALIBRATED, DESIGNED
+from stewart_dynamics.signals import interrupt_on_signals
 
 _PROGRAM = Program(
     'stewart_calibrate', 'parameters or poses, or a likely mistake: nothing is written',

@@ -53,14 +53,14 @@ def run(given: argparse.Namespace, parameters: Parameters, folder: Path) -> str:
     from tqdm import tqdm
 
     options = CalibrationOptions(force=given.force)
-    check_free(folder, options, DESIGNED_POSES)
+    before = check_free(folder, options, DESIGNED_POSES)
     remove_abandoned([folder])
     platform = StewartPlatform(parameters)
     noise = Noise(*given.noise) if given.noise else NOISE
     found = design_poses(platform, given.design, noise, given.seed)
     with tqdm(total=given.design, disable=None, leave=False, unit='pose') as bar:
         motion = visit(platform, found.poses, given.rest, lambda done: bar.update(done - bar.n))
-    with whole_folder(folder, options, DESIGNED_POSES) as partial:
+    with whole_folder(folder, options, DESIGNED_POSES, before) as partial:
         write_files({
             partial / DESIGNED_POSES: poses_csv(
                 parameters['joints'], found.lengths, found.poses),

@@ -64,14 +64,14 @@ def run(measured: MeasuredPoses, source: str, parameters: Parameters, folder: Pa
     ``source`` names the measured poses, ``parameters`` are those of the drawing. StewartError if
     the poses do not support a calibration: nothing is written.
     """
-    check_free(folder, options, CALIBRATION)
+    before = check_free(folder, options, CALIBRATION)
     remove_abandoned([folder])
     found = calibrate(
         StewartPlatform(parameters), measured.lengths, measured.poses, fixed=options.fixed,
         frames=options.frames, noise=options.noise, hold_out=options.hold_out,
         angles=measured.angles, degrees=options.degrees, accept_mistakes=options.accept_mistakes)
     result = document(found, measured, source, options.shown())
-    with whole_folder(folder, options, CALIBRATION) as partial:
+    with whole_folder(folder, options, CALIBRATION, before) as partial:
         found.parameters.to_yaml(partial / CALIBRATED_PARAMETERS, comments(result))
         write_json(partial / CALIBRATION, result)
         if options.report:

@@ -41,7 +41,7 @@ from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.block_statistics import finite
 from stewart_dynamics.reporting.results_folder import (
-    DATASHEET, DATASHEET_PAGE, whole_folder, WORKSPACE)
+    check_free, DATASHEET, DATASHEET_PAGE, whole_folder, WORKSPACE)
 from stewart_dynamics.whole_file import now, write_files, write_json
 
 VERSION = 2  # version of datasheet.json; increased when the meaning of a key changes
@@ -91,6 +91,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     Raises StewartError: no limit is given, the pose is outside the limits or singular, or the bag
         cannot be read.
     """
+    before = check_free(folder, options, DATASHEET)
     hexapod = RatedHexapod(parameters, order.pose, order.pivot, order.payload)
     progress.stage('motion')
     recorded = None if order.bag is None else read_motion(
@@ -131,7 +132,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     sheet['parameters'] = hexapod.given.plain()
     pictures = Pictures(hexapod, sheet, sections, modes, tilts, ranges,
                         None if recorded is None else recorded.seconds, used)
-    with whole_folder(folder, options, DATASHEET) as partial:
+    with whole_folder(folder, options, DATASHEET, before) as partial:
         write_json(partial / DATASHEET, sheet)
         write_files({partial / WORKSPACE: workspace.table(sections, tilts, hexapod)})
         write_page(partial / DATASHEET_PAGE, sheet, hexapod, pictures)

@@ -23,9 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.program import (
-    add_node, add_parameters, frequency, interrupt_on_signals, NODE, Program)
+    add_node, add_parameters, frequency, NODE, Program)
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import DATASHEETS
+from stewart_dynamics.signals import interrupt_on_signals
 
 _PROGRAM = Program('stewart_capability', 'parameters or bags',
                    'the motion or the box is not possible', partly=True)

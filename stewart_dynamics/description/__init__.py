@@ -19,8 +19,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from stewart_dynamics.signals import run_program
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program stewart_describe."""
-    from stewart_dynamics.description.describe_command_line import main as program
-    return program(arguments)
+    return run_program('stewart_describe', f'{__name__}.describe_command_line', arguments)

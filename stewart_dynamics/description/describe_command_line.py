@@ -24,7 +24,8 @@ from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.program import add_node, add_parameters, DONE, Program, STRICT
-from stewart_dynamics.whole_file import check_new, write_new
+from stewart_dynamics.signals import interrupt_on_signals
+from stewart_dynamics.whole_file import FilesOfFolder
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -39,7 +40,8 @@ _INTERFACES = ('position', 'velocity', 'effort')
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
     given = _arguments().parse_args(arguments)
-    return _PROGRAM.exit_code(lambda: _read(given) if given.source else _write(given))
+    work = _read if given.source else _write
+    return _PROGRAM.exit_code(lambda: work(given, FilesOfFolder(given.output, given.force)))
 
 
 def _arguments() -> argparse.ArgumentParser:
@@ -82,7 +84,7 @@ def _interfaces(text: str) -> list[str]:
     return found
 
 
-def _write(given: argparse.Namespace) -> int:
+def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.description.hexapod import Hexapod
     from stewart_dynamics.description.mjcf import mjcf
@@ -90,6 +92,7 @@ def _write(given: argparse.Namespace) -> int:
     from stewart_dynamics.description.urdf import Ros2Control, urdf
     from stewart_dynamics.parameters.table import Parameters
 
+    interrupt_on_signals()
     parameters = Parameters.from_yaml(given.params, given.node)
     if given.geometry_only:
         raise StewartError('--geometry-only: only with --from')
@@ -99,22 +102,21 @@ def _write(given: argparse.Namespace) -> int:
         control = Ros2Control(given.ros2_control, given.hardware)
     texts = {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
              f'{name}.xml': mjcf(hexapod, name)}
-    for path in write_new(given.output, texts, given.force):
+    for path in files.write(texts):
         _PROGRAM.say(str(path))
     return _judge(parameters, given)
 
 
-def _read(given: argparse.Namespace) -> int:
+def _read(given: argparse.Namespace, files: FilesOfFolder) -> int:
     from stewart_dynamics.description.recognition import read_hexapod
 
+    interrupt_on_signals()
     if given.ros2_control is not None:
         raise StewartError('--ros2-control: not with --from')
     found = read_hexapod(given.source, given.geometry_only)
-    path = given.output / f'{given.name or given.source.stem}.yaml'
-    check_new([path], given.force)
-    given.output.mkdir(parents=True, exist_ok=True)
-    found.parameters.to_yaml(path, _STANDS_FOR_NONE if given.geometry_only else None)
-    _PROGRAM.say(str(path))
+    text = found.parameters.yaml_text(_STANDS_FOR_NONE if given.geometry_only else None)
+    for path in files.write({f'{given.name or given.source.stem}.yaml': text}):
+        _PROGRAM.say(str(path))
     for remark in found.remarks:
         _PROGRAM.complain(remark)
     return _judge(found.parameters, given, found.warnings)

@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from stewart_dynamics.signals import run_program
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program stewart_export."""
-    from stewart_dynamics.export.export_command_line import main as program
-    return program(arguments)
+    return run_program('stewart_export', f'{__name__}.export_command_line', arguments)

@@ -20,7 +20,8 @@ import argparse
 from collections.abc import Sequence
 
 from stewart_dynamics.program import add_node, add_parameters, DONE, Program
-from stewart_dynamics.whole_file import write_new
+from stewart_dynamics.signals import interrupt_on_signals
+from stewart_dynamics.whole_file import FilesOfFolder
 
 _PROGRAM = Program('stewart_export', 'parameters, or files that exist or cannot be written')
 
@@ -28,7 +29,7 @@ _PROGRAM = Program('stewart_export', 'parameters, or files that exist or cannot 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
     given = _arguments().parse_args(arguments)
-    return _PROGRAM.exit_code(lambda: _export(given))
+    return _PROGRAM.exit_code(lambda: _export(given, FilesOfFolder(given.output, given.force)))
 
 
 def _arguments() -> argparse.ArgumentParser:
@@ -50,13 +51,14 @@ def _arguments() -> argparse.ArgumentParser:
     return parser
 
 
-def _export(given: argparse.Namespace) -> int:
+def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.export.c_project import c_project, check_name
     from stewart_dynamics.export.fmu import find_compiler, fmu, has_binaries
     from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
+    interrupt_on_signals()
     name = check_name(given.name)
     parameters = Parameters.from_yaml(given.params, given.node)
     for mistake in likely_mistakes(parameters):
@@ -68,6 +70,6 @@ def _export(given: argparse.Namespace) -> int:
         if compiler is None:
             _PROGRAM.complain(f'warning: {name}.fmu has no binary: no C compiler for this '
                               'computer is found ($CC, cc, gcc, clang)')
-    for path in write_new(given.output, files, given.force):
+    for path in files_of_folder.write(files):
         _PROGRAM.say(str(path))
     return DONE

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stewart_dynamics.program import run_program
+from stewart_dynamics.signals import run_program
 
 __all__ = ['main']
 

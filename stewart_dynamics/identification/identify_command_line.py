@@ -28,9 +28,10 @@ from stewart_dynamics.identification.identification_options import (
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
 from stewart_dynamics.program import (
     add_accepted, add_node, add_parameters, add_report, arguments_of, between, DONE,
-    interrupt_on_signals, names_of, Program, whole)
+    names_of, Program, whole)
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_MOTION, IDENTIFIED
+from stewart_dynamics.signals import interrupt_on_signals
 
 if TYPE_CHECKING:
     from stewart_dynamics.identification.design import Design
@@ -177,7 +178,7 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
                            f'--cutoff, {given.cutoff:g} Hz: nothing above passes the filter')
     folder = given.output or Path(DESIGNED)
     options = IdentificationOptions(force=given.force)
-    check_free(folder, options, DESIGNED_MOTION)
+    before = check_free(folder, options, DESIGNED_MOTION)
     remove_abandoned([folder])
     asked = DesignOptions(**arguments_of(given, DesignOptions._fields))
     _PROGRAM.complain(
@@ -196,7 +197,7 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
     with tqdm(total=asked.generations, disable=None, leave=False, dynamic_ncols=True,
               bar_format='{percentage:3.0f}%|{bar}| designing, {remaining} left') as bar:
         designed = design(parameters, asked, progress)
-    with whole_folder(folder, options, DESIGNED_MOTION) as partial:
+    with whole_folder(folder, options, DESIGNED_MOTION, before) as partial:
         path = partial / DESIGNED_MOTION
         given_values = designed.trajectory.given
         head = ''.join(f'# {line}'.rstrip() + '\n' for line in _design_head(designed, asked))

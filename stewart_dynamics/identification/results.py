@@ -79,7 +79,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
     ``warn`` is called with likely mistakes that were accepted. Raises StewartError if a bag cannot
     be used, or a mistake is likely: nothing is written.
     """
-    check_free(folder, options, IDENTIFICATION)
+    before = check_free(folder, options, IDENTIFICATION)
     remove_abandoned([folder])
     with closing(Identification(parameters, options)) as work:
         with tqdm(total=sum(map(bytes_of, bags)), unit='B', unit_scale=True, disable=None,
@@ -93,7 +93,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
                                    '(--accept-mistakes writes)')
             warn(f'warning: {likely.text}')
         result = document(found, options)
-        with whole_folder(folder, options, IDENTIFICATION) as partial:
+        with whole_folder(folder, options, IDENTIFICATION, before) as partial:
             _rounded(found).to_yaml(
                 partial / IDENTIFIED_PARAMETERS, comments(result, found.unknowns))
             write_json(partial / IDENTIFICATION, result)

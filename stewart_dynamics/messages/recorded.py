@@ -48,6 +48,14 @@ class Messages(NamedTuple):
         return self._replace(of_topic=self.of_topic[which], times=self.times[which],
                              starts=self.starts[which], sizes=self.sizes[which])
 
+    def compact(self) -> Messages:
+        """Return the same messages with only their own bytes."""
+        if self.data.size == self.sizes.sum():
+            return self
+        starts = np.cumsum(self.sizes) - self.sizes
+        places = np.arange(self.sizes.sum()) + np.repeat(self.starts - starts, self.sizes)
+        return self._replace(data=self.data[places], starts=starts)
+
     def each(self) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, time and bytes of each message."""
         for topic, time, start, size in zip(

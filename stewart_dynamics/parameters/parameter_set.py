@@ -30,7 +30,7 @@ import numpy as np
 from stewart_dynamics.errors import ParameterError, shown, shown_name
 from stewart_dynamics.parameters.yaml_file import (
     check_given, check_sections, flat, is_of_ros, parameters_of, read_document, read_value,
-    read_yaml, write_yaml)
+    read_yaml, write_yaml, yaml_text)
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -299,14 +299,23 @@ class ParameterSet(Mapping[str, Any]):
         An existing file is replaced. Comments by name stand behind the units of parameters. Raises
         ParameterError if the file cannot be written.
         """
+        write_yaml(path, *self._for_yaml(comments))
+
+    def yaml_text(self, comments: Mapping[str, str] | None = None) -> str:
+        """Return the text of the file that ``to_yaml`` writes."""
+        return yaml_text(*self._for_yaml(comments))
+
+    def _for_yaml(self, comments: Mapping[str, str] | None,
+                  ) -> tuple[dict[str, Any], dict[str, str]]:
+        """Return the values to write, and the comment behind each."""
         values = {name: self._given.get(name, parameter.default)
                   for name, parameter in self.table.items()
                   if name in self._given or not name.startswith(self.described)}
         added = comments or {}
         texts = {name: '; '.join(filter(None, (parameter.unit, added.get(name))))
                  for name, parameter in self.table.items()}
-        write_yaml(path, {name: value for name, value in values.items()
-                          if value is not None and value != ()}, texts)
+        return {name: value for name, value in values.items()
+                if value is not None and value != ()}, texts
 
     @classmethod
     def check_file(cls, path: str | Path) -> None:

@@ -312,6 +312,15 @@ def write_yaml(path: str | Path, values: Mapping[str, Any], comments: Mapping[st
     written as a single value. Comments stand behind the values, ``head`` before all lines. Raises
     ParameterError if the file cannot be written.
     """
+    try:
+        write_files({Path(path): yaml_text(values, comments, head).encode('utf-8')})
+    except (OSError, TypeError, ValueError) as exc:
+        reason = exc.strerror if isinstance(exc, OSError) else exc
+        raise ParameterError(f'{one_line(path)}: cannot be written: {reason}') from exc
+
+
+def yaml_text(values: Mapping[str, Any], comments: Mapping[str, str], head: str = '') -> str:
+    """Return the text that ``write_yaml`` writes."""
     tree: dict[str, Any] = {}
     for name, value in values.items():
         *groups, last = name.split('.')
@@ -320,11 +329,7 @@ def write_yaml(path: str | Path, values: Mapping[str, Any], comments: Mapping[st
             group = group.setdefault(each, {})
         group[last] = value, comments[name]
     lines = ['/**:', '  ros__parameters:', *_lines(tree, '    ')]
-    try:
-        write_files({Path(path): (head + '\n'.join([*lines, ''])).encode('utf-8')})
-    except (OSError, TypeError, ValueError) as exc:
-        reason = exc.strerror if isinstance(exc, OSError) else exc
-        raise ParameterError(f'{one_line(path)}: cannot be written: {reason}') from exc
+    return head + '\n'.join([*lines, ''])
 
 
 def _lines(tree: Mapping[str, Any], indent: str) -> Iterator[str]:

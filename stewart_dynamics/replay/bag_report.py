@@ -55,7 +55,7 @@ from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE,
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
 from stewart_dynamics.setpoints.rejections import stamp_of
-from stewart_dynamics.whole_file import write_files
+from stewart_dynamics.whole_file import FilesOfFolder, write_files
 
 FOLDER = Path(__file__).with_name('templates')
 # Where the numbers of the moving platform are in a frame; angles in degrees.
@@ -235,8 +235,7 @@ def share_plotly(folder: Path) -> Path:
     script = plotly_script().encode()
     path = folder.absolute() / f'plotly-{hashlib.sha256(script).hexdigest()[:12]}.min.js'
     if not path.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        write_files({path: script})
+        FilesOfFolder(path.parent, True).write({path.name: script})
     return path
 
 

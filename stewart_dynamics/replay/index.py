@@ -38,7 +38,7 @@ from stewart_dynamics.replay.statements import MEASURED, MISSING, needed_words, 
 from stewart_dynamics.replay.summary import margin_key
 from stewart_dynamics.reporting.pages import page
 from stewart_dynamics.reporting.results_folder import REPORT_PAGE
-from stewart_dynamics.whole_file import write_files
+from stewart_dynamics.whole_file import FilesOfFolder
 
 FOLDER = Path(__file__).with_name('templates')
 
@@ -199,15 +199,20 @@ def _reasons(summary: dict[str, Any]) -> list[str]:
             if each.level in ('warn', 'bad') and each.topic not in (MEASURED, MISSING)]
 
 
-def write_fleet(output: Path, rows: Sequence[Row]) -> None:
-    """Write fleet.csv and index.html into a folder, both complete or not at all."""
+def write_fleet(output: Path, rows: Sequence[Row], files: FilesOfFolder | None = None) -> None:
+    """
+    Write fleet.csv and index.html into a folder, both complete or not at all.
+
+    ``files`` knows the content of the folder when the run began; by default the present one.
+    """
     text = io.StringIO(newline='')
     # All text in quotes: spreadsheets that separate by semicolon do not split names.
     table = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC)
     table.writerow([column.key for column in COLUMNS])
     table.writerows([_harmless(column.key, row.get(column.key)) for column in COLUMNS]
                     for row in rows)
-    write_files({output / FLEET_TABLE: text.getvalue(), output / FLEET_PAGE: _page(output, rows)})
+    files = files or FilesOfFolder(output, replace=True)
+    files.write({FLEET_TABLE: text.getvalue(), FLEET_PAGE: _page(output, rows)})
 
 
 def listed_results(table: Path) -> set[str] | None:

@@ -30,9 +30,9 @@ from threading import Event, Lock, Thread
 from typing import Any
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.program import signals_wait
 from stewart_dynamics.replay.bag_task import (
     At, Cancelled, Ended, LOCAL_INTERVAL, replay_task, Replayed, Task)
+from stewart_dynamics.signals import signals_wait
 
 _CONTEXT = multiprocessing.get_context('forkserver')
 _CONTEXT.set_forkserver_preload(['stewart_dynamics.replay.one_bag'])
@@ -96,11 +96,12 @@ def processes(jobs: int, at: At) -> Iterator[Replayed]:
 
 def _start_server() -> None:
     """Start the process that starts the others."""
-    # They inherit its mask: Ctrl-C ends this process, which ends them. Starting the resource
-    # tracker later would lift the mask.
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    # They inherit its mask: Ctrl-C and the end of the terminal end this process, which ends them.
+    # Starting the resource tracker later would lift the mask of SIGINT.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
     try:
+        resource_tracker.ensure_running()
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -45,6 +45,7 @@ from stewart_dynamics.replay.index import (
 from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
 from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.results_folder import remove_abandoned
+from stewart_dynamics.whole_file import FilesOfFolder
 from tqdm import tqdm
 
 _SEVERITY = (DONE, LIMIT_MET, PARTLY_READ, BAD_INPUT).index
@@ -96,6 +97,7 @@ def replay_fleet(
     bags keep their results.
     """
     output.mkdir(parents=True, exist_ok=True)
+    files = FilesOfFolder(output, replace=True)  # _check_replaceable says whether
     options = options._replace(run=options.run or uuid.uuid4().hex)
     tasks = [Task(number, bag, folder, parameters, options)
              for number, (bag, folder) in enumerate(bags)]
@@ -118,9 +120,10 @@ def replay_fleet(
         raise KeyboardInterrupt(f'{len(ended)} of {len(tasks)} bags are done; the same command '
                                 'continues with the others') from None
     finally:
-        remove_abandoned(task.folder for task in tasks)  # of processes that died
+        # of processes that died
+        remove_abandoned((task.folder for task in tasks), options.run)
     fleet = Fleet(tuple(ended[number] for number in range(len(tasks))))
-    write_fleet(output, [_row(each, output) for each in fleet.ended])
+    write_fleet(output, [_row(each, output) for each in fleet.ended], files)
     return fleet
 
 

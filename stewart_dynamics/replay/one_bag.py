@@ -96,13 +96,13 @@ def replay(
     Raises StewartError if a library needed for an option is missing.
     """
     options = options or Options()
-    check_free(folder, options)
+    before = check_free(folder, options)
     made_of = fingerprint(bag, parameters, options)
     parameters = options.applied_to(parameters)
     with closing(Recording(bag)) as recording:
         topics = find_topics(recording, parameters, options)
         notices = notices_of(recording, topics, parameters, options)
-        with whole_folder(folder, options) as partial, ExitStack() as stack:
+        with whole_folder(folder, options, before=before) as partial, ExitStack() as stack:
             run = _Run(recording, topics, parameters, options, partial, stack)
             run.notices += [*likely_mistakes(parameters), *notices]
             for messages, size in recording.messages({name: key for key, name in topics.items()}):
@@ -177,7 +177,8 @@ class _Run:
             self.report = Report(parameters, options.measured is not None, folder)
             self._breakdown = ForceBreakdownRows(parameters)
         files = OutputProcess if bytes_of(recording.path) > _LARGE else OutputFiles
-        self._files = files(folder, parameters, options, self._quasi_static)
+        self._files = files(folder, parameters, options, self._quasi_static,
+                            [topic for topic in topics if topic != MEASURED])
         stack.callback(self._files.abandon)
 
     def take(self, messages: Messages) -> int:
@@ -187,6 +188,7 @@ class _Run:
             if measured.any():
                 self._take_measured(messages, measured)
                 messages = messages.chosen(~measured)
+        self._files.write_inputs(messages)
         setpoints = self._setpoints.take_many(messages)
         if self._differentiator is not None:
             setpoints = self._differentiator.add(setpoints)

@@ -16,6 +16,9 @@
 """
 The output bag of a replay: the topics of the node, and the hexapod as a model, in MCAP.
 
+The inputs are the recorded messages, byte by byte, under the names that the node subscribes to:
+the bag can be replayed again, with the same numbers.
+
 The model is the URDF, and the transforms of all its links, as robot_state_publisher publishes
 them: Foxglove and RViz need nothing else. The joint positions are those that the node publishes,
 but for rounding: many are computed at once.
@@ -25,7 +28,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from struct import Struct
 from typing import Any
@@ -48,9 +51,11 @@ from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import joint_state_layout
 from stewart_dynamics.messages.layout import at_any_byte
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.standard import string, transforms
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.summary import Answered
+from stewart_dynamics.setpoints.inputs import INPUT_TYPES
 from stewart_dynamics.setpoints.output_messages import OutputMessages, WARNING, Written
 from stewart_dynamics.setpoints.step import Outputs
 import yaml  # type: ignore[import-untyped]
@@ -113,15 +118,18 @@ class OutputBag:
     node: node name, the prefix of the topics.
     model: serializes those that show the hexapod as a model.
     rate: highest rate of these [Hz]; 0: they are not written and have no topics.
+    inputs: topics whose recorded messages are written as well.
     """
 
     def __init__(self, folder: Path, node: str, messages: OutputMessages, model: RecordedModel,
-                 rate: float) -> None:
+                 rate: float, inputs: Iterable[str] = ()) -> None:
         self._folder = folder
         self._messages, self._model = messages, model
         self._period = round(SECOND / rate) if rate else 0
         self._due: int | None = None  # when the model is written next
-        self._types = messages.types | (RECORDED_TYPES if rate else {})
+        self._types = {
+            **{topic: INPUT_TYPES[topic] for topic in inputs}, **messages.types,
+            **(RECORDED_TYPES if rate else {})}
         folder.mkdir()
         self._file = (folder / f'{folder.name}.mcap').open('wb')
         self._counts: Counter[int] = Counter()
@@ -153,6 +161,23 @@ class OutputBag:
             *self._messages.of_outputs(outputs),
             self._messages.of_base_wrenches(outputs.stamps, block.base_wrenches),
             *self._of_model(times, block.setpoints.motions, outputs)) if len(group[1])]
+        self._write_messages(times, groups)
+
+    def write_inputs(self, recorded: Messages) -> None:
+        """Write a chunk: recorded messages of the inputs."""
+        if not len(recorded.times):
+            return
+        groups = []
+        kinds, of_kind = np.unique(
+            np.column_stack([recorded.of_topic, recorded.sizes]), axis=0, return_inverse=True)
+        for n, (topic, size) in enumerate(kinds.tolist()):
+            which = np.flatnonzero(of_kind.ravel() == n)
+            groups.append((recorded.topics[topic], which,
+                           at_any_byte(recorded.data, size)[recorded.starts[which]]))
+        self._write_messages(recorded.times, groups)
+
+    def _write_messages(self, times: Stamps, groups: Sequence[Written]) -> None:
+        """Write a chunk of messages: by time, and of one time in the order of the groups."""
         sizes = np.zeros((len(times), len(groups)), dtype=np.int64)
         for n, (_, which, messages) in enumerate(groups):
             sizes[which, n] = _HEAD + messages.dtype.itemsize

@@ -22,6 +22,7 @@ standard input, and ends without completing the files when the replay is killed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -33,6 +34,7 @@ from typing import Any
 from stewart_dynamics.bags.find import OUTPUT_BAG
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import unexpected
 from stewart_dynamics.replay.legs_table import kind_of_table
@@ -54,22 +56,27 @@ class OutputFiles:
     The output bag and the table of a replay.
 
     quasi_static: velocities are not known: columns that depend on them are empty.
+    inputs: topics of which the output bag has the recorded messages.
     """
 
     def __init__(self, folder: Path, parameters: Parameters, options: Options,
-                 quasi_static: bool) -> None:
+                 quasi_static: bool, inputs: Sequence[str]) -> None:
         model = _model(parameters, options.node.strip('/'))
         self._table = kind_of_table(options.parquet)(
             folder, parameters['joints'], quasi_static,
             any(parameters[name] is not None for name in OF_JOINTS),
             parameters[CLEARANCE_MIN] is not None)
         self._bag = OutputBag(folder / OUTPUT_BAG, options.node, OutputMessages(parameters), model,
-                              parameters['visualization_rate'])
+                              parameters['visualization_rate'], inputs)
 
     def write(self, block: Answered) -> None:
         """Write setpoints."""
         self._bag.write(block)
         self._table.write(block)
+
+    def write_inputs(self, recorded: Messages) -> None:
+        """Write recorded messages of the inputs."""
+        self._bag.write_inputs(recorded)
 
     def close(self) -> None:
         """Complete the files."""
@@ -86,7 +93,7 @@ class OutputProcess:
     """Output files, by the same calls, that a process writes; its errors are raised here."""
 
     def __init__(self, folder: Path, parameters: Parameters, options: Options,
-                 quasi_static: bool) -> None:
+                 quasi_static: bool, inputs: Sequence[str]) -> None:
         self._folder = folder
         # A session of its own: Ctrl-C ends the replay, which ends the process.
         self._process = subprocess.Popen(
@@ -97,11 +104,15 @@ class OutputProcess:
         with suppress(ImportError, OSError):  # other systems; too many large pipes
             from fcntl import F_SETPIPE_SZ, fcntl
             fcntl(self._blocks, F_SETPIPE_SZ, _PIPE)
-        self._send((folder, parameters, options, quasi_static))
+        self._send((folder, parameters, options, quasi_static, inputs))
 
     def write(self, block: Answered) -> None:
         """Send setpoints; raises the error of earlier ones."""
         self._send(block)
+
+    def write_inputs(self, recorded: Messages) -> None:
+        """Send recorded messages of the inputs; raises the error of earlier ones."""
+        self._send(recorded.compact())
 
     def close(self) -> None:
         """Complete the files."""
@@ -142,7 +153,10 @@ def main() -> None:
     try:
         files = OutputFiles(*pickle.load(blocks))
         while (block := pickle.load(blocks)) is not None:
-            files.write(block)
+            if isinstance(block, Messages):
+                files.write_inputs(block)
+            else:
+                files.write(block)
         files.close()
     except (EOFError, pickle.UnpicklingError):
         pass  # the replay was killed

@@ -23,9 +23,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.program import (
-    add_node, add_parameters, add_report, frequency, interrupt_on_signals, Program)
+    add_node, add_parameters, add_report, frequency, Program)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
 from stewart_dynamics.reporting.results_folder import REPLAYS
+from stewart_dynamics.signals import interrupt_on_signals
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters

@@ -28,13 +28,14 @@ import hashlib
 import os
 from pathlib import Path
 import re
+import secrets
 import shutil
-import tempfile
-from typing import Protocol
+import time
+from typing import NamedTuple, Protocol
 
 from stewart_dynamics.bags.find import METADATA, OUTPUT_BAG, RESULT
 from stewart_dynamics.errors import BagError
-from stewart_dynamics.whole_file import named
+from stewart_dynamics.whole_file import Identity, identity, locked, named
 
 # The files by which folders of results are known, as RESULT is that of a replay.
 IDENTIFICATION, DATASHEET, CALIBRATION = (
@@ -50,21 +51,48 @@ DATASHEETS, REPLAYS, IDENTIFIED, CALIBRATED, DESIGNED = (
     'datasheet', 'replayed', 'identified', 'calibrated', 'designed')
 """Folders of the results of the programs, and of a design, if no other is given."""
 
-# For the file by which a folder is known: the kind of folder, and all that a program writes there.
+# Beginnings of the files by which folders are known: a file of the same name may be the user's.
+_OF_DOCUMENT = re.compile(rb'\s*\{.{0,400}?"software":\s*"stewart_dynamics ', re.DOTALL)
+_OF_DESIGNED_MOTION = re.compile(rb'# Designed to identify ')
+_OF_DESIGNED_POSES = re.compile(rb'[^\n]*,x,y,z,qx,qy,qz,qw\r?\n')
+_HEAD = 4096
+
+
+class _Kind(NamedTuple):
+    """A kind of folder of results."""
+
+    name: str
+    beginning: re.Pattern[bytes]  # of the file by which it is known
+    files: set[str]  # all that the program writes there
+    beside: str = ''  # another file that is always there
+
+    def is_found(self, file: Path) -> bool:
+        """Return whether a file is that by which such a folder is known."""
+        try:
+            with file.open('rb') as opened:
+                head = opened.read(_HEAD)
+        except OSError:
+            return False
+        return bool(self.beginning.match(head)) and (file.parent / self.beside).exists()
+
+
 _KINDS = {
-    RESULT: ('replay results', {
+    RESULT: _Kind('replay results', _OF_DOCUMENT, {
         RESULT, REPORT_PAGE, LEGS_CSV, LEGS_PARQUET, OUTPUT_BAG,
         f'{OUTPUT_BAG}/{OUTPUT_BAG}.mcap', f'{OUTPUT_BAG}/{METADATA}'}),
-    IDENTIFICATION: ('results of an identification',
-                     {IDENTIFICATION, IDENTIFIED_PARAMETERS, REPORT_PAGE}),
-    DATASHEET: ('a datasheet', {DATASHEET, DATASHEET_PAGE, WORKSPACE}),
-    CALIBRATION: ('results of a calibration', {CALIBRATION, CALIBRATED_PARAMETERS, REPORT_PAGE}),
-    DESIGNED_MOTION: ('a designed motion', {DESIGNED_MOTION}),
-    DESIGNED_POSES: ('designed poses', {DESIGNED_POSES, WAY_THROUGH_POSES})}
+    IDENTIFICATION: _Kind('results of an identification', _OF_DOCUMENT,
+                          {IDENTIFICATION, IDENTIFIED_PARAMETERS, REPORT_PAGE}),
+    DATASHEET: _Kind('a datasheet', _OF_DOCUMENT, {DATASHEET, DATASHEET_PAGE, WORKSPACE}),
+    CALIBRATION: _Kind('results of a calibration', _OF_DOCUMENT,
+                       {CALIBRATION, CALIBRATED_PARAMETERS, REPORT_PAGE}),
+    DESIGNED_MOTION: _Kind('a designed motion', _OF_DESIGNED_MOTION, {DESIGNED_MOTION}),
+    DESIGNED_POSES: _Kind('designed poses', _OF_DESIGNED_POSES,
+                          {DESIGNED_POSES, WAY_THROUGH_POSES}, WAY_THROUGH_POSES)}
 
 _REPLACED = '.replaced'
+_SECONDS_TO_DIE, _LOOK = 5.0, 0.05
 _PARTIAL = re.compile(
-    rf'(\..+\.)(?:[0-9a-f]{{32}}|one)\.partial\.\w{{8}}(?:{re.escape(_REPLACED)})?', re.DOTALL)
+    rf'(\..+\.)([0-9a-f]{{32}}|one)\.partial\.\w{{8}}(?:{re.escape(_REPLACED)})?', re.DOTALL)
 
 
 class Writing(Protocol):
@@ -80,22 +108,34 @@ class Writing(Protocol):
 
 
 @contextmanager
-def whole_folder(final: Path, options: Writing, result: str = RESULT) -> Iterator[Path]:
-    """Yield a folder that gets its final name only when it is complete."""
+def whole_folder(final: Path, options: Writing, result: str = RESULT,
+                 before: Identity | None = None) -> Iterator[Path]:
+    """
+    Yield a folder that gets its final name only when it is complete.
+
+    before: the existing results, as ``check_free`` has returned them. What another run has
+        written since then is not replaced.
+    """
     final.parent.mkdir(parents=True, exist_ok=True)
-    with named(final):
-        partial, lock = _new_folder(final, options.run)
+    partial = final.with_name(
+        f'{_beginning(final)}{options.run or "one"}.partial.{secrets.token_hex(4)}')
     replaced = partial.with_name(f'{partial.name}{_REPLACED}')
+    lock: int | None = None
     try:
+        with named(final):
+            lock = _make_and_lock(partial)
         yield partial
-        partial.chmod(0o755)
         # Existing results are kept until their replacement is complete.
-        if final.exists():
-            check_free(final, options, result)
-            final.rename(replaced)
-        partial.rename(final)
-    except OSError as exc:  # errors of writing to an open file have no name
-        exc.filename = str(exc.filename or final).replace(str(partial), str(final))
+        with locked(final.parent):
+            if identity(final) is not None:
+                check_free(final, options, result)
+                if identity(final) != before:
+                    raise BagError(f'{final}: another run has written it meanwhile: it is not '
+                                   'replaced')
+                final.rename(replaced)
+            partial.rename(final)
+    except Exception as exc:
+        _name_final(exc, partial, final)
         raise
     finally:
         if os.path.lexists(replaced) and not os.path.lexists(final):
@@ -104,21 +144,27 @@ def whole_folder(final: Path, options: Writing, result: str = RESULT) -> Iterato
             if left.is_symlink():
                 left.unlink()
             shutil.rmtree(left, ignore_errors=True)
-        os.close(lock)
+        if lock is not None:
+            os.close(lock)
 
 
-def _new_folder(final: Path, run: str) -> tuple[Path, int]:
-    """Return a folder for partial results, and the descriptor that locks it."""
+def _make_and_lock(partial: Path) -> int:
+    """Make a folder, by the mask of this process, and return the descriptor that locks it."""
     while True:
-        partial = Path(tempfile.mkdtemp(
-            prefix=f'{_beginning(final)}{run or "one"}.partial.', dir=final.parent))
-        try:
+        partial.mkdir(exist_ok=True)  # as long as that run removes it
+        with suppress(FileNotFoundError):  # another run has removed it before it was locked
             lock = os.open(partial, os.O_RDONLY)
-        except FileNotFoundError:  # another run has removed it before it was locked
-            continue
-        if _try_to_lock(lock) is not False and partial.exists():
-            return partial, lock
-        os.close(lock)
+            if _try_to_lock(lock) is not False and partial.exists():
+                return lock
+            os.close(lock)
+
+
+def _name_final(exc: Exception, partial: Path, final: Path) -> None:
+    """Let an error name the folder by its final name, an error of writing as well."""
+    exc.args = tuple(each.replace(partial.name, final.name) if isinstance(each, str) else each
+                     for each in exc.args)
+    if isinstance(exc, OSError):  # those of writing to an open file have no name
+        exc.filename = str(exc.filename or final).replace(partial.name, final.name)
 
 
 def _try_to_lock(descriptor: int) -> bool | None:
@@ -132,8 +178,14 @@ def _try_to_lock(descriptor: int) -> bool | None:
     return True
 
 
-def remove_abandoned(folders: Iterable[Path]) -> None:
-    """Remove partial results of killed runs beside these folders."""
+def remove_abandoned(folders: Iterable[Path], ended: str = '') -> None:
+    """
+    Remove partial results of killed runs beside these folders.
+
+    ended: identifier of a run that has ended: its partial results are removed as soon as
+        its processes have died.
+    """
+    until = time.monotonic() + _SECONDS_TO_DIE
     finals: dict[Path, dict[str, Path]] = {}
     for final in folders:
         finals.setdefault(final.parent, {})[_beginning(final)] = final
@@ -142,11 +194,18 @@ def remove_abandoned(folders: Iterable[Path]) -> None:
         for path in sorted(parent.iterdir()) if parent.is_dir() else ():
             found = _PARTIAL.fullmatch(path.name)
             if found and found[1] in of_names:
-                _remove_if_abandoned(path, of_names[found[1]])
+                final = of_names[found[1]]
+                while (not _remove_if_abandoned(path, final) and found[2] == ended
+                       and time.monotonic() < until):
+                    time.sleep(_LOOK)
 
 
-def _remove_if_abandoned(path: Path, final: Path) -> None:
-    """Remove partial results or restore the results they were to replace, unless in use."""
+def _remove_if_abandoned(path: Path, final: Path) -> bool:
+    """
+    Remove partial results or restore the results they were to replace, unless in use.
+
+    Returns whether it has done so.
+    """
     partial = path.with_name(path.name.removesuffix(_REPLACED))
     locked = partial if partial.exists() else final
     try:
@@ -154,10 +213,11 @@ def _remove_if_abandoned(path: Path, final: Path) -> None:
     except FileNotFoundError:
         with suppress(OSError):
             path.rename(final)
-        return
+        return True
     try:
-        if _try_to_lock(descriptor):
+        if unused := bool(_try_to_lock(descriptor)):
             shutil.rmtree(path, ignore_errors=True)
+        return unused
     finally:
         os.close(descriptor)
 
@@ -169,17 +229,23 @@ def _beginning(final: Path) -> str:
     return f'.{short}.'
 
 
-def check_free(folder: Path, options: Writing, result: str = RESULT) -> None:
-    """Raise BagError if results must not be written there."""
-    if not folder.exists():
-        return
-    kind, files = _KINDS[result]
-    if not (folder / result).is_file():
-        raise BagError(f'{folder}: exists already and is not a folder of {kind}: it is not '
+def check_free(folder: Path, options: Writing, result: str = RESULT) -> Identity | None:
+    """
+    Return the identity of existing results, None if there is nothing of this name.
+
+    Raises BagError: results must not be written there.
+    """
+    found = identity(folder)
+    if found is None:
+        return None
+    kind = _KINDS[result]
+    if not kind.is_found(folder / result):
+        raise BagError(f'{folder}: exists already and is not a folder of {kind.name}: it is not '
                        'replaced')
     if not options.force:
         raise BagError(f'{folder}: exists already; --force replaces results')
     for path in folder.rglob('*'):
-        if path.relative_to(folder).as_posix() not in files:
-            raise BagError(f'{folder}: contains {path}, which is not part of {kind}: it is not '
-                           'replaced')
+        if path.relative_to(folder).as_posix() not in kind.files:
+            raise BagError(f'{folder}: contains {path}, which is not part of {kind.name}: it is '
+                           'not replaced')
+    return found

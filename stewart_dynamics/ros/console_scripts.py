@@ -16,6 +16,7 @@
 The console scripts of the nodes; whatever needs no ROS is answered before rclpy is imported.
 
 ``--help``, ``--version``, a parameter file that breaks a rule, and that ROS is missing.
+Signals are handled before anything else is imported.
 """
 
 from __future__ import annotations
@@ -25,10 +26,6 @@ from importlib import import_module
 import sys
 from typing import Any, NoReturn, TYPE_CHECKING
 
-from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.parameters.yaml_file import is_of_ros, parameters_of, read_document
-from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.ros.signals import SIGNALS
 
 if TYPE_CHECKING:
@@ -43,6 +40,8 @@ def parameter_files(arguments: Sequence[str]) -> list[str]:
 
 def check_arguments(arguments: Sequence[str], kind: type[ParameterSet]) -> None:
     """Raise ParameterError for arguments that the parser of ROS rejects in its own words."""
+    from stewart_dynamics.errors import ParameterError
+
     for option, argument in zip(arguments, [*arguments[1:], ''], strict=True):
         if option in ('-p', '--param') and ':=' not in argument:
             raise ParameterError(f'command line: {option} {argument}: must be NAME:=VALUE')
@@ -59,6 +58,8 @@ def given_parameters(arguments: Sequence[str], node: str, kind: type[ParameterSe
     rclpy takes the number; values for ``/**`` and those for the node's name are applied in the
     order in which these two first appear; a ``-p`` of another type than in a file is dropped.
     """
+    from stewart_dynamics.parameters.yaml_file import is_of_ros, parameters_of, read_document
+
     values: dict[str, Any] = {}
     for option, argument in zip(arguments, arguments[1:], strict=False):
         if option == '--params-file':
@@ -93,6 +94,8 @@ def trajectory() -> int:
 
 def usage(kind: type[ParameterSet]) -> str:
     """Return what ``--help`` prints."""
+    from stewart_dynamics.parameters.table import Parameters
+
     compiles = kind.node == Parameters.node
     return '\n'.join([
         f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]',
@@ -118,6 +121,9 @@ def _described(parameter: Parameter) -> str:
 def _run(module: str, name: str, node: str) -> int:
     """Run the node of a module, with the parameters of another one; return its exit code."""
     SIGNALS.watch(end_at_once=True)  # until it is imported: run has its own way
+    from stewart_dynamics.errors import ParameterError
+    from stewart_dynamics.program import SOFTWARE
+
     kind: type[ParameterSet] = getattr(_imported(module), name)
     if {'-h', '--help'} & set(sys.argv[1:]):
         print(usage(kind))

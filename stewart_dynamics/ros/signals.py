@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-SIGINT and SIGTERM set a flag that a program looks at; they raise no exception.
+SIGINT, SIGTERM and SIGHUP set a flag that a program looks at; they raise no exception.
 
 An exception that a handler raises appears in whatever code runs at that time. Where this is a
 finalizer, a callback from C or another library's ``except``, the exception is lost, and the signal
@@ -24,15 +24,14 @@ whose calls of ROS then raise RCLError (https://github.com/ros2/rclpy/issues/128
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future, wait
 import os
 import signal
-from threading import Thread
 from typing import Any, TypeVar
+
+from stewart_dynamics.signals import ending_signals
 
 Result = TypeVar('Result')
 
-_NUMBERS = (signal.SIGINT, signal.SIGTERM)
 _LOOK = 0.1  # [s]
 
 
@@ -45,18 +44,18 @@ class Signals:
 
     def watch(self, end_at_once: bool = False) -> None:
         """
-        Handle both signals from now on; only the main thread may call it.
+        Handle these signals from now on; only the main thread may call it.
 
         With ``end_at_once`` they end the process, exit code 0: while libraries are imported, there
         is nothing to clean up.
         """
         self._ends = end_at_once
-        for number in _NUMBERS:
+        for number in ending_signals():
             signal.signal(number, self._handle)
 
     def ignore(self) -> None:
-        """Ignore both from now on: the program ends anyway."""
-        for number in _NUMBERS:
+        """Ignore these signals from now on: the program ends anyway."""
+        for number in ending_signals():
             signal.signal(number, signal.SIG_IGN)
 
     def interruptible(self, compute: Callable[[], Result]) -> Result:
@@ -65,6 +64,9 @@ class Signals:
 
         It runs in a thread of its own, which goes on after a signal until the process ends.
         """
+        from concurrent.futures import Future, wait  # late, so that signals are handled early
+        from threading import Thread
+
         future: Future[Result] = Future()
 
         def run() -> None:

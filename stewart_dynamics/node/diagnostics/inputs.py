@@ -32,6 +32,7 @@ from stewart_dynamics.node.diagnostics.levels import (
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import SECONDS
 from stewart_dynamics.setpoints.base_input import BaseInput
+from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejection, UNSTAMPED
 from stewart_dynamics.setpoints.step import Setpoint
 
 INCOMPLETE, _UNKNOWN = 'incomplete', 'unknown'  # causes of a level besides rejections
@@ -59,6 +60,14 @@ class SetpointDiagnostics(StatusPart):
         # Start of the time in which messages complete no setpoint, as seen by reports.
         self._incomplete_since = math.inf
         self._warned_at = NEVER
+        self._unstamped = ''  # topic whose last message that was not joined had a stamp of zero
+
+    def rejected(self, rejection: Rejection, details: str, now: float,
+                 cause: str = REJECTED) -> None:
+        """Note a rejection; one for lack of the other messages is a cause of silence."""
+        super().rejected(rejection, details, now, cause)
+        if rejection.reason == NOT_JOINED:
+            self._unstamped = rejection.topic if details == UNSTAMPED else ''
 
     def found(self, writers: Mapping[str, int], readers: Mapping[str, int],
               namesakes: str) -> None:
@@ -123,6 +132,8 @@ class SetpointDiagnostics(StatusPart):
         if last <= self._answers.at:
             self._incomplete_since = math.inf
             return lines
+        if self._answers.at >= self._incomplete_since:  # answered since the last report
+            self._incomplete_since = math.inf
         self._incomplete_since = min(self._incomplete_since, now)
         if (last - self._incomplete_since < _PATIENCE or last <= self._warned_at
                 or now - self._warned_at < SECONDS
@@ -134,11 +145,17 @@ class SetpointDiagnostics(StatusPart):
     def _no_setpoint(self, now: float) -> str:
         """Return why there is no setpoint: silence, rejections or stamps."""
         parameters = self._answers.parameters
+        # Only messages since the last setpoint could have been joined.
+        missing = {topic: at for topic, at in self.heard.items() if at <= self._answers.at}
         return 'no setpoint: ' + (
             _silent_topics(self.heard, parameters['setpoint.timeout'], now)
             or self.held.of(REJECTED, now).message
-            or 'all topics arrive, but none is joined: their stamps differ by more than '
-            f'setpoint.sync_tolerance, {parameters["setpoint.sync_tolerance"]:g} s')
+            or _silent_topics(missing, 0.0, now)
+            or 'all topics arrive, but none is joined: ' + (
+                f'header stamps of {self._unstamped} are zero: such messages are joined in order '
+                'of arrival, one of each topic' if self._unstamped else
+                'their stamps differ by more than setpoint.sync_tolerance, '
+                f'{parameters["setpoint.sync_tolerance"]:g} s'))
 
 
 class BaseDiagnostics(StatusPart):

@@ -1,0 +1,41 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The arguments of the launch files: launch itself accepts any name, and ignores it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+import difflib
+from pathlib import Path
+
+from stewart_dynamics.errors import StewartError
+
+
+def check_launch_arguments(file: str, command_line: Sequence[str], known: Iterable[str]) -> None:
+    """
+    Raise StewartError for an argument that a launch file does not have.
+
+    command_line: that of this process. Where it does not name the file, another launch file
+        includes it: the arguments are those of the other.
+    """
+    if Path(file).name not in (Path(each).name for each in command_line):
+        return
+    names = list(known)
+    for each in command_line:
+        name, given, _ = each.partition(':=')
+        if given and name not in names:
+            close = difflib.get_close_matches(name, names, 1)
+            raise StewartError(f'{name}: unknown argument; ' + (
+                f'did you mean {close[0]}?' if close else f'known are {", ".join(names)}'))
