@@ -28,7 +28,7 @@ from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS, drive_constants, Drives, MOTORS, Motors, SPEEDS)
 from stewart_dynamics.mechanics.limits import short_name, SPEED_MAX, TORQUE_MAX, TORQUE_SPEED
 from stewart_dynamics.mechanics.rows import MOTION, RESULT
-from stewart_dynamics.parameters.table import GUIDED, Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 # Ratio of a torque to none that is available: finite, for searches.
 _FAR_BEYOND = 1e9
@@ -60,7 +60,6 @@ class MotorBounds:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = p = parameters
         self._drives = Drives(p)
-        self._guided = Drives(p.replaced({'drive.screw_rotation': GUIDED}))
         constants = drive_constants(p)
         self._ratio, self._mass = constants[:, 0], constants[:, 2]
         self._factors = 1.0 + constants[:, 3], 1.0 + constants[:, 4]
@@ -84,11 +83,10 @@ class MotorBounds:
         """Return the motors for rows (..., MOTION) and (..., RESULT)."""
         shape = results.shape[:-1]
         rows = np.broadcast_to(motions, (*shape, MOTION)).reshape(-1, MOTION)
-        turning, straight = (drives(rows, results.reshape(-1, RESULT)).reshape(*shape, MOTORS)
-                             for drives in (self._drives, self._guided))
-        own = self.inertia * turning[..., ACCELERATIONS]
-        return MovingMotors(turning[..., SPEEDS], own,
-                            self._mass / self._ratio * straight[..., ACCELERATIONS])
+        motors = self._drives(rows, results.reshape(-1, RESULT)).reshape(*shape, MOTORS)
+        accelerations = motors[..., ACCELERATIONS]
+        return MovingMotors(motors[..., SPEEDS], self.inertia * accelerations,
+                            self._mass / self._ratio * accelerations)
 
     def ratios(self, motions: Array, results: Array) -> list[Array]:
         """Return speeds and torques relative to their limits, two of (N, 6)."""
@@ -112,7 +110,7 @@ class MotorBounds:
 
         low, high (6, N, 6): bounds of the quantities of ``GrowthBounds``.
         friction (two of (N, 6)): bounds of the Coulomb friction, low and high [N].
-        band (6,): rates below which a leg is near standstill.
+        band (6,): rates below which a drive is near standstill.
         """
         rates, speeds, load = ((low[n], high[n]) for n in (0, 2, 3))
         with np.errstate(invalid='ignore'):  # both factors count where loads are not bounded
@@ -151,7 +149,7 @@ class MotorBounds:
         load, own (three of (..., 6)): coefficients of 1, t and t^2: loads of the screws [N],
             torques of the rotors [N m].
         speeds (..., 6): [rad/s], where they grow at t = 1.
-        direction (..., 6): signs of the rates of the legs; 0 near standstill.
+        direction (..., 6): signs of the rates of the drives; 0 near standstill.
         begin, end (..., 6) or (): ends of the interval of each leg.
         growing: speeds grow with t.
         Returns exits, limits (..., 6): ``begin`` where a torque is exceeded there, infinity where

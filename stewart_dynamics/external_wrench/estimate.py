@@ -21,7 +21,8 @@ give the forces f_model of the same motion without it, so
 
     w_ext = J_inv^T (f_model - f)
 
-with the sign of ``~/wrench``: the load that the surroundings put on the platform at its origin,
+(J_q in place of J_inv where screws turn with their legs: ``drives.screws``), with the sign of
+``~/wrench``: the load that the surroundings put on the platform at its origin,
 base axes. It includes all forces that the model lacks: a wrong payload or friction, a brake, an
 end stop. ``external_wrenches`` is this equation for recorded samples, as the replay uses it.
 
@@ -53,14 +54,13 @@ from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
 from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
-from stewart_dynamics.mechanics.dynamics.bodies import leg_line
+from stewart_dynamics.mechanics.dynamics.bodies import drive_row
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import (
     BASE, consecutive, FORCES, MOTION, NO_BASE, PARTS_OF_WRENCH, RESULT, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.mechanics.vectors import cross
 from stewart_dynamics.parameters.table import Parameters
 
 # Under the node's name.
@@ -125,17 +125,19 @@ class Estimate(NamedTuple):
 @inlined
 def _add_external_wrench(constants: Array, motion: Array, model_forces: Array,
                          measured_forces: Array, weight: float, wrench: Array) -> None:
-    """Add w_ext = J_inv^T (f_model - f_measured), times a weight, without making J_inv."""
+    """Add w_ext = J_inv^T (f_model - f_measured), times a weight, row by row."""
     position = motion[0], motion[1], motion[2]
     rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
                 motion[10], motion[11])
     for leg in range(6):
-        a, _length, _inverse_length, s = leg_line(constants, leg, position, rotation)
-        m = cross(a, s)
+        r0, r1, r2, r3, r4, r5 = drive_row(constants, leg, position, rotation)
         force = weight * (model_forces[leg] - measured_forces[leg])
-        for n in range(3):
-            wrench[n] += force * s[n]
-            wrench[3 + n] += force * m[n]
+        wrench[0] += force * r0
+        wrench[1] += force * r1
+        wrench[2] += force * r2
+        wrench[3] += force * r3
+        wrench[4] += force * r4
+        wrench[5] += force * r5
 
 
 @entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
