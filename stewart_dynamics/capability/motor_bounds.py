@@ -51,6 +51,7 @@ class MotorBounds:
     in ``drives.motors``.
 
     limited, limits_speeds: there is a limit of torques, of speeds.
+    ratio (6,): turns of the motors for each metre of their drives [rad/m].
     inertia (6,): at the motors' shafts [kg m^2].
     scales (two of (6,)): torques per load [m]: of the motor that drives, and of the one that is
         driven.
@@ -61,10 +62,10 @@ class MotorBounds:
         self._parameters = p = parameters
         self._drives = Drives(p)
         constants = drive_constants(p)
-        self._ratio, self._mass = constants[:, 0], constants[:, 2]
+        self.ratio, self._mass = constants[:, 0], constants[:, 2]
         self._factors = 1.0 + constants[:, 3], 1.0 + constants[:, 4]
-        self.inertia = self._mass / self._ratio ** 2
-        self.scales = tuple(each / self._ratio for each in self._factors)
+        self.inertia = self._mass / self.ratio ** 2
+        self.scales = tuple(each / self.ratio for each in self._factors)
         self._strongest, self.fastest = bound_of(p, TORQUE_MAX), bound_of(p, SPEED_MAX)
         self.limits_speeds = bool(np.isfinite(self.fastest).any())
         self._curve = p[TORQUE_SPEED]
@@ -86,7 +87,7 @@ class MotorBounds:
         motors = self._drives(rows, results.reshape(-1, RESULT)).reshape(*shape, MOTORS)
         accelerations = motors[..., ACCELERATIONS]
         return MovingMotors(motors[..., SPEEDS], self.inertia * accelerations,
-                            self._mass / self._ratio * accelerations)
+                            self._mass / self.ratio * accelerations)
 
     def ratios(self, motions: Array, results: Array) -> list[Array]:
         """Return speeds and torques relative to their limits, two of (N, 6)."""
@@ -103,16 +104,17 @@ class MotorBounds:
         return np.where(
             largest < self._strongest, short_name(TORQUE_SPEED), short_name(TORQUE_MAX))
 
-    def between(self, low: Array, high: Array, friction: tuple[Array, Array], band: Array,
-                ) -> list[Array]:
+    def between(self, low: Array, high: Array, rates: tuple[Array, Array],
+                friction: tuple[Array, Array], band: Array) -> list[Array]:
         """
         Return bounds of ``ratios`` in an interval.
 
         low, high (6, N, 6): bounds of the quantities of ``GrowthBounds``.
+        rates (two of (N, 6)): bounds of the rates of the drives, low and high [m/s].
         friction (two of (N, 6)): bounds of the Coulomb friction, low and high [N].
         band (6,): rates below which a drive is near standstill.
         """
-        rates, speeds, load = ((low[n], high[n]) for n in (0, 2, 3))
+        speeds, load = ((low[n], high[n]) for n in (2, 3))
         with np.errstate(invalid='ignore'):  # both factors count where loads are not bounded
             sign = np.sign(rates[0]) * ((rates[0] >= band) | (rates[1] <= -band))
             power = sign * (load[0] + friction[0]), sign * (load[1] + friction[1])
@@ -136,7 +138,7 @@ class MotorBounds:
     @property
     def forces_at_rest(self) -> Array:
         """Return the largest leg forces at rest (6,) [N], by the breakaway torque."""
-        forces: Array = self._largest(np.zeros(6)) * self._ratio / np.max(
+        forces: Array = self._largest(np.zeros(6)) * self.ratio / np.max(
             np.abs(self._factors), axis=0)
         return forces if self.limited else np.full(6, math.inf)
 
@@ -179,7 +181,7 @@ class MotorBounds:
                     slope = np.where(flat, 0.0, rise / (high - low))
                 driving = (constant + middle * (linear + middle * square)) * direction > 0.0
                 for factor, active in zip(self._factors, (driving, ~driving), strict=True):
-                    scale = factor / self._ratio
+                    scale = factor / self.ratio
                     torques = tuple(a + scale * b for a, b in zip(own, load, strict=True))
                     found = quadratic_exit(
                         torques, here - slope * middle, low, high, slope)

@@ -48,7 +48,7 @@ from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
     FORCES, GRAVITY, JOINT_ANGLES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
-    RATES, RESULT, TWIST, WRENCH)
+    RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
 from stewart_dynamics.parameters.table import mean_radius, Parameters
@@ -432,10 +432,10 @@ class StewartPlatform:
                 self._legs(motion), motion.rotation, motion.linear_velocity,
                 motion.angular_velocity, self.screws), len(motion.shape))
 
-    def drive_rates(self, motions: Array, results: Array) -> Array:
-        """Return the rates of the drives (..., 6) [m/s] of rows of motion and of their results."""
+    def drive_rates(self, motions: Array, leg_rates: Array) -> Array:
+        """Return the rates of the drives (..., 6) [m/s] of rows of motion with their leg rates."""
         if not self.screws.any():
-            return results[..., RATES]
+            return leg_rates
         return lagrange.drive_rates(self.parameters, motions, self.screws)
 
     def inverse_jacobian_rate(self, motion: Motion) -> Array:

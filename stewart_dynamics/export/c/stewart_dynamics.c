@@ -192,7 +192,7 @@ static double pitch_of(const stewart_leg * leg) {
     leg->twist_ratio * leg->screw_lead / (2.0 * PI * leg->gear_ratio);
 }
 
-/* Coordinate of a drive: the length of its leg, less the extension by the turn of its leg. */
+/* q of a drive: the length of its leg, less the extension by the turn of its leg. */
 typedef struct { double position, rate, acceleration; } drive_motion;
 
 static drive_motion move_drive(const stewart_leg * leg, const stewart_motion * motion) {
@@ -243,8 +243,6 @@ static void turning_row(
   vector moment = add(cross(at.arm, h), scale(of_w, subtract(s, scale(ws, w))));
   put3(row, h), put3(row + 3, scale(1.0 / platform->characteristic_length, moment));
 }
-
-/* ---- dynamics/bodies: the platform ------------------------------------------------------------ */
 
 static load move_platform(const stewart_platform * platform, const stewart_motion * motion) {
   load moved;

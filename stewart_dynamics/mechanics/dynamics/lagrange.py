@@ -16,12 +16,12 @@
 The Lagrange equations as the paper assembles them: the readable reference.
 
 ``M(X) X'' + C(X, X') X' + G(X) = J_inv^T f + wrench`` in twist coordinates ``X' = [v; w]``,
-base axes. Where screws turn with their legs, their drives' J_q replaces J_inv for the forces f and
-the reflected masses: ``drives.screws``. Numbers in brackets are equations of Alwan and Sarhan, Dynamic Analysis of Gough
-Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon Eng. Sci. 26(10),
-2018, in their correct form: docs/misprints.md lists the misprints. ``inverse_dynamics``
-computes the same forces without a matrix and is validated against these. Every function takes any
-leading shape of samples.
+base axes. Where screws turn with their legs, their J_q replaces J_inv for the forces f and the
+reflected masses: ``drives.screws``. Numbers in brackets are equations of Alwan and Sarhan, Dynamic
+Analysis of Gough Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon Eng.
+Sci. 26(10), 2018, in their correct form: docs/misprints.md lists the misprints.
+``inverse_dynamics`` computes the same forces without a matrix and is validated against these.
+Every function takes any leading shape of samples.
 """
 
 from __future__ import annotations
