@@ -111,11 +111,12 @@ class Capability:
     Answers to "possible?" and "how far?" of a hexapod: exact, without sampling.
 
     J_inv is square, as is J_q of screws that turn with their legs (``drives.screws``), so leg
-    forces are an affine function of a load, of an acceleration and of an added mass: each question at a pose is six intervals. Poses and directions have any leading
-    shapes that broadcast against each other. A direction is six numbers, translation and rotation
-    (or force and moment), base axes; answers are multiples of it, so a unit vector gives meters,
-    radians, newtons. Loads, rates and payload are those of a pose whether or not its lengths,
-    joint angles and clearance are within their limits: ``reachable`` and ``travel`` say that.
+    forces are an affine function of a load, of an acceleration and of an added mass: each question
+    at a pose is six intervals. Poses and directions have any leading shapes that broadcast against
+    each other. A direction is six numbers, translation and rotation (or force and moment), base
+    axes; answers are multiples of it, so a unit vector gives meters, radians, newtons. Loads,
+    rates and payload are those of a pose whether or not its lengths, joint angles and clearance
+    are within their limits: ``reachable`` and ``travel`` say that.
 
     Parameters
     ----------

@@ -27,8 +27,9 @@ On the disc of radius r about k0, with displacement k d and rotation vector k ph
 - a vector a that turns with the platform changes by at most
   ``(exp(r |phi|) - 1) |phi x a| / |phi|``, and a leg's l by at most ``r max|d + phi x a|``;
 - d omega / dk = R phi', and d alpha / dk = R phi'' + omega x (R phi'), with R = exp(skew(k phi));
-- J = J_inv, or J_q of screws that turn with their legs (``drives.screws``), is ``(1 + z M + Q J0^-1) J0`` with M = J' J0^-1 at k0, and rows q_i of Q. The forces f
-  under a wrench W solve J^T f = W. Where W changes by w, f_i changes by at most
+- J is J_inv, or J_q where screws turn with their legs (``drives.screws``):
+  ``J = (1 + z M + Q J0^-1) J0`` with M = J' J0^-1 at k0, and rows q_i of Q. The forces f under
+  a wrench W solve J^T f = W. Where W changes by w, f_i changes by at most
   ``|A_i| |w| + (r |M_i| + |A_i| |q|) |f|`` with the columns A_i of J0^-1, M_i of M; and
   ``|f| <= (|f(k0)| + |A| |w|) / (1 - kappa)``, ``kappa = r |M| + |A| |q| < 1`` (Frobenius norms).
 """

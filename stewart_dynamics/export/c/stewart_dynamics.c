@@ -229,7 +229,7 @@ static drive_motion move_drive(const stewart_leg * leg, const stewart_motion * m
   return drive;
 }
 
-/* Write the row of J_q of a leg whose screw turns, moments divided by the characteristic length. */
+/* Write the row of J_q of a leg whose screw turns, moments by the characteristic length. */
 static void turning_row(
   const stewart_platform * platform, int i, const stewart_motion * motion, double row[6]) {
   const stewart_leg * leg = &platform->legs[i];
@@ -639,7 +639,7 @@ int stewart_step(
   return code;
 }
 
-/* ---- drives/motors --------------------------------------------------------------------------- */
+/* ---- drives/motors -------------------------------------------------------------------------- */
 
 int stewart_motor_torques(
   const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
