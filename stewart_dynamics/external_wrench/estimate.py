@@ -41,8 +41,9 @@ difference quotient alone gives sqrt(2) M s / dt.
 
 Six lengths alone do not show that the platform has passed a singularity: the forward kinematics
 stay on the side of the last pose. The setpoint shows it. Where det(J) has another sign at the
-setpoint than at the last pose, the pose is searched from the setpoint; if the one found is nearer
-to the setpoint, the estimate starts again there, as after a gap.
+setpoint than at the last pose, the pose is searched from the setpoint; if the platform is there
+(the pose found is at most half as far from the setpoint as from the one on the old side), the
+estimate starts again there, as after a gap.
 """
 
 from __future__ import annotations
@@ -261,7 +262,7 @@ class ExternalWrench:
                 other = self._solve(given, NO_WRENCH, 0.0, target, base, base)
                 if other[_CODE.start] == forward_kinematics.FOUND and (
                         result[_CODE.start] != forward_kinematics.FOUND
-                        or self._distance(other, target) < self._distance(result, target)):
+                        or 2.0 * self._distance(other, target) < self._distance(other, result)):
                     result, interval = other, 0
         else:
             for guess in self._guesses(before, target):
