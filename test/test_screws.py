@@ -236,7 +236,7 @@ def test_an_end_stop_pushes_along_its_leg_alone(commands: str) -> None:
         state.pose[:3], Rotation.from_quat(state.pose[3:]).as_matrix().ravel(), state.twist,
         np.zeros(6)]))
     forces = np.array(state.forces)
-    # What the stops do to the platform: the wrench that explains its acceleration.
+    # The wrench of the stops on the platform explains its acceleration.
     moving = at.rows.copy()
     moving[ACCELERATION] = state.acceleration
     needed = free.inverse_dynamics(Motion.of_rows(moving), up).forces

@@ -180,12 +180,12 @@ def _slope(constants: Array, drives: Array, torque_max: Array, curve: Array, by_
     for n in range(6):
         motion[TWIST.start + n] = state[STATE_TWIST.start + n]
         load[n] = loads[WRENCH.start + n]
-    turning = screws_turn(constants)
+    by_wrench = screws_turn(constants)
     for leg in range(6):
         a, length, _, s = leg_line(constants, leg, position, rotation)
         rate = dot(s, add(velocity, cross(omega, a)))
         of_stops[leg] = stop_force(stops, leg, length, rate)
-        if turning:
+        if by_wrench:
             moment = cross(a, s)
             for n in range(3):
                 load[n] += of_stops[leg] * s[n]

@@ -119,7 +119,8 @@ def drive_jacobian_rate(at: Legs, rotation: Array, velocity: Array, omega: Array
         return inverse_jacobian_rate(at, velocity, omega)
     pitch, u, w = _screws(rotation, screws)
     s, length = at.directions, at.lengths[..., None]
-    arm_rate, w_rate = (np.cross(omega[..., None, :], each) for each in (at.arms, w))
+    spin = omega[..., None, :]
+    arm_rate, w_rate = np.cross(spin, at.arms), np.cross(spin, w)
     joint_rate = velocity[..., None, :] + arm_rate
     rate = _dot(s, joint_rate)
     s_rate = (joint_rate - s * rate) / length
@@ -156,7 +157,7 @@ def _screws(rotation: Array, screws: Array) -> tuple[Array, Array, Array]:
         '...jk,ik->...ij', rotation, screws[:, PLATFORM_AXIS])
 
 
-def _dot(a: Array, b: Array) -> Array:
+def _dot(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Array:
     product: Array = np.sum(a * b, axis=-1, keepdims=True)
     return product
 
