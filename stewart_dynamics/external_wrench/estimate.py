@@ -180,7 +180,7 @@ def _one(numbers: Array) -> None:
         numbers[_MOTION], written[_MOTION_AFTER], written[_AFTER], written[_DIFFERENCES])
     for n in range(MOTION):
         motion[n] = before[n]
-    # Whether the setpoint is on the other side of a singularity; nan is on none.
+    # Whether the setpoint is on the other side of a singularity; nan: no setpoint.
     sides = forward_kinematics.determinant(constants, before) * forward_kinematics.determinant(
         constants, numbers[_TARGET])
     written[_ACROSS.start] = 1.0 if sides < 0.0 else 0.0
