@@ -19,7 +19,7 @@ The method is the classical Runge-Kutta method of fourth order, on position, qua
 After every step the quaternion is divided by its length, which keeps the order (Hairer, Lubich,
 Wanner, Geometric Numerical Integration, 2nd ed., IV.4, doi:10.1007/3-540-30666-8). Forces and
 wrench are constant within a call, so that the work of a leg force is the force times the change
-of its leg's length, exactly, and an energy balance shows the error of the method alone. The
+of its drive's coordinate, exactly, and an energy balance shows the error of the method alone. The
 motion of the base is given at begin, middle and end of a call, which are the stages of the method
 where a call is one step; with more steps it is the parabola through them.
 
