@@ -422,7 +422,9 @@ class StewartPlatform:
         It is J_inv unless ``drive.screw_rotation`` is universal: there a drive makes up for the
         turn of its leg, and its force acts with the moment of its screw (``drives.screws``).
         """
-        return lagrange.drive_jacobian(self._legs(pose), pose.rotation, self.screws)
+        with np.errstate(all='ignore'):
+            return check_finite('pose', lagrange.drive_jacobian(
+                self._legs(pose), pose.rotation, self.screws), len(pose.shape))
 
     def drive_jacobian_rate(self, motion: Motion) -> Array:
         """Return dJ_q/dt (..., 6, 6) in a motion."""
@@ -433,7 +435,12 @@ class StewartPlatform:
                 motion.angular_velocity, self.screws), len(motion.shape))
 
     def drive_rates(self, motions: Array, leg_rates: Array) -> Array:
-        """Return the rates of the drives (..., 6) [m/s] of rows of motion with their leg rates."""
+        """
+        Return the rates of the drives (..., 6) [m/s] of rows of motion, unchecked.
+
+        ``leg_rates`` (..., 6) are those of ``inverse_dynamics``; with guided screws they are the
+        drives' rates as well.
+        """
         if not self.screws.any():
             return leg_rates
         return lagrange.drive_rates(self.parameters, motions, self.screws)
