@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime, timezone
 import errno
@@ -31,12 +31,14 @@ import numpy as np
 from stewart_dynamics.errors import shown, StewartError
 
 
-def read_text(path: str | Path, largest: int, error: type[StewartError]) -> str:
+def read_text(path: str | Path, largest: int, error: type[StewartError],
+              check: Callable[[Any, bytes], None] | None = None) -> str:
     """
     Return the text of a regular file of UTF-8.
 
     path: the file; a pipe or a device is rejected without waiting for it.
     largest: largest size [bytes].
+    check: is called with path and bytes before they are decoded, to reject them.
     Raises StewartError: in one line: the file cannot be read, is too large or is not UTF-8.
     """
     try:
@@ -50,6 +52,8 @@ def read_text(path: str | Path, largest: int, error: type[StewartError]) -> str:
         raise error(f'{shown(str(path))}: cannot be read: {exc}') from exc
     if len(data) > largest:
         raise error(f'{path}: larger than {largest} bytes')
+    if check is not None:
+        check(path, data)
     try:
         return data.decode('utf-8')
     except UnicodeDecodeError as exc:

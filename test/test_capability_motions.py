@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import (
     BaseMotion, Capability, check_planned_trajectory, Motion, MotionError, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability import motions
 from stewart_dynamics.capability.motions import Deviations, faster
 from test_capability_boxes import PLATFORM
 
@@ -182,3 +183,18 @@ def test_times_that_do_not_fit_are_rejected(more: Any, text: str) -> None:
     for ask in (Capability(PLATFORM).speed_factor, Capability(PLATFORM).amplitude_factor):
         with pytest.raises(MotionError, match=text):
             ask(motion(0), **more)
+
+
+def test_a_long_motion_is_answered_block_by_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    platform, count = PLATFORM, 60
+    home = platform.home_pose()
+    times: Array = np.arange(count) * 0.02
+    s, c = np.sin(3.0 * times)[:, None], np.cos(3.0 * times)[:, None]
+    axis, none = np.array([0.05, 0.02, 0.03]), np.zeros((count, 3))
+    motion = Motion(home.position + s * axis, np.tile(home.rotation, (count, 1, 1)),
+                    3.0 * c * axis, none, -9.0 * s * axis, none)
+    whole = Capability(platform).speed_factor(motion, times=times)
+    # fewer than all of its intervals need together, more than one of them needs
+    monkeypatch.setattr(motions, 'MOST_SAMPLES', 100)
+    monkeypatch.setattr(motions, '_BLOCK', 37)
+    assert Capability(platform).speed_factor(motion, times=times) == whole

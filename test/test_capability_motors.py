@@ -22,7 +22,8 @@ import numpy as np
 import pytest
 from referees import Array, random_direction, random_motion, rng, symmetric_parameters
 
-from stewart_dynamics import Capability, Motion, ParameterError, Parameters, StewartPlatform
+from stewart_dynamics import (
+    Capability, Motion, MotionError, ParameterError, Parameters, StewartPlatform)
 from stewart_dynamics.capability.motions import Deviations, faster
 from stewart_dynamics.mechanics.rows import ACCELERATION, TWIST
 
@@ -193,3 +194,27 @@ def test_drives_without_limits_do_not_limit() -> None:
             ask(c.platform.home_pose(), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     with pytest.raises(ParameterError, match='not set'):
         c.force(c.platform.home_pose())
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_what_is_held_without_end_ends_at_the_continuous_torque(seed: int) -> None:
+    peak = driven(seed)
+    continuous = 0.5 * peak.parameters['drive.torque_max']
+    platform = StewartPlatform(peak.parameters.replaced({'drive.torque_continuous': continuous}))
+    c, pose, center = Capability(platform), platform.home_pose(), np.array([0.1, 0.0, 0.2])
+    found = c.payload(pose, center, continuous=True)
+    weight = found.value * platform.parameters['gravity']
+    held = platform.motors(Motion.from_pose(pose), np.concatenate([
+        weight, np.cross(pose.rotation @ center, weight)]))
+    assert found.limit == 'torque_continuous'
+    # the torque that is published and heats the winding: at rest without losses
+    assert (np.abs(held.torques) / continuous)[found.leg] == pytest.approx(1.0, abs=1e-9)
+    assert (np.abs(held.torques) / continuous).max() == pytest.approx(1.0, abs=1e-9)
+    assert found.value < c.payload(pose, center).value == Capability(peak).payload(
+        pose, center).value
+    for ask in (c.force, c.moment):
+        assert ask(pose, continuous=True) < ask(pose)
+    with pytest.raises(ParameterError, match='drive.torque_continuous: not set'):
+        Capability(peak).payload(pose, center, continuous=True)
+    with pytest.raises(MotionError, match='continuous: must be False for a motion'):
+        c.payload(Motion.from_pose(pose), center, continuous=True)

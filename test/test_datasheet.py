@@ -209,6 +209,53 @@ def test_a_payload_in_any_orientation_exceeds_no_force_under_any_gravity() -> No
         assert largest > 0.98 * 6000.0
 
 
+DRIVEN = PARAMETERS.replaced({
+    'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01, 'drive.motor_inertia': 7e-5,
+    'drive.efficiency': 0.85, 'drive.torque_max': 8.0, 'drive.torque_continuous': 2.4})
+
+
+@pytest.mark.parametrize(('changes', 'limit'), [
+    ({'drive.torque_max': 0.3, 'drive.torque_continuous': None}, 'drive.torque_max'),
+    ({'drive.torque_speed': [0.0, 0.3, 600.0, 0.2]}, 'drive.torque_speed'),
+    ({'limits.force_max': 100.0}, 'limits.force_max')])
+def test_a_pose_that_cannot_be_held_has_no_datasheet(
+        changes: dict[str, Any], limit: str, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    DRIVEN.replaced(changes).to_yaml(tmp_path / 'weak.yaml')
+    assert run('--params', tmp_path / 'weak.yaml', '--output', tmp_path / 'sheet') == 2
+    said = capsys.readouterr().err
+    assert re.search(rf'pose: leg_\d: .* above {limit}$', said, re.MULTILINE), said
+    assert not (tmp_path / 'sheet').exists()
+
+
+def test_the_payloads_of_peak_and_continuous_torque_are_named(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    DRIVEN.to_yaml(tmp_path / 'a.yaml')
+    assert run('--params', tmp_path / 'a.yaml', '--pivot', *PIVOT,
+               '--output', tmp_path / 'sheet') == 0
+    sheet = json.loads((tmp_path / 'sheet' / 'datasheet.json').read_text())
+    assert sheet['payload']['limit'] == 'torque_max'
+    assert sheet['payload']['continuous']['limit'] == 'torque_continuous'
+    assert sheet['payload']['continuous']['value'] < sheet['payload']['value']
+    home = StewartPlatform(DRIVEN).home_pose().position
+    assert sheet['pose']['position'] == home.tolist()
+    assert sheet['pose']['pivot_position'] == (home + PIVOT).tolist()
+    printed, page = capsys.readouterr().out, (tmp_path / 'sheet' / 'datasheet.html').read_text()
+    for text in ('continuous torque of a motor', 'torque of a motor'):
+        assert text in printed and text in page
+    assert all(each in page for each in DRIVEN.drives)
+    assert page.count('>pivot</text>') == 2
+
+
+def test_heights_are_those_of_the_platform_and_stay_in_the_picture() -> None:
+    home = StewartPlatform(PARAMETERS).home_pose()
+    svg = Drawing(PARAMETERS, home, (), np.array([0.0, 0.0, 30.0])).front().svg()
+    assert f'>{1e3 * home.position[2]:.0f}</text>' in svg
+    for name, most in (('x', 340.0), ('y', 360.0)):
+        assert all(0.0 <= float(each) <= most
+                   for each in re.findall(rf' c?{name}[12]?="([-0-9.e]+)"', svg))
+
+
 @pytest.fixture(scope='module')
 def recorded() -> RecordedMotion:
     """Return a motion of one second along z."""

@@ -27,7 +27,8 @@ from referees import (
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from stewart_dynamics import Motion, ParameterError, Parameters, SingularityError, StewartPlatform
+from stewart_dynamics import (
+    Motion, MotionError, ParameterError, Parameters, SingularityError, StewartPlatform)
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.drives.motor_limits import force_limits, rate_limits
@@ -399,3 +400,21 @@ def test_force_breakdown_and_identified_masses_with_drives() -> None:
     found = unknowns.parameters(np.full(6, 40.0))
     assert (found['actuator.reflected_mass'] == 40.0).all()
     assert 'drive.motor_inertia' not in found.given
+
+
+def test_motors_are_columns_and_curves_as_results_are() -> None:
+    pytest.importorskip('matplotlib')
+    platform = StewartPlatform(driven(symmetric_parameters(), rng()))
+    motion = random_motion(platform.parameters, rng(), 5)
+    motors, result = platform.motors(motion), platform.inverse_dynamics(motion)
+    columns = motors.to_dict()
+    np.testing.assert_array_equal(columns['torque_3'], motors.torques[:, 2])
+    assert len(columns) == 6 * len(motors)
+    for plot in (motors.plot, result.plot):
+        figure = plot(np.arange(5.0))
+        (legend,) = figure.legends  # beside the axes: no curve is below it
+        assert [each.get_text() for each in legend.get_texts()][:2] == ['leg_1', 'leg_2']
+        figure.canvas.draw()
+        assert legend.get_window_extent().y0 >= figure.axes[0].get_window_extent().y1
+    with pytest.raises(MotionError, match='times: shape'):
+        motors.plot(np.arange(4.0))

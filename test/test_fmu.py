@@ -29,7 +29,8 @@ import numpy as np
 import pytest
 from referees import random_base_motion, random_motion, random_wrench, rng
 from rosbags.highlevel import AnyReader
-from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatform
+from stewart_dynamics import (
+    InverseDynamics, Motion, ParameterError, Parameters, StewartPlatform)
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.export import main
 from stewart_dynamics.export.fmu import find_compiler, fmu, variables
@@ -362,3 +363,44 @@ def _recorded_inputs(bag: Path) -> list[list[float]]:
                 for each in (of.linear, of.angular):
                     row += [each.x, each.y, each.z]
     return [row for _, row in sorted(setpoints.items())]
+
+
+def test_without_limits_of_length_it_starts_where_forces_can_be_solved(
+        version: str, tmp_path: Path) -> None:
+    """A file that the node takes is exported; it starts at rest at a pose that is not singular."""
+    p = PARAMETERS.replaced({
+        'limits.length_min': None, 'limits.length_max': None, 'geometry.zero_length': 0.0})
+    with pytest.raises(ParameterError, match='home pose'):
+        StewartPlatform(p).home_pose()
+    path = tmp_path / 'hexapod.fmu'
+    path.write_bytes(fmu(p, 'hexapod', version, COMPILER))
+    assert not validate_fmu(str(path))
+    done = fmpy.simulate_fmu(str(path), stop_time=0.01, output_interval=0.001)
+    assert set(done['status']) == {0}
+
+
+def test_motors_have_the_bits_of_the_library(version: str, tmp_path: Path) -> None:
+    """Speeds and torques of the motors, where drives are given."""
+    p = PARAMETERS.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.005, 'drive.gear_ratio': 3.0,
+        'drive.motor_inertia': 1.37e-4, 'drive.efficiency': 0.9, 'limits.force_max': None})
+    path = tmp_path / 'hexapod.fmu'
+    path.write_bytes(fmu(p, 'hexapod', version, COMPILER))
+    assert not validate_fmu(str(path))
+    places = {each.name: n for n, each in enumerate(variables(p))}
+    unit, platform = Unit(path, version, tmp_path / 'unit'), StewartPlatform(p)
+    unit.fmu.exitInitializationMode()
+    for motion in random_motion(p, rng(), 50).rows:
+        quaternion = to_quaternion(motion[3:12].reshape(3, 3)).tolist()
+        unit.put(0, [*motion[:3], *quaternion, *motion[12:]])
+        unit.step()
+        length = quaternion_length(*quaternion)
+        motion[3:12] = from_quaternion(*(each / length for each in quaternion))
+        motors = platform.motors(Motion.of_rows(motion))
+        for name, wanted in (('speeds', motors.speeds), ('torques', motors.torques)):
+            found = unit.get([places[f'motor_{name}[{leg}]'] for leg in range(1, 7)])
+            assert found == wanted.tolist()
+    unit.put(0, [math.nan])
+    unit.step()
+    assert unit.get([places[f'motor_torques[{leg}]'] for leg in range(1, 7)]) == [0.0] * 6
+    unit.close()

@@ -27,7 +27,7 @@ from referees import (
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import (
-    Motion, Parameters, Pose, PoseError, SingularityError, StewartPlatform)
+    Motion, ParameterError, Parameters, Pose, PoseError, SingularityError, StewartPlatform)
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.forward_kinematics import FOUND, RESIDUAL, SINGULAR
@@ -258,3 +258,10 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     assert codes[3] != FOUND
     assert codes[4] == SINGULAR
     assert_uncompiled_gives_the_same(forward_kinematics.twists, platform.constants, rates, rows)
+
+
+def test_without_a_home_pose_the_error_names_the_guess() -> None:
+    platform = StewartPlatform(symmetric_parameters().replaced({
+        'limits.length_min': None, 'limits.length_max': None, 'geometry.zero_length': 0.0}))
+    with pytest.raises(ParameterError, match='home pose: .*; give guess='):
+        platform.forward_kinematics(np.ones(6))

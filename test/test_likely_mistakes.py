@@ -26,7 +26,7 @@ import pytest
 from referees import random_parameters, rng, ROOT, scaled
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.kinematics.home_pose import homes
+from stewart_dynamics.mechanics.kinematics.home_pose import home_of, homes
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import inertia_matrix, PARAMETERS
@@ -614,3 +614,64 @@ def test_a_mistake_in_a_drive_is_reported(changes: dict[str, Any], begin: str, e
     about = [line for line in found if line.startswith(begin)]
     assert about, found
     assert about[0].endswith(end) and all(len(line) < 400 for line in found)
+
+
+# Data of a servo motor of 400 W: 1500 s for windings with housing, 4 A at 2 N m.
+HEAT = {'drive__torque_constant': 0.5, 'drive__resistance': 0.8, 'drive__thermal_resistance': 0.7,
+        'drive__thermal_time_constant': 1500.0}
+
+
+def test_a_motor_with_its_heat_gives_no_warning() -> None:
+    assert drive_mistakes(**HEAT) == ()
+    assert drive_mistakes(**HEAT, drive__back_driving_efficiency=0.9) == ()
+
+
+@pytest.mark.parametrize(('changes', 'begin'), [
+    ({**HEAT, 'drive__thermal_time_constant': 25.0}, 'drive.thermal_time_constant: 25 s'),
+    ({**HEAT, 'drive__resistance': 800.0}, 'drive.resistance: 800 Ohm'),
+    ({**HEAT, 'drive__torque_constant': 500.0, 'drive__resistance': 8e8},
+     'drive.resistance: 8e+08 Ohm'),
+    ({'drive__torque_constant': 0.5, 'drive__resistance': 8000.0}, 'drive.resistance: 8000 Ohm'),
+    ({'drive__efficiency': 0.3, 'drive__back_driving_efficiency': 0.9, 'limits__force_max': 2000.0,
+      }, 'drive.back_driving_efficiency: 0.9, but drive.efficiency is 0.3'),
+    ({'drive__torque_max': 0.2, 'drive__torque_continuous': None, 'drive__torque_speed': None,
+      'limits__force_max': None, 'drive__motor_inertia': 1e-6, 'drive__screw_inertia': 0.0},
+     'drive.torque_max: 0.2 N m: '),
+])
+def test_data_of_a_motor_that_no_motor_has_are_reported(changes: dict[str, Any], begin: str,
+                                                        ) -> None:
+    found = drive_mistakes(**changes)
+    assert len(found) == 1
+    assert found[0].startswith(begin)
+
+
+@pytest.mark.parametrize(('changes', 'end'), [
+    ({'limits.velocity_max': 30.0}, 'in m/min or mm/s?'),
+    ({'limits.platform_joint_angle_max': math.radians(1.0)}, 'converted from degrees twice?')])
+def test_limits_that_the_strokes_contradict_are_reported(changes: dict[str, Any], end: str,
+                                                         ) -> None:
+    found = likely_mistakes(PLATFORM.replaced(changes))
+    assert len(found) == 1
+    assert found[0].endswith(end)
+
+
+def moved(base: float, platform: float, center: float, scale: float = 1.0) -> Parameters:
+    """Return PLATFORM with its frames moved along z, and a center of mass at a height."""
+    p = PLATFORM
+    inertia = scale ** 2 * p['platform.inertia']
+    return p.replaced({
+        'geometry.base_joints': scale * (p['geometry.base_joints'] + [0.0, 0.0, base]),
+        'geometry.platform_joints': scale * (p['geometry.platform_joints'] + [0.0, 0.0, platform]),
+        'platform.center_of_mass': [0.0, 0.0, scale * center], 'platform.inertia': inertia})
+
+
+@pytest.mark.parametrize('center', [0.0, 1e-18, -1e-18, 0.05, -0.05])
+@pytest.mark.parametrize('offset', [0.0, 0.02, -0.1, 1e-18])
+def test_a_base_frame_at_the_home_of_the_platform_is_no_mistake(center: float, offset: float,
+                                                                ) -> None:
+    """As positioning hexapods have it: the base joints below, home at zero."""
+    home = home_of(PLATFORM)
+    middle = PLATFORM['geometry.base_joints'].mean(axis=0)[2]
+    joints = PLATFORM['geometry.platform_joints'].mean(axis=0)[2]
+    p = moved(offset - middle - float(home.heights[0]), offset - joints, center)
+    assert likely_mistakes(p) == ()

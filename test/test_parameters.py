@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 import pickle
+import re
 from typing import Any
 
 from hypothesis import given, HealthCheck, settings
@@ -614,3 +615,29 @@ def test_the_given_values_cannot_be_changed() -> None:
     assert parameters.replaced({'platform.mass': 2.0})['platform.mass'] == 2.0
     with pytest.raises(TypeError):
         parameters.given['platform.mass'] = 3.0  # type: ignore[index]
+
+
+@pytest.mark.parametrize(('name', 'shape', 'said'), [
+    ('geometry.base_joints', (3, 6), 'must be (18,) or (6, 3): transposed?'),
+    ('geometry.platform_joints', (2, 9), 'must be (18,) or (6, 3)'),
+    ('geometry.base_joints', (1, 18), 'must be (18,) or (6, 3)'),
+    ('drive.base_universal_axes', (3, 3, 2), 'must be (18,) or (6, 3)'),
+    ('platform.inertia', (2, 3), 'must be (6,)'),
+    ('platform.inertia', (3, 3), 'must be (6,)'),
+    ('platform.center_of_mass', (3, 1), 'must be (3,): transposed?'),
+    ('platform.mass', (1, 1), 'must be a single value'),
+    ('legs.piston.mass', (2, 3), 'must be (1,) or (6,)'),
+    ('geometry.base_outline', (3, 4), 'must be (N, 3)'),
+    ('drive.torque_speed', (2, 3), 'must be (N, 2)')])
+def test_rows_that_are_not_those_of_the_parameter_are_rejected(
+        p: Parameters, name: str, shape: tuple[int, ...], said: str) -> None:
+    values = np.arange(1.0, 1.0 + np.prod(shape)).reshape(shape)
+    for each in (values, values.tolist()):
+        with pytest.raises(ParameterError, match=re.escape(f'{name}: shape {shape}: {said}')):
+            p.replaced({name: each})
+
+
+def test_joints_are_taken_as_rows_and_flat(p: Parameters) -> None:
+    joints = p['geometry.base_joints']
+    for each in (joints, joints.ravel(), joints.tolist(), [*joints]):
+        assert p.replaced({'geometry.base_joints': each}) == p

@@ -25,7 +25,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 from referees import random_parameters, rng, ROOT
-from stewart_dynamics import Parameters, StewartError, StewartPlatform
+from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
 from stewart_dynamics.description import read_mjcf as loading
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.mjcf import mjcf
@@ -194,7 +194,16 @@ def test_a_start_outside_the_limits_is_reported(tmp_path):
     ('', 'not XML'),
     ('<robot', 'not XML'),
     ('<html/>', "begins with 'html': must be URDF"),
-    ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x"/>', 'is xacro'),
+    ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x"><xacro:leg/></robot>',
+     'is xacro: run xacro first'),
+    ('<robot name="x"><xacro:leg/></robot>', 'is xacro: run xacro first'),
+    ('<robot name="x"><link name="${a}"/></robot>', 'is xacro: run xacro first'),
+    ('<robot xmlns:xacro="http://ros.org/wiki/xacro" name="x"/>', 'no hexapod: 0 prismatic'),
+    ('<sdf version="1.9"><%= leg %></sdf>', 'is a template (ERB or Jinja): render it first'),
+    ('#usda 1.0\n', 'is USD (text): convert it'),
+    ('PXR-USDC\0', 'is USD (binary): convert it'),
+    ('PK\3\4', 'is a zip archive, as usdz is'),
+    ('version https://git-lfs.github.com/spec/v1\noid sha256:1\n', 'run git lfs pull first'),
     ('<!DOCTYPE a [<!ENTITY b "c">]><robot name="x"/>', 'has entities'),
     ('<robot name="x"><link name="a"/></robot>', 'no hexapod: 0 prismatic joints'),
     ('<robot name="x"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
@@ -399,3 +408,140 @@ def test_the_model_is_turned_until_gravity_points_down(gravity):
 def test_a_base_frame_with_the_name_of_the_world_gets_another_in_sdf():
     model = sdf_model(PLATFORM.replaced({'base_frame': 'world'}))
     assert [link.get('name') for link in model.iter('link')][0] == 'world_base'
+
+
+def read_changed(kind, folder, *changes):
+    """Read a file of PLATFORM by others, with texts replaced in all legs."""
+    def change(text):
+        text = foreign(text)
+        for pattern, replacement in changes:
+            text, count = re.subn(pattern, replacement, text)
+            assert count
+        return text
+
+    return read_hexapod(written(PLATFORM, kind, folder, change))
+
+
+SLIDE = r'(<joint name="leg_\d" type="slide" [^>]*?)( ?/>)'
+
+
+@pytest.mark.parametrize(('changes', 'said'), [
+    ([(SLIDE, r'\1 stiffness="2000" springref="0.05"\2')], 'stiffness 2000 N/m about 0.05 m'),
+    ([('<body name="platform"', '<body name="platform" gravcomp="1"')],
+     'platform: gravcomp 1 is left out'),
+    ([('</worldbody>', '</worldbody><tendon><spatial name="s" stiffness="30"><site '
+       'site="leg_1_base_joint"/><site site="leg_1_platform_joint"/></spatial></tendon>')],
+     's: stiffness 30 N/m of this tendon is left out'),
+])
+def test_forces_of_an_mjcf_at_rest_are_warnings(changes, said, tmp_path):
+    found = read_changed('xml', tmp_path, *changes)
+    assert any(said in each for each in found.warnings)
+
+
+def test_limits_of_an_mjcf_are_taken_both_ways_or_named(tmp_path):
+    without = (r' ctrlrange="[^"]*"| ctrllimited="[^"]*"', '')
+    found = read_changed('xml', tmp_path, without,
+                         (SLIDE, r'\1 actuatorfrclimited="true" actuatorfrcrange="-250 250"\2'))
+    assert found.parameters['limits.force_max'] == pytest.approx(250.0)
+    found = read_changed('xml', tmp_path, without, (
+        '<motor ', '<motor ctrllimited="true" ctrlrange="0 400" '))
+    assert 'each leg: ctrlrange 0 400 is one-sided: left out' in found.remarks
+    assert found.parameters['limits.force_max'] is None
+    assert not any('limits.force_max' in each for each in found.remarks)
+
+
+def test_springs_and_links_without_weight_of_an_sdf_are_warnings(tmp_path):
+    found = read_changed('sdf', tmp_path, ('</damping>', '</damping><spring_stiffness>50'
+                                           '</spring_stiffness>'),
+                         ('<link name="platform">', '<link name="platform"><gravity>0</gravity>'))
+    assert any('each leg: stiffness 50 N/m about 0 m' in each for each in found.warnings)
+    assert any(each.startswith('platform: gravity switched off') for each in found.warnings)
+
+
+def cad_urdf(platform, limit='lower="-0.1" upper="0.1" effort="500" velocity="0.3"', extra='',
+             mass=0.001):
+    """Return a URDF as CAD programs write it: leg 1 carries the platform, dummies at joints."""
+    p = PLATFORM
+    home = StewartPlatform(p).home_pose()
+    tips = home.position + p['geometry.platform_joints'] @ home.rotation.T
+
+    def link(name, heavy):
+        return (f'<link name="{name}"><inertial><mass value="{heavy}"/><inertia ixx="{heavy}" '
+                f'ixy="0" ixz="0" iyy="{heavy}" iyz="0" izz="0"/></inertial></link>')
+
+    def joint(name, kind, parent, child, at, axis):
+        return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child '
+                f'link="{child}"/><origin xyz="{" ".join(map(repr, map(float, at)))}"/>'
+                f'<axis xyz="{" ".join(map(repr, map(float, axis)))}"/>'
+                + (f'<limit {limit}/>' if kind == 'prismatic' else '') + '</joint>')
+
+    text, zero, (x, y, z) = link('base', 30), np.zeros(3), np.eye(3)
+    for n, (base, tip) in enumerate(zip(p['geometry.base_joints'], tips, strict=True)):
+        arm = tip - base
+        for child, heavy in (('u', mass), ('cyl', 2), ('rod', 1), ('s1', mass), ('s2', mass),
+                             ('s3', mass)):
+            text += link(f'{child}{n}', heavy)
+        text += joint(f'ux{n}', 'continuous', 'base', f'u{n}', base, x)
+        text += joint(f'uy{n}', 'continuous', f'u{n}', f'cyl{n}', zero, y)
+        text += joint(f'slide{n}', 'prismatic', f'cyl{n}', f'rod{n}', arm, arm)
+        for parent, child, axis in (('rod', 's1', x), ('s1', 's2', y), ('s2', 's3', z)):
+            text += joint(f'{child}_{n}', 'continuous', f'{parent}{n}', f'{child}{n}', zero, axis)
+    text += platform + joint('plate', 'fixed', 's30', 'platform', home.position - tips[0], x)
+    return f'<robot name="cad">{text}{extra}</robot>'
+
+
+def from_text(text, folder, geometry_only=False):
+    path = folder / 'hexapod.urdf'
+    path.write_text(text)
+    return read_hexapod(path, geometry_only)
+
+
+HEAVY = ('<link name="platform"><inertial><mass value="20"/><inertia ixx="1" ixy="0" ixz="0" '
+         'iyy="1" iyz="0" izz="1"/></inertial></link>')
+
+
+@pytest.mark.parametrize('platform', [
+    HEAVY, '<link name="platform"/>',
+    '<link name="platform"><visual><geometry><sphere radius="1"/></geometry></visual></link>'])
+def test_the_platform_frame_does_not_depend_on_masses(platform, tmp_path):
+    found = from_text(cad_urdf(platform), tmp_path)
+    p = found.parameters
+    assert p['platform_frame'] == 'platform'
+    assert p['geometry.platform_joints'] == pytest.approx(
+        PLATFORM['geometry.platform_joints'], abs=1e-9)
+    missing = ('platform: no mass but 0.006 kg of six links; legs have 3 kg each: is the mass of '
+               "'platform' missing?")
+    assert (missing in found.warnings) == (platform is not HEAVY)
+
+
+def test_limits_of_zero_are_left_out_and_not_listed_as_missing(tmp_path):
+    found = from_text(cad_urdf(HEAVY, 'lower="0" upper="0" effort="0" velocity="0"'), tmp_path)
+    assert all(found.parameters[name] is None for name in (
+        'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max'))
+    assert ('each leg: limits.length_min, limits.length_max: lower and upper are both 0: no '
+            'travel: left out') in found.remarks
+    assert not any('not in the file: unlimited' in each for each in found.remarks)
+
+
+def test_what_gazebo_and_ros2_control_add_in_a_urdf_is_named_or_taken(tmp_path):
+    extra = ''.join(
+        f'<gazebo reference="slide{n}"><springStiffness>40</springStiffness></gazebo>'
+        f'<ros2_control><joint name="slide{n}"><command_interface name="effort"><param name="min">-90</param>'
+        '<param name="max">90</param></command_interface></joint></ros2_control>'
+        for n in range(6))
+    found = from_text(cad_urdf(HEAVY, extra=extra), tmp_path)
+    assert found.parameters['limits.force_max'] == pytest.approx(90.0)
+    assert any(each.startswith('each leg: stiffness 40 N/m about 0 m') for each in found.warnings)
+
+
+def test_geometry_alone_is_read_without_masses(tmp_path):
+    text = cad_urdf('<link name="platform"/>', mass=0.0)
+    with pytest.raises(StewartError, match='has no mass; --geometry-only reads the geometry'):
+        from_text(text, tmp_path)
+    p = from_text(text, tmp_path, True).parameters
+    assert p['geometry.base_joints'] == pytest.approx(PLATFORM['geometry.base_joints'], abs=1e-9)
+    machine = StewartPlatform(p)
+    assert any(each.startswith('platform.mass: ') and 'stands for none' in each
+               for each in machine.check())
+    assert np.abs(machine.inverse_dynamics(Motion.from_pose(machine.home_pose())).forces
+                  ).max() < 1e-9

@@ -37,6 +37,8 @@ _FOLDER = Path(__file__).with_name('templates')
 _MM = 1e3
 # Length of the longest arrow in a view, by the radius of the joints.
 _ARROW = 0.35
+# Width of a character and height of a line of a label [px].
+_CHARACTER, _LINE = 5.9, 13.0
 # Standard errors that the largest of the 36 changes of exact joints exceeds with 5 %.
 _NOISE = 3.2
 
@@ -66,8 +68,8 @@ def _changes(found: Calibration) -> str:
                       '95 % interval')
     left = 60.0
     for part, width, title, axes in (
-            (BASE, 445.0, 'base joints', 'xyz'), (PLATFORM, 445.0, 'platform joints', 'xyz'),
-            (ZERO, 130.0, 'zero lengths', ' ')):
+            (BASE, 410.0, 'base joints', 'xyz'), (PLATFORM, 410.0, 'platform joints', 'xyz'),
+            (ZERO, 200.0, 'zero lengths', ' ')):
         count = part.stop - part.start
         chart = Chart(picture, (left, 34.0, width, 220.0), (-0.6, count - 0.4), (-end, end))
         _frame(picture, chart, title, left == 60.0)
@@ -128,15 +130,39 @@ def _view(found: Calibration, part: slice, title: str, times: float) -> str:
     picture.text([20.0, 16.0], f'{title}, ' + (
         f'arrows {digits(float(f"{times:.2g}"))} times as long' if times else
         'no change above the noise'), css='view')
-    for leg in range(6):
-        at, to = chart.at([start[leg], start[leg] + times * moved[leg]])
+    points = chart.at(start), chart.at(start + times * moved)
+    way: Array = np.linspace(0.0, 1.0, 33, dtype=float)[:, None, None]
+    taken = [(points[0] + way * (points[1] - points[0])).reshape(-1, 2)]
+    for leg, (at, to) in enumerate(zip(*points, strict=True)):
         picture.circle(at, 5.0, css='joint')
         if times:
             picture.line(at, to, css=f'edge leg{leg}')
             picture.circle(to, 2.6, fill=f'var(--leg{leg})')
-        outward = (start[leg] - middle) / max(float(np.linalg.norm(start[leg] - middle)), 1e-9)
-        x, y = at + np.array([22.0, -22.0]) * outward
-        picture.text([x, y + 4.0], f'{found.parameters["joints"][leg]}: '
-                     f'{_MM * np.linalg.norm(moved[leg]):.3g} mm',
-                     'start' if outward[0] > 0.0 else 'end', css='tick')
+    for leg, at in enumerate(points[0]):
+        text = (f'{found.parameters["joints"][leg]}: '
+                f'{_MM * np.linalg.norm(moved[leg]):.3g} mm')
+        corner = _free(at, np.array([_CHARACTER * len(text), _LINE]), at - chart.at(middle),
+                       np.concatenate(taken), picture)
+        picture.text(corner + [0.0, _LINE - 3.0], text, css='tick')
+        taken.append(corner + np.stack(np.meshgrid(
+            np.linspace(0.0, 1.0, 9), [0.0, 0.5, 1.0]), axis=-1).reshape(-1, 2)
+            * [_CHARACTER * len(text), _LINE])
     return picture.svg()
+
+
+def _free(at: Array, size: Array, outward: Array, taken: Array, picture: Picture) -> Array:
+    """Return the corner of a label next to a point with the fewest taken points (N, 2) in it."""
+    first = math.atan2(outward[1], outward[0])
+    best: Array = at
+    fewest = math.inf
+    for radius in (14.0, 26.0, 40.0):
+        for turn in (0.0, 0.6, -0.6, 1.2, -1.2, 1.8, -1.8, 2.4, -2.4, 3.1):
+            way = np.array([math.cos(first + turn), math.sin(first + turn)])
+            # the side of the label that is toward the point
+            free = at + radius * way + size * (0.5 * way - 0.5)
+            corner: Array = np.asarray(np.clip(
+                free, [2.0, 20.0], [picture.width, picture.height] - size - 2.0), dtype=float)
+            inside = ((taken > corner - 2.0) & (taken < corner + size + 2.0)).all(axis=1).sum()
+            if inside < fewest:
+                best, fewest = corner, inside
+    return best

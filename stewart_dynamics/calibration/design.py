@@ -41,7 +41,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR, TWO_SIDED
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
-from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.approach import approach, TimedMotion
 
@@ -121,10 +121,10 @@ def _within_limits(platform: StewartPlatform, random: np.random.Generator, count
     poses = poses[np.flatnonzero(sound)[:count]]
     known, motions = PoseLimits(p), motion_rows(poses)
     side, results = (platform.solve(rows) for rows in (motion_rows(home), motions))
-    values = {**known.values(motions, results), limits.FORCE_MAX: results[:, FORCES]}
+    exceeded = known.exceeded(known.values(motions, results), len(poses))
     return poses[known.regular(results, side[0, DETERMINANT]) & (
         results[:, CONDITION] < p['singularity.warn_condition'])
-        & ~known.exceeded(values, len(poses))]
+        & ~exceeded & ~known.overloaded(motions, results)]
 
 
 def _exchange(rows: Array, chosen: Integers) -> Integers:

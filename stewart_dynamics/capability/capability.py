@@ -343,7 +343,7 @@ class Capability:
                      self._single(pose).rows, center)
 
     def wrench(self, pose: Pose | Motion, direction: ArrayLike, base: BaseMotion | None = None,
-               ) -> Extent:
+               *, continuous: bool = False) -> Extent:
         """
         Return the largest wrench that the platform at rest can exert on its surroundings.
 
@@ -358,12 +358,17 @@ class Capability:
             Force [N] and moment [N m] at the platform's origin for a value of 1, base axes.
         base : BaseMotion, optional
             Motion or tilt of the base, as in ``inverse_dynamics``.
+        continuous : bool
+            Held without end: ``drive.torque_continuous`` counts as well, for the torque without
+            losses, which is that of ``motors`` and heats the winding. By default what the peak
+            torque can hold for a short time.
 
         """
         directions, sizes = _directions(direction)
         still = self._held(pose)
         return _divided(self._multiple(
-            still, self._forces(still, base), self._per_wrench(pose, directions)), sizes)
+            still, self._forces(still, base), self._per_wrench(pose, directions),
+            continuous=continuous), sizes)
 
     def clearance(self, pose: Pose | Motion) -> Array | float:
         """Return the smallest distance of a leg from another or a plate [m]; negative: overlap."""
@@ -404,13 +409,21 @@ class Capability:
             columns.append((ends[0] - ends[1]) / (2.0 * _STEP))
         return np.stack(columns, axis=-1)
 
-    def force(self, pose: Pose | Motion) -> Array | float:
-        """Return the force [N] that the platform at rest can exert in every direction."""
-        return self._in_every_direction(pose, slice(0, 3))
+    def force(self, pose: Pose | Motion, *, continuous: bool = False) -> Array | float:
+        """
+        Return the force [N] that the platform at rest can exert in every direction.
 
-    def moment(self, pose: Pose | Motion) -> Array | float:
-        """Return the moment [N m] that the platform at rest can exert about every axis."""
-        return self._in_every_direction(pose, slice(3, 6))
+        ``continuous`` as in ``wrench``.
+        """
+        return self._in_every_direction(pose, slice(0, 3), continuous)
+
+    def moment(self, pose: Pose | Motion, *, continuous: bool = False) -> Array | float:
+        """
+        Return the moment [N m] that the platform at rest can exert about every axis.
+
+        ``continuous`` as in ``wrench``.
+        """
+        return self._in_every_direction(pose, slice(3, 6), continuous)
 
     def velocity(self, pose: Pose | Motion, direction: ArrayLike) -> Extent:
         """Return the largest twist along a direction (..., 6) that legs and motors permit."""
@@ -447,7 +460,7 @@ class Capability:
             directions=directions), sizes)
 
     def payload(self, motion: Pose | Motion, center_of_mass: ArrayLike,
-                times: ArrayLike | None = None) -> Extent:
+                times: ArrayLike | None = None, *, continuous: bool = False) -> Extent:
         """
         Return the largest point mass that can be added to the platform [kg].
 
@@ -459,8 +472,13 @@ class Capability:
             Position of the added mass, platform frame [m].
         times : (N,), optional
             Times of a motion (N,), as in ``speed_factor``.
+        continuous : bool
+            Held without end, as in ``wrench``: for poses at rest.
 
         """
+        if continuous and (times is not None or isinstance(motion, Motion)):
+            raise MotionError('continuous: must be False for a motion: drive.torque_continuous '
+                              'limits what is held at rest')
         if times is not None:
             return timed(self.platform, times, motion, lambda each, _: self.payload(
                 each, center_of_mass), lambda rows, _: rows)
@@ -471,7 +489,8 @@ class Capability:
         with np.errstate(over='ignore', invalid='ignore'):
             mass = np.array([1.0, *center, *about_origin(1.0, center, np.zeros(6))])
             per_mass = check_finite('center_of_mass', matrix @ mass, 0)
-        return self._multiple(moving, forces, per_mass, whole=isinstance(motion, Motion))
+        return self._multiple(moving, forces, per_mass, whole=isinstance(motion, Motion),
+                              continuous=continuous)
 
     def speed_factor(self, motion: Motion, wrench: ArrayLike | None = None,
                      base: BaseMotion | None = None, times: ArrayLike | None = None) -> Extent:
@@ -668,13 +687,17 @@ class Capability:
         return np.asarray(np.linalg.solve(transposed, wrenches[..., None])[..., 0], dtype=float)
 
     def _multiple(self, motion: Motion, forces: Array, change: Array, whole: bool = False,
-                  directions: Array | None = None) -> Extent:
+                  directions: Array | None = None, continuous: bool = False) -> Extent:
         """
         Return the largest multiple of a change of leg forces that forces and torques permit.
 
         ``directions`` (..., 6): the change is that of this acceleration.
+        continuous: the load is held without end.
         """
         found: list[tuple[Array, Any]] = []
+        if continuous:
+            found.append((largest_multiple(forces, change, self._continuous_forces),
+                          limits.short_name(limits.TORQUE_CONTINUOUS)))
         if limits.FORCE_MAX in self._limits.bounds:
             found.append((largest_multiple(
                 forces, change, self._limits.bounds[limits.FORCE_MAX]),
@@ -718,14 +741,33 @@ class Capability:
             forces, self._motors.forces_at_rest)
 
     @property
+    def limits_held(self) -> bool:
+        """Return whether there is a limit of the torques that motors can hold without end."""
+        return self._motors is not None and self._motors.continuous_forces is not None
+
+    @property
+    def _continuous_forces(self) -> Array:
+        held = None if self._motors is None else self._motors.continuous_forces
+        if held is None:
+            raise self._unlimited((limits.TORQUE_CONTINUOUS,))
+        return held
+
+    def holding_forces(self, continuous: bool = False) -> Array:
+        """Return the largest leg forces (6,) [N] at rest, or those that are held without end."""
+        return np.minimum(
+            self.forces_at_rest, self._continuous_forces) if continuous else self.forces_at_rest
+
+    @property
     def limits_forces(self) -> bool:
         """Return whether there is a limit of the legs' forces or of the motors' torques."""
-        return bool(np.isfinite(self.forces_at_rest).any())
+        return self.limits_held or bool(np.isfinite(self.forces_at_rest).any())
 
-    def _in_every_direction(self, pose: Pose | Motion, part: slice) -> Array | float:
-        if not self.limits_forces:
+    def _in_every_direction(self, pose: Pose | Motion, part: slice, continuous: bool,
+                            ) -> Array | float:
+        if not (self.limits_forces or continuous):
             raise self._unlimited((limits.FORCE_MAX,))
-        strongest, forces = self.forces_at_rest, self._forces(self._held(pose), None)
+        strongest = self.holding_forces(continuous)
+        forces = self._forces(self._held(pose), None)
         inverse = np.linalg.inv(np.swapaxes(self.platform.drive_jacobian(pose), -1, -2))
         reach = np.linalg.norm(inverse[..., part], axis=-1)
         with np.errstate(divide='ignore'):

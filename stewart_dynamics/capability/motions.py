@@ -41,6 +41,8 @@ from stewart_dynamics.planned.trajectory import MOST_SAMPLES
 LARGEST = 2.0 ** 20  # a factor that nothing limits grows by doubling up to this one
 # Rounds in which the sample that limits is found between two, and samples of a round.
 _ZOOMS, _NEAR = 6, 33
+# Largest number of samples between those of a motion, and of those that are computed at once.
+_MOST_OF_ALL, _BLOCK = 50_000_000, 100_000
 
 Answer = TypeVar('Answer')
 
@@ -129,21 +131,30 @@ def timed(platform: StewartPlatform, times: ArrayLike, motion: Any,
     scale = factor if grown is faster else 1.0
     results = platform.solve(rows)
     with np.errstate(all='ignore'):  # numbers that overflow need too many samples
-        parts = np.minimum(Sampling(platform.parameters).parts(
+        parts = Sampling(platform.parameters).parts(
             durations / scale, Interpolation(durations / scale, rows), results,
-            platform.drive_rates(rows, results[:, RATES]), None, 0.0), MOST_SAMPLES)
-    if parts.sum() > MOST_SAMPLES:
-        raise MotionError(f'motion: samples too far apart: more than {MOST_SAMPLES} are needed '
-                          'between them')
-    dense = np.flatnonzero(parts > 1.0)
-    where = np.concatenate([np.arange(len(seconds), dtype=float), *(
-        n + np.arange(1, int(parts[n])) / parts[n] for n in dense.tolist())])
-    where.sort()
+            platform.drive_rates(rows, results[:, RATES]), None, 0.0)
+    near = parts <= MOST_SAMPLES  # not where they are nan
+    if not near.all():
+        n = int(np.argmin(near))
+        raise MotionError(f'motion: samples {n} and {n + 1} too far apart: more than '
+                          f'{MOST_SAMPLES} are needed between them')
+    if parts.sum() > _MOST_OF_ALL:
+        raise MotionError(f'motion: {parts.sum():.0f} samples are needed between its own, at most '
+                          f'{_MOST_OF_ALL} are possible: ask for parts of the motion')
+    counts = parts.astype(np.int64)
+    first = np.cumsum(counts) - counts
+    where = np.append(
+        np.repeat(np.arange(len(counts)), counts)
+        + (np.arange(counts.sum()) - np.repeat(first, counts)) / np.repeat(parts, counts),
+        float(len(counts)))
     width, best, at = 1.0, found, float(found.sample or 0)
     for turn in range(_ZOOMS + 1):
-        answer: Any = ask(Motion.of_rows(rows_at(where)), best.value)
-        if answer.sample is not None and answer.value <= best.value:
-            best, at = answer, float(where[answer.sample])
+        for begin in range(0, len(where), _BLOCK):
+            block = where[begin:begin + _BLOCK]
+            answer: Any = ask(Motion.of_rows(rows_at(block)), best.value)
+            if answer.sample is not None and answer.value <= best.value:
+                best, at = answer, float(block[answer.sample])
         if best.sample is None:
             return cast('Answer', best)
         if turn == 0:

@@ -26,7 +26,8 @@ from stewart_dynamics.capability.force_intervals import quadratic_exit
 from stewart_dynamics.mechanics.drives.motor_limits import bound_of, largest_torques
 from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS, drive_constants, Drives, MOTORS, Motors, SPEEDS)
-from stewart_dynamics.mechanics.limits import short_name, SPEED_MAX, TORQUE_MAX, TORQUE_SPEED
+from stewart_dynamics.mechanics.limits import (
+    short_name, SPEED_MAX, TORQUE_CONTINUOUS, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import MOTION, RESULT
 from stewart_dynamics.parameters.table import Parameters
 
@@ -141,6 +142,12 @@ class MotorBounds:
         forces: Array = self._largest(np.zeros(6)) * self.ratio / np.max(
             np.abs(self._factors), axis=0)
         return forces if self.limited else np.full(6, math.inf)
+
+    @property
+    def continuous_forces(self) -> Array | None:
+        """Return leg forces (6,) [N] that can be held without end, without losses as published."""
+        continuous = self._parameters[TORQUE_CONTINUOUS]
+        return None if continuous is None else np.asarray(continuous * self.ratio)
 
     def exits(self, load: tuple[Array, ...], own: tuple[Array, ...], speeds: Array,
               direction: Array, begin: Array, end: Array, growing: bool = False,

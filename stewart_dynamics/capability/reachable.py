@@ -52,6 +52,8 @@ _EXACT = 1e-9
 # proof takes longer.
 _EXACT_OF_CLEARANCE = 0.01
 _EXACT_OF_CONDITION = 1e-3
+# Smaller bounds that are not zero are below the rounding errors of poses [m, rad].
+SMALLEST = 1e-12
 # Boxes of translations are proven up to this multiple of the hexapod's size.
 _LARGEST = 1e6
 
@@ -220,6 +222,9 @@ def checked_ranges(value: ArrayLike) -> Array:
     for name, (low, high) in zip(('x', 'y', 'z', 'rx', 'ry', 'rz'), ranges.tolist(), strict=True):
         if low > high:
             raise MotionError(f'box: {name}: {low:g} to {high:g}: must not decrease')
+        if any(0.0 < abs(bound) < SMALLEST for bound in (low, high)):
+            raise MotionError(f'box: {name}: {low:g} to {high:g}: bounds must be 0, or at least '
+                              f'{SMALLEST:g} from it')
     if float(np.abs(ranges[3:]).max()) > 2.0 * math.pi:
         raise MotionError('box: rotations: must be within a turn, 2 pi rad')
     if not np.ptp(ranges, axis=1).any():

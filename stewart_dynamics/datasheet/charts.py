@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +33,10 @@ _WIDTH = 340.0
 DASHES = {'length_max': None, 'length_min': '6 3', 'base_joint_angle_max': '2 2.5',
           'platform_joint_angle_max': '9 2 2 2', 'leg_clearance_min': '4 2 1 2 1 2',
           'singularity': '1 3'}
+# Largest number of names of curves in a line.
+_IN_ROW = 3
+# Dashes of curves in one chart, in the order in which they are drawn.
+_CURVE_DASHES = None, '7 5', '2 4', '11 4 2 4'
 _MILLI = 1e3
 # Shades of a quantity over a section.
 _BANDS = 8
@@ -121,15 +126,17 @@ def tilt_chart(boundaries: Sequence[Boundary], names: Sequence[str]) -> Picture:
                   for each in boundaries)
     rings = ticks(0.0, np.degrees(largest), 4)
     outer = max(np.degrees(largest) * 1.02, rings[-1])
-    center, radius = np.array([170.0, 158.0]), 126.0
+    center, radius = np.array([170.0, 156.0]), 116.0
     scale = radius / outer
     for ring in rings[1:]:
         picture.circle(center, ring * scale, css='grid', fill='none')
     for angle in range(0, 360, 30):
         way = _toward(np.radians(angle))
         picture.line(center, center + radius * way, css='grid')
-        picture.text(center + (radius + 12.0) * way + [0.0, 3.5], f'{angle}°', 'middle',
-                     css='tick')
+        # beside the circle, so that no boundary is below it
+        anchor = 'middle' if abs(way[0]) < 0.1 else 'start' if way[0] > 0.0 else 'end'
+        picture.text(center + (radius + 7.0) * way + [0.0, 3.5 + 3.0 * way[1]], f'{angle}°',
+                     anchor, css='tick')
     ways = _toward(np.linspace(0.0, 2.0 * np.pi, len(boundaries[0].values), endpoint=False))
     for n, each in reversed(list(enumerate(boundaries))):
         values = np.degrees(np.where(np.isfinite(each.values), each.values, np.nan)) * scale
@@ -160,10 +167,14 @@ def curves_chart(title: str, x: Array, curves: Mapping[str, Array], x_title: str
                   (0.0, 1.05 * top if top else 1.0))
     chart.draw_axes(x_title, y_title)
     for n, (name, values) in enumerate(curves.items()):
-        picture.path(chart.at(np.stack([x, values], axis=1)), css=f'curve curve{n}')
-        left = 14.0 + 326.0 / len(curves) * n
-        picture.line([left, 314.5], [left + 16.0, 314.5], css=f'curve curve{n}')
-        picture.text([left + 20.0, 318.0], name, css='tick')
+        look = _look(n)
+        picture.path(chart.at(np.stack([x, values], axis=1)), **look)
+        in_row = len(curves) if len(curves) <= _IN_ROW else 2
+        row, column = divmod(n, in_row)
+        left, low = 14.0 + 326.0 / in_row * column, 318.0 - 15.0 * (
+            (len(curves) - 1) // in_row - row)
+        picture.line([left, low - 3.5], [left + 16.0, low - 3.5], **look)
+        picture.text([left + 20.0, low], name, css='tick')
     return picture
 
 
@@ -183,11 +194,17 @@ def use_chart(seconds: Array, used: Mapping[str, Array], timeout: float) -> Pict
     for n, name in enumerate(used):
         times, values = curves.drawn(n)
         points = chart.at(np.stack([times, np.minimum(values, top)], axis=1))
-        picture.path(points, css=f'curve curve{n}')
+        look = _look(n)
+        picture.path(points, **look)
         left = 46.0 + min(112.0, 654.0 / len(used)) * n
-        picture.line([left, 284.5], [left + 14.0, 284.5], css=f'curve curve{n}')
+        picture.line([left, 284.5], [left + 14.0, 284.5], **look)
         picture.text([left + 18.0, 288.0], name, css='tick')
     return picture
+
+
+def _look(n: int) -> dict[str, Any]:
+    """Return color and dashes of a curve: an equal one below it is seen in their gaps."""
+    return {'css': f'curve curve{n}', 'stroke_dasharray': _CURVE_DASHES[n % len(_CURVE_DASHES)]}
 
 
 def _toward(azimuth: ArrayLike) -> Array:

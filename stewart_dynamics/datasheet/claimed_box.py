@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability.reachable import SMALLEST
 from stewart_dynamics.datasheet.ratings import AXES
 from stewart_dynamics.errors import ParameterError, shown, shown_name
 from stewart_dynamics.parameters.table import Parameters
@@ -57,6 +58,9 @@ def read_box(path: Path, parameters: Parameters) -> Array:
         if max(map(abs, bounds)) > most:
             raise ParameterError(
                 f'{path}: {name}: {shown(value)}: must be within {most:.4g}, {rule}')
+        if any(0.0 < abs(each) < SMALLEST for each in bounds):
+            raise ParameterError(
+                f'{path}: {name}: {shown(value)}: must be 0, or at least {SMALLEST:g} from it')
         ranges[AXES.index(name)] = bounds
     if not np.ptp(ranges, axis=1).any():
         raise ParameterError(f'{path}: all ranges are of size zero: there is nothing to check')

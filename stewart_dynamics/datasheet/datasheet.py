@@ -44,7 +44,7 @@ from stewart_dynamics.reporting.results_folder import (
     DATASHEET, DATASHEET_PAGE, whole_folder, WORKSPACE)
 from stewart_dynamics.whole_file import now, write_files, write_json
 
-VERSION = 1  # version of datasheet.json; increased when the meaning of a key changes
+VERSION = 2  # version of datasheet.json; increased when the meaning of a key changes
 
 # Heights of the tilt chart, as parts of the travel along z both ways.
 _HEIGHTS = {'at the pose': 0.0, 'half way up': 0.5, 'half way down': -0.5}
@@ -141,8 +141,9 @@ def _head(hexapod: RatedHexapod, order: Order) -> dict[str, Any]:
     return {
         'version': VERSION, 'software': SOFTWARE, 'date': now(),
         'name': order.name,
-        'pose': {'position': hexapod.pose.position.tolist(),
-                 'angles': to_euler(hexapod.pose.rotation).tolist(),
+        'pose': {'position': hexapod.origin.position.tolist(),
+                 'angles': to_euler(hexapod.origin.rotation).tolist(),
+                 'pivot_position': hexapod.pose.position.tolist(),
                  'home': order.pose is None},
         'pivot': hexapod.pivot.tolist(),
         'added_payload': None if order.payload is None else {

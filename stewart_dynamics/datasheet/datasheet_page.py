@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,13 +28,14 @@ from stewart_dynamics.bags.find import RESULT
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
-    between_setpoints, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
-    motion_verdict, numbers, rated_payload, setpoints_used, span, unit_of)
+    between_setpoints, both_payloads, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
+    motion_verdict, numbers, payloads_in_words, rated_payload, setpoints_used, span, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.datasheet.ratings import AXES, grid, Payloads, poses_of
 from stewart_dynamics.datasheet.workspace import (
     Boundary, Frequencies, PLANES, rotations_over_height)
+from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.parameters.table import inertia_matrix, PARAMETERS
 from stewart_dynamics.reporting.pages import link_to_other, page
 from stewart_dynamics.reporting.results_folder import REPLAYS, REPORT_PAGE
@@ -58,11 +60,11 @@ class Pictures(NamedTuple):
 
     def drawing(self) -> Drawing:
         """Return the drawing of the hexapod, with the ends of its travel along z."""
-        ends = [self.hexapod.moved_by(np.array([0.0, 0.0, sign, 0.0, 0.0, 0.0]), by)
+        origin = self.hexapod.origin
+        ends = [Pose(origin.position + [0.0, 0.0, sign * by], origin.rotation)
                 for key, sign in (('z+', 1.0), ('z-', -1.0))
                 if (by := self.sheet['travel'][key]['value'])]
-        p = self.hexapod.platform.parameters
-        return Drawing(p, self.hexapod.pose, tuple(ends))
+        return Drawing(self.hexapod.given, origin, tuple(ends), self.hexapod.pivot)
 
     def workspace(self) -> list[Picture]:
         """Return sections, tilt, rotation over height, and payload where it is limited."""
@@ -79,7 +81,8 @@ class Pictures(NamedTuple):
                 'Rotation over height', MM.factor * heights,
                 {f'±{name}': DEGREE.factor * each for name, each in turns.items()}, 'Z [mm]',
                 'rotation [°]'))
-        if self.sheet['payload'] is not None and self.hexapod.given['gravity'].any():
+        payload = self.sheet['payload']
+        if payload is not None and self.hexapod.given['gravity'].any():
             found.append(self._payload())
         return found
 
@@ -101,6 +104,9 @@ class Pictures(NamedTuple):
             corners = Payloads(loads, poses_of(self.hexapod, grid(self.ranges, 2)))
             curves['worst'] = np.array([corners.level(each) for each in offsets])
         curves['any orientation'] = np.array([here.any_orientation(each) for each in offsets])
+        if loads.limits_held:
+            held = Payloads(loads, self.hexapod.pose[None], continuous=True)
+            curves['continuous'] = np.array([held.level(each) for each in offsets])
         return charts.curves_chart(
             'Payload over the distance of its center of mass', MM.factor * offsets, curves,
             'center of mass from the pivot, sideways [mm]', 'payload [kg]')
@@ -134,8 +140,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         motion=(chart.svg() if (chart := pictures.motion()) else None),
         between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
         dashes={name: charts.DASHES[name] for name in pictures.limits()},
-        limit_name=limit_name, setpoints_used=setpoints_used, down=down, span=span, MM=MM,
-        DEGREE=DEGREE, names=_NAMES)
+        payloads=payloads_in_words(sheet), limit_name=limit_name,
+        setpoints_used=setpoints_used, down=down, span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 
@@ -161,8 +167,9 @@ def _key_figures(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[
                   if sheet['tilt']['value'] is not None else '–', '°'))
     found.append(('Rotation θZ', both_ways(travel, 'rz', DEGREE), '°'))
     if sheet['payload'] is not None:
-        any_orientation, value = rated_payload(sheet)
-        found.append((f'Payload{any_orientation}', down(value), 'kg'))
+        for kind, payload in both_payloads(sheet):
+            any_orientation, value = rated_payload(sheet, payload)
+            found.append((f'Payload{kind and f", {kind}"}{any_orientation}', down(value), 'kg'))
         found.append(('Force, every direction', down(sheet['force']['every_direction']), 'N'))
     if sheet['velocity'] is not None:
         found.append(('Velocity Z', both_ways(sheet['velocity'], 'z', LINEAR['velocity']), 'mm/s'))
@@ -221,28 +228,28 @@ def _loads(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[dict[str, An
     if sheet['force'] is None:
         return []
     rows, worst = [], sheet['worst']
+
+    def row(name: str, unit: str, kind: str, text: Callable[[Any], str], axis: str = '',
+            of_axis: bool = True) -> dict[str, Any]:
+        held = sheet[kind].get('continuous')
+        ends = (sheet[kind] if axis else {'x-': sheet[kind], 'x+': sheet[kind]}) if of_axis else {}
+        return {'name': name, 'unit': unit, 'value': text(sheet[kind]), 'sum': not axis,
+                'limits': _limits(ends, axis or 'x', hexapod.joints) if ends else [],
+                'continuous': text(held) if held else None,
+                'worst': text(worst[kind]) if worst else '–'}
+
     for axis in AXES:
         name = 'moment' if axis.startswith('r') else 'force'
         unit = unit_of(axis, name)
-        rows.append({
-            'name': f'{name.capitalize()} {_NAMES[axis].replace("θ", "")}', 'unit': unit.name,
-            'value': both_ways(sheet[name], axis, unit),
-            'limits': _limits(sheet[name], axis, hexapod.joints), 'sum': False,
-            'worst': both_ways(worst[name], axis, unit) if worst else '–'})
+        rows.append(row(f'{name.capitalize()} {_NAMES[axis].replace("θ", "")}', unit.name, name,
+                        partial(both_ways, axis=axis, unit=unit), axis))
         if axis in ('z', 'rz'):
-            rows.append({
-                'name': f'{name.capitalize()}, every direction', 'unit': unit.name, 'sum': True,
-                'value': down(sheet[name]['every_direction']), 'limits': [],
-                'worst': down(worst[name]['every_direction']) if worst else '–'})
-    payload = {'x-': sheet['payload'], 'x+': sheet['payload']}
-    rows.append({'name': 'Payload at the pivot', 'unit': 'kg', 'sum': True,
-                 'value': down(sheet['payload']['value']),
-                 'limits': _limits(payload, 'x', hexapod.joints),
-                 'worst': down(worst['payload']['value']) if worst else '–'})
-    rows.append({'name': 'Payload, base in any orientation', 'unit': 'kg', 'sum': True,
-                 'limits': [], 'value': down(sheet['payload']['any_orientation']),
-                 'worst': down(worst['payload']['any_orientation']) if worst else '–'})
-    return rows
+            rows.append(row(f'{name.capitalize()}, every direction', unit.name, name,
+                            lambda found: down(found['every_direction']), of_axis=False))
+    return [*rows,
+            row('Payload at the pivot', 'kg', 'payload', lambda found: down(found['value'])),
+            row('Payload, base in any orientation', 'kg', 'payload',
+                lambda found: down(found['any_orientation']), of_axis=False)]
 
 
 def _stiffness(sheet: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -284,6 +291,8 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
          numbers(sheet['pose']['position'], 1e3, ' mm') + '; '
          + numbers(sheet['pose']['angles'], DEGREE.factor, '°')),
         ('Pivot, platform frame', numbers(sheet['pivot'], 1e3, ' mm')),
+        *([('Pivot at the rated pose', numbers(sheet['pose']['pivot_position'], 1e3, ' mm'))]
+          if any(sheet['pivot']) else []),
         ('Platform' + (' with payload' if sheet['added_payload'] else ''),
          f'{p["platform.mass"]:.5g} kg at {numbers(p["platform.center_of_mass"], 1e3, " mm")}'),
         ('Its inertia, xx yy zz', numbers(np.diagonal(inertia), 1.0, ' kg m²')),
@@ -297,6 +306,12 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
             unit = PARAMETERS[name].unit
             rows.append((name, numbers(value, DEGREE.factor, DEGREE.name) if unit == 'rad' else
                          numbers(value, 1.0, f' {unit}')))
+    if p.drives:
+        for name, value in p.items():
+            if value is not None and (name.startswith('drive.') or name == 'actuator.screw_lead'):
+                unit = PARAMETERS[name].unit.replace('^2', '²')
+                rows.append((name, numbers(value, 1.0, f' {unit}'.rstrip())
+                             if isinstance(value, np.ndarray) else str(value)))
     if sheet['leg_clearance'] is not None:
         rows.append(('Clearance between legs at the pose',
                      numbers(sheet['leg_clearance'], 1e3, ' mm')))

@@ -54,6 +54,7 @@ ANGULAR = {'travel': DEGREE, 'velocity': Unit('°/s', DEGREE.factor),
 _NAMES = {
     'length_max': 'longest leg', 'length_min': 'shortest leg', 'velocity_max': 'speed of a leg',
     'force_max': 'force of a leg', 'torque_max': 'torque of a motor',
+    'torque_continuous': 'continuous torque of a motor',
     'torque_speed': 'torque of a motor at its speed', 'speed_max': 'speed of a motor',
     'base_joint_angle_max': 'joint angle at the base',
     'platform_joint_angle_max': 'joint angle at the platform',
@@ -101,7 +102,7 @@ def span(bounds: Sequence[float | None], unit: Unit) -> str:
 
 def numbers(values: Any, factor: float = 1.0, unit: str = '') -> str:
     """Return numbers in five digits of the largest one, and six equal ones as one."""
-    given = factor * np.atleast_1d(np.asarray(values, dtype=float))
+    given = factor * np.ravel(np.asarray(values, dtype=float))
     size = max(float(np.abs(given).max()), 1e-7)
     # a home pose has rounding errors behind these digits
     given = np.round(given, 4 - math.floor(math.log10(size))) + 0.0  # no -0
@@ -124,8 +125,11 @@ def sheet_text(sheet: dict[str, Any]) -> str:
             line += f' {ranges:>20} {unit.name}'
         lines.append(line.rstrip())
     if sheet['payload'] is not None:
-        any_orientation, value = rated_payload(sheet)
-        lines.append(f'payload at the pivot, at rest{any_orientation}: {down(value)} kg')
+        for kind, payload in both_payloads(sheet):
+            any_orientation, value = rated_payload(sheet, payload)
+            limit = f', by {_limit(payload)}' if payload['limit'] and not any_orientation else ''
+            lines.append(f'payload at the pivot, at rest{kind and f", {kind}"}{any_orientation}: '
+                         f'{down(value)} kg{limit}')
     for name, words in (('box', box_verdict), ('motion', motion_verdict)):
         if sheet[name]:
             possible = 'possible' if sheet[name]['possible'] else 'not possible'
@@ -139,12 +143,30 @@ def sheet_text(sheet: dict[str, Any]) -> str:
     return '\n'.join(lines)
 
 
-def rated_payload(sheet: Mapping[str, Any]) -> tuple[str, float | None]:
-    """Return the payload at rest; of any orientation of the base, and so named, if that moves."""
+def both_payloads(sheet: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
+    """Return the payload at rest, or those of peak and continuous torque with their kind."""
     found = sheet['payload']
-    if sheet['parameters']['base.source'] != FIXED and found['any_orientation'] is not None:
-        return ', base in any orientation', found['any_orientation']
-    return '', found['value']
+    if 'continuous' not in found:
+        return [('', found)]
+    return [('continuous', found['continuous']), ('peak', found)]
+
+
+def payloads_in_words(sheet: Mapping[str, Any]) -> str:
+    """Return the payloads at rest with the limits that end them; empty without a limit."""
+    if sheet['payload'] is None:
+        return ''
+    return ', '.join(
+        f'{kind and f"{kind} "}{down(each["value"])} kg'
+        + (f' by {_limit(each)}' if each['limit'] else '')
+        for kind, each in both_payloads(sheet))
+
+
+def rated_payload(sheet: Mapping[str, Any], payload: Mapping[str, Any],
+                  ) -> tuple[str, float | None]:
+    """Return a payload at rest; of any orientation of the base, and so named, if that moves."""
+    if sheet['parameters']['base.source'] != FIXED and payload['any_orientation'] is not None:
+        return ', base in any orientation', payload['any_orientation']
+    return '', payload['value']
 
 
 def setpoints_used(motion: Mapping[str, Any]) -> str:
@@ -204,7 +226,7 @@ def box_verdict(found: dict[str, Any]) -> str:
     return text + (f'; reachable {factor}' if factor else '')
 
 
-def _limit(found: dict[str, Any]) -> str:
+def _limit(found: Mapping[str, Any]) -> str:
     text = limit_name(found['limit'])
     return f'{text} ({found["leg"]})' if found['leg'] else text
 

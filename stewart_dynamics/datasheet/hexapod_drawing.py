@@ -39,6 +39,8 @@ _PLATE = 0.022  # half of a plate's thickness, relative to the size
 _RIM = 1.06
 _TRIAD = 22.0  # length of an axis [px]
 _VERTICAL = 0.9999  # cosine of the largest angle of an axis that counts as vertical
+# Width of a digit and height of a line in a picture [px].
+_DIGIT, _LINE = 6.6, 11.0
 # Axes that are shorter in a view, as parts of their length, are not drawn.
 _SEEN = 0.72
 
@@ -82,14 +84,19 @@ class Drawing:
 
     pose: pose that is drawn.
     ends: poses whose platforms are drawn as outlines.
+    pivot: the platform turns about it, platform frame [m]; marked where it is not the origin.
     """
 
-    def __init__(self, parameters: Parameters, pose: Pose, ends: tuple[Pose, ...] = ()) -> None:
+    def __init__(self, parameters: Parameters, pose: Pose, ends: tuple[Pose, ...] = (),
+                 pivot: Array | None = None) -> None:
         self._p, self._poses = parameters, (pose, *ends)
         self._upright = upright(parameters['gravity'])
         self._arms = np.asarray(parameters['geometry.platform_joints'])
         self._base = np.asarray(parameters['geometry.base_joints']) @ self._upright.T
         self._platform = self._placed(pose, self._arms)
+        self._pivot: Array = np.empty((0, 3))
+        if pivot is not None and np.any(pivot):
+            self._pivot = self._placed(pose, pivot[None])
         everything = np.concatenate([self._base, self._platform])
         self._size = float(np.linalg.norm(np.ptp(everything, axis=0))) / 2.0
         base = parameters[BASE_OUTLINE]
@@ -100,10 +107,11 @@ class Drawing:
     def front(self) -> Picture:
         """Return the front view, with heights along z where that is vertical."""
         picture = Picture(340.0, 360.0, 'Front view of the hexapod, to scale')
-        place = self._fitted(FRONT, picture, (FRONT, TOP), Margins())
+        place = self._fitted(FRONT, picture, (FRONT, TOP), Margins(bottom=58.0))
         for end in self._poses[1:]:
             picture.path(hull(place(FRONT.of(self._moving_plate(end)))), closed=True, css='ghost')
         self._draw(picture, FRONT, place)
+        self._mark_pivot(picture, FRONT, place)
         if abs(self._upright[2, 2]) > _VERTICAL:
             self._heights(picture, place)
         picture.text([8, 18], 'Front view', css='view')
@@ -125,6 +133,7 @@ class Drawing:
                 picture.path(place(self._plan.of(center + diameter / 2.0 * circle)), closed=True,
                              css='pitch')
         self._draw(picture, self._plan, place)
+        self._mark_pivot(picture, self._plan, place)
         center = place(self._plan.of(self._base.mean(axis=0)))
         for n, joint in enumerate(place(self._plan.of(self._base))):
             out = joint - center
@@ -157,7 +166,8 @@ class Drawing:
                 ) -> _Place:
         """Return the place of a view, at the largest scale at which some views fit."""
         points = np.concatenate([
-            self._base, self._base_plate, self._platform, *map(self._moving_plate, self._poses)])
+            self._base, self._base_plate, self._platform, self._pivot,
+            *map(self._moving_plate, self._poses)])
         room = np.array([picture.width - margins.sides, picture.height - margins.top
                          - margins.bottom])
         spans = [np.ptp(each.of(points), axis=0) + _PLATE * self._size for each in views]
@@ -202,21 +212,46 @@ class Drawing:
         normal = level_axes(arms)[2] * _PLATE * self._size
         return np.concatenate([wide - normal, wide + normal])
 
+    def _mark_pivot(self, picture: Picture, view: View, place: _Place) -> None:
+        for at in place(view.of(self._pivot)):
+            picture.circle(at, 4.0, css='pivot')
+            for way in np.array([[7.0, 0.0], [0.0, 7.0]]):
+                picture.line(at - way, at + way, css='pivot')
+            left = float(at[0]) + 44.0 > picture.width
+            picture.text(at + [-10.0 if left else 10.0, -6.0], 'pivot',
+                         'end' if left else 'start', css='tick halo')
+
     def _heights(self, picture: Picture, place: _Place) -> None:
-        """Draw z of the platform's origin, at the pose and its ends."""
-        right = picture.width - 44.0
+        """Draw z of the platform's origin, at the pose and its ends, from parts that are drawn."""
+        texts = [f'{1e3 * float(pose.position[2]):.0f}'.replace('-', '−')
+                 for pose in self._poses]
+        right = picture.width - 14.0 - _DIGIT * max(map(len, texts))
         zero = float(place(FRONT.of(np.zeros(3)))[1])
-        picture.line([right - 60.0, zero], [right + 8.0, zero], css='extension')
-        for n, pose in enumerate(self._poses):
-            height = float(place(FRONT.of(self._upright @ pose.position))[1])
-            picture.line([right - 60.0, height], [right + 8.0, height], css='extension')
-            text = f'{1e3 * float(pose.position[2]):.0f}'.replace('-', '−')
-            if n == 0:
+        base = place(FRONT.of(self._base_plate))
+        low, high = 4.0, picture.height - 4.0
+        heights: list[float] = []
+        for n, (pose, text) in enumerate(zip(self._poses, texts, strict=True)):
+            origin = place(FRONT.of(self._upright @ pose.position))
+            height = float(origin[1])
+            if not low < height < high or any(abs(height - each) < _LINE for each in heights):
+                continue
+            heights.append(height)
+            plate = place(FRONT.of(self._moving_plate(pose)))
+            on_plate = plate[:, 1].min() - 2.0 <= height <= plate[:, 1].max() + 2.0
+            begin = float(plate[:, 0].max()) + 5.0 if on_plate else float(origin[0])
+            if not on_plate:
+                picture.circle(origin, 1.8, css='origin')
+            picture.line([begin, height], [right + 8.0, height], css='extension')
+            if n == 0 and low < zero < high and abs(zero - height) > _LINE:
+                picture.line([float(base[:, 0].max()) + 5.0, zero], [right + 8.0, zero],
+                             css='extension')
                 _dimension(picture, [right, zero], [right, height])
-                picture.text([right - 4.0, (zero + height) / 2.0], text, 'middle', 90.0,
-                             css='dimension')
-            else:
-                picture.text([right + 11.0, height + 4.0], text, css='dimension soft')
+                if abs(zero - height) > _DIGIT * len(text) + 24.0:
+                    picture.text([right - 4.0, (zero + height) / 2.0], text, 'middle', 90.0,
+                                 css='dimension halo')
+                    continue
+            picture.text([right + 11.0, height + 4.0], text,
+                         css='dimension' if n == 0 else 'dimension soft')
 
     def _axes(self, picture: Picture, view: View) -> None:
         """Draw the base axes in the lower left corner, as far as they are seen."""

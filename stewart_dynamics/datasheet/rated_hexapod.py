@@ -29,9 +29,9 @@ from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
 from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LIMITS, position_in_mm)
+    LENGTH_MAX, LIMITS, position_in_mm)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
-from stewart_dynamics.mechanics.rows import CONDITION, FORCES, LENGTHS
+from stewart_dynamics.mechanics.rows import CONDITION, LENGTHS
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import HELD_MOTORS
 from stewart_dynamics.parameters.table import (
@@ -155,15 +155,9 @@ class RatedHexapod:
             raise SingularityError(
                 f'pose: singular: the condition number of J_inv is {condition:.6g}, '
                 f'must be less than singularity.stop_condition, {stop:g}{mistake}')
-        values = {**known.lengths_and_angles(motions, results),
-                  FORCE_MAX: results[:, FORCES]}
-        found = known.limits.exceeded({name: each[0].tolist() for name, each in values.items()})
-        if not found and known.clearance is not None:
-            clearances, nearest = known.clearance.nearest(motions)
-            found = known.limits.exceeded(
-                {CLEARANCE_MIN: clearances[0].tolist()}, nearest[0].tolist())
-        if found:
-            raise PoseError(f'pose: {found[0].words(self.joints)}{mistake}')
+        exceeded = known.first_exceeded(motions[0], results[0])
+        if exceeded is not None:
+            raise PoseError(f'pose: {exceeded.words(self.joints)}{mistake}')
 
 
 def _moved(p: Parameters, pivot: Array) -> Parameters:

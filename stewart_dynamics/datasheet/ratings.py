@@ -39,12 +39,13 @@ class Payloads:
     Largest point masses that can be added to a platform at rest, by forces and torques.
 
     capability, poses (N,): with limits of forces.
+    continuous: that are held without end, by ``drive.torque_continuous``.
     """
 
-    def __init__(self, capability: Capability, poses: Pose) -> None:
+    def __init__(self, capability: Capability, poses: Pose, continuous: bool = False) -> None:
         platform = capability.platform
         p = platform.parameters
-        self._largest = capability.forces_at_rest
+        self._largest = capability.holding_forces(continuous)
         self._gravity = np.asarray(p['gravity'])
         rows = Motion.from_pose(poses).rows
         matrices = np.stack([platform.regressors_at_rest(rows, each[None]) for each in np.eye(3)])
@@ -124,16 +125,27 @@ def _loads(hexapod: RatedHexapod, poses: Pose) -> dict[str, Any]:
         found['velocity'] = _smallest(c.velocity(at, DIRECTIONS), joints, KEYS)
     if c.limits_forces:
         found['acceleration'] = _smallest(c.acceleration(at, DIRECTIONS), joints, KEYS)
-        for name, part in (('force', slice(0, 6)), ('moment', slice(6, 12))):
-            found[name] = _smallest(c.wrench(at, DIRECTIONS[part]), joints, KEYS[part])
-        found['force']['every_direction'] = _least(c.force(all_poses))
-        found['moment']['every_direction'] = _least(c.moment(all_poses))
-        payload = c.payload(all_poses, np.zeros(3))
-        column = Extent(*(each[:, None] for each in payload[:3]))
-        found['payload'] = _smallest(column, joints, ['mass'])['mass']
-        found['payload']['any_orientation'] = (
-            Payloads(c, all_poses).any_orientation()
-            if hexapod.given['gravity'].any() else None)
+        found |= _held(hexapod, all_poses, False)
+        if c.limits_held:
+            for name, each in _held(hexapod, all_poses, True).items():
+                found[name]['continuous'] = each
+    return found
+
+
+def _held(hexapod: RatedHexapod, poses: Pose, continuous: bool) -> dict[str, Any]:
+    """Return the smallest force, moment and payload at rest over poses (N,)."""
+    c, joints, at = hexapod.loads, hexapod.joints, poses[:, None]
+    found = {name: _smallest(c.wrench(at, DIRECTIONS[part], continuous=continuous), joints,
+                             KEYS[part])
+             for name, part in (('force', slice(0, 6)), ('moment', slice(6, 12)))}
+    found['force']['every_direction'] = _least(c.force(poses, continuous=continuous))
+    found['moment']['every_direction'] = _least(c.moment(poses, continuous=continuous))
+    payload = c.payload(poses, np.zeros(3), continuous=continuous)
+    column = Extent(*(each[:, None] for each in payload[:3]))
+    found['payload'] = _smallest(column, joints, ['mass'])['mass']
+    found['payload']['any_orientation'] = (
+        Payloads(c, poses, continuous).any_orientation()
+        if hexapod.given['gravity'].any() else None)
     return found
 
 

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 _PROGRAM = Program('stewart_describe', 'parameters or files, or no hexapod found',
                    'a likely mistake was found')
+_STANDS_FOR_NONE = dict.fromkeys(
+    ('platform.mass', 'platform.inertia'), 'stands for none: write that of the platform')
 _INTERFACES = ('position', 'velocity', 'effort')
 
 
@@ -49,6 +51,8 @@ def _arguments() -> argparse.ArgumentParser:
     add_parameters(source, required=False)
     source.add_argument('--from', dest='source', type=Path, metavar='FILE',
                         help='URDF, SDFormat or MJCF (needs mujoco) of a hexapod')
+    parser.add_argument('--geometry-only', action='store_true',
+                        help='with --from: geometry and limits of a file without masses')
     _PROGRAM.add_results(parser, '.')
     parser.add_argument('--name', type=_name, metavar='NAME',
                         help='name of the model and of the files (default: that of FILE)')
@@ -87,6 +91,8 @@ def _write(given: argparse.Namespace) -> int:
     from stewart_dynamics.parameters.table import Parameters
 
     parameters = Parameters.from_yaml(given.params, given.node)
+    if given.geometry_only:
+        raise StewartError('--geometry-only: only with --from')
     hexapod, name = Hexapod(parameters), given.name or given.params.stem
     control = None
     if given.ros2_control is not None:
@@ -103,22 +109,23 @@ def _read(given: argparse.Namespace) -> int:
 
     if given.ros2_control is not None:
         raise StewartError('--ros2-control: not with --from')
-    found = read_hexapod(given.source)
+    found = read_hexapod(given.source, given.geometry_only)
     path = given.output / f'{given.name or given.source.stem}.yaml'
     check_new([path], given.force)
     given.output.mkdir(parents=True, exist_ok=True)
-    found.parameters.to_yaml(path)
+    found.parameters.to_yaml(path, _STANDS_FOR_NONE if given.geometry_only else None)
     _PROGRAM.say(str(path))
     for remark in found.remarks:
         _PROGRAM.complain(remark)
-    return _judge(found.parameters, given)
+    return _judge(found.parameters, given, found.warnings)
 
 
-def _judge(parameters: Parameters, given: argparse.Namespace) -> int:
-    """Print likely mistakes and return the exit code."""
+def _judge(parameters: Parameters, given: argparse.Namespace, warnings: tuple[str, ...] = (),
+           ) -> int:
+    """Print warnings and likely mistakes and return the exit code."""
     from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 
-    mistakes = likely_mistakes(parameters)
+    mistakes = warnings + likely_mistakes(parameters)
     for mistake in mistakes:
         _PROGRAM.complain(f'warning: {mistake}')
     return STRICT if mistakes and given.strict else DONE

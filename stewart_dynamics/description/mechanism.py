@@ -22,6 +22,7 @@ Everything is placed as the file has it, at the positions of the joints that the
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -74,6 +75,10 @@ class MechanismBody:
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     """About the center of mass, axes of the body [kg m^2]."""
     note: str = ''  # assumption of the reader about it
+    shapes: int = 0  # visual and collision elements
+    weightless: str = ''  # what takes its weight away in the file
+    left_out: list[str] = field(default_factory=list)
+    """What acts on it while it moves and has no parameter."""
 
 
 @dataclass
@@ -96,6 +101,42 @@ class Joint:
     damping: float = 0.0
     friction: float = 0.0
     armature: float = 0.0
+    springs: list[str] = field(default_factory=list)
+    """What acts on it at rest as well and has no parameter."""
+    left_out: list[str] = field(default_factory=list)
+    """What else acts on it or limits it and has no parameter."""
+    remarks: list[str] = field(default_factory=list)  # assumptions of the reader about it
+    without: set[str] = field(default_factory=set)
+    """Fields above that the file has, but not as a parameter can have them."""
+
+    def bound(self, field: str, key: str, lower: float, upper: float) -> None:
+        """Take a range of forces or rates as their largest value, if it is the smallest."""
+        known: float | None = getattr(self, field)
+        most = self.symmetric(field, key, lower, upper)
+        setattr(self, field, known if most == math.inf else min(
+            most, math.inf if known is None else known))
+
+    def symmetric(self, field: str, key: str, lower: float, upper: float) -> float:
+        """Return the bound of a range that holds both ways; infinity if it is one-sided."""
+        if not lower < 0.0 < upper:
+            self.remarks.append(f'{key} {lower:.6g} {upper:.6g} is one-sided: left out')
+            self.without.add(field)
+            return math.inf
+        if -lower != upper:
+            self.remarks.append(f'{key} {lower:.6g} {upper:.6g}: the smaller of both is taken for '
+                                'both directions')
+        return min(-lower, upper)
+
+    def spring(self, stiffness: float, reference: float, more: str = '') -> None:
+        """Add a spring that acts on the joint; reference: its position without force."""
+        slides = self.kind == SLIDE
+        rate, unit = ('N/m', 'm') if slides else ('N m/rad', 'rad')
+        pushes = ''
+        if slides and not more:
+            force = stiffness * (reference - self.position) + 0.0
+            pushes = f', {force:.4g} N at the positions of the file'
+        self.springs.append(f'stiffness {stiffness:.6g} {rate} about {reference:.6g} {unit}'
+                            f'{more}{pushes}')
 
 
 @dataclass
@@ -111,3 +152,5 @@ class Mechanism:
     """Parameters that stewart_describe has added to the format, as text."""
     order: tuple[str, ...] = ()  # names of slides in the order of their actuators
     remarks: list[str] = field(default_factory=list)  # assumptions of the reader, one line each
+    warnings: list[str] = field(default_factory=list)
+    """What acts at rest and has no parameter, one line each."""

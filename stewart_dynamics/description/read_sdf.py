@@ -26,7 +26,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
     SLIDE, UNIVERSAL, WORLD)
-from stewart_dynamics.description.read_urdf import body_of, numbers_of, unit
+from stewart_dynamics.description.read_urdf import body_of, numbers_of, shapes_of, unit
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import INERTIA
@@ -39,6 +39,9 @@ _DETACHABLE = '::systems::DetachableJoint'
 # Before this version axes are in the frame of the model, not of the joint.
 _JOINT_AXES = (1, 5)
 _UNLIMITED = 1e15  # SDFormat's own value is 1e16
+_OFF = ('0', 'false')
+# In the names of systems that exert forces on links.
+_FORCES = 'buoyancy', 'hydrodynamics', 'liftdrag', 'spring', 'wind', 'thruster', 'applylinkwrench'
 _DEFAULT_MASS = 1.0  # [kg], of a link without one
 
 
@@ -58,6 +61,10 @@ def read_sdf(root: ET.Element, source: Path) -> Mechanism:
         {link.get('name', ''): reader.part(link) for link in model.findall('link')}, joints)
     if model.find('include') is not None or model.find('model') is not None:
         mechanism.remarks.append('nested and included models are not read')
+    for plugin in [*root.iter('plugin')]:
+        named = f'{plugin.get("name", "")} {plugin.get("filename", "")}'
+        if any(each in named.lower().replace('_', '').replace('-', '') for each in _FORCES):
+            mechanism.remarks.append(f'plugin {plugin.get("name", "")!r} is left out')
     gravity = root.find('world/gravity')
     if gravity is not None:
         mechanism.gravity = numbers_of(gravity.text, 3, source, 'gravity')
@@ -112,16 +119,27 @@ class _Model:
     def part(self, link: ET.Element) -> MechanismBody:
         """Return a link as a body."""
         name, inertial = link.get('name', ''), link.find('inertial')
+        made = self._body(name, inertial, shapes_of(link))
+        if link.findtext('gravity', '').strip() in _OFF:
+            made.weightless = 'gravity switched off'
+        if link.find('velocity_decay') is not None:
+            made.left_out.append('velocity_decay')
+        if inertial is not None and inertial.find('fluid_added_mass') is not None:
+            made.left_out.append('fluid_added_mass')
+        return made
+
+    def _body(self, name: str, inertial: ET.Element | None, shapes: int) -> MechanismBody:
         if inertial is None:
-            return MechanismBody(name, self.place(name), _DEFAULT_MASS, inertia=np.eye(3), note=(
-                f'{name}: no mass: {_DEFAULT_MASS:g} kg, as SDFormat has it'))
+            return MechanismBody(
+                name, self.place(name), _DEFAULT_MASS, inertia=np.eye(3), shapes=shapes,
+                note=f'{name}: no mass: {_DEFAULT_MASS:g} kg, as SDFormat has it')
         six = numbers_of(' '.join(
             inertial.findtext(f'inertia/{key}', '1' if key in ('ixx', 'iyy', 'izz') else '0')
             for key in INERTIA), 6, self._source, f'{name}: inertia')
         text = inertial.findtext('mass')
         mass = _DEFAULT_MASS if text is None else float(
             numbers_of(text, 1, self._source, f'{name}: mass')[0])
-        return body_of(name, self.place(name), mass, six, self._own(inertial))
+        return body_of(name, self.place(name), mass, six, self._own(inertial), shapes)
 
     def joint(self, joint: ET.Element) -> Joint | None:
         """Return a joint."""
@@ -134,18 +152,33 @@ class _Model:
                      self.place(name).position)
         made.axes = [self._axis(joint, axis) for axis in (
             joint.find('axis'), joint.find('axis2')) if axis is not None]
-        axis = joint.find('axis')
-        if made.kind == SLIDE and axis is not None:
-            for field, path in (('lower', 'limit/lower'), ('upper', 'limit/upper'),
-                                ('velocity_max', 'limit/velocity'), ('force_max', 'limit/effort'),
-                                ('damping', 'dynamics/damping'),
-                                ('friction', 'dynamics/friction')):
-                text = axis.findtext(path)
-                if text is not None:
-                    value = float(numbers_of(text, 1, self._source, f'{name}: {path}')[0])
-                    if abs(value) < _UNLIMITED and not (value < 0.0 and field.endswith('_max')):
-                        setattr(made, field, value)
+        for tag in ('axis', 'axis2'):
+            axis = joint.find(tag)
+            if axis is not None:
+                self._add_axis(axis, made)
         return made
+
+    def _add_axis(self, axis: ET.Element, made: Joint) -> None:
+        """Add limits and dynamics of an axis; a joint with two has the larger dynamics."""
+        def number(path: str) -> float:
+            return float(numbers_of(axis.findtext(path), 1, self._source,
+                                    f'{made.name}: {path}')[0])
+
+        made.damping = max(made.damping, number('dynamics/damping'))
+        made.friction = max(made.friction, number('dynamics/friction'))
+        if number('dynamics/spring_stiffness'):
+            made.spring(number('dynamics/spring_stiffness'), number('dynamics/spring_reference'))
+        mimic = axis.find('mimic')
+        if mimic is not None:
+            made.left_out.append(f'mimic of {mimic.get("joint", "")!r}')
+        if made.kind != SLIDE:
+            return
+        for field, key in (('lower', 'lower'), ('upper', 'upper'), ('velocity_max', 'velocity'),
+                           ('force_max', 'effort')):
+            if axis.find(f'limit/{key}') is not None:
+                value = number(f'limit/{key}')
+                if abs(value) < _UNLIMITED and not (value < 0.0 and field.endswith('_max')):
+                    setattr(made, field, value)
 
     def fixed(self, plugin: ET.Element) -> Joint | None:
         """Return the joint by which Gazebo fixes a link of the model to another; None if none."""

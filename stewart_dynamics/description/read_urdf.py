@@ -30,6 +30,8 @@ from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import INERTIA, inertia_matrix
 
+_LIMITS = 'lower', 'upper', 'velocity', 'effort'
+_TRUE, _FALSE = ('1', 'true'), ('0', 'false')
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'ball': BALL, 'spherical': BALL, 'revolute2': UNIVERSAL}
 
@@ -53,6 +55,8 @@ def read_urdf(root: ET.Element, source: Path) -> Mechanism:
         [_joint(joint, placements, source) for joint in found])
     for joint in root.findall('gazebo/joint'):
         mechanism.joints.append(_closing(joint, placements, source))
+    _add_of_gazebo(root, mechanism, source)
+    _add_of_ros2_control(root, mechanism, source)
     block = root.find(CARRIED)
     if block is not None:
         mechanism.carried = {each.get('name', ''): each.get('value', '')
@@ -130,9 +134,9 @@ def axis_of(joint: ET.Element, source: Path) -> Array:
 
 
 def _part(name: str, link: ET.Element, placement: Placement, source: Path) -> MechanismBody:
-    inertial = link.find('inertial')
+    inertial, shapes = link.find('inertial'), shapes_of(link)
     if inertial is None:
-        return MechanismBody(name, placement)
+        return MechanismBody(name, placement, shapes=shapes)
     what = f'inertial of link {name!r}'
     origin = origin_of(inertial, source)
     given, of_mass = inertial.find('inertia'), inertial.find('mass')
@@ -140,16 +144,21 @@ def _part(name: str, link: ET.Element, placement: Placement, source: Path) -> Me
         ' '.join(given.get(key, '0') for key in INERTIA), 6, source, what)
     mass = None if of_mass is None else float(
         numbers_of(of_mass.get('value'), 1, source, what)[0])
-    return body_of(name, placement, mass, six, origin)
+    return body_of(name, placement, mass, six, origin, shapes)
+
+
+def shapes_of(link: ET.Element) -> int:
+    """Return the number of visual and collision elements of a link."""
+    return len(link.findall('visual')) + len(link.findall('collision'))
 
 
 def body_of(name: str, placement: Placement, mass: float | None, six: Array, own: Placement,
-            ) -> MechanismBody:
+            shapes: int) -> MechanismBody:
     """Return a body from the inertia ixx ixy ixz iyy iyz izz in the frame of its inertial."""
     tensor, r = inertia_matrix(six), own.rotation
     if not np.array_equal(r, np.eye(3)):
         tensor = r @ tensor @ r.T
-    return MechanismBody(name, placement, mass, own.position, tensor)
+    return MechanismBody(name, placement, mass, own.position, tensor, shapes=shapes)
 
 
 def _joint(joint: ET.Element, placements: dict[str, Placement], source: Path) -> Joint:
@@ -164,11 +173,57 @@ def _joint(joint: ET.Element, placements: dict[str, Placement], source: Path) ->
     limit, dynamics = joint.find('limit'), joint.find('dynamics')
     if limit is not None:
         made.lower, made.upper, made.velocity_max, made.force_max = (
-            _optional(limit, key, source) for key in ('lower', 'upper', 'velocity', 'effort'))
+            _optional(limit, key, source) for key in _LIMITS)
+        made.left_out += [f'{key} {value} of its limit' for key, value in limit.attrib.items()
+                          if key not in _LIMITS]
     if dynamics is not None:
         made.damping = _optional(dynamics, 'damping', source) or 0.0
         made.friction = _optional(dynamics, 'friction', source) or 0.0
+        stiffness = _optional(dynamics, 'spring_stiffness', source)
+        if stiffness:
+            made.spring(stiffness, _optional(dynamics, 'spring_reference', source) or 0.0)
+    if joint.find('safety_controller') is not None:
+        made.left_out.append('safety_controller')
+    mimic = joint.find('mimic')
+    if mimic is not None:
+        made.left_out.append(f'mimic of {mimic.get("joint", "")!r}')
     return made
+
+
+def _add_of_gazebo(root: ET.Element, mechanism: Mechanism, source: Path) -> None:
+    """Name what blocks ``gazebo`` of links and joints add to their forces."""
+    joints = {joint.name: joint for joint in mechanism.joints}
+    for block in root.findall('gazebo'):
+        name = block.get('reference', '')
+        stiffness, reference, decay = (
+            float(numbers_of(block.findtext(key), 1, source, f'{name}: {key}')[0])
+            for key in ('springStiffness', 'springReference', 'dampingFactor'))
+        if name in joints and stiffness:
+            joints[name].spring(stiffness, reference)
+        if name in mechanism.parts:
+            part = mechanism.parts[name]
+            if (block.findtext('gravity', '').strip() in _FALSE
+                    or block.findtext('turnGravityOff', '').strip() in _TRUE):
+                part.weightless = 'gravity switched off'
+            if decay:
+                part.left_out.append(f'dampingFactor {decay:.4g}')
+
+
+def _add_of_ros2_control(root: ET.Element, mechanism: Mechanism, source: Path) -> None:
+    """Take smaller bounds of efforts and rates from blocks ``ros2_control``."""
+    joints = {joint.name: joint for joint in mechanism.joints}
+    for each in root.findall('ros2_control/joint'):
+        joint = joints.get(each.get('name', ''))
+        for interface in each.findall('command_interface'):
+            field = {'effort': 'force_max', 'velocity': 'velocity_max'}.get(
+                interface.get('name', ''))
+            ends = {param.get('name'): param.text for param in interface.findall('param')}
+            if joint is None or field is None or not ends.get('min') or not ends.get('max'):
+                continue
+            lower, upper = (float(numbers_of(
+                ends[key], 1, source, f'{joint.name}: {key} of {interface.get("name")}')[0])
+                for key in ('min', 'max'))
+            joint.bound(field, f'{interface.get("name")} of ros2_control', lower, upper)
 
 
 def _optional(element: ET.Element, key: str, source: Path) -> float | None:

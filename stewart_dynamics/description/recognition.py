@@ -22,9 +22,10 @@ center of mass and its inertia are taken along the line between the joints.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 import math
 from pathlib import Path
+import re
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -32,7 +33,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, HERE, HINGE, Mechanism, MechanismBody, Placement, UNIVERSAL)
+    BALL, DescriptionError, HERE, HINGE, Joint, Mechanism, MechanismBody, Placement, UNIVERSAL)
 from stewart_dynamics.description.read_mjcf import read_mjcf
 from stewart_dynamics.description.read_sdf import read_sdf
 from stewart_dynamics.description.read_urdf import read_urdf
@@ -40,9 +41,9 @@ from stewart_dynamics.description.topology import Chain, LegJoint, Topology, top
 from stewart_dynamics.description.xml_text import NOT_CHECKED
 from stewart_dynamics.errors import one_line, shown
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of
-from stewart_dynamics.mechanics.limits import OF_RESULTS
+from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, OF_RESULTS
 from stewart_dynamics.parameters.table import (
-    NEGATIVE, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
+    mean_radius, NEGATIVE, NO_MASS, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
 from stewart_dynamics.whole_file import read_text
 
 # Smaller parts of the length of a leg, or smaller angles [rad], are rounding errors.
@@ -52,6 +53,9 @@ _ACROSS = math.radians(45.0)
 _OFF_AXIS = 1e-3
 _UNEQUAL = 0.01
 _THICK = 0.05
+# A platform with less of the mass of a leg has dummies of joints alone.
+_MISSING = 0.02
+_COUNTS = dict(enumerate(('no', 'one', 'two', 'three', 'four', 'five', 'six')))
 # A platform that is closer to the plane of the base joints, in larger radii, is on neither side.
 _FLAT = 0.05
 
@@ -61,6 +65,7 @@ class Recognized(NamedTuple):
 
     parameters: Parameters
     remarks: tuple[str, ...]  # assumptions and missing values, one line each
+    warnings: tuple[str, ...] = ()  # what makes forces wrong at rest, too, one line each
 
 
 class _Body(NamedTuple):
@@ -72,24 +77,31 @@ class _Body(NamedTuple):
 
 
 @np.errstate(all='ignore')  # what overflows breaks a rule of the parameters
-def recognized(mechanism: Mechanism) -> Recognized:
+def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
     """
     Return the parameters of the hexapod in a mechanism.
 
+    geometry_only: leave masses and friction out; the platform gets a mass that stands for none.
     Raises DescriptionError if there is no hexapod in it, ParameterError if its numbers break a
     rule of the parameters.
     """
     found = topology_of(mechanism)
-    remarks = list(mechanism.remarks)
+    remarks, warnings = list(mechanism.remarks), list(mechanism.warnings)
     legs, of_legs = [], []
     for chain in found.chains:
         said: list[str] = []
         legs.append(_leg(chain, found, said))
         of_legs.append(said)
     names = [leg['joints'] for leg in legs]
-    remarks += [part.note for parts in (
-        found.platform_parts, *(chain.lower + chain.upper for chain in found.chains))
-        for part in parts if part.note]
+    warnings += _grouped(names, [[*_springs(chain)] for chain in found.chains])
+    parts = [*found.platform_parts, *(
+        part for chain in found.chains for part in chain.lower + chain.upper)]
+    remarks += [part.note for part in parts if part.note]
+    remarks += [f'{part.name}: {what} of this body is left out'
+                for part in parts for what in part.left_out]
+    warnings += [f'{part.name}: {part.weightless} is left out: forces have its whole weight'
+                 for part in parts if part.weightless and part.mass]
+    _add_of_platform_joints(mechanism, found, remarks, warnings)
     remarks += _grouped(names, of_legs)
     values: dict[str, Any] = {
         'base_frame': found.base.name, 'platform_frame': found.platform.name,
@@ -98,13 +110,59 @@ def recognized(mechanism: Mechanism) -> Recognized:
         if key != 'joints':
             values[key] = np.array([leg[key] for leg in legs]).ravel() if all(
                 leg[key] is not None for leg in legs) else None
-    values |= _platform(mechanism, found, remarks)
-    values |= _gravity(mechanism, found, remarks)
-    given = {name: value for name, value in (values | _carried(mechanism)).items()
-             if value is not None}
-    remarks += _missing(given, mechanism)
+    if geometry_only:
+        values |= _carried(mechanism)
+        values, warnings = _without_masses(values), []
+    else:
+        values |= _platform(mechanism, found, remarks, warnings)
+        values |= _carried(mechanism)
+    values |= {name: value for name, value in _gravity(mechanism, found, remarks).items()
+               if name not in mechanism.carried}
+    given = {name: value for name, value in values.items() if value is not None}
+    remarks += _missing(given, mechanism, found, legs)
     parameters = _with_side(Parameters(given, mechanism.source), found)
-    return Recognized(parameters, tuple(dict.fromkeys(remarks)))
+    return Recognized(parameters, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(warnings)))
+
+
+def _springs(chain: Chain) -> Iterator[str]:
+    """Yield what acts on the joints of a leg at rest, too."""
+    for n, step in enumerate(chain.steps):
+        for spring in step.joint.springs:
+            yield f'{spring},{_place(chain, n)} is left out'
+
+
+def _place(chain: Chain, n: int) -> str:
+    """Return which joint of a leg it is, in words; nothing for its prismatic joint."""
+    if n == chain.slide:
+        return ''
+    return f' of its joints at the {"base" if n < chain.slide else "platform"}'
+
+
+def _left_out(chain: Chain) -> Iterator[str]:
+    """Yield what acts on the joints of a leg while it moves, or limits it."""
+    yield from chain.steps[chain.slide].joint.remarks
+    for n, step in enumerate(chain.steps):
+        for what in [*step.joint.left_out, *([] if n == chain.slide else _passive(step.joint))]:
+            yield f'{what}{_place(chain, n)} is left out'
+
+
+def _passive(joint: Joint) -> Iterator[str]:
+    """Yield the friction and inertia of a joint that has no actuator in this model."""
+    for name in ('damping', 'friction', 'armature'):
+        if getattr(joint, name):
+            yield f'{name} {getattr(joint, name):.6g}'
+
+
+def _add_of_platform_joints(mechanism: Mechanism, found: Topology, remarks: list[str],
+                            warnings: list[str]) -> None:
+    """Add what acts on joints of the platform that are of no leg, as a free joint."""
+    of_legs = {step.joint.name for chain in found.chains for step in chain.steps}
+    platform = {part.name for part in found.platform_parts}
+    for joint in mechanism.joints:
+        if joint.name not in of_legs and platform & {joint.parent, joint.child}:
+            warnings += [f'{joint.name}: {spring}, is left out' for spring in joint.springs]
+            remarks += [f'{joint.name}: {what} is left out'
+                        for what in (*joint.left_out, *_passive(joint))]
 
 
 def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
@@ -118,6 +176,7 @@ def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
                                'of this model turns at both of its ends')
     root = _center(lower, 'base', said)
     tip = _center(upper, 'platform', said)
+    _say_other_joints(lower, upper, said)
     on_platform = tip if len(upper) > 1 or upper[0].joint.child_anchor is None else upper[-1].far
     gap = float(np.linalg.norm(tip - on_platform))
     length = float(np.linalg.norm(tip - root))
@@ -162,10 +221,28 @@ def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
             said.append(f'{name}: {value:.3g}: cannot be: left out')
             value = None
         leg[name] = value
+    if slide.lower is not None and slide.lower == slide.upper:
+        said.append(f'{LENGTH_MIN}, {LENGTH_MAX}: lower and upper are both {slide.lower:.4g}: '
+                    'no travel: left out')
+        leg |= dict.fromkeys((LENGTH_MIN, LENGTH_MAX))
+    said += _left_out(chain)
     for part, bodies, start, way in (('cylinder', chain.lower, root, along),
                                      ('piston', chain.upper, tip, -along)):
         leg |= _slender(part, bodies, start, way, length, said)
     return leg
+
+
+def _say_other_joints(lower: list[LegJoint], upper: list[LegJoint], said: list[str]) -> None:
+    """Say that a leg has not one universal joint and one ball joint."""
+    axes = {HINGE: 1, UNIVERSAL: 2, BALL: 3}
+    at_base, at_platform = (sum(axes.get(step.joint.kind, 0) for step in steps)
+                            for steps in (lower, upper))
+    if at_base >= 3 and at_platform >= 3:
+        said.append('ball joints at both ends, no universal joint: it may turn about its own axis '
+                    'in the file: taken as one that does not')
+    elif at_base == at_platform == 2:
+        said.append('universal joints at both ends: it cannot turn freely about its own axis: '
+                    'taken as one with a ball joint')
 
 
 def _center(steps: list[LegJoint], where: str, said: list[str]) -> Array:
@@ -245,10 +322,42 @@ def _together(parts: Iterable[MechanismBody], frame: Placement) -> _Body:
     return _Body(float(masses.sum()), center, inertia)
 
 
-def _platform(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[str, Any]:
+def _without_masses(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the geometry and the limits, with a platform whose mass stands for none."""
+    kept = {name: value for name, value in values.items()
+            if not name.startswith(('legs.', 'actuator.', 'drive.', 'platform.'))}
+    radius = mean_radius(np.reshape(values['geometry.platform_joints'], (6, 3)))
+    mass = NO_MASS * radius ** 3
+    moment = 0.25 * mass * radius ** 2
+    return kept | {'actuator.reflected_mass': 0.0, 'platform.mass': mass, 'platform.inertia': [
+        moment, 0.0, 0.0, moment, 0.0, 2.0 * moment]}
+
+
+def _missing_mass(found: Topology, mass: float) -> str:
+    """Return the warning that the platform's mass is missing; empty if it is not."""
+    heavy = [part for part in found.platform_parts if part.mass]
+    ends = {end for chain in found.chains
+            for end in (chain.steps[-1].joint.parent, chain.steps[-1].joint.child)}
+    of_legs = [part.mass or 0.0 for chain in found.chains for part in chain.lower + chain.upper]
+    of_leg = sum(of_legs) / len(found.chains)
+    dummies = not found.platform.mass and all(part.name in ends for part in heavy)
+    if not dummies and mass > _MISSING * of_leg:
+        return ''
+    has = (f'{mass:.3g} kg' if found.platform.mass else
+           f'no mass but {mass:.3g} kg of {_COUNTS.get(len(heavy), len(heavy))} links')
+    return (f'platform: {has}; legs have {of_leg:.3g} kg each: is the mass of '
+            f'{found.platform.name!r} missing?')
+
+
+def _platform(mechanism: Mechanism, found: Topology, remarks: list[str], warnings: list[str],
+              ) -> dict[str, Any]:
     body = _together(found.platform_parts, found.platform.placement)
     if not body.mass:
-        raise DescriptionError(f'{found.platform.name}: the platform has no mass')
+        raise DescriptionError(f'{found.platform.name}: the platform has no mass; --geometry-only '
+                               'reads the geometry without masses')
+    if 'platform.mass' not in mechanism.carried and (
+            missing := _missing_mass(found, body.mass)):
+        warnings.append(missing)
     several = sum(bool(part.mass) for part in found.platform_parts)
     if several > 1 and 'platform.mass' not in mechanism.carried:
         remarks.append(f'platform: {several} bodies that are fixed to each other are one here')
@@ -263,6 +372,8 @@ def _gravity(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[
         if 'gravity' not in mechanism.carried:
             remarks.append(f'gravity: not in the file: {-STANDARD_GRAVITY[2]} m/s^2 along the '
                            "world's -z")
+    elif not gravity.any():
+        remarks.append('gravity: zero in the file: forces have no weight')
     turn = found.base.placement.rotation
     return {'gravity': gravity if np.array_equal(turn, np.eye(3)) else turn.T @ gravity}
 
@@ -298,10 +409,22 @@ def _carried(mechanism: Mechanism) -> dict[str, Any]:
     return values
 
 
-def _missing(given: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
-    """Return one line for each value that is not in the file."""
-    said = [f'{name}: not in the file: unlimited' for name in OF_RESULTS
-            if name not in {**given, **mechanism.carried}]
+def _missing(given: Mapping[str, Any], mechanism: Mechanism, found: Topology,
+             legs: list[dict[str, Any]]) -> list[str]:
+    """Return one line for each limit that is not in the file, or not of all legs."""
+    said = []
+    for name, field in zip(OF_RESULTS, ('lower', 'upper', 'velocity_max', 'force_max'),
+                           strict=True):
+        if name in given or name in mechanism.carried:
+            continue
+        without = [leg['joints'] for leg in legs if leg[name] is None]
+        slides = [chain.steps[chain.slide].joint for chain in found.chains]
+        if len(without) < len(legs):
+            said.append(f'{name}: {", ".join(without)} without it in the file: left out of all '
+                        'legs: unlimited')
+        elif not any(getattr(slide, field) is not None or field in slide.without
+                     for slide in slides):
+            said.append(f'{name}: not in the file: unlimited')
     if not (mechanism.carried or np.any(given['actuator.reflected_mass'])):
         said.append('actuator.reflected_mass: not in the file: 0 kg')
     return said
@@ -318,32 +441,52 @@ def _grouped(names: list[str], of_legs: list[list[str]]) -> list[str]:
 
 
 _LARGEST = 20_000_000  # bytes
-_XACRO = 'http://www.ros.org/wiki/xacro'
+# First bytes of files of other kinds, and the advice about them.
+_KINDS = (
+    (b'version https://git-lfs.github.com/spec/', 'a Git LFS pointer, not the file: run git lfs '
+     'pull first'),
+    (b'#usda', 'USD (text): convert it to MJCF or URDF first'),
+    (b'PXR-USDC', 'USD (binary): convert it to MJCF or URDF first'),
+    (b'PK\x03\x04', 'a zip archive, as usdz is: unpack and convert it first'),
+    (b'\x1f\x8b', 'compressed with gzip: unpack it first'),
+    (b'ISO-10303-21', 'a STEP file: shapes without joints'))
+_XACRO = re.compile(r'<xacro:|\$[{(][^})]*[})]')
+_TEMPLATE = re.compile(r'<%|\{%|\{\{')
 
 
-def read_hexapod(path: Path) -> Recognized:
+def read_hexapod(path: Path, geometry_only: bool = False) -> Recognized:
     """
     Return the parameters of the hexapod in a file, with remarks on all assumptions.
 
+    geometry_only: as in ``recognized``.
     Raises StewartError if the file cannot be read, or there is no hexapod in it.
     """
     try:
-        return recognized(read_mechanism(path))
+        return recognized(read_mechanism(path), geometry_only)
     except np.linalg.LinAlgError as exc:
         raise DescriptionError(f'{path}: out of range: numbers overflow') from exc
 
 
+def _check_kind(path: Path, data: bytes) -> None:
+    """Raise DescriptionError for a file of another kind."""
+    for begin, words in _KINDS:
+        if data.startswith(begin):
+            raise DescriptionError(f'{path}: is {words}')
+
+
 def read_mechanism(path: Path) -> Mechanism:
     """Return the mechanism that a file describes."""
-    text = read_text(path, _LARGEST, DescriptionError)
+    text = read_text(path, _LARGEST, DescriptionError, _check_kind)
+    if path.suffix == '.xacro' or _XACRO.search(text) and '<robot' in text:
+        raise DescriptionError(f'{path}: is xacro: run xacro first: xacro FILE > FILE.urdf')
+    if _TEMPLATE.search(text):
+        raise DescriptionError(f'{path}: is a template (ERB or Jinja): render it first')
     if '<!ENTITY' in text:  # which may grow without bound
         raise DescriptionError(f'{path}: has entities of its own: write their text out')
     try:
         root = ET.fromstring(text)
     except (ET.ParseError, ValueError) as exc:
         raise DescriptionError(f'{path}: not XML: {one_line(exc)}') from exc
-    if _XACRO in text and root.tag == 'robot':
-        raise DescriptionError(f'{path}: is xacro: convert it with xacro first')
     if root.tag == 'mujoco':
         return read_mjcf(path)
     readers = {'robot': read_urdf, 'sdf': read_sdf, 'gazebo': read_sdf}

@@ -23,7 +23,8 @@ are six chains with one slide each. Names are not used, but for the block of ste
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, FIXED, Joint, Mechanism, MechanismBody, SLIDE, WORLD)
 
 LEGS = 6
+_ALIKE = 0.1  # masses of equal dummies, as CAD programs compute them, differ by less
 
 
 class LegJoint(NamedTuple):
@@ -85,9 +87,12 @@ class _Groups:
     def __init__(self, mechanism: Mechanism) -> None:
         self._parts = mechanism.parts
         self._of = {name: name for name in [WORLD, *mechanism.parts]}
+        self._fixed: dict[str, list[str]] = {name: [] for name in self._of}
         for joint in mechanism.joints:
             if joint.kind == FIXED:
                 self._of[self.of(joint.parent)] = self.of(joint.child)
+                self._fixed[joint.parent].append(joint.child)
+                self._fixed[joint.child].append(joint.parent)
         self.members: dict[str, list[str]] = {}  # names of the bodies of each group
         for name in self._of:
             self.members.setdefault(self.of(name), []).append(name)
@@ -116,11 +121,41 @@ class _Groups:
         return [self._parts[name] for name in self.members[group] if name in self._parts]
 
     def main(self, group: str) -> MechanismBody:
-        """Return the body of a group to which its legs are attached, or else the heaviest."""
-        ends = Counter(
-            end for joint in self.joints[group] for end in (joint.parent, joint.child))
-        return max(self.parts(group), key=lambda part: (
-            ends[part.name] > LEGS // 2, part.mass or 0.0, ends[part.name]))
+        """
+        Return the body of a group that is nearest to its joints, in fixed joints to each of them.
+
+        It is the one to which the legs are attached, or that carries the bodies to which they are.
+        Masses are not used: bodies without one may be drawn alone.
+        """
+        joints = Counter(end for joint in self.joints[group] for end in (
+            joint.parent, joint.child) if self.of(end) == group)
+        distances: Counter[str] = Counter()
+        for end, count in joints.items():
+            for name, distance in self.fixed_to(end).items():
+                distances[name] += count * distance
+        return min(self.parts(group), key=lambda part: distances[part.name])
+
+    def fixed_to(self, start: str) -> dict[str, int]:
+        """Return the bodies of a group by their number of fixed joints to one, nearest first."""
+        found = {start: 0}
+        waiting = deque([start])
+        while waiting:
+            name = waiting.popleft()
+            for other in self._fixed[name]:
+                if other not in found:
+                    found[other] = found[name] + 1
+                    waiting.append(other)
+        return found
+
+    def end(self, group: str) -> MechanismBody:
+        """Return the body of a group that has its first joint."""
+        joint = self.joints[group][0]
+        return self._parts[joint.child if self.of(joint.child) == group else joint.parent]
+
+    def carried(self, end: MechanismBody) -> MechanismBody:
+        """Return the first body that is fixed to one and has a mass or shape, or the next one."""
+        others = [self._parts[name] for name in self.fixed_to(end.name) if name in self._parts][1:]
+        return next((part for part in others if part.mass or part.shapes), [*others, end][0])
 
     def shown(self, group: str) -> str:
         """Return the name of a group's main body, in quotes."""
@@ -226,24 +261,43 @@ def _close(mechanism: Mechanism, groups: _Groups, base: str) -> bool:
         return False
     longest = max(lengths.values())
     shorter = Counter(lengths.values())[longest - 1]
+    ends = {group: groups.end(group) for group in lengths}
     if min(lengths.values()) == longest:
         kind, how = FIXED, 'fixed to'
-        platform = max(lengths, key=lambda group: sum(
-            part.mass or 0.0 for part in groups.parts(group)))
+        platform = _odd_one(groups, ends)
+        others = [end for group, end in ends.items() if group != platform]
+        is_dummy = _alike(ends[platform], others)
     elif shorter == LEGS - 1:
         kind, how = BALL, 'ball joints on'
         platform = max(lengths, key=lambda group: lengths[group])
+        is_dummy = not (ends[platform].shapes or ends[platform].mass)
     else:
         return False
-    for group in lengths:
+    carrier = groups.carried(ends[platform]) if is_dummy else ends[platform]
+    for group, end in ends.items():
         if group != platform:
-            end = groups.main(group)
-            mechanism.joints.append(Joint(f'{end.name} to {platform}', kind, end.name, platform,
-                                          end.placement.position))
+            mechanism.joints.append(Joint(f'{end.name} to {carrier.name}', kind, end.name,
+                                          carrier.name, end.placement.position))
     mechanism.remarks.append(
         f'the loops are open: the ends of five legs are taken as {how} '
-        f'{groups.shown(platform)} where they are in the file')
+        f'{carrier.name!r} where they are in the file')
     return True
+
+
+def _odd_one(groups: _Groups, ends: Mapping[str, MechanismBody]) -> str:
+    """Return the group at the end of a leg that is unlike the others: it has the platform."""
+    values = np.array([[len(parts), sum(part.shapes for part in parts),
+                        sum(part.mass or 0.0 for part in parts)]
+                       for parts in map(groups.parts, ends)])
+    unlike = np.abs(values - np.median(values, axis=0))
+    most = unlike / np.maximum(unlike.max(axis=0), np.finfo(float).tiny)
+    return [*ends][int(np.argmax(most.sum(axis=1)))]
+
+
+def _alike(end: MechanismBody, others: Sequence[MechanismBody]) -> bool:
+    """Return whether a body is like most of the others: the dummy of a ball joint."""
+    return sum(each.shapes == end.shapes and math.isclose(
+        each.mass or 0.0, end.mass or 0.0, rel_tol=_ALIKE) for each in others) > LEGS // 2
 
 
 def _baseness(groups: _Groups, group: str) -> tuple[bool, bool, float]:

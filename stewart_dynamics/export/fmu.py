@@ -32,9 +32,14 @@ import zipfile
 import numpy as np
 
 from stewart_dynamics import __version__
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.export.c_project import digest, hexadecimal, platform_source, source, SOURCES
+from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.kinematics.home_pose import homes
+from stewart_dynamics.mechanics.rows import CONDITION
+from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import INERTIA, Parameters, SUPPRESS_FORCES
 
@@ -79,10 +84,11 @@ def variables(parameters: Parameters) -> list[Variable]:
     """
     Return the variables in the order of ``fmu.h``; they start at rest at the home pose.
 
-    Raises ParameterError: the parameters do not give the height of the platform at the home pose.
+    Where the parameters do not give the height of the platform there, they start at a pose at
+    which the forces can be solved. The last variables are those of the motors, with drives.
     """
-    home = StewartPlatform(parameters).home_pose()
-    start = [*home.position, *to_quaternion(home.rotation), *np.zeros(18), *parameters['gravity'],
+    position, rotation = _start_pose(parameters)
+    start = [*position, *to_quaternion(rotation), *np.zeros(18), *parameters['gravity'],
              *np.zeros(9), parameters['platform.mass'], *parameters['platform.center_of_mass'],
              *parameters['platform.inertia'], parameters['singularity.warn_condition'],
              parameters['singularity.stop_condition'], parameters['singularity.warn_time'],
@@ -90,7 +96,18 @@ def variables(parameters: Parameters) -> list[Variable]:
              parameters['limits.action'] == SUPPRESS_FORCES]
     given = [*_inputs(), *_tunable()]
     return [*(each._replace(start=float(value))
-              for each, value in zip(given, start, strict=True)), *_outputs()]
+              for each, value in zip(given, start, strict=True)), *_outputs(),
+            *(_of_motors() if parameters.drives else ())]
+
+
+def _start_pose(parameters: Parameters) -> tuple[Array, Array]:
+    """Return position and rotation of the first possible home pose that is not singular."""
+    positions, rotations = homes(parameters)
+    conditions = StewartPlatform(parameters).solve(
+        motion_rows(Pose(positions, rotations)))[:, CONDITION]
+    regular = conditions < stop_condition_of(parameters)
+    at = int(np.argmax(regular))  # the first pose if all of them are singular
+    return positions[at], rotations[at]
 
 
 def _inputs() -> Iterator[Variable]:
@@ -149,6 +166,15 @@ def _outputs() -> Iterator[Variable]:
     yield Variable('time', 'independent', 'time of the last step', 's')
 
 
+def _of_motors() -> Iterator[Variable]:
+    for name, unit, text in (
+            ('motor_speeds', 'rad/s', 'speed of the motor'),
+            ('motor_torques', 'N.m', 'torque of the motor for the force to command, not limited; '
+             'zero unless status is 0;')):
+        for leg in range(1, 7):
+            yield Variable(f'{name}[{leg}]', 'output', f'{text} of leg {leg}', unit)
+
+
 def fmu(parameters: Parameters, name: str, version: str = '3',
         compiler: list[str] | None = None) -> bytes:
     """
@@ -158,7 +184,7 @@ def fmu(parameters: Parameters, name: str, version: str = '3',
     version: version of FMI, 3 or 2.
     compiler: words of the command of a C compiler, for the binary of this computer; None: no
         binary.
-    Raises StewartError: the compiler fails, or the parameters give no home pose.
+    Raises StewartError: the compiler fails.
     """
     listed = variables(parameters)
     token = f'{{{uuid.UUID(bytes=bytes.fromhex(digest(parameters))[:16])}}}'

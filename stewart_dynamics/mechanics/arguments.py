@@ -36,7 +36,8 @@ def as_array(name: str, value: ArrayLike, tail: tuple[int, ...]) -> Array:
         raise MotionError(f'{name}: {_shown(value)}: not an array of real numbers: '
                           f'{text[:200]}') from exc
     if array.shape[-len(tail):] != tail:
-        raise MotionError(f'{name}: shape {array.shape}: must end in {tail}')
+        turned = ': transposed?' if tail and tail[-1] in array.shape[:-1] else ''
+        raise MotionError(f'{name}: shape {array.shape}: must end in {tail}{turned}')
     finite = np.isfinite(array)
     if not finite.all():
         at, name = first_of(name, ~finite)

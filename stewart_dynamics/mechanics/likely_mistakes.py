@@ -31,16 +31,17 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.drives import likely_mistakes as drives
+from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, Home, home_of, is_too_long, poses_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import (
-    DRIVE_INERTIAS, FIXED, inertia_matrix, Parameters, STANDARD_GRAVITY)
+    BY_IMU, DRIVE_INERTIAS, FIXED, inertia_matrix, NO_MASS, Parameters, STANDARD_GRAVITY)
 
 # Digits of the position of a joint in a message.
 _DIGITS = 5
@@ -55,6 +56,8 @@ _LARGEST_RATIO = 300.0
 # at least 5 mm that is given in mm has 1e-9 of that. Small ones without mass are not checked.
 _SMALL_RADIUS = 5.0  # [m]
 _THINNEST = 0.01  # [kg/m^3]
+# Less stands for no mass, as stewart_describe --geometry-only writes it.
+_NO_BODY = 10.0 * NO_MASS  # [kg/m^3]
 
 # A body's radius of gyration divided by the radius of its joints: 0.1 to 3 for all hexapods known.
 # With kg cm^2 for kg m^2 it is 100 times as large, with kg mm^2 1000 times, g mm^2 3e4 times.
@@ -101,6 +104,13 @@ _LARGEST_PLATFORM_RATIO = 1.2
 _HANGING = 0.5
 # Points are in the base frame if they are this near to home, in terms of its height.
 _AT_HOME = 0.2
+# A rate that needs this many times the possible acceleration along the whole stroke: 1e-4 to 0.5,
+# 3600 times as large in m/min.
+_UNREACHABLE = 3.0
+# An angle limit by the turn of a leg by half of another's stroke: 1 to 10.
+_SMALLEST_ANGLE = 0.25
+# The frames of base and platform differ at home by more than this, in terms of its height.
+_APART = 0.7
 # The center of mass of a piston behind its joint, in terms of the longest leg.
 _BEHIND = 0.02
 
@@ -126,6 +136,8 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
             found += _legs(parameters, home, bool(sizes))
             if not sizes:
                 found += _frames(parameters, home)
+                found += _torques_at_home(parameters, home)
+                found += _small_angles(parameters, home)
             odd = tuple(_symmetry(parameters))
             if len(odd) == 1:
                 found += odd
@@ -139,6 +151,10 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
 def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
     base, platform = shape.base_radius, shape.platform_radius
     mass = p['platform.mass']
+    if mass < _NO_BODY * platform * platform * platform:
+        yield (f'platform.mass: {mass:.3g} kg stands for none: forces are those of a hexapod '
+               'without masses: write the mass of the platform')
+        return
     if base > _LARGEST_RADIUS:
         yield (f'geometry.base_joints: {base:.3g} m from their center: larger than any hexapod '
                'known: in mm?')
@@ -194,16 +210,21 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
     center = p['platform.center_of_mass']
     middle = p['geometry.platform_joints'].mean(axis=0)
     height = abs(float(home.heights[0]))
-    from_base = p['geometry.base_joints'].mean(axis=0) + height * away
+    base_middle = p['geometry.base_joints'].mean(axis=0)
+    from_base = base_middle + height * away
     if home.length is None:
         return  # heights are guesses
-    if np.linalg.norm(middle - from_base) < _AT_HOME * height and (
-            np.linalg.norm(center) < 0.5 * np.linalg.norm(center - middle)):
+    # A base frame away from its joints may be where the platform frame is at home: then both
+    # frames give the same numbers.
+    if (np.linalg.norm(middle - from_base) < _AT_HOME * height
+            and np.linalg.norm(base_middle) < _APART * height < np.linalg.norm(middle)
+            and np.linalg.norm(center) < 0.5 * np.linalg.norm(center - middle)):
         yield (f'geometry.platform_joints: {_listed(middle.round(9))} m is their center, '
                'where it is at home in the base frame, but platform.center_of_mass is '
                f'{np.linalg.norm(center - middle):.3g} m away from it: are the joints given in '
                'the base frame?')
     in_base_frame = bool(np.linalg.norm(center - from_base) < _AT_HOME * height
+                         and np.linalg.norm(middle - from_base) > _APART * height
                          and np.linalg.norm(middle) < 0.5 * height)
     if in_base_frame:
         yield (f'platform.center_of_mass: {_listed(center)} m is where the platform is at home '
@@ -220,6 +241,42 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
                f'the hexapod, {axial:.3g} m about it, and the base is {reference:.3g} m from '
                "the center of mass at home: about the base's origin? It is about the center of "
                'mass')
+
+
+def _torques_at_home(p: Parameters, home: Home) -> Iterator[str]:
+    """Yield that the motors cannot hold the platform where it is at rest at home."""
+    most = p['drive.torque_max']
+    if most is None or not p.drives or home.length is None or p['base.source'] == BY_IMU:
+        return
+    if any(each.startswith('drive.torque_max') for each in drives.likely_mistakes(p)):
+        return
+    positions, rotations = home.poses(p)
+    jacobian = lagrange.inverse_jacobian(
+        lagrange.unchecked_legs(p, positions[:1], rotations[:1]))[0]
+    weight = p['platform.mass'] * p['gravity']
+    load = np.concatenate([weight, np.cross(rotations[0] @ p['platform.center_of_mass'], weight)])
+    if np.linalg.cond(jacobian) > UNSOLVABLE_CONDITION:
+        return
+    torques = np.abs(np.linalg.solve(jacobian.T, load)) / motor_ratio(p) / p[
+        'drive.efficiency']
+    at = int(np.argmax(torques / most))
+    if torques[at] > most[at]:
+        yield (f'drive.torque_max: {most[at]:.3g} N m: {p["joints"][at]} needs '
+               f'{torques[at]:.3g} N m to hold the platform at rest at home: at another shaft, or '
+               'in another unit?')
+
+
+def _small_angles(p: Parameters, home: Home) -> Iterator[str]:
+    """Yield limits of the joints' angles that end far before the strokes of the legs."""
+    low, high = p['limits.length_min'], p['limits.length_max']
+    if low is None or high is None:
+        return
+    turns = 0.5 * float(np.max((high - low) / (high + low)))
+    for name in OF_JOINTS:
+        if p[name] is not None and p[name].max() < _SMALLEST_ANGLE * turns:
+            yield (f'{name}: {p[name].max():.3g} rad, {math.degrees(p[name].max()):.2g} degrees, '
+                   f'but the strokes of the legs are enough to turn them by {turns:.2g} rad: '
+                   'converted from degrees twice?')
 
 
 def _reflected_mass(p: Parameters, shape: Shape) -> Iterator[str]:
@@ -268,6 +325,21 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
     fastest = p['limits.velocity_max']
     if fastest is not None and fastest.max() > _FASTEST * max(shape.radius, 1.0):
         yield f'limits.velocity_max: {fastest.max():.3g} m/s: in mm/s?'
+        return
+    low, high = p['limits.length_min'], p['limits.length_max']
+    if fastest is None or low is None or high is None:
+        return
+    # Along the whole stroke, with all the force of a leg for a sixth of the platform.
+    needed = fastest ** 2 / (2.0 * (high - low))
+    largest = np.full(6, _LARGEST_ACCELERATION / min(shape.radius, 1.0))
+    if most is not None:
+        largest = np.minimum(largest, most / (p['platform.mass'] / 6.0 + p[
+            'legs.piston.mass'] + p['actuator.reflected_mass']))
+    at = int(np.argmax(needed / largest))
+    if needed[at] > _UNREACHABLE * largest[at]:
+        yield (f'limits.velocity_max: {fastest[at]:.3g} m/s: reached within the stroke of '
+               f'{high[at] - low[at]:.3g} m with {needed[at]:.3g} m/s^2 alone, possible are '
+               f'{largest[at]:.3g}: in m/min or mm/s?')
 
 
 def _clearance(p: Parameters) -> Iterator[str]:

@@ -76,6 +76,8 @@ QUANTITIES = {
     SPEED_MAX: Quantity('motor speed', 'rad/s'),
     TEMPERATURE_RISE_MAX: Quantity('temperature rise', 'K'),
     JUMP: Quantity('mean rate from the last setpoint', 'm/s')}
+TORQUE_CONTINUOUS = 'drive.torque_continuous'
+"""The torque that a motor can hold without end: may be exceeded for a short time."""
 SINGULARITY = 'singularity'  # among short names: inside stop_condition, or beyond det(J) = 0
 CLIPPED = FORCE_MAX, TORQUE_MAX, TORQUE_SPEED
 """Limits to which published values are clipped; the others follow limits.action."""

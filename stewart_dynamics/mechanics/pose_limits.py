@@ -12,18 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The limits that a pose alone may exceed: lengths, joint angles, clearance, singularities."""
+"""
+The limits that a pose alone may exceed.
+
+Lengths, joint angles, clearance, singularities; and forces and torques that hold it at rest.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
+from stewart_dynamics.mechanics.drives.motors import Drives
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, Limits)
-from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, LENGTHS
+    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, TORQUE_MAX,
+    TORQUE_SPEED)
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, LENGTHS
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.parameters.table import Parameters
 
@@ -42,6 +49,8 @@ class PoseLimits:
         self.angles = angles_to_check(parameters, self.limits.of_joints)
         self.clearance = clearance_to_check(parameters)
         self.stop_condition = stop_condition_of(parameters)
+        self._drives = Drives(parameters) if parameters.drives else None
+        self._motors = MotorLimits(parameters)
 
     def values(self, motions: Array, results: Array) -> dict[str, Array]:
         """Return the values (N, 6) of all limits at rows of motion and their results."""
@@ -66,6 +75,42 @@ class PoseLimits:
         for name, of_legs in values.items():
             found |= self.limits.exceeds(name, of_legs).any(axis=1)
         return found
+
+    def loads(self, motions: Array, results: Array) -> dict[str, tuple[Array, Array]]:
+        """
+        Return values and bounds (N, 6) of the limits of forces and torques.
+
+        At rest torques are breakaway torques: the leg must be able to move off either way.
+        """
+        forces: Array = results[:, FORCES]
+        found = {FORCE_MAX: (forces, np.broadcast_to(self.limits.force_max, forces.shape))}
+        if self._drives is not None:
+            of_motors = self._motors.excesses(
+                self._drives(motions, results), np.zeros(forces.shape))
+            found.update((name, of_motors[name]) for name in (TORQUE_MAX, TORQUE_SPEED))
+        return found
+
+    def overloaded(self, motions: Array, results: Array) -> Flags:
+        """Return where (N,) forces or torques exceed a limit."""
+        found = np.zeros(len(motions), dtype=bool)
+        for values, bounds in self.loads(motions, results).values():
+            found |= exceeds(values, bounds).any(axis=1)
+        return found
+
+    def first_exceeded(self, motion: Array, result: Array) -> Exceedance | None:
+        """Return the first limit that a pose at rest exceeds, of its row of motion and result."""
+        motions, results = motion[None], result[None]
+        values = self.lengths_and_angles(motions, results)
+        found = self.limits.exceeded({name: each[0].tolist() for name, each in values.items()})
+        for name, (loads, bounds) in self.loads(motions, results).items():
+            leg = int(np.argmax(np.abs(loads[0]) - bounds[0]))
+            if exceeds(loads[0, leg], bounds[0, leg]):
+                found += Exceedance(name, leg, float(loads[0, leg]), float(bounds[0, leg])),
+        if not found and self.clearance is not None:
+            clearances, nearest = self.clearance.nearest(motions)
+            found = self.limits.exceeded(
+                {CLEARANCE_MIN: clearances[0].tolist()}, nearest[0].tolist())
+        return found[0] if found else None
 
     def regular(self, results: Array, side: Array | float) -> Flags:
         """Return which results (N, RESULT) are not singular, with the sign of det(J) of a side."""

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.errors import PoseError, SingularityError
+from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics import batch, stiffness
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, optional_array, place, wrong_type)
@@ -341,7 +341,10 @@ class StewartPlatform:
 
         """
         if guess is None:
-            guess = self.home_pose()
+            try:
+                guess = self.home_pose()
+            except ParameterError as exc:
+                raise ParameterError(f'{exc}; give guess=, the pose to begin at') from exc
         row = self._single.forward_kinematics(lengths, guess)
         if row is not None:
             return Pose.of_rows(row)

@@ -120,6 +120,32 @@ def checked(parameter: Parameter, value: Any, source: str) -> Any:
     return array
 
 
+def check_shape(parameter: Parameter, value: Any, source: str) -> None:
+    """
+    Raise ParameterError for rows that are not those of the parameter.
+
+    Flat arrays may have its length; rows must be the points of three joints' coordinates, of the
+    corners of a plate or of a curve. Other rows of as many numbers would be read in a wrong order.
+    """
+    try:
+        shape = np.shape(value)
+    except Exception:
+        return  # no array: the check of entries rejects it
+    if len(shape) < 2:
+        return
+    row = parameter.sizes[0] if parameter.repeated else 3 if 18 in parameter.sizes else 0
+    rows = None if parameter.repeated else 6
+    if len(shape) == 2 and shape[1] == row and rows in (None, shape[0]):
+        return
+    flat_shapes = () if parameter.repeated else parameter.sizes
+    expected = [f'({each},)' for each in flat_shapes]
+    expected += [f'({rows or "N"}, {row})'] if row else []
+    turned = row and shape[0] == row or not row and shape[1:] == (1,)
+    raise ParameterError(
+        f'{source}: {parameter.name}: shape {shape}: must be '
+        f'{" or ".join(expected) or "a single value"}{": transposed?" if turned else ""}')
+
+
 def _broken_rule(parameter: Parameter, entry: Any) -> str:
     """Return the rule that an entry breaks, with a likely correction; empty if it breaks none."""
     kind = parameter.kind
@@ -193,8 +219,8 @@ class ParameterSet(Mapping[str, Any]):
             raise ParameterError(
                 f'{source}: {shown(values)}: must be a mapping of names to values')
         self.source = source
-        for name in values:
-            self.declared(name, source)
+        for name, value in values.items():
+            check_shape(self.declared(name, source), value, source)
         self._given = {
             name: _plain(value) if exact_types else _as_double(self.table[name], _plain(value))
             for name, value in values.items() if value is not None}

@@ -37,6 +37,8 @@ from stewart_dynamics.parameters.tolerances import (
 
 # Corners of a plate are in a plane to this part of its size.
 _FLAT = 1e-6
+NO_MASS = 1e-15
+"""Mass of a platform in a cube on its radius that stands for none: forces are zero [kg/m^3]."""
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s^2]
 
 

@@ -41,7 +41,8 @@ void fmu_reset(fmu_instance * instance)
 double * fmu_value(fmu_instance * instance, uint32_t reference, fmu_type type, int settable)
 {
   fmu_type actual = FMU_REAL;
-  if (reference >= FMU_VALUES || (settable && reference >= FMU_LENGTHS)) {
+  if (reference >= FMU_VALUES ||
+    (reference >= FMU_MOTOR_SPEEDS && !(fmu_platform->legs[0].screw_lead > 0.0)) || (settable && reference >= FMU_LENGTHS)) {
     return NULL;
   }
   if (reference >= FMU_EXCEEDED && reference <= FMU_STATUS) {
@@ -101,6 +102,7 @@ int fmu_step(fmu_instance * instance, double time)
   stewart_motion motion;
   stewart_base base;
   stewart_output output;
+  stewart_motors motors;
   int code, n;
   if (instance->memory.initializing) {  /* each set of inputs is the first */
     memset(&instance->memory.state, 0, sizeof instance->memory.state);
@@ -125,6 +127,15 @@ int fmu_step(fmu_instance * instance, double time)
     for (n = 0; n < 6; n++) {
       values[FMU_EXCEEDED + n] = output.exceeded[n];
     }
+  }
+  memset(&motors, 0, sizeof motors);
+  if ((code == STEWART_OK || code == STEWART_SUPPRESSED || code == STEWART_SINGULAR) &&
+    stewart_motor_torques(&platform, &motion, output.forces, &motors) == STEWART_OK)
+  {
+    memcpy(values + FMU_MOTOR_SPEEDS, motors.speeds, 6 * sizeof *values);
+  }
+  for (n = 0; n < 6; n++) {
+    values[FMU_MOTOR_TORQUES + n] = code == STEWART_OK ? motors.torques[n] : 0.0;
   }
   for (n = 0; n < 6; n++) {
     values[FMU_FORCES + n] = code == STEWART_OK ? output.forces[n] : 0.0;

@@ -66,7 +66,9 @@ enum {
   FMU_EXCEEDED = 74,
   FMU_STATUS = 80,
   FMU_TIME = 81,
-  FMU_VALUES = 82
+  FMU_MOTOR_SPEEDS = 82,  /* the first of those that exist with drives alone */
+  FMU_MOTOR_TORQUES = 88,
+  FMU_VALUES = 94
 };
 
 typedef enum {FMU_REAL, FMU_INTEGER, FMU_BOOLEAN, FMU_OTHER} fmu_type;

@@ -35,6 +35,17 @@ _FASTEST_MOTOR = 2000.0  # [rad/s]
 _SLOWEST_START, _FASTEST_START = 5.0, 1e-4  # [s]
 # The inertia of a screw at the motor's shaft is 0.05 to 5 times that of the rotor.
 _LARGEST_SCREW = 20.0
+# Continuous torque of a motor divided by the mass that its heat capacity is that of, as iron and
+# copper have it: 0.2 to 5 N m/kg. With a time constant in minutes it is 60 times as large.
+_HEAT_CAPACITY = 450.0  # [J/(kg K)]
+_DENSEST_TORQUE = 10.0  # [N m/kg]
+_OF_PEAK = 0.25  # continuous torque of a motor by its peak torque
+# Copper heat at the peak torque divided by peak torque times maximum speed: 0.01 to 1.
+_LARGEST_HEAT = 20.0
+# Temperature rise of a winding at the continuous torque: 50 to 150 K.
+_HOTTEST = 1500.0  # [K]
+# A drive loses more when it is driven back: 2 - 1 / efficiency is never above the efficiency.
+_BACK = 0.1
 # How far drive and legs may miss each other's limits, and how well they must fit if corrected.
 _MISSED, _FITS = 1.5, 1.2
 
@@ -55,6 +66,13 @@ def likely_mistakes(p: Parameters) -> Iterator[str]:
                    'in rpm?')
             return
     yield from _inertia(p)
+    yield from _heat(p)
+    forward, back = p['drive.efficiency'], p['drive.back_driving_efficiency']
+    if np.any(back > forward + _BACK):
+        at = int(np.argmax(back - forward))
+        yield (f'drive.back_driving_efficiency: {back[at]:g}, but drive.efficiency is '
+               f'{forward[at]:g}: a drive that loses this much loses more when it is driven back '
+               f'(2 - 1 / efficiency is {2.0 - 1.0 / forward[at]:.3g}): exchanged?')
     if speed is None and curve is not None:
         speed = np.full(6, curve[-1, 0])
     torque = p['drive.torque_max']
@@ -86,6 +104,35 @@ def likely_mistakes(p: Parameters) -> Iterator[str]:
             return
     if weight > most.min():
         yield (f'drive.torque_max: {torque.min():g} N m: {said}: less than a sixth of the weight')
+
+
+def _heat(p: Parameters) -> Iterator[str]:
+    """Yield that windings would be heated as no motor is."""
+    peak, lasting = p['drive.torque_max'], p['drive.torque_continuous']
+    torque = lasting if lasting is not None or peak is None else _OF_PEAK * peak
+    resistance, constant, speed = (
+        p[f'drive.{name}'] for name in ('resistance', 'torque_constant', 'speed_max'))
+    if torque is None:
+        return
+    to_ambient, time = p['drive.thermal_resistance'], p['drive.thermal_time_constant']
+    if time is not None:
+        density = torque * _HEAT_CAPACITY * to_ambient / time
+        at = int(np.argmax(density))
+        if density[at] > _DENSEST_TORQUE:
+            yield (f'drive.thermal_time_constant: {time[at]:g} s: the heat capacity of '
+                   f'{1000.0 * time[at] / to_ambient[at] / _HEAT_CAPACITY:.3g} g of metal for a '
+                   f'motor of {torque[at]:.3g} N m: in minutes?')
+    if resistance is None:
+        return
+    rise = 0.0 * torque if to_ambient is None else (
+        resistance * (torque / constant) ** 2 * to_ambient)
+    heat = 0.0 * torque if peak is None or speed is None else (
+        resistance * (peak / constant) ** 2 / (peak * speed))
+    at = int(np.argmax(np.maximum(rise / _HOTTEST, heat / _LARGEST_HEAT)))
+    if rise[at] > _HOTTEST or heat[at] > _LARGEST_HEAT:
+        yield (f'drive.resistance: {resistance[at]:g} Ohm: {torque[at]:.3g} N m would need '
+               f'{resistance[at] * (torque[at] / constant[at]) ** 2:.3g} W: in mOhm, or '
+               'drive.torque_constant in mN m/A?')
 
 
 def _inertia(p: Parameters) -> Iterator[str]:

@@ -41,22 +41,28 @@ are part of the leg forces: the torque of an ideal screw is f / k, and its power
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.dynamics.bodies import drive_motion
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.leg_curves import columns, figure, LEGS
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, consecutive, FORCES, LINEAR_ACCELERATION,
     LINEAR_VELOCITY, POSITION, ROTATION)
 from stewart_dynamics.mechanics.vectors import read3, read9
 from stewart_dynamics.parameters.table import Parameters
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 # A row of the six motors' quantities. Commands are the torques of the forces that are published,
@@ -70,6 +76,11 @@ MECHANICAL = np.r_[ANGLES, SPEEDS, ACCELERATIONS, TORQUES]
 # Constants of one drive.
 (_RATIO, _ZERO, _MASS, _DRIVING, _DRIVEN, _SLOW, _TORQUE_CONSTANT, _RESISTANCE) = range(8)
 DRIVE = 8
+
+
+# Columns of a table of motors, in the order of Motors.
+_COLUMNS = ('angle', 'speed', 'acceleration', 'torque', 'current', 'power', 'copper_heat',
+            'breakaway_torque', 'available_torque')
 
 
 class Motors(NamedTuple):
@@ -119,6 +130,25 @@ class Motors(NamedTuple):
         """Return available less breakaway torques (..., 6) [N m]; negative where exceeded."""
         margins: Array = self.available_torques - np.abs(self.breakaway_torques)
         return margins
+
+    def to_dict(self) -> dict[str, Array]:
+        """
+        Return the numbers as columns, each (N,), as ``pandas.DataFrame`` takes them.
+
+        Leading shapes are flattened; SI units. The columns of the motors end in _1 to _6.
+        """
+        return columns(dict(zip(_COLUMNS, self, strict=True)))
+
+    def plot(self, times: ArrayLike | None = None, joints: Sequence[str] = LEGS) -> Figure:
+        """
+        Return a matplotlib figure of speeds and torques, and of currents and power if known.
+
+        Arguments and errors are those of ``InverseDynamics.plot``.
+        """
+        curves = {'speed [rad/s]': self.speeds, 'torque [N m]': self.torques,
+                  'current [A]': self.currents, 'power [W]': self.power}
+        known = {name: each for name, each in curves.items() if np.isfinite(each).any()}
+        return figure(known or curves, times, joints)
 
     def __repr__(self) -> str:
         """Return the shape, not the arrays."""

@@ -16,15 +16,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.errors import MotionError
-from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.frames.motion import listed
+from stewart_dynamics.mechanics.leg_curves import columns, figure, LEGS
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, RESULT, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
@@ -103,15 +103,14 @@ class InverseDynamics:
         Leading shapes are flattened; SI units. The columns of the legs end in _1 to _6.
         """
         rows = self.rows.reshape(-1, RESULT)
-        legs = {f'{name}_{leg + 1}': rows[:, part.start + leg]
-                for name, part in (('length', LENGTHS), ('rate', RATES), ('force', FORCES),
-                                   ('unit_load_force', UNIT_LOAD_FORCES)) for leg in range(6)}
+        legs = columns({'length': self.lengths, 'rate': self.rates, 'force': self.forces,
+                        'unit_load_force': self.unit_load_forces})
         return {**legs, 'determinant': rows[:, DETERMINANT],
                 'determinant_rate': rows[:, DETERMINANT_RATE],
                 'condition_number': rows[:, CONDITION],
                 'time_to_crossing': np.reshape(self.time_to_crossing, -1)}
 
-    def plot(self, times: ArrayLike | None = None) -> Figure:
+    def plot(self, times: ArrayLike | None = None, joints: Sequence[str] = LEGS) -> Figure:
         """
         Return a matplotlib figure of lengths, rates and forces.
 
@@ -119,6 +118,8 @@ class InverseDynamics:
         ----------
         times : (N,), optional
             Times of the samples [s]; by default the axis shows sample numbers.
+        joints : six str, optional
+            Names of the legs.
 
         Raises
         ------
@@ -128,26 +129,8 @@ class InverseDynamics:
             There is one sample alone, or times do not fit.
 
         """
-        try:
-            from matplotlib.figure import Figure
-        except ImportError as exc:
-            raise ModuleNotFoundError('plot: matplotlib is not installed: '
-                                      'pip install matplotlib') from exc
-        if self.rows.ndim != 2:
-            raise MotionError(f'plot: results of shape {self.rows.shape[:-1]}: must be (N,)')
-        size = len(self.rows)
-        across = np.arange(size) if times is None else as_array('times', times, (size,))
-        figure = Figure(figsize=(8.0, 8.0), layout='constrained')
-        for axes, name, values in zip(
-                figure.subplots(3, 1, sharex=True),
-                ('length [m]', 'rate [m/s]', 'force [N]'),
-                (self.lengths, self.rates, self.forces), strict=True):
-            axes.plot(across, values, label=[f'leg {leg}' for leg in range(1, 7)])
-            axes.set_ylabel(name)
-            axes.grid(alpha=0.3)
-        axes.set_xlabel('sample' if times is None else 'time [s]')
-        figure.axes[0].legend(ncols=6)
-        return figure
+        return figure({'length [m]': self.lengths, 'rate [m/s]': self.rates,
+                       'force [N]': self.forces}, times, joints)
 
     def __repr__(self) -> str:
         """Return the numbers of a single sample, or the shape."""
