@@ -80,11 +80,13 @@ def test_a_limit_that_is_exceeded_only_shortly_is_found(limit: str) -> None:
     assert cases > 2
 
 
-@pytest.mark.parametrize('seed', range(10))
+@pytest.mark.parametrize('seed', range(14))
 def test_bounds_hold_between_factors(seed: int) -> None:
     """Rates, forces, speeds and torques, with a load, on a base that moves."""
     random = rng(seed)
-    platform = driven(seed, **{'limits.force_max': 1e3, 'limits.velocity_max': 0.5})
+    # From 10 on turning screws have a lead that makes J_q another matrix than J_inv.
+    coarse = {'actuator.screw_lead': 0.3} if seed >= 10 else {}
+    platform = driven(seed, **{'limits.force_max': 1e3, 'limits.velocity_max': 0.5, **coarse})
     p = platform.parameters
     home = Motion.from_pose(platform.home_pose())
     deviations = Deviations(home, random_motion(p, random, 1).rows)

@@ -41,7 +41,7 @@ from stewart_dynamics.export.c_project import (
     SOURCES)
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS, hexapod_constants
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS, constants_with
 from stewart_dynamics.mechanics.frames.motion import ORTHOGONALITY
 from stewart_dynamics.mechanics.frames.rotation import (
     from_euler, from_quaternion, quaternion_length)
@@ -147,6 +147,13 @@ def random_hexapods(random: np.random.Generator) -> Any:
     example = Parameters.from_yaml(PLATFORM_FILE)
     for name in ('geometry.base_joints', 'geometry.platform_joints'):
         legs[name][random.random(many) < 0.3] = example[name]
+    # Half of them have screws that turn with their legs.
+    legs['actuator.screw_lead'] = random.uniform(0.005, 0.1, (many, 6))
+    legs['drive.gear_ratio'] = random.uniform(0.5, 4.0, (many, 6))
+    legs['drive.screw_rotation'] = legs['drive.gear_ratio'] * random.choice([-1.0, 1.0], (many, 6))
+    legs['drive.screw_rotation'][random.random(many) < 0.5] = 0.0
+    for name in ('drive.base_universal_axes', 'drive.platform_universal_axes'):
+        legs[name] /= np.linalg.norm(legs[name], axis=-1, keepdims=True)
     hexapods['singularity.characteristic_length'] = random.uniform(0.1, 3.0, many)
     return hexapods
 
@@ -172,9 +179,13 @@ def samples(library: ctypes.CDLL) -> dict[str, Any]:
     constants = np.empty((len(hexapods), CONSTANTS))
     for n, hexapod in enumerate(hexapods):
         legs = hexapod['legs']
-        constants[n] = hexapod_constants({  # type: ignore[arg-type]
+        pitch = (legs['drive.screw_rotation'] * legs['actuator.screw_lead']
+                 / (2.0 * math.pi * legs['drive.gear_ratio']))
+        constants[n] = constants_with({  # type: ignore[arg-type]
             **{name: legs[name] for name in LEG_FIELDS}, **{
-                name: hexapod[name] for name in (*FIELDS_BEFORE_LEGS, *FIELDS_AFTER_LEGS)}})
+                name: hexapod[name] for name in (*FIELDS_BEFORE_LEGS, *FIELDS_AFTER_LEGS)}},
+            np.column_stack([pitch, legs['drive.base_universal_axes'],
+                             legs['drive.platform_universal_axes']]))
     made['constants'] = np.repeat(constants, MOTIONS, axis=0)
     return made
 
@@ -442,7 +453,7 @@ def test_cppcheck_finds_nothing(exported: Path) -> None:
 
 def test_the_source_is_short_and_needs_math_alone() -> None:
     texts = [(FOLDER / name).read_text() for name in SOURCES]
-    assert sum(text.count('\n') for text in texts) < 900
+    assert sum(text.count('\n') for text in texts) < 955
     assert all(len(line) < 100 for text in texts for line in text.splitlines())
     assert set(re.findall('#include <(.*)>', ''.join(texts))) == {'math.h', 'stddef.h', 'stdint.h'}
 

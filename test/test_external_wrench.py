@@ -38,6 +38,8 @@ from stewart_dynamics.external_wrench.measured_legs import (
     MEASURED_LEGS, MeasuredLegs, NOT_CONVERGED, SINGULAR, UNSTAMPED)
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS, UNEVEN
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import BASE_IMU
 from stewart_dynamics.setpoints.rejections import (
@@ -332,6 +334,55 @@ def test_the_search_begins_at_the_last_pose_and_then_at_the_setpoint() -> None:
     # But not within a series.
     with pytest.raises(SingularityError, match=r'lengths \['):
         step(at, flat._replace(stamp=BEGIN - 1), NO_WRENCH, HOME.rows.tolist())
+
+
+# Singularities
+
+@pytest.mark.parametrize(('turn', 'crossings', 'lag'), [
+    (1.66, 1, 0.0), (1.66, 1, 0.02), (1.52, 0, 0.0), (1.52, 0, 0.02)])
+def test_the_estimate_follows_the_setpoint_through_a_singularity(
+        turn: float, crossings: int, lag: float) -> None:
+    """The paper's motion, and one that ends short of the singularity and returns."""
+    reference = ReferenceMotionParameters.from_yaml(
+        ROOT / 'config' / 'trajectory_singular.yaml').replaced({
+            'motion.final': [0.06, -0.04, 0.8, 0.1, -0.08, turn]})
+    seconds = np.arange(0.0, 10.0, 0.0025)
+    if not crossings:
+        seconds = 10.0 - np.abs(10.0 - 2.0 * seconds)  # there and back
+    targets = motion_at(reference, seconds)
+    true = motion_at(reference, np.maximum(seconds - lag, 0.0))
+    platform, step = StewartPlatform(HEXAPOD), ExternalWrench(HEXAPOD)
+    sides = np.sign(platform.inverse_dynamics(targets, singular='nan').determinant)
+    assert np.count_nonzero(np.diff(sides)) == crossings
+    result = platform.inverse_dynamics(true, singular='nan')
+    found: list[Estimate] = []
+    for n in range(len(seconds)):
+        found.append(step(
+            Measurement(BEGIN + n * 5 * MILLISECOND // 2, six(result.lengths[n]),
+                        six(result.rates[n]), six(result.forces[n])),
+            found[-1] if found else None, NO_WRENCH, tuple(targets.rows[n].tolist())))
+    poses = np.array([each.motion[:12] for each in found])
+    off = np.abs(poses - true.rows[:, :12]).max(axis=1)
+    # While the platform lags behind, near the singularity its mirror image may be taken.
+    behind = np.zeros(len(off), dtype=bool)
+    at = np.flatnonzero(np.diff(sides))
+    for n in at:
+        behind[n:n + round(lag / 0.0025) + 2] = True
+    assert off[~behind].max() < 1e-8 and off.max() < 0.01
+    # A restart, without a wrench, for each crossing.
+    assert sum(each.wrench is None for each in found) == 1 + crossings
+
+
+def test_a_setpoint_beyond_a_singularity_that_is_not_followed_changes_nothing() -> None:
+    step, platform = ExternalWrench(HEXAPOD), StewartPlatform(HEXAPOD)
+    beyond = Motion.from_euler([0.06, -0.04, 0.8], [0.1, -0.08, 1.66])
+    assert platform.inverse_dynamics(HOME).determinant * platform.inverse_dynamics(
+        beyond).determinant < 0.0
+    legs = resting(HEXAPOD, HOME, LOAD, [BEGIN + n * MILLISECOND for n in range(50)])
+    found = [step(legs[0], None, NO_WRENCH, tuple(HOME.rows.tolist()))]
+    for each in legs[1:]:
+        found.append(step(each, found[-1], NO_WRENCH, tuple(beyond.rows.tolist())))
+    assert found == estimates(ExternalWrench(HEXAPOD), legs)
 
 
 # Impossible

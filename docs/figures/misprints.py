@@ -81,6 +81,11 @@ MISPRINTS = (
     Misprint('leg gravity', 'section 5, linkages: G_Li',
              '`(m1 S1 + m2 (L - S2)) skew(U)^2`', '`(m1 S1 + m2 (L - S2)) / L skew(U)^2`',
              'has kg m in place of kg: taken as the number in SI units'),
+    Misprint('', "section 5, whole manipulator: the linkages' equation, in both of its lines",
+             "`M_Li x_Li'' + C_Li x_Li' + G_Li = (J^-1)^T F_Li`",
+             "`M_Li x_Li'' + C_Li x_Li' + G_Li = F_Li`",
+             'three numbers on the left, six on the right: F_Li is the force at the platform '
+             'joint of the leg, and `J_i^T F_Li` its part of the six'),
     Misprint('', 'section 5, whole manipulator: G_lini', '`J_i^T G_Li J_i`', '`J_i^T G_Li`',
              'the shapes do not match: the second J_i is left out'),
     Misprint('', 'section 5, whole manipulator: last line',

@@ -110,12 +110,13 @@ class Capability:
     """
     Answers to "possible?" and "how far?" of a hexapod: exact, without sampling.
 
-    J_inv is square, so leg forces are an affine function of a load, of an acceleration and of an
-    added mass: each question at a pose is six intervals. Poses and directions have any leading
-    shapes that broadcast against each other. A direction is six numbers, translation and rotation
-    (or force and moment), base axes; answers are multiples of it, so a unit vector gives meters,
-    radians, newtons. Loads, rates and payload are those of a pose whether or not its lengths,
-    joint angles and clearance are within their limits: ``reachable`` and ``travel`` say that.
+    J_inv is square, as is J_q of screws that turn with their legs (``drives.screws``), so leg
+    forces are an affine function of a load, of an acceleration and of an added mass: each question
+    at a pose is six intervals. Poses and directions have any leading shapes that broadcast against
+    each other. A direction is six numbers, translation and rotation (or force and moment), base
+    axes; answers are multiples of it, so a unit vector gives meters, radians, newtons. Loads,
+    rates and payload are those of a pose whether or not its lengths, joint angles and clearance
+    are within their limits: ``reachable`` and ``travel`` say that.
 
     Parameters
     ----------
@@ -384,7 +385,7 @@ class Capability:
         check_kind(pose, Pose, Motion)
         legs = lagrange.legs(self.platform.parameters, pose.position, pose.rotation)
         return self.platform.stiffness(pose, leg_stiffness) + geometric_stiffness(
-            legs, self._forces(self._held(pose), None))
+            legs, self._forces(self._held(pose), None), pose.rotation, self.platform.screws)
 
     def modes(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> NaturalModes:
         """
@@ -639,16 +640,16 @@ class Capability:
         constant, backward = (
             self._frictionless.inverse_dynamics(Motion.of_rows(each), wrench, base).forces
             for each in (still, back))
-        p = self.platform.parameters
-        linear = (solved.forces - backward) / 2.0 + p['actuator.viscous_friction'] * solved.rates
+        p, rates = self.platform.parameters, self.platform.drive_rates(rows, solved.rates)
+        linear = (solved.forces - backward) / 2.0 + p['actuator.viscous_friction'] * rates
         square = (solved.forces + backward) / 2.0 - constant
         coulomb, band = p['actuator.coulomb_friction'], p['actuator.coulomb_velocity']
         with np.errstate(divide='ignore'):
-            knee = band / np.abs(solved.rates)
-        sign = np.sign(solved.rates)
-        # (forces by powers of k, direction of the leg, begin, end)
+            knee = band / np.abs(rates)
+        sign = np.sign(rates)
+        # (forces by powers of k, direction of the drive, begin, end)
         pieces = (
-            ((constant, linear + coulomb * solved.rates / band, square), 0.0 * sign,
+            ((constant, linear + coulomb * rates / band, square), 0.0 * sign,
              np.zeros(()), knee),
             ((constant + coulomb * sign, linear, square), sign, knee, np.full((), math.inf)))
         found: list[tuple[Array, Any]] = []
@@ -682,7 +683,7 @@ class Capability:
 
     def _per_wrench(self, pose: Pose | Motion, wrenches: Array) -> Array:
         """Return the leg forces (..., 6) that balance wrenches (..., 6) alone."""
-        transposed = np.swapaxes(self.platform.inverse_jacobian(pose), -1, -2)
+        transposed = np.swapaxes(self.platform.drive_jacobian(pose), -1, -2)
         return np.asarray(np.linalg.solve(transposed, wrenches[..., None])[..., 0], dtype=float)
 
     def _multiple(self, motion: Motion, forces: Array, change: Array, whole: bool = False,
@@ -719,11 +720,12 @@ class Capability:
             accelerated = rows.copy()
             accelerated[..., ACCELERATION] += directions
             more = bounds.moving(accelerated, solved.rows)
-        slow = np.abs(solved.rates) < self.platform.parameters['actuator.coulomb_velocity']
+        rates = self.platform.drive_rates(rows, solved.rates)
+        slow = np.abs(rates) < self.platform.parameters['actuator.coulomb_velocity']
         return bounds.exits(
             (forces - motors.inertial, change - (more.inertial - motors.inertial), none),
             (motors.own, more.own - motors.own, none), motors.speeds,
-            np.where(slow, 0.0, np.sign(solved.rates)), np.zeros(()), np.full((), math.inf))
+            np.where(slow, 0.0, np.sign(rates)), np.zeros(()), np.full((), math.inf))
 
     @property
     def limits_rates(self) -> bool:
@@ -766,7 +768,7 @@ class Capability:
             raise self._unlimited((limits.FORCE_MAX,))
         strongest = self.holding_forces(continuous)
         forces = self._forces(self._held(pose), None)
-        inverse = np.linalg.inv(np.swapaxes(self.platform.inverse_jacobian(pose), -1, -2))
+        inverse = np.linalg.inv(np.swapaxes(self.platform.drive_jacobian(pose), -1, -2))
         reach = np.linalg.norm(inverse[..., part], axis=-1)
         with np.errstate(divide='ignore'):
             values = np.maximum((strongest - np.abs(forces)) / reach, 0.0).min(axis=-1)

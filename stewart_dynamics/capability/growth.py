@@ -85,7 +85,7 @@ class Growth:
             np.asarray(0.0 if wrench is None else wrench, dtype=float), (self._count, WRENCH))
         self._base = np.broadcast_to(
             (BaseMotion(p['gravity']) if base is None else base).rows, (self._count, BASE))
-        self._bounds = GrowthBounds(p, motors)
+        self._bounds = GrowthBounds(p, motors, platform.screws)
 
     def first_exit(self, most: float) -> tuple[float, int, int] | None:
         """
@@ -173,7 +173,8 @@ class Growth:
         ratios = [results[:, RATES if name == VELOCITY_MAX else FORCES] / bound
                   for name, bound in self._limits.items()]
         smooth = [rates, forces - p['actuator.coulomb_friction'] * np.clip(
-            rates / p['actuator.coulomb_velocity'], -1.0, 1.0)]
+            self._platform.drive_rates(rows, rates) / p['actuator.coulomb_velocity'],
+            -1.0, 1.0)]
         if self._motors is not None:
             ratios += self._motors.ratios(rows, results)
             motors = self._motors.moving(rows, results)
@@ -214,13 +215,17 @@ class Growth:
         else:
             low, high = middle.smooth - off, middle.smooth + off
         low, high = (np.moveaxis(each, 1, 0) for each in (low, high))
+        rates = low[0], high[0]  # of the drives
+        if self._motors is not None and self._platform.screws.any():
+            rates = low[2] / self._motors.ratio, high[2] / self._motors.ratio
         friction = tuple(p['actuator.coulomb_friction'] * np.clip(
-            each[0] / p['actuator.coulomb_velocity'], -1.0, 1.0) for each in (low, high))
+            each / p['actuator.coulomb_velocity'], -1.0, 1.0) for each in rates)
         found = [np.maximum(-low[0], high[0]) / bound if name == VELOCITY_MAX else
                  np.maximum(-low[1] - friction[0], high[1] + friction[1]) / bound
                  for name, bound in self._limits.items()]
         if self._motors is not None:
-            found += self._motors.between(low, high, friction, p['actuator.coulomb_velocity'])
+            found += self._motors.between(
+                low, high, rates, friction, p['actuator.coulomb_velocity'])
         return np.concatenate(found, axis=1)
 
 

@@ -27,8 +27,9 @@ On the disc of radius r about k0, with displacement k d and rotation vector k ph
 - a vector a that turns with the platform changes by at most
   ``(exp(r |phi|) - 1) |phi x a| / |phi|``, and a leg's l by at most ``r max|d + phi x a|``;
 - d omega / dk = R phi', and d alpha / dk = R phi'' + omega x (R phi'), with R = exp(skew(k phi));
-- J = J_inv is ``(1 + z M + Q J0^-1) J0`` with M = J' J0^-1 at k0, and rows q_i of Q. The forces f
-  under a wrench W solve J^T f = W. Where W changes by w, f_i changes by at most
+- J is J_inv, or J_q where screws turn with their legs (``drives.screws``):
+  ``J = (1 + z M + Q J0^-1) J0`` with M = J' J0^-1 at k0, and rows q_i of Q. The forces f under
+  a wrench W solve J^T f = W. Where W changes by w, f_i changes by at most
   ``|A_i| |w| + (r |M_i| + |A_i| |q|) |f|`` with the columns A_i of J0^-1, M_i of M; and
   ``|f| <= (|f(k0)| + |A| |w|) / (1 - kappa)``, ``kappa = r |M| + |A| |q| < 1`` (Frobenius norms).
 """
@@ -41,12 +42,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.motor_bounds import MotorBounds
-from stewart_dynamics.mechanics.drives.motors import (
-    BASE_AXIS, drive_constants, PLATFORM_AXIS, TWIST as SCREW_TWIST)
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
-    BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSITION, ROTATION)
+    BASE_ANGULAR_VELOCITY, BASE_AXIS, GRAVITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, PITCH,
+    PLATFORM_AXIS, POSITION, ROTATION)
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 
 
@@ -149,9 +149,8 @@ class GrowthBounds:
     factors of ``MotorBounds``.
     """
 
-    def __init__(self, parameters: Parameters, motors: MotorBounds | None) -> None:
-        self._p, self._motors = parameters, motors
-        self._drives = drive_constants(parameters)
+    def __init__(self, parameters: Parameters, motors: MotorBounds | None, screws: Array) -> None:
+        self._p, self._motors, self._screws = parameters, motors, screws
         self._inertia = inertia_matrix(parameters['platform.inertia'])
 
     def __call__(self, rows: Array, forces: Array, per_load: Array, changes: Array, base: Array,
@@ -170,11 +169,11 @@ class GrowthBounds:
         chord: bounds are those of the distance from the chord instead.
         """
         at = lagrange.unchecked_legs(
-            self._p, rows[:, POSITION], rows[:, ROTATION].reshape(-1, 3, 3))
+            self._p, rows[:, POSITION], rotation := rows[:, ROTATION].reshape(-1, 3, 3))
         with np.errstate(all='ignore'):
-            relative = lagrange.inverse_jacobian_rate(
-                at, changes[:, 0, :3], changes[:, 0, 3:]) @ np.linalg.inv(
-                    lagrange.inverse_jacobian(at))
+            relative = lagrange.drive_jacobian_rate(
+                at, rotation, changes[:, 0, :3], changes[:, 0, 3:], self._screws
+                ) @ np.linalg.inv(lagrange.drive_jacobian(at, rotation, self._screws))
             if not chord:
                 return self._radii(rows, at, relative, forces, per_load, changes, base,
                                    0.5 * widths[:, None])
@@ -264,30 +263,36 @@ class GrowthBounds:
 
         # rates, forces, speeds and torques
         viscous, mass = p['actuator.viscous_friction'], p['actuator.reflected_mass']
-        lever_change = turn.cross(arm).cross(s) + arm.cross(s_change)
-        q = r * np.hypot(s_change.radius, lever_change.radius / size_of_hexapod)
+        row_change = s_change, turn.cross(arm).cross(s) + arm.cross(s_change)
+        leg_rate = rate
+        if self._screws.any():
+            twist_rate, twist_acc = self._twist(rotation, turning, s, s_rate, s_acc)
+            pitch = self._screws[:, PITCH]
+            rate, acc = rate + twist_rate * pitch, acc + twist_acc * pitch
+            row_change = self._turning_row(rotation, turning, turn, arm, s, s_change, inverse,
+                                           line_change)
+        q = r * np.hypot(row_change[0].radius, row_change[1].radius / size_of_hexapod)
         columns = r * np.linalg.norm(relative, axis=1)
         kappa = _norm(columns) + _norm(per_load) * _norm(q)
         at_middle = _norm(forces - viscous * rate.center - mass * acc.center)
         strongest = (at_middle + _norm(per_load) * wrench) / (1.0 - kappa)
         load = viscous * rate.radius + per_load * wrench + (
             columns + per_load * _norm(q)) * strongest
-        found = [rate.radius, load + mass * acc.radius]
+        found = [leg_rate.radius, load + mass * acc.radius]
         if self._motors is not None:
-            ratio, gear = self._drives[:, 0], np.abs(self._drives[:, SCREW_TWIST])
-            twist = self._twist(rotation, turning, s, s_rate, s_acc) if gear.any() else (0.0, 0.0)
-            own = self._motors.inertia * (ratio * acc.radius + gear * twist[1])
-            found += [ratio * rate.radius + gear * twist[0], load,
+            ratio = self._motors.ratio
+            own = self._motors.inertia * (ratio * acc.radius)
+            found += [ratio * rate.radius, load,
                       *(own + np.abs(scale) * load for scale in self._motors.scales)]
         radii = np.stack(found, axis=1)
         return np.where((kappa < 1.0)[:, None] & np.isfinite(radii), radii, np.inf)
 
     def _twist(self, rotation: Array, turning: Callable[[Array], tuple[Disc, Disc, Disc]],
-               s: Disc, s_rate: Disc, s_acc: Disc) -> tuple[Array, Array]:
-        """Return the largest changes of rate and acceleration of the twist of ``leg_twist``."""
-        u = Disc(self._drives[:, BASE_AXIS:PLATFORM_AXIS].T[:, None])
+               s: Disc, s_rate: Disc, s_acc: Disc) -> tuple[Disc, Disc]:
+        """Return rate and acceleration of the twist of ``leg_twist``."""
+        u = Disc(self._screws[:, BASE_AXIS].T[:, None])
         w, w_rate, w_acc = turning(np.einsum(
-            'nij,kj->ink', rotation, self._drives[:, PLATFORM_AXIS:]))
+            'nij,kj->ink', rotation, self._screws[:, PLATFORM_AXIS]))
         normal, normal_rate, normal_acc = u.cross(w), u.cross(w_rate), u.cross(w_acc)
         y = s.dot(normal)
         y_rate = s_rate.dot(normal) + s.dot(normal_rate)
@@ -301,7 +306,37 @@ class GrowthBounds:
         inverse = (x * x + y * y).inverse()
         rate = (x * y_rate - y * x_rate) * inverse
         acc = (x * y_acc - y * x_acc - (x * x_rate + y * y_rate) * rate * 2.0) * inverse
-        return rate.radius, acc.radius
+        return rate, acc
+
+    def _turning_row(self, rotation: Array, turning: Callable[[Array], tuple[Disc, Disc, Disc]],
+                     turn: Disc, arm: Disc, s: Disc, s_change: Disc, inverse: Disc,
+                     line_change: Disc) -> tuple[Disc, Disc]:
+        """Return the derivative by k of a row of J_q, in halves, as in ``drive_jacobian_rate``."""
+        pitch = self._screws[:, PITCH]
+        u = Disc(self._screws[:, BASE_AXIS].T[:, None])
+        w, _, _ = turning(np.einsum('nij,kj->ink', rotation, self._screws[:, PLATFORM_AXIS]))
+        arm_change, w_change = turn.cross(arm), turn.cross(w)
+        one = Disc(np.ones(()))
+
+        def factors(c: Disc, c_change: Disc) -> tuple[Disc, Disc, Disc]:
+            """Return 1 / (1 - c^2), c / (1 - c^2) and its derivative."""
+            across = (one - c * c).inverse()
+            return across, c * across, c_change * (one + c * c) * across * across
+
+        u_s, w_s, w_s_change = u.dot(s), w.dot(s), w_change.dot(s) + w.dot(s_change)
+        _, of_u, of_u_change = factors(u_s, u.dot(s_change))
+        across, of_w, of_w_change = factors(w_s, w_s_change)
+        inner = s.cross(u) * of_u - s.cross(w) * of_w
+        inner_change = (
+            s.cross(u) * of_u_change + s_change.cross(u) * of_u - s.cross(w) * of_w_change
+            - (s_change.cross(w) + s.cross(w_change)) * of_w)
+        h = s + inner * inverse * pitch
+        h_change = s_change + (
+            inner_change - inner * (s.dot(line_change) * inverse)) * inverse * pitch
+        d = (s - w * w_s) * across
+        d_change = (s_change - w * w_s_change - w_change * w_s
+                    + d * (w_s * w_s_change * 2.0)) * across
+        return h_change, arm_change.cross(h) + arm.cross(h_change) + d_change * pitch
 
 
 def _norm(values: Array) -> Array:

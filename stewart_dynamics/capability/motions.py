@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
-    POSITION, ROTATION, TWIST)
+    POSITION, RATES, ROTATION, TWIST)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.interpolation import (
     Interpolation, motion_of, rates_of_vector, rotation_vector)
@@ -132,7 +132,8 @@ def timed(platform: StewartPlatform, times: ArrayLike, motion: Any,
     results = platform.solve(rows)
     with np.errstate(all='ignore'):  # numbers that overflow need too many samples
         parts = Sampling(platform.parameters).parts(
-            durations / scale, Interpolation(durations / scale, rows), results, None, 0.0)
+            durations / scale, Interpolation(durations / scale, rows), results,
+            platform.drive_rates(rows, results[:, RATES]), None, 0.0)
     near = parts <= MOST_SAMPLES  # not where they are nan
     if not near.all():
         n = int(np.argmin(near))

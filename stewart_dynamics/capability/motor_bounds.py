@@ -29,7 +29,7 @@ from stewart_dynamics.mechanics.drives.motors import (
 from stewart_dynamics.mechanics.limits import (
     short_name, SPEED_MAX, TORQUE_CONTINUOUS, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import MOTION, RESULT
-from stewart_dynamics.parameters.table import GUIDED, Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 # Ratio of a torque to none that is available: finite, for searches.
 _FAR_BEYOND = 1e9
@@ -52,6 +52,7 @@ class MotorBounds:
     in ``drives.motors``.
 
     limited, limits_speeds: there is a limit of torques, of speeds.
+    ratio (6,): turns of the motors for each metre of their drives [rad/m].
     inertia (6,): at the motors' shafts [kg m^2].
     scales (two of (6,)): torques per load [m]: of the motor that drives, and of the one that is
         driven.
@@ -61,12 +62,11 @@ class MotorBounds:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = p = parameters
         self._drives = Drives(p)
-        self._guided = Drives(p.replaced({'drive.screw_rotation': GUIDED}))
         constants = drive_constants(p)
-        self._ratio, self._mass = constants[:, 0], constants[:, 2]
+        self.ratio, self._mass = constants[:, 0], constants[:, 2]
         self._factors = 1.0 + constants[:, 3], 1.0 + constants[:, 4]
-        self.inertia = self._mass / self._ratio ** 2
-        self.scales = tuple(each / self._ratio for each in self._factors)
+        self.inertia = self._mass / self.ratio ** 2
+        self.scales = tuple(each / self.ratio for each in self._factors)
         self._strongest, self.fastest = bound_of(p, TORQUE_MAX), bound_of(p, SPEED_MAX)
         self.limits_speeds = bool(np.isfinite(self.fastest).any())
         self._curve = p[TORQUE_SPEED]
@@ -85,11 +85,10 @@ class MotorBounds:
         """Return the motors for rows (..., MOTION) and (..., RESULT)."""
         shape = results.shape[:-1]
         rows = np.broadcast_to(motions, (*shape, MOTION)).reshape(-1, MOTION)
-        turning, straight = (drives(rows, results.reshape(-1, RESULT)).reshape(*shape, MOTORS)
-                             for drives in (self._drives, self._guided))
-        own = self.inertia * turning[..., ACCELERATIONS]
-        return MovingMotors(turning[..., SPEEDS], own,
-                            self._mass / self._ratio * straight[..., ACCELERATIONS])
+        motors = self._drives(rows, results.reshape(-1, RESULT)).reshape(*shape, MOTORS)
+        accelerations = motors[..., ACCELERATIONS]
+        return MovingMotors(motors[..., SPEEDS], self.inertia * accelerations,
+                            self._mass / self.ratio * accelerations)
 
     def ratios(self, motions: Array, results: Array) -> list[Array]:
         """Return speeds and torques relative to their limits, two of (N, 6)."""
@@ -106,16 +105,17 @@ class MotorBounds:
         return np.where(
             largest < self._strongest, short_name(TORQUE_SPEED), short_name(TORQUE_MAX))
 
-    def between(self, low: Array, high: Array, friction: tuple[Array, Array], band: Array,
-                ) -> list[Array]:
+    def between(self, low: Array, high: Array, rates: tuple[Array, Array],
+                friction: tuple[Array, Array], band: Array) -> list[Array]:
         """
         Return bounds of ``ratios`` in an interval.
 
         low, high (6, N, 6): bounds of the quantities of ``GrowthBounds``.
+        rates (two of (N, 6)): bounds of the rates of the drives, low and high [m/s].
         friction (two of (N, 6)): bounds of the Coulomb friction, low and high [N].
-        band (6,): rates below which a leg is near standstill.
+        band (6,): rates below which a drive is near standstill.
         """
-        rates, speeds, load = ((low[n], high[n]) for n in (0, 2, 3))
+        speeds, load = ((low[n], high[n]) for n in (2, 3))
         with np.errstate(invalid='ignore'):  # both factors count where loads are not bounded
             sign = np.sign(rates[0]) * ((rates[0] >= band) | (rates[1] <= -band))
             power = sign * (load[0] + friction[0]), sign * (load[1] + friction[1])
@@ -139,7 +139,7 @@ class MotorBounds:
     @property
     def forces_at_rest(self) -> Array:
         """Return the largest leg forces at rest (6,) [N], by the breakaway torque."""
-        forces: Array = self._largest(np.zeros(6)) * self._ratio / np.max(
+        forces: Array = self._largest(np.zeros(6)) * self.ratio / np.max(
             np.abs(self._factors), axis=0)
         return forces if self.limited else np.full(6, math.inf)
 
@@ -147,7 +147,7 @@ class MotorBounds:
     def continuous_forces(self) -> Array | None:
         """Return leg forces (6,) [N] that can be held without end, without losses as published."""
         continuous = self._parameters[TORQUE_CONTINUOUS]
-        return None if continuous is None else np.asarray(continuous * self._ratio)
+        return None if continuous is None else np.asarray(continuous * self.ratio)
 
     def exits(self, load: tuple[Array, ...], own: tuple[Array, ...], speeds: Array,
               direction: Array, begin: Array, end: Array, growing: bool = False,
@@ -158,7 +158,7 @@ class MotorBounds:
         load, own (three of (..., 6)): coefficients of 1, t and t^2: loads of the screws [N],
             torques of the rotors [N m].
         speeds (..., 6): [rad/s], where they grow at t = 1.
-        direction (..., 6): signs of the rates of the legs; 0 near standstill.
+        direction (..., 6): signs of the rates of the drives; 0 near standstill.
         begin, end (..., 6) or (): ends of the interval of each leg.
         growing: speeds grow with t.
         Returns exits, limits (..., 6): ``begin`` where a torque is exceeded there, infinity where
@@ -188,7 +188,7 @@ class MotorBounds:
                     slope = np.where(flat, 0.0, rise / (high - low))
                 driving = (constant + middle * (linear + middle * square)) * direction > 0.0
                 for factor, active in zip(self._factors, (driving, ~driving), strict=True):
-                    scale = factor / self._ratio
+                    scale = factor / self.ratio
                     torques = tuple(a + scale * b for a, b in zip(own, load, strict=True))
                     found = quadratic_exit(
                         torques, here - slope * middle, low, high, slope)

@@ -28,10 +28,10 @@ import numpy as np
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import ParameterError, shown, StewartError
 from stewart_dynamics.export.golden_vectors import COLUMNS, golden_vectors, PARTS
-from stewart_dynamics.mechanics.drives.motors import (
-    BASE_AXIS, drive_constants, PLATFORM_AXIS, TWIST)
+from stewart_dynamics.mechanics.drives.screws import motor_turns, screw_constants
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.limits import Limits
+from stewart_dynamics.mechanics.rows import BASE_AXIS, PLATFORM_AXIS
 from stewart_dynamics.parameters.table import (
     LEG_SHAPE, OUTLINES, PARAMETERS, Parameters, SUPPRESS_FORCES)
 
@@ -142,10 +142,10 @@ def field_values(parameters: Parameters) -> dict[str, Any]:
     axes = np.zeros((12, 3)) if angles is None else np.nan_to_num(angles.axes)
     values['geometry.base_joint_axes'] = axes[:6]
     values['geometry.platform_joint_axes'] = axes[6:]
-    drives = drive_constants(parameters)
-    values['drive.screw_rotation'] = drives[:, TWIST]
-    values['drive.base_universal_axes'] = drives[:, BASE_AXIS:BASE_AXIS + 3]
-    values['drive.platform_universal_axes'] = drives[:, PLATFORM_AXIS:PLATFORM_AXIS + 3]
+    screws = screw_constants(parameters)
+    values['drive.screw_rotation'] = motor_turns(parameters)
+    values['drive.base_universal_axes'] = screws[:, BASE_AXIS]
+    values['drive.platform_universal_axes'] = screws[:, PLATFORM_AXIS]
     for name in LEG_FIELDS:
         if np.ndim(values[name]) < 1:
             values[name] = np.full(6, values[name])

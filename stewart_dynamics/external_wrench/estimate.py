@@ -21,7 +21,8 @@ give the forces f_model of the same motion without it, so
 
     w_ext = J_inv^T (f_model - f)
 
-with the sign of ``~/wrench``: the load that the surroundings put on the platform at its origin,
+(J_q in place of J_inv where screws turn with their legs: ``drives.screws``), with the sign of
+``~/wrench``: the load that the surroundings put on the platform at its origin,
 base axes. It includes all forces that the model lacks: a wrong payload or friction, a brake, an
 end stop. ``external_wrenches`` is this equation for recorded samples, as the replay uses it.
 
@@ -37,6 +38,12 @@ with the gain K = 2 pi cutoff. The observer integrates r' = K (p' - u - r), p th
 r = K (p - integral(u + r)); here the same equation is solved step by step. Noise is therefore no
 worse: white noise of deviation s in a twist gives at most M K s, however short dt is, while the
 difference quotient alone gives sqrt(2) M s / dt.
+
+Six lengths alone do not show that the platform has passed a singularity: the forward kinematics
+stay on the side of the last pose. The setpoint shows it. Where det(J) has another sign at the
+setpoint than at the last pose, the pose is searched from the setpoint; if the platform is there
+(the pose found is at most half as far from the setpoint as from the one on the old side), the
+estimate starts again there, as after a gap.
 """
 
 from __future__ import annotations
@@ -53,14 +60,14 @@ from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
 from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
-from stewart_dynamics.mechanics.dynamics.bodies import leg_line
+from stewart_dynamics.mechanics.dynamics.bodies import drive_row
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import (
-    BASE, consecutive, FORCES, MOTION, NO_BASE, PARTS_OF_WRENCH, RESULT, WRENCH)
+    BASE, consecutive, FORCES, MOTION, NO_BASE, PARTS_OF_WRENCH, POSE, POSITION, RESULT,
+    ROTATION, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.mechanics.vectors import cross
 from stewart_dynamics.parameters.table import Parameters
 
 # Under the node's name.
@@ -71,15 +78,16 @@ WRENCH_LIMITS = {f'{EXTERNAL_WRENCH}.{part}_max': part for part in PARTS_OF_WREN
 _OUT_OF_RANGE = 3
 
 # One measurement as numbers, since an array costs time to pass: inputs, then results.
-_MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _CODE = consecutive(
-    MOTION, WRENCH, 6, 1, 1, 1)
+_MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _ACROSS, _CODE = consecutive(
+    MOTION, WRENCH, 6, 1, 1, 1, 1)
 # The motion given is the previous one, or the guess.
 (_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION, _BASE_BEFORE,
- _BASE, _WRITTEN, _RESULT, _TILE) = consecutive(
-    CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, BASE, BASE, _CODE.stop, RESULT,
+ _BASE, _TARGET, _WRITTEN, _RESULT, _TILE) = consecutive(
+    CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, BASE, BASE, POSE.stop, _CODE.stop, RESULT,
     inverse_dynamics.TILE)
 _GIVEN = Struct(f'{_WRITTEN.start - _LENGTHS.start}d')
 _GIVES = Struct(f'{_CODE.stop}d')
+_NO_TARGET = (math.nan,) * POSE.stop
 
 
 class Measurement(NamedTuple):
@@ -125,17 +133,19 @@ class Estimate(NamedTuple):
 @inlined
 def _add_external_wrench(constants: Array, motion: Array, model_forces: Array,
                          measured_forces: Array, weight: float, wrench: Array) -> None:
-    """Add w_ext = J_inv^T (f_model - f_measured), times a weight, without making J_inv."""
+    """Add w_ext = J_inv^T (f_model - f_measured), times a weight, row by row."""
     position = motion[0], motion[1], motion[2]
     rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
                 motion[10], motion[11])
     for leg in range(6):
-        a, _length, _inverse_length, s = leg_line(constants, leg, position, rotation)
-        m = cross(a, s)
+        r0, r1, r2, r3, r4, r5 = drive_row(constants, leg, position, rotation)
         force = weight * (model_forces[leg] - measured_forces[leg])
-        for n in range(3):
-            wrench[n] += force * s[n]
-            wrench[3 + n] += force * m[n]
+        wrench[0] += force * r0
+        wrench[1] += force * r1
+        wrench[2] += force * r2
+        wrench[3] += force * r3
+        wrench[4] += force * r4
+        wrench[5] += force * r5
 
 
 @entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
@@ -170,6 +180,10 @@ def _one(numbers: Array) -> None:
         numbers[_MOTION], written[_MOTION_AFTER], written[_AFTER], written[_DIFFERENCES])
     for n in range(MOTION):
         motion[n] = before[n]
+    # Whether the setpoint is on the other side of a singularity; nan: no setpoint.
+    sides = forward_kinematics.determinant(constants, before) * forward_kinematics.determinant(
+        constants, numbers[_TARGET])
+    written[_ACROSS.start] = 1.0 if sides < 0.0 else 0.0
     code, written[_STEPS.start], written[_RESIDUAL.start] = forward_kinematics.pose(
         constants, numbers[_LENGTHS], motion)
     written[_CODE.start] = code
@@ -217,6 +231,7 @@ class ExternalWrench:
         self._numbers = np.zeros(_TILE.stop)
         self._memory = self._numbers.data  # the same as bytes
         self._numbers[_PLATFORM] = StewartPlatform(parameters).constants
+        self._size = parameters['singularity.characteristic_length']
         self._longest_gap = round(parameters['setpoint.timeout'] * SECOND)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
         self._bounds = [(limit, part, parameters[limit]) for limit, part in WRENCH_LIMITS.items()
@@ -229,7 +244,8 @@ class ExternalWrench:
 
         ``known`` is the load on ``~/wrench`` [N, N m], ``target`` the last setpoint as a row of
         motion. If the stamp of the last estimate is later, or older by more than
-        ``setpoint.timeout``, only its pose is used, and the filter restarts.
+        ``setpoint.timeout``, only its pose is used, and the filter restarts. It restarts as well
+        where the platform has followed the target through a singularity.
 
         Raises PoseError, SingularityError: the forward kinematics did not converge from the last
             pose. If there is no pose yet, or no pose within ``setpoint.timeout``, the target and
@@ -240,8 +256,14 @@ class ExternalWrench:
         interval = 0 if before is None else measurement.stamp - before.stamp
         if before is not None and 0 < interval <= self._longest_gap:
             seconds = interval * NANOSECOND
-            result = self._solve(
-                given, before.wrench or NO_WRENCH, seconds, before.motion, before.base, base)
+            result = self._solve(given, before.wrench or NO_WRENCH, seconds, before.motion,
+                                 before.base, base, target)
+            if target is not None and result[_ACROSS.start] == 1.0:
+                other = self._solve(given, NO_WRENCH, 0.0, target, base, base)
+                if other[_CODE.start] == forward_kinematics.FOUND and (
+                        result[_CODE.start] != forward_kinematics.FOUND
+                        or 2.0 * self._distance(other, target) < self._distance(other, result)):
+                    result, interval = other, 0
         else:
             for guess in self._guesses(before, target):
                 result = self._solve(given, NO_WRENCH, 0.0, guess, base, base)
@@ -261,14 +283,20 @@ class ExternalWrench:
 
     def _solve(self, given: tuple[float, ...], before: Six, interval: float,
                motion: Sequence[float], base_before: tuple[float, ...],
-               base: tuple[float, ...]) -> tuple[float, ...]:
+               base: tuple[float, ...], target: Sequence[float] | None = None,
+               ) -> tuple[float, ...]:
         # Computed here: compiled code has an expm1 of its own.
         gain = -math.expm1(-self._rate * interval)
         _GIVEN.pack_into(
             self._memory, 8 * _LENGTHS.start, *given, *before, gain, interval, *motion,
-            *base_before, *base)
+            *base_before, *base, *(_NO_TARGET if target is None else target[POSE]))
         self._bound()
         return _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
+
+    def _distance(self, one: Sequence[float], other: Sequence[float]) -> float:
+        """Return how far two poses are apart [m], turns by the characteristic length."""
+        turned = math.dist(one[ROTATION], other[ROTATION]) / math.sqrt(2.0)
+        return math.hypot(math.dist(one[POSITION], other[POSITION]), self._size * turned)
 
     def _guesses(self, before: Estimate | None, target: Sequence[float] | None,
                  ) -> Iterator[Sequence[float]]:

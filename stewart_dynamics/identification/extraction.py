@@ -192,7 +192,8 @@ class Extraction:
         legs = np.stack([decimated(each, taps, self.step)
                          for each in (lengths, rates, accelerations)], axis=-1)
         at = self._narrow.half + self.step * np.arange(count)
-        slip = decimated(self._slip(rates, speeds), taps, self.step)
+        slip = decimated(self._slip(self.platform.drive_rates(rows, rates), speeds), taps,
+                         self.step)
         extract = Extract(times, columns, ~wrong[:count], legs, slip, found.rows[at][:, POSE])
         return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]), moves,
                           1.0 - _rms(legs[..., 1]) / _rms(rates[at]) if moves else 0.0)

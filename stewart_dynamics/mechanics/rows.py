@@ -54,6 +54,11 @@ RESULT = 27
 BASE_JOINT_ANGLES, PLATFORM_JOINT_ANGLES = slice(0, 6), slice(6, 12)
 JOINT_ANGLES = 12
 
+# Constants of one screw: its pitch [m/rad], and the unit vectors of the axes of the universal
+# joints, fixed to the base, base axes, and to the platform, platform axes.
+PITCH, BASE_AXIS, PLATFORM_AXIS = 0, slice(1, 4), slice(4, 7)
+SCREW = 7
+
 
 def consecutive(*sizes: int) -> tuple[slice, ...]:
     """Return the slices of consecutive parts of these sizes."""

@@ -29,10 +29,11 @@ from stewart_dynamics.mechanics import batch, stiffness
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, optional_array, place, wrong_type)
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL, MOTORS, Motors
+from stewart_dynamics.mechanics.drives.screws import screw_constants
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, lagrange, regressor
 from stewart_dynamics.mechanics.dynamics.force_breakdown import (
     ForceBreakdown, ForceBreakdownRows, SOURCES)
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import constants_with
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     LINEAR, linear_parameters, names_of)
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
@@ -72,6 +73,8 @@ class StewartPlatform:
         As given.
     constants : (CONSTANTS,)
         The hexapod as the compiled functions take it, see ``hexapod_constants``.
+    screws : (6, SCREW)
+        The screws as the readable functions take them, see ``drives.screws``; zero if guided.
     solve : callable
         ``mechanics.batch.solve`` of this hexapod: rows of motion, and optionally rows of wrenches
         and of the base's motion, to rows of results, unchecked.
@@ -88,7 +91,8 @@ class StewartPlatform:
             raise wrong_type('parameters', parameters, 'Parameters; StewartPlatform.from_yaml '
                              'reads a file, Parameters takes a dict')
         self.parameters = parameters
-        self.constants = hexapod_constants(parameters)
+        self.screws = screw_constants(parameters)
+        self.constants = constants_with(parameters, self.screws)
         self.solve = partial(batch.solve, self.constants)
         self._single = SingleSample(self.constants)
         self._breakdown: ForceBreakdownRows | None = None
@@ -407,8 +411,42 @@ class StewartPlatform:
         return angles[..., BASE_JOINT_ANGLES].copy(), angles[..., PLATFORM_JOINT_ANGLES].copy()
 
     def inverse_jacobian(self, pose: Pose | Motion) -> Array:
-        """Return J_inv (..., 6, 6): leg rates = J_inv [v; w], J_inv^T forces = wrench."""
+        """
+        Return J_inv (..., 6, 6): leg rates = J_inv [v; w].
+
+        Unless screws turn with their legs, J_inv^T forces = wrench as well: ``drive_jacobian``.
+        """
         return lagrange.inverse_jacobian(self._legs(pose))
+
+    def drive_jacobian(self, pose: Pose | Motion) -> Array:
+        """
+        Return J_q (..., 6, 6): rates of the drives = J_q [v; w], J_q^T forces = wrench.
+
+        It is J_inv unless ``drive.screw_rotation`` is universal: there a drive makes up for the
+        turn of its leg, and its force acts with the moment of its screw (``drives.screws``).
+        """
+        with np.errstate(all='ignore'):
+            return check_finite('pose', lagrange.drive_jacobian(
+                self._legs(pose), pose.rotation, self.screws), len(pose.shape))
+
+    def drive_jacobian_rate(self, motion: Motion) -> Array:
+        """Return dJ_q/dt (..., 6, 6) in a motion."""
+        check_kind(motion, Motion)
+        with np.errstate(all='ignore'):
+            return check_finite('motion', lagrange.drive_jacobian_rate(
+                self._legs(motion), motion.rotation, motion.linear_velocity,
+                motion.angular_velocity, self.screws), len(motion.shape))
+
+    def drive_rates(self, motions: Array, leg_rates: Array) -> Array:
+        """
+        Return the rates of the drives (..., 6) [m/s] of rows of motion, unchecked.
+
+        ``leg_rates`` (..., 6) are those of ``inverse_dynamics``; with guided screws they are the
+        drives' rates as well.
+        """
+        if not self.screws.any():
+            return leg_rates
+        return lagrange.drive_rates(self.parameters, motions, self.screws)
 
     def inverse_jacobian_rate(self, motion: Motion) -> Array:
         """Return dJ_inv/dt (..., 6, 6) in a motion."""
@@ -420,14 +458,14 @@ class StewartPlatform:
 
     def mass_matrix(self, pose: Pose | Motion) -> Array:
         """
-        Return M (..., 6, 6) of M X'' + C X' + G = J_inv^T f + wrench, with X' = [v; w].
+        Return M (..., 6, 6) of M X'' + C X' + G = J_q^T f + wrench, with X' = [v; w].
 
         Platform, both parts of each leg, and the actuators' reflected mass.
         """
         check_kind(pose, Pose, Motion)
         with np.errstate(all='ignore'):
             return check_finite('pose', lagrange.mass_matrix(
-                self.parameters, pose.position, pose.rotation), len(pose.shape))
+                self.parameters, pose.position, pose.rotation, self.screws), len(pose.shape))
 
     def coriolis_matrix(self, motion: Motion, christoffel: bool = False,
                         base: BaseMotion | None = None) -> Array:
@@ -444,7 +482,7 @@ class StewartPlatform:
         with np.errstate(all='ignore'):
             c = lagrange.coriolis_matrix(
                 self.parameters, motion.position, motion.rotation, motion.linear_velocity,
-                motion.angular_velocity, christoffel)
+                motion.angular_velocity, christoffel, self.screws)
             if base is not None:
                 c = c + lagrange.base_coriolis_matrix(
                     self.parameters, motion.position, motion.rotation,
@@ -482,14 +520,14 @@ class StewartPlatform:
         Returns
         -------
         (..., 6, 6)
-            ``J_inv^T k J_inv`` in [N/m], [N] and [N m/rad]; see ``mechanics.stiffness``.
+            ``J_q^T k J_q`` in [N/m], [N] and [N m/rad]; see ``mechanics.stiffness``.
 
         """
         legs = stiffness.leg_stiffnesses(leg_stiffness)
-        j_inv = self.inverse_jacobian(pose)
+        j_q = self.drive_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):
-            return check_finite('stiffness', stiffness.platform_stiffness(j_inv, legs), len(shape))
+            return check_finite('stiffness', stiffness.platform_stiffness(j_q, legs), len(shape))
 
     def natural_modes(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> NaturalModes:
         """
@@ -502,10 +540,10 @@ class StewartPlatform:
         'drive.screw_inertia': None})``.
         """
         legs = stiffness.leg_stiffnesses(leg_stiffness)
-        mass, j_inv = self.mass_matrix(pose), self.inverse_jacobian(pose)
+        mass, j_q = self.mass_matrix(pose), self.drive_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):
-            modes = stiffness.natural_modes(mass, j_inv, legs)
+            modes = stiffness.natural_modes(mass, j_q, legs)
         check_finite('natural modes', modes.frequencies, len(shape))
         check_finite('natural modes', modes.shapes, len(shape))
         return modes

@@ -16,10 +16,12 @@
 Stiffness of the platform on its legs, and its natural modes.
 
 Legs of stiffness k_i hold a small displacement ``dX = [dx; dtheta]`` (base axes) with the wrench
-``K dX``, ``K = J_inv^T diag(k) J_inv`` (Merlet, Parallel Robots, 2nd ed., 2006, 9.2). Forces f of
-the legs turn with them, by ``ds = (1 - s s^T) / L (dx + dtheta x a)``, and so do the arms a,
-by ``dtheta x a``: ``geometric_stiffness`` is minus the derivative of their wrench. Undamped small
-vibrations obey ``M dX'' + K dX = 0``: modes are the solutions of ``K phi = omega^2 M phi``.
+``K dX``, ``K = J_inv^T diag(k) J_inv`` (Merlet, Parallel Robots, 2nd ed., 2006, 9.2). Where screws
+turn with their legs, the springs are those of the drives at held motors: J_q in place of J_inv
+(``drives.screws``). Forces f of the legs turn with them, by
+``ds = (1 - s s^T) / L (dx + dtheta x a)``, and so do the arms a, by ``dtheta x a``:
+``geometric_stiffness`` is minus the derivative of their wrench. Undamped small vibrations obey
+``M dX'' + K dX = 0``: modes are the solutions of ``K phi = omega^2 M phi``.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
-from stewart_dynamics.mechanics.dynamics.lagrange import Legs, skew
+from stewart_dynamics.mechanics.dynamics.lagrange import (
+    drive_jacobian_rate, Legs, skew)
 from stewart_dynamics.parameters.table import DRIVE_INERTIAS
 
 HELD_MOTORS = {'actuator.reflected_mass': 0.0, **dict.fromkeys(DRIVE_INERTIAS)}
@@ -74,19 +77,25 @@ def leg_stiffnesses(value: ArrayLike) -> Array:
     return legs
 
 
-def platform_stiffness(inverse_jacobian: Array, leg_stiffness: Array) -> Array:
-    """Return K (..., 6, 6) [N/m, N, N m/rad] of J_inv (..., 6, 6) and legs (..., 6) [N/m]."""
-    stiffness: Array = np.swapaxes(inverse_jacobian, -1, -2) @ (
-        leg_stiffness[..., None] * inverse_jacobian)
+def platform_stiffness(drive_jacobian: Array, leg_stiffness: Array) -> Array:
+    """Return K (..., 6, 6) [N/m, N, N m/rad] of J_q (..., 6, 6) and legs (..., 6) [N/m]."""
+    stiffness: Array = np.swapaxes(drive_jacobian, -1, -2) @ (
+        leg_stiffness[..., None] * drive_jacobian)
     return stiffness
 
 
-def geometric_stiffness(legs: Legs, forces: Array) -> Array:
+def geometric_stiffness(legs: Legs, forces: Array, rotation: Array, screws: Array) -> Array:
     """
     Return the part (..., 6, 6) of K that is due to the forces of the legs.
 
     It is symmetric if the moment of all forces (..., 6) [N] about the platform's origin is zero.
+    screws (6, SCREW): constants of the screws, see ``drives.screws``.
     """
+    if screws.any():
+        slopes = np.stack([drive_jacobian_rate(legs, rotation, each[:3], each[3:], screws)
+                           for each in np.eye(6)], axis=-1)
+        by_drives: Array = -np.einsum('...n,...nij->...ij', forces, slopes)
+        return by_drives
     s, arm = skew(legs.directions), skew(legs.arms)
     across = s @ s / legs.lengths[..., None, None]  # -(1 - s s^T) / L
     turning = -across @ arm
@@ -95,12 +104,12 @@ def geometric_stiffness(legs: Legs, forces: Array) -> Array:
     return stiffness
 
 
-def natural_modes(mass: Array, inverse_jacobian: Array, leg_stiffness: Array) -> NaturalModes:
+def natural_modes(mass: Array, drive_jacobian: Array, leg_stiffness: Array) -> NaturalModes:
     """
-    Return the modes of M (..., 6, 6), J_inv (..., 6, 6) and stiffnesses of the legs (..., 6).
+    Return the modes of M (..., 6, 6), J_q (..., 6, 6) and stiffnesses of the legs (..., 6).
 
     With ``M = L L^T``, ``omega^2`` are the eigenvalues of ``L^-1 K L^-T = A A^T``, where
-    ``A = L^-1 J_inv^T diag(sqrt(k))``: its singular values are omega, never negative, and keep
+    ``A = L^-1 J_q^T diag(sqrt(k))``: its singular values are omega, never negative, and keep
     their digits near a singularity (Golub and Van Loan, Matrix Computations, 4th ed., 8.7).
 
     Raises
@@ -111,7 +120,7 @@ def natural_modes(mass: Array, inverse_jacobian: Array, leg_stiffness: Array) ->
     """
     try:
         factor = np.linalg.cholesky(mass)
-        a = np.linalg.solve(factor, np.swapaxes(inverse_jacobian, -1, -2)
+        a = np.linalg.solve(factor, np.swapaxes(drive_jacobian, -1, -2)
                             * np.sqrt(leg_stiffness)[..., None, :])
         left, omega, _ = np.linalg.svd(a)
         shapes = np.linalg.solve(np.swapaxes(factor, -1, -2), left)

@@ -192,9 +192,9 @@ class Checks:
             return self._losses_reverse(samples, rows)
 
     def _losses_reverse(self, samples: Samples, rows: Array) -> list[int]:
-        """Return after which samples a leg reverses while its motor, row, may be at its limit."""
-        p, rates, ratio = self._parameters, samples.results[:, RATES], motor_ratio(
-            self._parameters)
+        """Return after which samples a drive reverses while its motor may be at its limit."""
+        p, ratio = self._parameters, motor_ratio(self._parameters)
+        rates = rows[:, SPEEDS] / ratio
         inertial = p['actuator.reflected_mass'] / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
         highest = (np.abs(inertial) + (np.abs(samples.results[:, FORCES] - inertial)
                                        + 2.0 * self._coulomb) / p['drive.efficiency']) / ratio
@@ -265,11 +265,13 @@ class Checks:
         if not len(which) or not self._coulomb.any():
             return []
         here, there = results[which], results[which + 1]
+        at_here, rate_here = self._of_drives(samples.motions[which], here)
+        at_there, rate_there = self._of_drives(samples.motions[which + 1], there)
         middle = Cubics(
-            here[:, LENGTHS], there[:, LENGTHS], here[:, RATES] * durations[which, None],
-            there[:, RATES] * durations[which, None]).middle_rate() / durations[which, None]
+            at_here, at_there, rate_here * durations[which, None],
+            rate_there * durations[which, None]).middle_rate() / durations[which, None]
         of_rates = np.empty((3, len(which), 6))
-        for rates, its in zip((here[:, RATES], there[:, RATES], middle), of_rates, strict=True):
+        for rates, its in zip((rate_here, rate_there, middle), of_rates, strict=True):
             friction.friction(np.ascontiguousarray(rates), np.zeros(6), self._coulomb,
                               self._coulomb_velocity, its)
         others = here[:, FORCES] - of_rates[0], there[:, FORCES] - of_rates[1]
@@ -278,6 +280,13 @@ class Checks:
         unclear: list[int] = which[
             self._exceed_known(np.maximum(highest, -lowest))].tolist()
         return unclear
+
+    def _of_drives(self, motions: Array, results: Array) -> tuple[Array, Array]:
+        """Return coordinates and rates of the drives (N, 6) [m, m/s], but for a constant."""
+        if self._drives is None:
+            return results[:, LENGTHS], results[:, RATES]
+        rows, ratio = self._drives(motions, results), motor_ratio(self._parameters)
+        return rows[:, ANGLES_OF_MOTORS] / ratio, rows[:, SPEEDS] / ratio
 
     def _check_limit(self, limit: str, values: Array, times: Array,
                      others: Integers | None = None) -> None:

@@ -82,12 +82,13 @@ class Sampling:
             + parameters['legs.cylinder.inertia'] + parameters['legs.piston.inertia'])
 
     def parts(self, durations: Array, between: Interpolation, results: Array,
-              bases: Array | None, largest: float) -> Array:
+              drive_rates: Array, bases: Array | None, largest: float) -> Array:
         """
         Return the number of parts in which each of N intervals is sampled (N,).
 
         durations, between, results (N,), Interpolation, (N + 1, RESULT): durations of the
             intervals [s], motion in them, and results at the points.
+        drive_rates (N + 1, 6): rates of the drives at the points [m/s].
         bases (N + 1, BASE) or (1, BASE): rows of the base's motion at the points; the base is at
             rest by default.
         largest: absolute force that is known to occur in the trajectory [N].
@@ -96,7 +97,8 @@ class Sampling:
         # Accelerations of the joints and along the legs due to speed.
         inverse_radius = 1.0 / self._arm + 1.0 / _smaller(results[:, LENGTHS]).min(axis=1)
         steps = bounds.path / (_STEP * self._arm)
-        forces = self._force_parts(durations, bounds, inverse_radius, results, bases, largest)
+        forces = self._force_parts(
+            durations, bounds, inverse_radius, results, drive_rates, bases, largest)
         cubics = self._may_exceed_limits(durations, bounds, inverse_radius, results)
         parts: Array = np.maximum(np.maximum(np.ceil(steps), forces),
                                   np.where(cubics, float(_FEWEST), 1.0))
@@ -125,9 +127,9 @@ class Sampling:
         return deviation
 
     def _force_parts(self, durations: Array, bounds: Bounds, inverse_radius: Array,
-                     results: Array, bases: Array | None, largest: float) -> Array:
+                     results: Array, rates: Array, bases: Array | None, largest: float) -> Array:
         """Return the number of parts that the forces need (N,)."""
-        rates, magnitudes = results[:, RATES], np.abs(results[:, FORCES])
+        magnitudes = np.abs(results[:, FORCES])
         rate_deviation = self._rate_deviation(durations, bounds, inverse_radius)
         deviation = self._viscous * rate_deviation + self._inertia_deviation(
             durations, bounds, inverse_radius, results, bases)

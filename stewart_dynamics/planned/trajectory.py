@@ -403,7 +403,9 @@ class _Work:
             bases = bases[None] if bases.ndim == 1 else bases[first:first + len(results)]
         largest = float(np.fmax.reduce(
             np.abs(results[:, FORCES]), axis=None, initial=self._checks.force))
-        parts = self._sampling.parts(durations, between, results, bases, largest)
+        drive_rates = self._platform.drive_rates(
+            self._motions[first:first + len(results)], results[:, RATES])
+        parts = self._sampling.parts(durations, between, results, drive_rates, bases, largest)
         if not (bounded := parts <= MOST_SAMPLES).all():
             n = first + int(np.argmin(bounded))
             raise self._too_far(f'{TOO_FAR}: points[{n}] and the next: more', n)

@@ -34,6 +34,7 @@ from stewart_dynamics.mechanics.limits import (
     OF_RESULTS, QUANTITIES, Quantity, result_values, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.motor_loads import MotorLoads
 from stewart_dynamics.reporting.block_statistics import (
@@ -100,6 +101,7 @@ class Summary:
         # of the quantity of each limit, the value nearest to it or farthest beyond it
         self._peaks = {
             name: Extreme(6, np.negative if name in MINIMA else np.abs) for name in LIMITS}
+        self._platform = StewartPlatform(parameters)
         self._published, self._power = Extreme(6, np.abs), Extreme(6, np.abs)
         # squares of the forces; driving power; braking power
         self._means = Integral(18)
@@ -158,7 +160,7 @@ class Summary:
         self._suppressed += int((with_nan(outputs.forces) & ~without).sum())
         self._base_wrench.add(seconds, steps, base_wrenches)
         with np.errstate(over='ignore', invalid='ignore'):
-            power = demanded * rates
+            power = demanded * self._platform.drive_rates(setpoints.motions, rates)
             self._means.add(steps, np.concatenate(
                 (demanded ** 2, np.maximum(power, 0.0), np.maximum(-power, 0.0)), axis=1))
         self._published.add(seconds, outputs.forces)

@@ -37,7 +37,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
+from stewart_dynamics.mechanics.drives.motors import DRIVE, Drives, motor_ratio
 from stewart_dynamics.mechanics.dynamics.forward_dynamics import WORK
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.limits import Limits, result_values
@@ -176,7 +176,7 @@ class Plant:
         self._state[STATE_POSITION] = pose[:3]
         self._state[STATE_QUATERNION] = to_quaternion(from_euler(pose[3:]))
         drives = Drives(parameters).arguments if parameters.drives else (
-            StewartPlatform(parameters).constants, np.empty((0, 15)), np.empty(0),
+            StewartPlatform(parameters).constants, np.empty((0, DRIVE)), np.empty(0),
             np.empty((0, 2)))
         self._driven = bool(parameters.drives)
         self._take_none, self._take_steps = (advance.bound(

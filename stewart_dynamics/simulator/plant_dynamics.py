@@ -19,14 +19,17 @@ The method is the classical Runge-Kutta method of fourth order, on position, qua
 After every step the quaternion is divided by its length, which keeps the order (Hairer, Lubich,
 Wanner, Geometric Numerical Integration, 2nd ed., IV.4, doi:10.1007/3-540-30666-8). Forces and
 wrench are constant within a call, so that the work of a leg force is the force times the change
-of its leg's length, exactly, and an energy balance shows the error of the method alone. The
+of its drive's coordinate, exactly, and an energy balance shows the error of the method alone. The
 motion of the base is given at begin, middle and end of a call, which are the stages of the method
 where a call is one step; with more steps it is the parabola through them.
 
-The load of a screw is (k torque - m_r L'') / c, see ``drives.motors``: under a torque a leg has
+The load of a screw is (k torque - m_r q'') / c, see ``drives.motors``: under a torque a leg has
 the force k torque / c and the reflected mass m_r / c. c depends on the direction of the power,
-which is assumed, and assumed again where the load that follows contradicts it. The acceleration
-of a leg's twist, which adds little to the torque of its motor, is found by the same iteration.
+which is assumed, and assumed again where the load that follows contradicts it.
+
+End stops act between cylinder and piston, along the leg. With the forces of the drives they are
+added up, except where screws turn with their legs (``drives.screws``): drives act with the rows of
+J_q there, end stops with those of J_inv, as a wrench on the platform.
 """
 
 from __future__ import annotations
@@ -41,7 +44,8 @@ from stewart_dynamics.mechanics.drives.motors import (
 from stewart_dynamics.mechanics.dynamics.base_load import moves
 from stewart_dynamics.mechanics.dynamics.bodies import leg_line
 from stewart_dynamics.mechanics.dynamics.forward_dynamics import acceleration
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS, put_reflected_mass
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
+    CONSTANTS, put_reflected_mass, screws_turn)
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, BASE, consecutive, MOTION, POSITION, ROTATION, TWIST)
@@ -51,15 +55,13 @@ from stewart_dynamics.simulator.end_stops import stop_force
 
 
 # Scratch memory of ``torque_acceleration``: constants with other reflected masses, forces, assumed
-# directions of the power, factors c, and torques for the twist of the legs.
-_CHANGED, _PUSHES, _POWER, _FACTOR, _OF_TWIST = consecutive(CONSTANTS, 6, 6, 6, 6)
+# directions of the power, and factors c.
+_CHANGED, _PUSHES, _POWER, _FACTOR = consecutive(CONSTANTS, 6, 6, 6)
 
 # Solutions until one is taken as it is; one or two are enough but where loads are near zero.
 _MOST_ATTEMPTS = 64
 # From this one on a single direction is changed at a time, which ends for every hexapod.
 _CAREFUL = 8
-# Relative change of the torque for the twist, above rounding errors.
-_UNCHANGED = 1e-14
 
 
 @compiled
@@ -75,11 +77,11 @@ def _torque_acceleration(
         available.
     torques (6,): [N m], + extends.
     others (6,): forces along the legs that do not pass through their screws [N].
-    scratch (_OF_TWIST.stop,): scratch memory.
+    scratch (_FACTOR.stop,): scratch memory.
     forces (6,): written: forces of the legs as ``inverse_dynamics`` has them [N].
     """
     changed, pushes = scratch[_CHANGED], scratch[_PUSHES]
-    power, factor, of_twist = scratch[_POWER], scratch[_FACTOR], scratch[_OF_TWIST]
+    power, factor = scratch[_POWER], scratch[_FACTOR]
     for n in range(CONSTANTS):
         changed[n] = constants[n]
     for n in range(6):
@@ -88,25 +90,20 @@ def _torque_acceleration(
         _, speed, _, rate, _ = motor_motion(constants, drives[leg], leg, motion)
         torques[leg] = clipped(torques[leg], min(torque_max[leg], curve_torque(curve, speed)))
         power[leg] = torques[leg] * rate
-        of_twist[leg] = 0.0
     for attempt in range(_MOST_ATTEMPTS):
         for leg in range(6):
             ratio, mass = ratio_and_mass(drives[leg])
             _, _, _, rate, _ = motor_motion(constants, drives[leg], leg, motion)
             factor[leg] = torque_factor(drives[leg], power[leg], rate)
             put_reflected_mass(changed, leg, mass / factor[leg])
-            pushes[leg] = ratio * (torques[leg] - of_twist[leg]) / factor[leg] + others[leg]
+            pushes[leg] = ratio * torques[leg] / factor[leg] + others[leg]
         acceleration(changed, motion, pushes, wrench, base, work)
         settled = True
         for leg in range(6):
             ratio, mass = ratio_and_mass(drives[leg])
-            _, _, speed_rate, rate, acc = motor_motion(constants, drives[leg], leg, motion)
-            load = (ratio * (torques[leg] - of_twist[leg]) - mass * acc) / factor[leg]
+            _, _, _, rate, acc = motor_motion(constants, drives[leg], leg, motion)
+            load = (ratio * torques[leg] - mass * acc) / factor[leg]
             forces[leg] = load + mass * acc
-            own = mass / ratio / ratio * (speed_rate - ratio * acc)
-            if abs(own - of_twist[leg]) > _UNCHANGED * abs(torques[leg]):
-                settled = False
-            of_twist[leg] = own
             if (load * rate > 0.0) != (power[leg] > 0.0) and (
                     settled or attempt < _CAREFUL):
                 power[leg] = load * rate
@@ -130,8 +127,8 @@ RESULT = RESULT_MOTORS.stop
 COMMANDS, WRENCH, BASE_BEGIN, BASE_MIDDLE, BASE_END = consecutive(6, 6, BASE, BASE, BASE)
 LOADS = BASE_END.stop
 # Scratch memory.
-_MOTION, _FORCES, _AFTER, _SLOPE, _MEAN, _BASE, _STOPS, _TORQUES, _DRIVES = consecutive(
-    MOTION, 6, STATE, STATE, STATE, BASE, 6, 6, _OF_TWIST.stop)
+_MOTION, _FORCES, _AFTER, _SLOPE, _MEAN, _BASE, _STOPS, _TORQUES, _LOAD, _DRIVES = consecutive(
+    MOTION, 6, STATE, STATE, STATE, BASE, 6, 6, 6, _FACTOR.stop)
 SCRATCH = _DRIVES.stop
 
 # In one step the platform may turn by at most this [rad], and a platform joint move by at most
@@ -173,7 +170,7 @@ def _slope(constants: Array, drives: Array, torque_max: Array, curve: Array, by_
            slope: Array) -> None:
     """Write a state's time derivative under its loads and a motion of the base."""
     motion, forces, of_stops = scratch[_MOTION], scratch[_FORCES], scratch[_STOPS]
-    torques = scratch[_TORQUES]
+    torques, load = scratch[_TORQUES], scratch[_LOAD]
     position, rotation = read3(state, STATE_POSITION.start), _rotation(state)
     velocity, omega = _twist(state)
     for n in range(3):
@@ -182,17 +179,25 @@ def _slope(constants: Array, drives: Array, torque_max: Array, curve: Array, by_
         motion[ROTATION.start + n] = rotation[n]
     for n in range(6):
         motion[TWIST.start + n] = state[STATE_TWIST.start + n]
+        load[n] = loads[WRENCH.start + n]
+    by_wrench = screws_turn(constants)
     for leg in range(6):
         a, length, _, s = leg_line(constants, leg, position, rotation)
         rate = dot(s, add(velocity, cross(omega, a)))
         of_stops[leg] = stop_force(stops, leg, length, rate)
+        if by_wrench:
+            moment = cross(a, s)
+            for n in range(3):
+                load[n] += of_stops[leg] * s[n]
+                load[3 + n] += of_stops[leg] * moment[n]
+            of_stops[leg] = 0.0
         torques[leg] = loads[COMMANDS.start + leg]
         forces[leg] = torques[leg] + of_stops[leg]
     if by_torques:
         _torque_acceleration(constants, drives, torque_max, curve, motion, torques, of_stops,
-                             loads[WRENCH], base, work, scratch[_DRIVES], forces)
+                             load, base, work, scratch[_DRIVES], forces)
     else:
-        acceleration(constants, motion, forces, loads[WRENCH], base, work)
+        acceleration(constants, motion, forces, load, base, work)
     at = STATE_QUATERNION.start
     vector, scalar = read3(state, at), state[at + 3]
     turning = add(scale(scalar, omega), cross(omega, vector))

@@ -126,6 +126,14 @@ static leg_pose pose_of(const stewart_leg * leg, const double position[3], const
 
 typedef struct { vector force, moment; } load;  /* moment about the platform's origin */
 
+/* Return the force that moves an actuator at a rate and an acceleration of its drive. */
+static double move_actuator(const stewart_leg * leg, double rate, double acceleration) {
+  double slip = rate / leg->coulomb_velocity;
+  slip = slip < -1.0 ? -1.0 : slip > 1.0 ? 1.0 : slip;
+  return leg->reflected_mass * acceleration + leg->viscous_friction * rate +
+    leg->coulomb_friction * slip;
+}
+
 /* Return the load that moves leg i; write its length, its rate, the force that moves its actuator,
    and its row of J_inv, moments divided by the characteristic length, with the row's rate. */
 static load move_leg(
@@ -161,15 +169,79 @@ static load move_leg(
   moved.force = add(moved.force, scale(along, s));
   moved.moment = cross(a, moved.force);
 
-  double slip = *rate / leg->coulomb_velocity;
-  slip = slip < -1.0 ? -1.0 : slip > 1.0 ? 1.0 : slip;
-  *actuator = leg->reflected_mass * (along_acc + across_squared * per_length) +
-    leg->viscous_friction * *rate + leg->coulomb_friction * slip;
+  *actuator = move_actuator(leg, *rate, along_acc + across_squared * per_length);
 
   vector s_rate = scale(per_length, across);
   put3(row, s), put3(row + 3, scale(inverse_size, cross(a, s))), put3(row_rate, s_rate);
   put3(row_rate + 3, scale(inverse_size, add(cross(a_rate, s), cross(a, s_rate))));
   return moved;
+}
+
+/* ---- drives/screws: screws that turn with their legs ---------------------------------------- */
+
+/* Write the first and return the second derivative of a vector that turns with the platform. */
+static vector turned(vector a, const stewart_motion * motion, vector * rate) {
+  vector omega = read3(motion->angular_velocity);
+  *rate = cross(omega, a);
+  return add(cross(read3(motion->angular_acceleration), a), cross(omega, *rate));
+}
+
+/* How far the drive of a leg moves for a turn of its leg [m/rad]; 0 where its screw is guided. */
+static double pitch_of(const stewart_leg * leg) {
+  return leg->twist_ratio == 0.0 ? 0.0 :
+    leg->twist_ratio * leg->screw_lead / (2.0 * PI * leg->gear_ratio);
+}
+
+/* q of a drive: the length of its leg, less the extension by the turn of its leg. */
+typedef struct { double position, rate, acceleration; } drive_motion;
+
+static drive_motion move_drive(const stewart_leg * leg, const stewart_motion * motion) {
+  drive_motion drive;
+  leg_pose at = pose_of(leg, motion->position, motion->rotation);
+  vector s = at.direction, a_rate, a_acc = turned(at.arm, motion, &a_rate);
+  vector x_rate = add(read3(motion->linear_velocity), a_rate);
+  vector x_acc = add(read3(motion->linear_acceleration), a_acc);
+  double rate = dot(s, x_rate), pitch = pitch_of(leg);
+  vector s_rate = scale(at.per_length, subtract(x_rate, scale(rate, s)));
+  double acc = dot(s, x_acc) + at.length * dot(s_rate, s_rate);
+  drive.position = at.length, drive.rate = rate, drive.acceleration = acc;
+  if (pitch == 0.0) {return drive;}
+  vector s_acc = subtract(subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate));
+  s_acc = scale(at.per_length, s_acc);
+  vector u = read3(leg->base_universal_axis), w_rate;
+  vector w = rotate(motion->rotation, read3(leg->platform_universal_axis));
+  vector w_acc = turned(w, motion, &w_rate);
+  double us = dot(u, s), us_rate = dot(u, s_rate), us_acc = dot(u, s_acc);
+  double ws = dot(w, s), ws_rate = dot(w_rate, s) + dot(w, s_rate);
+  double ws_acc = dot(w_acc, s) + 2.0 * dot(w_rate, s_rate) + dot(w, s_acc);
+  vector n = cross(u, w), n_rate = cross(u, w_rate), n_acc = cross(u, w_acc);
+  double y = dot(s, n), y_rate = dot(s_rate, n) + dot(s, n_rate);
+  double y_acc = dot(s_acc, n) + 2.0 * dot(s_rate, n_rate) + dot(s, n_acc);
+  double x = dot(u, w) - us * ws, x_turn = dot(u, w_rate) - us_rate * ws - us * ws_rate;
+  double x_turn_rate = dot(u, w_acc) - us_acc * ws - 2.0 * us_rate * ws_rate - us * ws_acc;
+  double inverse = 1.0 / (x * x + y * y);
+  double twist_rate = (x * y_rate - y * x_turn) * inverse;
+  double twist_acc = (x * y_acc - y * x_turn_rate -
+    2.0 * (x * x_turn + y * y_rate) * twist_rate) * inverse;
+  drive.position += pitch * atan2(y, x);
+  drive.rate += pitch * twist_rate;
+  drive.acceleration += pitch * twist_acc;
+  return drive;
+}
+
+/* Write the row of J_q of a leg whose screw turns, moments by the characteristic length. */
+static void turning_row(
+  const stewart_platform * platform, int i, const stewart_motion * motion, double row[6]) {
+  const stewart_leg * leg = &platform->legs[i];
+  leg_pose at = pose_of(leg, motion->position, motion->rotation);
+  vector s = at.direction, u = read3(leg->base_universal_axis);
+  vector w = rotate(motion->rotation, read3(leg->platform_universal_axis));
+  double us = dot(u, s), ws = dot(w, s), pitch = pitch_of(leg);
+  double of_u = pitch / (1.0 - us * us), of_w = pitch / (1.0 - ws * ws);
+  vector turn = subtract(scale(us * of_u, cross(s, u)), scale(ws * of_w, cross(s, w)));
+  vector h = add(s, scale(at.per_length, turn));
+  vector moment = add(cross(at.arm, h), scale(of_w, subtract(s, scale(ws, w))));
+  put3(row, h), put3(row + 3, scale(1.0 / platform->characteristic_length, moment));
 }
 
 static load move_platform(const stewart_platform * platform, const stewart_motion * motion) {
@@ -384,6 +456,20 @@ static void solve(
   double of_inverse = largest_singular_value(inverse, diagonal, &inverse_trace);
   result->condition_number = sqrt(trace) * sqrt(inverse_trace) * (of_rows * of_inverse);
   for (int i = 0; i < 6; i++) {result->unit_load_forces[i] = sqrt(diagonal[i]);}
+  if (pitch_of(&platform->legs[0]) == 0.0) {return;}
+
+  /* Screws that turn with their legs: J_q^T f = wrench, by virtual work f q'. */
+  for (int i = 0; i < 6; i++) {
+    turning_row(platform, i, motion, rows[i]);
+    for (int j = 0; j < 6; j++) {inverse[j][i] = rows[i][j];}
+  }
+  invert(inverse);
+  for (int i = 0; i < 6; i++) {
+    drive_motion drive = move_drive(&platform->legs[i], motion);
+    result->forces[i] = dot6(inverse[i], balanced) +
+      move_actuator(&platform->legs[i], drive.rate, drive.acceleration);
+    result->unit_load_forces[i] = sqrt(dot6(inverse[i], inverse[i]));
+  }
 }
 
 int stewart_inverse_dynamics(
@@ -553,14 +639,7 @@ int stewart_step(
   return code;
 }
 
-/* ---- drives/motors, drives/leg_twist -------------------------------------------------------- */
-
-/* Write the first and return the second derivative of a vector that turns with the platform. */
-static vector turned(vector a, const stewart_motion * motion, vector * rate) {
-  vector omega = read3(motion->angular_velocity);
-  *rate = cross(omega, a);
-  return add(cross(read3(motion->angular_acceleration), a), cross(omega, *rate));
-}
+/* ---- drives/motors -------------------------------------------------------------------------- */
 
 int stewart_motor_torques(
   const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
@@ -570,38 +649,12 @@ int stewart_motor_torques(
   if (!(platform->legs[0].screw_lead > 0.0)) {return STEWART_NO_MOTORS;}
   for (int i = 0; i < 6; i++) {
     const stewart_leg * leg = &platform->legs[i];
-    leg_pose at = pose_of(leg, motion->position, motion->rotation);
-    vector s = at.direction, a_rate, a_acc = turned(at.arm, motion, &a_rate);
-    vector x_rate = add(read3(motion->linear_velocity), a_rate);
-    vector x_acc = add(read3(motion->linear_acceleration), a_acc);
-    double rate = dot(s, x_rate), ratio = 2.0 * PI * leg->gear_ratio / leg->screw_lead;
-    vector s_rate = scale(at.per_length, subtract(x_rate, scale(rate, s)));
-    double acc = dot(s, x_acc) + at.length * dot(s_rate, s_rate);
-    double twist = 0.0, twist_rate = 0.0, twist_acc = 0.0;  /* of the leg, turned back */
-    if (leg->twist_ratio != 0.0) {
-      vector s_acc = subtract(subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate));
-      s_acc = scale(at.per_length, s_acc);
-      vector u = read3(leg->base_universal_axis), w_rate;
-      vector w = rotate(motion->rotation, read3(leg->platform_universal_axis));
-      vector w_acc = turned(w, motion, &w_rate);
-      double us = dot(u, s), us_rate = dot(u, s_rate), us_acc = dot(u, s_acc);
-      double ws = dot(w, s), ws_rate = dot(w_rate, s) + dot(w, s_rate);
-      double ws_acc = dot(w_acc, s) + 2.0 * dot(w_rate, s_rate) + dot(w, s_acc);
-      vector n = cross(u, w), n_rate = cross(u, w_rate), n_acc = cross(u, w_acc);
-      double y = dot(s, n), y_rate = dot(s_rate, n) + dot(s, n_rate);
-      double y_acc = dot(s_acc, n) + 2.0 * dot(s_rate, n_rate) + dot(s, n_acc);
-      double x = dot(u, w) - us * ws, x_turn = dot(u, w_rate) - us_rate * ws - us * ws_rate;
-      double x_turn_rate = dot(u, w_acc) - us_acc * ws - 2.0 * us_rate * ws_rate - us * ws_acc;
-      double inverse = 1.0 / (x * x + y * y);
-      twist = atan2(y, x);
-      twist_rate = (x * y_rate - y * x_turn) * inverse;
-      twist_acc = (x * y_acc - y * x_turn_rate -
-        2.0 * (x * x_turn + y * y_rate) * twist_rate) * inverse;
-    }
-    found.angles[i] = ratio * (at.length - leg->zero_length) + leg->twist_ratio * twist;
-    found.speeds[i] = ratio * rate + leg->twist_ratio * twist_rate;
-    found.accelerations[i] = ratio * acc + leg->twist_ratio * twist_acc;
-    double through = forces[i] - leg->reflected_mass * acc;  /* the screw */
+    drive_motion drive = move_drive(leg, motion);
+    double rate = drive.rate, ratio = 2.0 * PI * leg->gear_ratio / leg->screw_lead;
+    found.angles[i] = ratio * (drive.position - leg->zero_length);
+    found.speeds[i] = ratio * rate;
+    found.accelerations[i] = ratio * drive.acceleration;
+    double through = forces[i] - leg->reflected_mass * drive.acceleration;  /* the screw */
     double slip = fabs(rate) / leg->coulomb_velocity;
     double loss = through * rate > 0.0 ? 1.0 / leg->efficiency : leg->back_driving_efficiency;
     found.torques[i] = leg->reflected_mass / ratio / ratio * found.accelerations[i] +

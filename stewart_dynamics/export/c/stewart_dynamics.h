@@ -110,7 +110,7 @@ typedef struct {
 
 typedef struct {
   double lengths[6], rates[6]; /* [m], [m/s] */
-  double forces[6];            /* of the actuators, before any limit [N] */
+  double forces[6];            /* of the drives, before any limit [N]; with moments of screws */
   double determinant;          /* det(J_inv) [m^3]; zero at a singularity */
   double determinant_rate;     /* its time derivative [m^3/s] */
   double condition_number;     /* of J_inv, at least 1 */

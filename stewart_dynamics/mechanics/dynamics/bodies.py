@@ -25,9 +25,11 @@ from typing import NamedTuple
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import inlined
+from stewart_dynamics.mechanics.drives.screws import leg_twist, turned, turning_row
 from stewart_dynamics.mechanics.dynamics.friction import with_friction
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
-    characteristic_length_of, gravity_of, joints_of, Leg, leg_of, platform_of)
+    characteristic_length_of, gravity_of, joints_of, Leg, leg_of, platform_of, screw_pitch_of,
+    universal_axes_of)
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, Matrix3, norm, rotate, rotate_back, scale, subtract, symmetric, Vector3,
     Vector6)
@@ -41,7 +43,7 @@ class LegDynamics(NamedTuple):
     force: Vector3  # on the leg at its platform joint, to move the leg [N], base axes
     moment: Vector3  # of that force about the platform's origin [N m]
     actuator: float
-    """Force [N] that moves the actuator itself: its reflected mass and its friction."""
+    """Force [N] that moves the actuator itself: its reflected mass and its friction; guided."""
     row: Vector6  # the leg's row of J_inv, its right half divided by the characteristic length
     row_rate: Vector6  # time derivative of that row
     arm: Vector3  # a = R p: the platform joint from the platform's origin, base axes [m]
@@ -68,6 +70,57 @@ def leg_inertia(leg: Leg, length: float, inverse_length: float) -> tuple[float, 
     piston_moment = leg.piston_mass * piston_distance
     return piston_moment, ((leg.joint_inertia + piston_moment * piston_distance)
                            * inverse_length * inverse_length)
+
+
+@inlined
+def actuator_force(leg: Leg, rate: float, acceleration: float) -> float:
+    """Return the force that moves an actuator at a rate and an acceleration of its drive [N]."""
+    force: float = with_friction(leg.reflected_mass * acceleration, rate, leg.viscous_friction,
+                                 leg.coulomb_friction, leg.coulomb_velocity)
+    return force
+
+
+@inlined
+def drive_motion(
+        constants: Array, leg: int, position: Vector3, rotation: Matrix3, velocity: Vector3,
+        omega: Vector3, acceleration: Vector3, alpha: Vector3) -> Vector3:
+    """Return the coordinate q of a leg's drive, its rate and its acceleration: ``screws``."""
+    a, length, inverse_length, s = leg_line(constants, leg, position, rotation)
+    a_rate, a_acc = turned(a, omega, alpha)
+    x_rate, x_acc = add(velocity, a_rate), add(acceleration, a_acc)
+    rate = dot(s, x_rate)
+    s_rate = scale(inverse_length, subtract(x_rate, scale(rate, s)))
+    acc = dot(s, x_acc) + length * dot(s_rate, s_rate)
+    pitch = screw_pitch_of(constants, leg)
+    if pitch == 0.0:
+        return length, rate, acc
+    s_acc = scale(inverse_length, subtract(
+        subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate)))
+    u, fixed = universal_axes_of(constants, leg)
+    w = rotate(rotation, fixed)
+    w_rate, w_acc = turned(w, omega, alpha)
+    twist, twist_rate, twist_acc = leg_twist(u, w, w_rate, w_acc, s, s_rate, s_acc)
+    return length + pitch * twist, rate + pitch * twist_rate, acc + pitch * twist_acc
+
+
+@inlined
+def drive_row(constants: Array, leg: int, position: Vector3, rotation: Matrix3) -> Vector6:
+    """Return a leg's row of J_q, which is its row of J_inv where its screw is guided."""
+    a, _, inverse_length, s = leg_line(constants, leg, position, rotation)
+    pitch = screw_pitch_of(constants, leg)
+    if pitch == 0.0:
+        m = cross(a, s)
+        return s[0], s[1], s[2], m[0], m[1], m[2]
+    u, fixed = universal_axes_of(constants, leg)
+    return turning_row(pitch, u, rotate(rotation, fixed), a, inverse_length, s)
+
+
+@inlined
+def scaled_drive_row(constants: Array, leg: int, position: Vector3, rotation: Matrix3) -> Vector6:
+    """Return the same, its right half divided by the characteristic length."""
+    k, row = 1.0 / characteristic_length_of(constants), drive_row(
+        constants, leg, position, rotation)
+    return row[0], row[1], row[2], k * row[3], k * row[4], k * row[5]
 
 
 @inlined
@@ -104,8 +157,7 @@ def leg_dynamics(
                                  * inverse_length * across_squared), s))
 
     length_acc = along_acc + across_squared * inverse_length
-    actuator = with_friction(own.reflected_mass * length_acc, rate, own.viscous_friction,
-                             own.coulomb_friction, own.coulomb_velocity)
+    actuator = actuator_force(own, rate, length_acc)
 
     # (3): the row of J_inv and its rate
     s_rate = scale(inverse_length, across)

@@ -29,8 +29,10 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import batch
+from stewart_dynamics.mechanics.drives.screws import screw_constants
 from stewart_dynamics.mechanics.dynamics.friction import friction
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.dynamics.lagrange import drive_rates
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, CONDITION, FORCES, GRAVITY, MOTION, RATES, TWIST)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -105,6 +107,7 @@ class ForceBreakdownRows:
     def __init__(self, parameters: Parameters) -> None:
         self._friction = tuple(parameters[f'actuator.{name}'].copy() for name in (
             'viscous_friction', 'coulomb_friction', 'coulomb_velocity'))
+        self._parameters, self._screws = parameters, screw_constants(parameters)
         self._whole = hexapod_constants(parameters)
         self._weightless = hexapod_constants(
             parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION}))
@@ -163,7 +166,9 @@ class ForceBreakdownRows:
         by.velocity[:] = results[:, FORCES]
         # By the friction law: as a difference it would lose its digits near a singularity.
         own = np.empty((len(rows), 6))
-        friction(results[:, RATES].copy(), *self._friction, own)
+        rates = results[:, RATES].copy() if not self._screws.any() else drive_rates(
+            self._parameters, rows, self._screws)
+        friction(rates, *self._friction, own)
         by.friction[:] = own
         by.base_motion[:] = 0.0 if bases is None else (
             solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)

@@ -18,7 +18,8 @@ Forward dynamics: how the platform accelerates under given leg forces.
 ``X'' = M^-1 (J_inv^T (f - friction) + wrench - C X' - G)``, the wrench less the load of a moving
 base, with the functions of the inverse dynamics for the load without acceleration, and with M as
 a sum over the legs, ``M = M_p + sum (e_i J_i^T J_i + (m2 + m_r - e_i) j_i j_i^T)`` with
-J_i = [1, -skew(a_i)], j_i the leg's row of J_inv and e_i its effective mass across the leg. M is
+J_i = [1, -skew(a_i)], j_i the leg's row of J_inv and e_i its effective mass across the leg. Where
+screws turn with their legs, f, friction and m_r have the rows of J_q (``drives.screws``). M is
 positive definite for every hexapod, so Cholesky solves it without a pivot (Golub and Van Loan,
 Matrix Computations, 4th ed., 4.2).
 """
@@ -31,9 +32,10 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.dynamics.base_load import (
     carrying_matrix, felt_at_origin, leg_load, moves, platform_load)
-from stewart_dynamics.mechanics.dynamics.bodies import leg_dynamics, platform_dynamics
+from stewart_dynamics.mechanics.dynamics.bodies import (
+    actuator_force, drive_motion, leg_dynamics, platform_dynamics, scaled_drive_row)
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
-    characteristic_length_of, leg_of, platform_of)
+    characteristic_length_of, leg_of, platform_of, screws_turn)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
     BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSITION, ROTATION)
@@ -90,6 +92,23 @@ def _add_body(work: Array, mass: float, moment: Vector3, inertia: Symmetric3,
     work[5, 3] += i * inertia[2]
     work[5, 4] += i * inertia[4]
     work[5, 5] += i * inertia[5]
+
+
+@compiled
+def _add_turning_drives(constants: Array, motion: Array, forces: Array, work: Array) -> None:
+    """Add forces and reflected masses of drives whose screws turn with their legs."""
+    position, rotation = read3(motion, POSITION.start), read9(motion, ROTATION.start)
+    for n in range(6):
+        own = leg_of(constants, n)
+        _, rate, drift = drive_motion(
+            constants, n, position, rotation, read3(motion, LINEAR_VELOCITY.start),
+            read3(motion, ANGULAR_VELOCITY.start), _REST, _REST)
+        row = scaled_drive_row(constants, n, position, rotation)
+        push = forces[n] - actuator_force(own, rate, drift)
+        for i in range(6):
+            work[_RIGHT, i] += push * row[i]
+            for k in range(i + 1):
+                work[i, k] += own.reflected_mass * row[i] * row[k]
 
 
 @inlined
@@ -153,6 +172,9 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
             constants, position, rotation, velocity, omega, felt, spin, spin_rate, carrying)
         force, torque = subtract(force, load), subtract(torque, moment_of_load)
     work[:] = 0.0
+    turning = screws_turn(constants)
+    if turning:
+        _add_turning_drives(constants, motion, forces, work)
     for n in range(6):
         leg = leg_dynamics(constants, n, position, rotation, velocity, omega, _REST, _REST)
         mass += leg.inertia
@@ -167,6 +189,8 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
         push = forces[n] - leg.actuator
         own = leg_of(constants, n)
         along = own.piston_mass + own.reflected_mass - leg.inertia
+        if turning:
+            push, along = 0.0, own.piston_mass - leg.inertia
         for i in range(6):
             work[_RIGHT, i] += push * leg.row[i]
             for k in range(i + 1):

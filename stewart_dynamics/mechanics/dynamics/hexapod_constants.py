@@ -15,8 +15,9 @@
 """
 The constants of a hexapod as one array, for all compiled functions.
 
-The constants of the platform come first, then 15 for each leg. Products of masses and distances
-of a leg that do not change with its length are computed here.
+The constants of the platform come first, then 15 for each leg, then those of the screws
+(``drives.screws``). Products of masses and distances of a leg that do not change with its length
+are computed here.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import inlined
+from stewart_dynamics.mechanics.drives.screws import screw_constants
+from stewart_dynamics.mechanics.rows import BASE_AXIS, PITCH, PLATFORM_AXIS, SCREW
 from stewart_dynamics.mechanics.vectors import read3, Symmetric3, Vector3
 from stewart_dynamics.parameters.table import Parameters
 
@@ -40,7 +43,8 @@ _REFLECTED_MASS, _VISCOUS_FRICTION, _COULOMB_FRICTION, _COULOMB_VELOCITY = 10, 1
 _CYLINDER_MASS = 14
 _LEG = 15
 
-CONSTANTS = _FIRST_LEG + 6 * _LEG
+_FIRST_SCREW = _FIRST_LEG + 6 * _LEG
+CONSTANTS = _FIRST_SCREW + 6 * SCREW
 
 
 class Leg(NamedTuple):
@@ -60,6 +64,11 @@ class Leg(NamedTuple):
 
 def hexapod_constants(p: Parameters) -> Array:
     """Return the constants (CONSTANTS,) of a hexapod, SI units."""
+    return constants_with(p, screw_constants(p))
+
+
+def constants_with(p: Parameters, screws: Array) -> Array:
+    """Return the constants (CONSTANTS,) of a hexapod with given screws (6, SCREW)."""
     cylinder_mass, cylinder_center = p['legs.cylinder.mass'], p['legs.cylinder.center_of_mass']
     legs = np.column_stack([
         p['geometry.base_joints'], p['geometry.platform_joints'],
@@ -71,7 +80,7 @@ def hexapod_constants(p: Parameters) -> Array:
         p['actuator.coulomb_friction'], p['actuator.coulomb_velocity'], cylinder_mass])
     return np.concatenate([
         p['gravity'], [p['singularity.characteristic_length'], p['platform.mass']],
-        p['platform.center_of_mass'], p['platform.inertia'], legs.ravel()])
+        p['platform.center_of_mass'], p['platform.inertia'], legs.ravel(), screws.ravel()])
 
 
 @inlined
@@ -126,3 +135,23 @@ def coulomb_velocity_of(constants: Array, leg: int) -> float:
     """Return the rate of a leg below which its Coulomb friction is linear [m/s]."""
     velocity: float = constants[_FIRST_LEG + leg * _LEG + _COULOMB_VELOCITY]
     return velocity
+
+
+@inlined
+def screw_pitch_of(constants: Array, leg: int) -> float:
+    """Return how far the drive of a leg moves for a turn of its leg [m/rad]; 0 where guided."""
+    pitch: float = constants[_FIRST_SCREW + leg * SCREW + PITCH]
+    return pitch
+
+
+@inlined
+def screws_turn(constants: Array) -> bool:
+    """Return whether the screws turn with their legs."""
+    return screw_pitch_of(constants, 0) != 0.0
+
+
+@inlined
+def universal_axes_of(constants: Array, leg: int) -> tuple[Vector3, Vector3]:
+    """Return the axes of a leg's universal joints: fixed to base, and to platform, their axes."""
+    o = _FIRST_SCREW + leg * SCREW
+    return read3(constants, o + BASE_AXIS.start), read3(constants, o + PLATFORM_AXIS.start)

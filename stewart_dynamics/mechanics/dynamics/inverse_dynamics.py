@@ -24,7 +24,9 @@ each sample's bits are the same in either case. Numbers in brackets are the pape
 3. ``base_load.base_load``: the load of a moving base, subtracted from the wrench beforehand.
 4. ``_dynamics``: six forces along the legs balance the sum, ``J_inv^T f = wrench``; the inverse of
    J_inv gives det(J), its rate, and the forces under a unit load as well.
-5. ``_tile_eigenvalues``: the condition number, from the largest eigenvalues of J J^T and of its
+5. ``_put_forces_of_turning_screws``: where screws turn with their legs, these forces and those
+   under a unit load are replaced by those of ``J_q^T f = wrench`` (``drives.screws``).
+6. ``_tile_eigenvalues``: the condition number, from the largest eigenvalues of J J^T and of its
    inverse.
 
 ``solve`` computes a tile of ``LANES`` samples side by side in each of these steps, so that one
@@ -40,9 +42,10 @@ import math
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.dynamics.base_load import base_load, moves
-from stewart_dynamics.mechanics.dynamics.bodies import leg_dynamics, platform_dynamics
+from stewart_dynamics.mechanics.dynamics.bodies import (
+    actuator_force, drive_motion, leg_dynamics, LegDynamics, platform_dynamics, scaled_drive_row)
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
-    characteristic_length_of, gravity_of)
+    characteristic_length_of, gravity_of, leg_of, screws_turn)
 from stewart_dynamics.mechanics.matrix6 import (
     gram, inverse_and_determinant, laguerre_step, Rows, Tridiagonal, tridiagonal)
 from stewart_dynamics.mechanics.rows import (
@@ -51,7 +54,8 @@ from stewart_dynamics.mechanics.rows import (
     LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSITION, RATES, RESULT, ROTATION,
     UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
-from stewart_dynamics.mechanics.vectors import add, dot6, Matrix3, scale, subtract, Vector3
+from stewart_dynamics.mechanics.vectors import (
+    add, dot6, Matrix3, scale, subtract, Vector3, Vector6)
 
 LANES = 32
 
@@ -167,11 +171,13 @@ def _tile_base_loads(constants: Array, tile: Array, lanes: int) -> None:
         _subtract_base_load(constants, tile, k)
 
 
+_SixLegs = tuple[LegDynamics, LegDynamics, LegDynamics, LegDynamics, LegDynamics, LegDynamics]
+
+
 @inlined
-def _dynamics(constants: Array, tile: Array, k: int) -> None:
-    """Compute the sample in lane k, except for the eigenvalues of its condition number."""
-    size = characteristic_length_of(constants)
-    inverse_size = 1.0 / size
+def _moved(constants: Array, tile: Array, k: int) -> tuple[_SixLegs, Vector6]:
+    """Return the legs in lane k, and the wrench that moves platform and legs, scaled."""
+    inverse_size = 1.0 / characteristic_length_of(constants)
     position = vector3(tile, k + POSITION.start * LANES)
     rotation = matrix3(tile, k + ROTATION.start * LANES)
     velocity = vector3(tile, k + LINEAR_VELOCITY.start * LANES)
@@ -192,7 +198,15 @@ def _dynamics(constants: Array, tile: Array, k: int) -> None:
                 l5.force)
     moment = scale(inverse_size, add(add(add(add(add(add(
         moment, l0.moment), l1.moment), l2.moment), l3.moment), l4.moment), l5.moment))
-    wrench = force[0], force[1], force[2], moment[0], moment[1], moment[2]
+    return (l0, l1, l2, l3, l4, l5), (
+        force[0], force[1], force[2], moment[0], moment[1], moment[2])
+
+
+@inlined
+def _dynamics(constants: Array, tile: Array, k: int) -> None:
+    """Compute the sample in lane k, except for the eigenvalues of its condition number."""
+    size = characteristic_length_of(constants)
+    (l0, l1, l2, l3, l4, l5), wrench = _moved(constants, tile, k)
 
     # With J the scaled J_inv, row n of (J^T)^-1 maps the wrench to the force of leg n, its
     # length is the largest force of that leg under a unit load, and
@@ -218,10 +232,55 @@ def _dynamics(constants: Array, tile: Array, k: int) -> None:
     _put_unit_load_forces(tile, k, (r0, r1, r2, r3, r4, r5), (b0, b1, b2, b3, b4, b5))
 
 
+@inlined
+def _drive_force(constants: Array, tile: Array, k: int, leg: int) -> float:
+    """Return the force that moves the actuator of a leg in lane k [N]."""
+    _, rate, acceleration = drive_motion(
+        constants, leg, vector3(tile, k + POSITION.start * LANES),
+        matrix3(tile, k + ROTATION.start * LANES),
+        vector3(tile, k + LINEAR_VELOCITY.start * LANES),
+        vector3(tile, k + ANGULAR_VELOCITY.start * LANES),
+        vector3(tile, k + LINEAR_ACCELERATION.start * LANES),
+        vector3(tile, k + ANGULAR_ACCELERATION.start * LANES))
+    force: float = actuator_force(leg_of(constants, leg), rate, acceleration)
+    return force
+
+
+@compiled
+def _put_forces_of_turning_screws(constants: Array, tile: Array, k: int) -> None:
+    """Store the forces of drives whose screws turn with their legs, also under a unit load."""
+    position = vector3(tile, k + POSITION.start * LANES)
+    rotation = matrix3(tile, k + ROTATION.start * LANES)
+    r0 = scaled_drive_row(constants, 0, position, rotation)
+    r1 = scaled_drive_row(constants, 1, position, rotation)
+    r2 = scaled_drive_row(constants, 2, position, rotation)
+    r3 = scaled_drive_row(constants, 3, position, rotation)
+    r4 = scaled_drive_row(constants, 4, position, rotation)
+    r5 = scaled_drive_row(constants, 5, position, rotation)
+    (b0, b1, b2, b3, b4, b5), _ = inverse_and_determinant(
+        (r0[0], r1[0], r2[0], r3[0], r4[0], r5[0]), (r0[1], r1[1], r2[1], r3[1], r4[1], r5[1]),
+        (r0[2], r1[2], r2[2], r3[2], r4[2], r5[2]), (r0[3], r1[3], r2[3], r3[3], r4[3], r5[3]),
+        (r0[4], r1[4], r2[4], r3[4], r4[4], r5[4]), (r0[5], r1[5], r2[5], r3[5], r4[5], r5[5]))
+    _, wrench = _moved(constants, tile, k)
+    at = k + _RESULT
+    put6(tile, at + FORCES.start * LANES, dot6(b0, wrench) + _drive_force(constants, tile, k, 0),
+         dot6(b1, wrench) + _drive_force(constants, tile, k, 1),
+         dot6(b2, wrench) + _drive_force(constants, tile, k, 2),
+         dot6(b3, wrench) + _drive_force(constants, tile, k, 3),
+         dot6(b4, wrench) + _drive_force(constants, tile, k, 4),
+         dot6(b5, wrench) + _drive_force(constants, tile, k, 5))
+    put6(tile, at + UNIT_LOAD_FORCES.start * LANES, math.sqrt(dot6(b0, b0)),
+         math.sqrt(dot6(b1, b1)), math.sqrt(dot6(b2, b2)), math.sqrt(dot6(b3, b3)),
+         math.sqrt(dot6(b4, b4)), math.sqrt(dot6(b5, b5)))
+
+
 @compiled
 def _tile_dynamics(constants: Array, tile: Array, lanes: int) -> None:
     for k in range(min(lanes, LANES)):
         _dynamics(constants, tile, k)
+    if screws_turn(constants):
+        for k in range(min(lanes, LANES)):
+            _put_forces_of_turning_screws(constants, tile, k)
 
 
 @inlined
@@ -268,6 +327,8 @@ def solve_one(constants: Array, motion: Array, wrench: Array, base: Array, resul
             tile[_BASE + n * LANES] = base[n]
         _subtract_base_load(constants, tile, 0)
     _dynamics(constants, tile, 0)
+    if screws_turn(constants):
+        _put_forces_of_turning_screws(constants, tile, 0)
     for _ in range(_MOST_STEPS):
         if _nearer_eigenvalues(tile, 0) == 0:
             break

@@ -16,11 +16,12 @@
 The Lagrange equations as the paper assembles them: the readable reference.
 
 ``M(X) X'' + C(X, X') X' + G(X) = J_inv^T f + wrench`` in twist coordinates ``X' = [v; w]``,
-base axes. Numbers in brackets are equations of Alwan and Sarhan, Dynamic Analysis of Gough
-Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon Eng. Sci. 26(10),
-2018, in their correct form: docs/misprints.md lists the misprints. ``inverse_dynamics``
-computes the same forces without a matrix and is validated against these. Every function takes any
-leading shape of samples.
+base axes. Where screws turn with their legs, their J_q replaces J_inv for the forces f and the
+reflected masses: ``drives.screws``. Numbers in brackets are equations of Alwan and Sarhan, Dynamic
+Analysis of Gough Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon Eng.
+Sci. 26(10), 2018, in their correct form: docs/misprints.md lists the misprints.
+``inverse_dynamics`` computes the same forces without a matrix and is validated against these.
+Every function takes any leading shape of samples.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.rows import (
+    BASE_AXIS, PITCH, PLATFORM_AXIS, POSITION, ROTATION, TWIST)
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 
 
@@ -89,6 +92,74 @@ def inverse_jacobian_rate(at: Legs, velocity: Array, omega: Array) -> Array:
     return np.concatenate([
         direction_rates,
         np.cross(arm_rates, at.directions) + np.cross(at.arms, direction_rates)], axis=-1)
+
+
+def drive_jacobian(at: Legs, rotation: Array, screws: Array | None = None) -> Array:
+    """
+    Return J_q (..., 6, 6): rates of the drives = J_q [v; w], J_q^T forces = wrench.
+
+    screws (6, SCREW): constants of the screws, see ``drives.screws``; by default they are guided,
+        and J_q is J_inv.
+    """
+    if screws is None or not screws.any():
+        return inverse_jacobian(at)
+    pitch, u, w = _screws(rotation, screws)
+    s = at.directions
+    u_s, w_s = _dot(u, s), _dot(w, s)
+    h = s + pitch / at.lengths[..., None] * (
+        u_s / (1.0 - u_s ** 2) * np.cross(s, u) - w_s / (1.0 - w_s ** 2) * np.cross(s, w))
+    d = (s - w_s * w) / (1.0 - w_s ** 2)
+    return np.concatenate([h, np.cross(at.arms, h) + pitch * d], axis=-1)
+
+
+def drive_jacobian_rate(at: Legs, rotation: Array, velocity: Array, omega: Array,
+                        screws: Array | None = None) -> Array:
+    """Return dJ_q/dt (..., 6, 6) under a twist."""
+    if screws is None or not screws.any():
+        return inverse_jacobian_rate(at, velocity, omega)
+    pitch, u, w = _screws(rotation, screws)
+    s, length = at.directions, at.lengths[..., None]
+    spin = omega[..., None, :]
+    arm_rate, w_rate = np.cross(spin, at.arms), np.cross(spin, w)
+    joint_rate = velocity[..., None, :] + arm_rate
+    rate = _dot(s, joint_rate)
+    s_rate = (joint_rate - s * rate) / length
+    u_s, w_s = _dot(u, s), _dot(w, s)
+    u_s_rate, w_s_rate = _dot(u, s_rate), _dot(w_rate, s) + _dot(w, s_rate)
+    of_u, of_w = u_s / (1.0 - u_s ** 2), w_s / (1.0 - w_s ** 2)
+    of_u_rate, of_w_rate = ((1.0 + c ** 2) / (1.0 - c ** 2) ** 2 * c_rate
+                            for c, c_rate in ((u_s, u_s_rate), (w_s, w_s_rate)))
+    inner = of_u * np.cross(s, u) - of_w * np.cross(s, w)
+    inner_rate = (of_u_rate * np.cross(s, u) + of_u * np.cross(s_rate, u)
+                  - of_w_rate * np.cross(s, w)
+                  - of_w * (np.cross(s_rate, w) + np.cross(s, w_rate)))
+    h = s + pitch / length * inner
+    h_rate = s_rate + pitch / length * (inner_rate - rate / length * inner)
+    d = (s - w_s * w) / (1.0 - w_s ** 2)
+    d_rate = (s_rate - w_s_rate * w - w_s * w_rate + 2.0 * w_s * w_s_rate * d) / (1.0 - w_s ** 2)
+    return np.concatenate([
+        h_rate, np.cross(arm_rate, h) + np.cross(at.arms, h_rate) + pitch * d_rate], axis=-1)
+
+
+def drive_rates(parameters: Parameters, motions: Array, screws: Array) -> Array:
+    """Return the rates of the drives (..., 6) [m/s] of rows of motion (..., MOTION), unchecked."""
+    rotation = motions[..., ROTATION].reshape(*motions.shape[:-1], 3, 3)
+    with np.errstate(all='ignore'):
+        at = unchecked_legs(parameters, motions[..., POSITION], rotation)
+        rates: Array = np.einsum('...ij,...j->...i', drive_jacobian(at, rotation, screws),
+                                 motions[..., TWIST])
+    return rates
+
+
+def _screws(rotation: Array, screws: Array) -> tuple[Array, Array, Array]:
+    """Return pitches (6, 1), and axes fixed to base (6, 3) and to platform (..., 6, 3)."""
+    return screws[:, PITCH, None], screws[:, BASE_AXIS], np.einsum(
+        '...jk,ik->...ij', rotation, screws[:, PLATFORM_AXIS])
+
+
+def _dot(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Array:
+    product: Array = np.sum(a * b, axis=-1, keepdims=True)
+    return product
 
 
 def _joint_jacobian(arms: Array) -> Array:
@@ -190,25 +261,26 @@ def _turning(inertia: Array) -> Array:
     return np.pad(inertia, [(0, 0)] * (inertia.ndim - 2) + [(3, 0), (3, 0)])
 
 
-def mass_matrix(parameters: Parameters, position: Array, rotation: Array) -> Array:
-    """Return M = M_p + sum J_i^T M_i J_i + J_inv^T m_r J_inv, (..., 6, 6): (5)."""
+def mass_matrix(parameters: Parameters, position: Array, rotation: Array,
+                screws: Array | None = None) -> Array:
+    """Return M = M_p + sum J_i^T M_i J_i + J_q^T m_r J_q, (..., 6, 6): (5)."""
     at = legs(parameters, position, rotation)
     j_com = _joint_jacobian(_center_of_mass(parameters, rotation))
     j = _joint_jacobian(at.arms)
-    j_inv = inverse_jacobian(at)
+    j_q = drive_jacobian(at, rotation, screws)
     m: Array = (
         parameters['platform.mass'] * _transposed(j_com) @ j_com
         + _turning(_platform_inertia(parameters, rotation))
         + np.sum(_transposed(j) @ leg_mass(parameters, at) @ j, axis=-3)
-        + _transposed(j_inv) @ (parameters['actuator.reflected_mass'][:, None] * j_inv))
+        + _transposed(j_q) @ (parameters['actuator.reflected_mass'][:, None] * j_q))
     return m
 
 
 def coriolis_matrix(
         parameters: Parameters, position: Array, rotation: Array, velocity: Array,
-        omega: Array, christoffel: bool = False,
+        omega: Array, christoffel: bool = False, screws: Array | None = None,
 ) -> Array:
-    """Return C = C_p + sum (J_i^T M_i J_i' + J_i^T C_i J_i) + J_inv^T m_r J_inv': (6)."""
+    """Return C = C_p + sum (J_i^T M_i J_i' + J_i^T C_i J_i) + J_q^T m_r J_q': (6)."""
     at = legs(parameters, position, rotation)
     com = _center_of_mass(parameters, rotation)
     com_rate = -skew(np.cross(omega, com))
@@ -221,9 +293,9 @@ def coriolis_matrix(
         parameters['platform.mass'] * _transposed(_joint_jacobian(com)) @ j_com_rate
         + _turning(skew(omega) @ _platform_inertia(parameters, rotation))
         + np.sum(_transposed(j) @ (leg_mass(parameters, at) @ j_rate + c @ j), axis=-3)
-        + _transposed(inverse_jacobian(at)) @ (
+        + _transposed(drive_jacobian(at, rotation, screws)) @ (
             parameters['actuator.reflected_mass'][:, None]
-            * inverse_jacobian_rate(at, velocity, omega)))
+            * drive_jacobian_rate(at, rotation, velocity, omega, screws)))
     return coriolis
 
 

@@ -18,7 +18,8 @@ The regressor Y of the leg forces, f = Y theta, of many samples; compiled.
 theta are the parameters in which leg forces are linear, see ``linear_parameters``. As in
 ``base_wrench``, velocities and accelerations are those in axes that do not turn, accelerations
 less gravity: ``A = a_B - g + W' x r + W x (W x r) + 2 W x r' + r''`` at a point r. So a moving
-base needs nothing more. Row n of (J_inv^T)^-1, in halves u (for forces) and h (for moments),
+base needs nothing more. Row n of (J_inv^T)^-1, or of (J_q^T)^-1 where screws turn with their legs
+(``drives.screws``), in halves u (for forces) and h (for moments),
 gives the force of leg n:
 
 - platform, in platform axes, with its origin's A and its absolute w and w': the mass gives u . A,
@@ -37,10 +38,10 @@ from typing import NamedTuple
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.dynamics.base_load import carried, carrying_matrix, moves
-from stewart_dynamics.mechanics.dynamics.bodies import leg_line
+from stewart_dynamics.mechanics.dynamics.bodies import drive_motion, leg_line, scaled_drive_row
 from stewart_dynamics.mechanics.dynamics.friction import with_friction
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
-    characteristic_length_of, coulomb_velocity_of, gravity_of, joints_of)
+    characteristic_length_of, coulomb_velocity_of, gravity_of, joints_of, screws_turn)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, FIRST_MOMENT, INERTIA,
     LINEAR, MASS, OFFSET, PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS,
@@ -76,7 +77,8 @@ class Regressor(NamedTuple):
 
 
 # Scratch memory: for each leg its row of J_inv, later of (J_inv^T)^-1; then a, the vectors of its
-# four parameters, and rate and acceleration of its length.
+# four parameters, and rate and acceleration of its length. Where screws turn with their legs: its
+# row of J_q, and rate and acceleration of its drive.
 _ROW, _ARM, _OF_FIRST, _OF_SECOND, _OF_PISTON, _OF_PISTON_FIRST, _RATE, _ACCELERATION = (
     part.start for part in consecutive(6, 3, 3, 3, 3, 3, 1, 1))
 _LEG = 23
@@ -148,6 +150,20 @@ def _put_leg(constants: Array, leg: int, of: _Moving, work: Array) -> None:
     put3(work, at + _OF_PISTON_FIRST, subtract(scale(turning, s), add(
         of_first, add(scale(2.0, s_acceleration), scale(inverse_length, sliding)))))
     work[at + _RATE], work[at + _ACCELERATION] = rate, length_acceleration
+
+
+@compiled
+def _put_drive(constants: Array, leg: int, motion: Array, work: Array) -> None:
+    """Replace the row of J_inv by that of J_q, and the length by the drive's coordinate."""
+    position, rotation = read3(motion, POSITION.start), read9(motion, ROTATION.start)
+    at = leg * _LEG
+    row = scaled_drive_row(constants, leg, position, rotation)
+    for n in range(6):
+        work[at + _ROW + n] = row[n]
+    _, work[at + _RATE], work[at + _ACCELERATION] = drive_motion(
+        constants, leg, position, rotation, read3(motion, LINEAR_VELOCITY.start),
+        read3(motion, ANGULAR_VELOCITY.start), read3(motion, LINEAR_ACCELERATION.start),
+        read3(motion, ANGULAR_ACCELERATION.start))
 
 
 @compiled
@@ -236,6 +252,8 @@ def regressors(constants: Array, motions: Array, bases: Array, results: Array, w
         of = _moving(constants, motions[row], bases[0 if one_base else row])
         for leg in range(6):
             _put_leg(constants, leg, of, work)
+            if screws_turn(constants):
+                _put_drive(constants, leg, motions[row], work)
         _invert(work)
         for leg in range(6):
             _put_row(of, size, leg, coulomb_velocity_of(constants, leg), work,

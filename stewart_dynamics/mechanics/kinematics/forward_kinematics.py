@@ -66,6 +66,17 @@ def _row(constants: Array, leg: int, position: Vector3, rotation: Matrix3,
     return length, (s[0], s[1], s[2], m[0], m[1], m[2])
 
 
+@compiled
+def determinant(constants: Array, motion: Array) -> float:
+    """Return det(J) at the pose of a row of motion, moments by the characteristic length."""
+    position, rotation = read3(motion, POSITION.start), read9(motion, ROTATION.start)
+    _, found = inverse_and_determinant(
+        _row(constants, 0, position, rotation)[1], _row(constants, 1, position, rotation)[1],
+        _row(constants, 2, position, rotation)[1], _row(constants, 3, position, rotation)[1],
+        _row(constants, 4, position, rotation)[1], _row(constants, 5, position, rotation)[1])
+    return found
+
+
 @inlined
 def _squares(rows: Rows) -> float:
     a, b, c, d, e, f = rows

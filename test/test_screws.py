@@ -1,0 +1,310 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Screws that turn with their legs: J_q, forces by virtual work, and all that follows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import (
+    Array, energies, random_motion, random_parameters, random_wrench, rng, symmetric_parameters)
+from scipy.spatial.transform import Rotation
+
+from stewart_dynamics import Capability, Motion, StewartPlatform
+from stewart_dynamics.external_wrench.estimate import external_wrenches
+from stewart_dynamics.mechanics.drives.motors import motor_ratio
+from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters
+from stewart_dynamics.mechanics.rows import (
+    ACCELERATION, BASE_AXIS, PITCH, PLATFORM_AXIS, TWIST)
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import Plant
+from test_drives import driven
+
+# Coefficients of the first derivative by central differences of 8th order, of steps -4 to 4.
+DIFFERENCES = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
+
+
+def turning(seed: int, **changes: Any) -> StewartPlatform:
+    """Return a random hexapod whose screws turn with its legs."""
+    random = rng(seed)
+    return StewartPlatform(driven(random_parameters(random), random, **{
+        'drive.screw_rotation': 'universal', 'drive.screw_hand': ['right', 'left'][seed % 2],
+        **changes}))
+
+
+def guided(platform: StewartPlatform) -> StewartPlatform:
+    return StewartPlatform(platform.parameters.replaced({'drive.screw_rotation': 'guided'}))
+
+
+def by_chains(platform: StewartPlatform, motion: Motion) -> Array:
+    """
+    Return the rates of the drives (N, 6) by each leg as a serial chain of six joints.
+
+    Base to platform: axis fixed to the base, axis across it, turn about the leg, slide along it,
+    axis across, axis fixed to the platform. The joints' rates follow from the platform's twist.
+    """
+    p, screws = platform.parameters, platform.screws
+    rates = np.empty((len(motion.rows), 6))
+    for n in range(len(motion.rows)):
+        at = motion[n]
+        omega = at.angular_velocity
+        twist = np.concatenate([at.linear_velocity - np.cross(omega, at.position), omega])
+        for leg in range(6):
+            base = p['geometry.base_joints'][leg]
+            top = at.position + at.rotation @ p['geometry.platform_joints'][leg]
+            s = (top - base) / np.linalg.norm(top - base)
+            u, w = screws[leg, BASE_AXIS], at.rotation @ screws[leg, PLATFORM_AXIS]
+
+            def hinge(axis: Array, point: Array) -> Array:
+                axis = axis / np.linalg.norm(axis)
+                return np.concatenate([np.cross(point, axis), axis])
+
+            chain = np.column_stack([
+                hinge(u, base), hinge(np.cross(u, s), base), hinge(s, base),
+                np.concatenate([s, np.zeros(3)]), hinge(np.cross(w, s), top), hinge(w, top)])
+            of_joints = np.linalg.solve(chain, twist)
+            rates[n, leg] = of_joints[3] + screws[leg, PITCH] * of_joints[2]
+    return rates
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_rates_of_the_drives_are_those_of_serial_chains(seed: int) -> None:
+    platform = turning(seed)
+    motion = random_motion(platform.parameters, rng(seed), 20)
+    rates = by_chains(platform, motion)
+    found = np.einsum('nij,nj->ni', platform.drive_jacobian(motion), motion.rows[:, TWIST])
+    np.testing.assert_allclose(found, rates, rtol=0.0, atol=1e-12 * np.abs(rates).max())
+    motors, k = platform.motors(motion), motor_ratio(platform.parameters)
+    np.testing.assert_allclose(motors.speeds, k * rates, rtol=0.0,
+                               atol=1e-12 * np.abs(motors.speeds).max())
+    accelerations = (
+        np.einsum('nij,nj->ni', platform.drive_jacobian(motion), motion.rows[:, ACCELERATION])
+        + np.einsum('nij,nj->ni', platform.drive_jacobian_rate(motion), motion.rows[:, TWIST]))
+    np.testing.assert_allclose(motors.accelerations, k * accelerations, rtol=0.0,
+                               atol=1e-12 * np.abs(motors.accelerations).max())
+    legs = np.einsum('nij,nj->ni', platform.inverse_jacobian(motion), motion.rows[:, TWIST])
+    np.testing.assert_allclose(platform.inverse_dynamics(motion).rates, legs, rtol=0.0,
+                               atol=1e-12 * np.abs(legs).max())
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_forces_are_those_of_lagrange_with_the_work_of_the_drives(seed: int) -> None:
+    """By differences of the energies of all parts and rotors, in six coordinates."""
+    platform, random = turning(seed, **{
+        'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}), rng(seed)
+    p = platform.parameters
+    massless = p.replaced({'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
+                           'drive.screw_inertia': None})
+    place = random_motion(p, random, 1).position[0]
+    amplitude = np.array([0.05, 0.05, 0.05, 0.1, 0.1, 0.1]) * random.normal(size=6)
+    frequency, phase = random.uniform(1.0, 3.0, 6), random.uniform(0.0, 6.0, 6)
+
+    def coordinates(time: float) -> tuple[Array, Array, Array]:
+        turn = frequency * time + phase
+        x = amplitude * np.sin(turn)
+        x[:3] += place
+        return (x, amplitude * frequency * np.cos(turn),
+                -amplitude * frequency ** 2 * np.sin(turn))
+
+    def motion(x: Array, rate: Array) -> Motion:
+        return Motion.from_euler(x[..., :3], x[..., 3:], rate[..., :3], rate[..., 3:])
+
+    def kinetic(x: Array, rate: Array) -> Array:
+        at = motion(np.broadcast_to(x, rate.shape), rate)
+        drives = by_chains(platform, at)
+        found: Array = energies(massless, at)[0] + 0.5 * (
+            p['actuator.reflected_mass'] * drives ** 2).sum(axis=1)
+        return found
+
+    def momenta(time: float) -> Array:
+        x, rate, _ = coordinates(time)
+        ends = rate + np.concatenate([np.eye(6), -np.eye(6)])  # exact: the energy is quadratic
+        energy = kinetic(x, ends)
+        return 0.5 * (energy[:6] - energy[6:])
+
+    h = 0.02
+    steps = h * np.arange(-4, 5)
+    x, rate, acceleration = coordinates(0.0)
+    change = DIFFERENCES @ np.array([momenta(step) for step in steps]) / h
+    slopes = np.empty(6)
+    for n in range(6):
+        moved = x + steps[:, None] * np.eye(6)[n]
+        lagrangian = np.array([kinetic(each, rate[None])[0] for each in moved]) - energies(
+            massless, motion(moved, np.broadcast_to(rate, moved.shape)))[1]
+        slopes[n] = DIFFERENCES @ lagrangian / h
+    # How the drives move with each coordinate.
+    drives = by_chains(platform, motion(np.tile(x, (6, 1)), np.eye(6)))
+    wanted = np.linalg.solve(drives, change - slopes)
+    whole = Motion.from_euler(x[:3], x[3:], rate[:3], rate[3:], acceleration[:3],
+                              acceleration[3:])
+    forces = platform.inverse_dynamics(whole).forces
+    np.testing.assert_allclose(forces, wanted, rtol=0.0, atol=1e-9 * np.abs(forces).max())
+    assert np.abs(guided(platform).inverse_dynamics(whole).forces - wanted).max() > (
+        1e-4 * np.abs(forces).max())
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_all_calls_of_the_library_have_the_same_forces(seed: int) -> None:
+    platform, random = turning(seed), rng(seed)
+    p = platform.parameters
+    motion, wrench = random_motion(p, random, 30), random_wrench(p, random, 30)
+    result = platform.inverse_dynamics(motion, wrench)
+    forces, size = result.forces, np.abs(result.forces).max()
+    # the readable equations
+    twist, acceleration = motion.rows[:, TWIST], motion.rows[:, ACCELERATION]
+    transposed = np.swapaxes(platform.drive_jacobian(motion), 1, 2)
+    c = platform.coriolis_matrix(motion)
+    load = (np.einsum('nij,nj->ni', platform.mass_matrix(motion), acceleration)
+            + np.einsum('nij,nj->ni', c, twist) + platform.gravity_vector(motion) - wrench)
+    rates = np.einsum('nij,nj->ni', platform.drive_jacobian(motion), twist)
+    friction = p['actuator.viscous_friction'] * rates + p['actuator.coulomb_friction'] * np.clip(
+        rates / p['actuator.coulomb_velocity'], -1.0, 1.0)
+    wanted = np.linalg.solve(transposed, load[..., None])[..., 0] + friction
+    np.testing.assert_allclose(forces, wanted, rtol=0.0, atol=1e-12 * size)
+    # unit loads, forward dynamics, regressor, breakdown, external wrench
+    inverse = np.linalg.inv(transposed)
+    inverse[..., 3:] *= p['singularity.characteristic_length']
+    np.testing.assert_allclose(
+        result.unit_load_forces, np.linalg.norm(inverse, axis=2), rtol=1e-12)
+    back = platform.forward_dynamics(motion, forces, wrench).rows[:, ACCELERATION]
+    np.testing.assert_allclose(back, acceleration, rtol=0.0, atol=1e-11 * np.abs(back).max())
+    free = platform.inverse_dynamics(motion).forces
+    np.testing.assert_allclose(platform.regressor(motion).matrix @ linear_parameters(p), free,
+                               rtol=0.0, atol=1e-12 * size)
+    parts = platform.force_breakdown(motion, wrench)
+    np.testing.assert_allclose(parts.total, forces, rtol=0.0, atol=1e-12 * size)
+    np.testing.assert_allclose(parts.friction, friction, rtol=0.0, atol=1e-12 * size)
+    np.testing.assert_allclose(external_wrenches(platform, motion.rows, free, forces), wrench,
+                               rtol=0.0, atol=1e-11 * np.abs(wrench).max())
+    # det(J) and the condition number stay those of J_inv; all at once as one by one
+    same = guided(platform).inverse_dynamics(motion, wrench)
+    assert np.array_equal(result.determinant, same.determinant)
+    assert np.array_equal(result.condition_number, same.condition_number)
+    assert platform.inverse_dynamics(motion[3], wrench[3]).rows.tolist() == (
+        result.rows[3].tolist())
+
+
+def test_a_drive_moves_as_far_for_a_turn_of_an_upright_leg_as_its_screw() -> None:
+    p = symmetric_parameters()
+    base, joints = p['geometry.base_joints'].copy(), p['geometry.platform_joints'].copy()
+    base[0] = joints[0] = [0.0, 0.0, 0.0]
+    platform = StewartPlatform(p.replaced({
+        'actuator.screw_lead': 0.005, 'drive.gear_ratio': 3.0, 'geometry.zero_length': 1.1,
+        'geometry.base_joints': base, 'geometry.platform_joints': joints,
+        'drive.screw_rotation': 'universal'}))
+    row = platform.drive_jacobian(Motion([0.0, 0.0, 1.0], np.eye(3)))[0]
+    np.testing.assert_allclose(row, [0.0, 0.0, 1.0, 0.0, 0.0, -0.005 / (2.0 * np.pi)], atol=1e-15)
+
+
+@pytest.mark.parametrize('commands', ['force', 'torque'])
+def test_an_end_stop_pushes_along_its_leg_alone(commands: str) -> None:
+    """At rest, within the end stops of two legs, with no command."""
+    free = turning(1)
+    pose = random_motion(free.parameters, rng(1), 1)[0]
+    position = [*pose.position, 0.0, 0.0, 0.0]
+    pose = Motion(pose.position, np.eye(3))
+    lengths = free.inverse_kinematics(pose)
+    most = lengths + [0.2, 0.2, 0.0, 0.2, 0.0, 0.2]
+    plant = Plant(SimulatorParameters({
+        **dict(free.parameters), 'limits.length_max': most, 'limits.length_min': 0.1,
+        'commands': commands, 'initial_pose': position}))
+    # Brakes release; the platform falls or is lifted until legs are in their stops.
+    zero = (0.0,) * 6
+    up = (0.0, 0.0, 1e5, 0.0, 0.0, 0.0)
+    for _ in range(200):
+        before = plant.state
+        state = plant.advance(zero, up)
+        over = np.array(state.lengths) - most
+        if (over > 1e-5).any():
+            break
+    assert (over > 1e-5).any() and before.lengths != state.lengths
+    at = Motion.of_rows(np.concatenate([
+        state.pose[:3], Rotation.from_quat(state.pose[3:]).as_matrix().ravel(), state.twist,
+        np.zeros(6)]))
+    forces = np.array(state.forces)
+    # The wrench of the stops on the platform explains its acceleration.
+    moving = at.rows.copy()
+    moving[ACCELERATION] = state.acceleration
+    needed = free.inverse_dynamics(Motion.of_rows(moving), up).forces
+    stops = free.drive_jacobian(at).T @ (needed - forces)
+    along = np.linalg.solve(free.inverse_jacobian(at).T, stops)
+    pushed = np.abs(along) > 1e-6 * np.abs(along).max()
+    assert pushed.tolist() == (over > 0.0).tolist()
+
+
+def test_stiffness_is_the_derivative_of_the_wrench_of_the_drives() -> None:
+    platform = turning(2, **{'limits.force_max': 1e5})
+    pose = random_motion(platform.parameters, rng(2), 1)[0]
+    k = rng(2).uniform(1e6, 1e7, 6)
+    still = Motion(pose.position, pose.rotation)
+    forces = platform.inverse_dynamics(still).forces
+    found = Capability(platform).stiffness(still, k)
+    h = 1e-6
+    wanted = np.empty((6, 6))
+    for n in range(6):
+        ends = []
+        for sign in (1.0, -1.0):
+            step = sign * h * np.eye(6)[n]
+            turned = Motion.from_euler(step[:3], step[3:])
+            at = Motion(still.position + turned.position, turned.rotation @ still.rotation)
+            angles = platform.motors(at).angles - platform.motors(still).angles
+            moved = angles / motor_ratio(platform.parameters)
+            ends.append(platform.drive_jacobian(at).T @ (forces - k * moved))
+        wanted[:, n] = -(ends[0] - ends[1]) / (2.0 * h)
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-7 * np.abs(wanted).max())
+
+
+def test_exertable_loads_bring_a_drive_to_its_limit() -> None:
+    platform = turning(3, **{'limits.force_max': 2e4})
+    capability = Capability(platform)
+    poses = random_motion(platform.parameters, rng(3), 20)
+    still = Motion(poses.position, poses.rotation)
+    direction = np.array([0.3, -0.2, 0.5, 0.1, 0.4, 1.0])
+    most = capability.wrench(still, direction)
+    forces = platform.inverse_dynamics(still, -most.value[:, None] * direction).forces
+    np.testing.assert_allclose(np.abs(forces).max(axis=1)[most.value > 0.0], 2e4, rtol=1e-12)
+    for value, part in ((capability.force(still), slice(0, 3)),
+                        (capability.moment(still), slice(3, 6))):
+        rows = np.swapaxes(np.linalg.inv(platform.drive_jacobian(still)), 1, 2)[..., part]
+        leg = np.argmin((2e4 - np.abs(platform.inverse_dynamics(still).forces))
+                        / np.linalg.norm(rows, axis=2), axis=1)
+        for n in range(20):
+            wrench = np.zeros(6)
+            unit = rows[n, leg[n]] / np.linalg.norm(rows[n, leg[n]])
+            wrench[part] = np.asarray(value)[n] * unit
+            found = [np.abs(platform.inverse_dynamics(still[n], sign * wrench).forces).max()
+                     for sign in (1.0, -1.0)]
+            assert max(found) == pytest.approx(2e4, rel=1e-12)
+
+
+def test_passivity_and_symmetry() -> None:
+    platform, random = turning(4), rng(4)
+    motion = random_motion(platform.parameters, random, 1)[0]
+    m = platform.mass_matrix(motion)
+    np.testing.assert_allclose(m, m.T, rtol=0.0, atol=1e-12 * np.abs(m).max())
+    twist = motion.rows[TWIST]
+    h = 1e-3
+
+    def energy(time: float) -> float:
+        turn = Rotation.from_rotvec(time * motion.angular_velocity).as_matrix()
+        at = Motion(motion.position + time * motion.linear_velocity, turn @ motion.rotation)
+        return float(twist @ platform.mass_matrix(at) @ twist)
+
+    slope = DIFFERENCES @ np.array([energy(n * h) for n in range(-4, 5)]) / h
+    for christoffel in (False, True):
+        c = platform.coriolis_matrix(motion, christoffel)
+        assert twist @ c @ twist == pytest.approx(0.5 * slope, rel=1e-8)
