@@ -126,8 +126,8 @@ void FeedForward::start()
   std::copy_n(guess_.position, 3, held_.position);
   std::copy_n(guess_.rotation, 9, held_.rotation);
   started_ = false;
-  refusal_ = nullptr;
-  refused_leg_ = 0;
+  rejection_ = nullptr;
+  rejected_leg_ = 0;
   state_ = stewart_state{};
   output_ = stewart_output{};
 }
@@ -154,17 +154,17 @@ int FeedForward::answer(
   stewart_motion motion;
   int code = motion_of(reference, motion);
   code = code == STEWART_OK ? follow(motion, wrench, feedback, now, command) :
-    refuse(code, text_of(code));
+    reject(code, text_of(code));
   if (code != STEWART_OK) {
     hold(feedback, command);
   }
   return code;
 }
 
-int FeedForward::refuse(int code, const char * rule, int leg)
+int FeedForward::reject(int code, const char * rule, int leg)
 {
-  refusal_ = rule;
-  refused_leg_ = leg;
+  rejection_ = rule;
+  rejected_leg_ = leg;
   return code;
 }
 
@@ -230,12 +230,12 @@ int FeedForward::follow(
   Command & command)
 {
   if (!finite(feedback)) {
-    return refuse(STEWART_NOT_FINITE, text_of(STEWART_NOT_FINITE));
+    return reject(STEWART_NOT_FINITE, text_of(STEWART_NOT_FINITE));
   }
   state_.followed = 0;  // cycles repeat references that come more rarely: check_lengths judges steps
   int code = stewart_step(&hexapod_, &motion, wrench.data(), nullptr, now, &state_, &output_);
   if (code != STEWART_OK) {
-    return refuse(code, text_of(code));
+    return reject(code, text_of(code));
   }
   code = check_lengths();
   if (code != STEWART_OK) {
@@ -256,7 +256,7 @@ int FeedForward::follow(
   held_wrench_ = wrench;
   followed_at_ = now;
   started_ = true;
-  return refuse(STEWART_OK, nullptr);
+  return reject(STEWART_OK, nullptr);
 }
 
 /// Whatever limits.action says: no drive may get a position that its leg cannot have, or a step
@@ -267,14 +267,14 @@ int FeedForward::check_lengths()
     const double length = output_.result.lengths[n];
     const double farthest = hexapod_.legs[n].velocity_max * (1e-9 * static_cast<double>(timeout_));
     if (output_.exceeded[n] & STEWART_LENGTH_MIN) {
-      return refuse(STEWART_SUPPRESSED, "shorter than limits.length_min", n + 1);
+      return reject(STEWART_SUPPRESSED, "shorter than limits.length_min", n + 1);
     }
     if (output_.exceeded[n] & STEWART_LENGTH_MAX) {
-      return refuse(STEWART_SUPPRESSED, "longer than limits.length_max", n + 1);
+      return reject(STEWART_SUPPRESSED, "longer than limits.length_max", n + 1);
     }
     const double step = length - held_lengths_[static_cast<std::size_t>(n)];
     if (started_ && std::fabs(step) > farthest) {
-      return refuse(
+      return reject(
         STEWART_SUPPRESSED,
         "farther from the last command than limits.velocity_max allows in setpoint.timeout", n + 1);
     }

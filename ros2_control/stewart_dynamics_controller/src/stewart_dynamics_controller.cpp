@@ -92,14 +92,13 @@ CallbackReturn StewartDynamicsController::on_activate(const rclcpp_lifecycle::St
     (void)ordered_exported_reference_interfaces_[n]->set_value(n < not_set ? kNaN : 0.0);
   }
   received_.set(std::nullopt);
+  received_at_ = -1;
   // A manager that deactivates the controller before this one alone activates this one again at
-  // once, not chained: then setpoints must come on the topic from now on.
-  const std::int64_t now = get_node()->now().nanoseconds();
-  const bool left_chain = was_chained_ && !is_in_chained_mode() &&
-    !feed_forward_->timed_out(deactivated_at_, now);
-  received_at_ = left_chain ? now : -1;
+  // once, not chained.
+  left_chain_ = was_chained_ && !is_in_chained_mode() &&
+    !feed_forward_->timed_out(deactivated_at_, get_node()->now().nanoseconds());
   was_chained_ = is_in_chained_mode();
-  last_refusal_ = nullptr;
+  last_rejection_ = nullptr;
   feed_forward_->start();
   return CallbackReturn::SUCCESS;
 }
@@ -221,10 +220,10 @@ void StewartDynamicsController::on_setpoint(
 return_type StewartDynamicsController::update_reference_from_subscribers(
   const rclcpp::Time & time, const rclcpp::Duration &)
 {
-  if (!of_platform()) {
+  if (left_chain_ || !of_platform()) {
     RCLCPP_ERROR(
-      get_node()->get_logger(), "reference: legs needs an active controller before it: activate and "
-      "deactivate both together");
+      get_node()->get_logger(), "not chained%s: activate and deactivate this controller together "
+      "with the one before it", of_platform() ? " any more" : ", with reference: legs");
     return return_type::ERROR;
   }
   std::optional<PlatformNumbers> setpoint;
@@ -263,17 +262,17 @@ return_type StewartDynamicsController::update_and_write_commands(
     (void)ordered_exported_state_interfaces_[n]->set_value(states[n]);
   }
   const bool given = feed_forward_->started() || code != STEWART_NOT_FINITE;
-  const char * refusal = given ? feed_forward_->refusal() : nullptr;
-  if (refusal && refusal != last_refusal_) {
+  const char * rejection = given ? feed_forward_->rejection() : nullptr;
+  if (rejection && rejection != last_rejection_) {
     RCLCPP_WARN(
       get_node()->get_logger(), "%s: %s%s",
-      feed_forward_->started() ? "platform held, reference refused" : "reference refused",
-      leg_text(), refusal);
+      feed_forward_->started() ? "platform held, reference rejected" : "reference rejected",
+      leg_text(), rejection);
   }
-  last_refusal_ = refusal;
+  last_rejection_ = rejection;
   if (feed_forward_->timed_out(time.nanoseconds())) {
     RCLCPP_ERROR(
-      get_node()->get_logger(), "platform held for setpoint.timeout: %s%s", leg_text(), refusal);
+      get_node()->get_logger(), "platform held for setpoint.timeout: %s%s", leg_text(), rejection);
     return return_type::ERROR;
   }
   return written ? return_type::OK : return_type::ERROR;
@@ -291,7 +290,7 @@ Six StewartDynamicsController::read(std::size_t first) const
 
 const char * StewartDynamicsController::leg_text() const
 {
-  const int leg = feed_forward_->refused_leg();
+  const int leg = feed_forward_->rejected_leg();
   return leg == 0 ? "" : leg_texts_[static_cast<std::size_t>(leg - 1)].c_str();
 }
 

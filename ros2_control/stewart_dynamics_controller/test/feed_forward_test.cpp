@@ -278,14 +278,14 @@ void test_parameters()
 }
 
 /// A way in which a reference cannot be followed, with the code that it has.
-struct Refusal
+struct Rejection
 {
   const char * rule;
   int code, leg;
   void (* spoil)(stewart_platform & p, PlatformReference & reference, Six & wrench);
 };
 
-const Refusal kRefusals[] = {
+const Rejection kRejections[] = {
   {"a reference is NaN or infinite", STEWART_NOT_FINITE, 0,
     [](auto &, auto & r, auto &) {r.linear_velocity[1] = kNaN;}},
   {"a reference is NaN or infinite", STEWART_NOT_FINITE, 0,
@@ -327,30 +327,30 @@ void test_hold()
   FeedForward at_rest(hexapod(), guess(), kTimeout);
   Command followed, expected, command;
   CHECK(at_rest.update(resting, wrench, feedback, 0, expected) == STEWART_OK);
-  for (const Refusal & refusal : kRefusals) {
+  for (const Rejection & rejection : kRejections) {
     stewart_platform p = hexapod();
     FeedForward feed_forward(p, guess(), kTimeout);
     PlatformReference bad = moving;
     Six load = wrench;
-    refusal.spoil(p, bad, load);
+    rejection.spoil(p, bad, load);
 
     // Not before a first reference that can be followed; a step is one from a command.
     command.efforts.fill(7.0);
     feed_forward.change(p);
     const int code = feed_forward.update(bad, load, feedback, 0, command);
-    CHECK(code == refusal.code || (code == STEWART_OK && refusal.leg == 6));
+    CHECK(code == rejection.code || (code == STEWART_OK && rejection.leg == 6));
     CHECK(code == STEWART_OK || (!feed_forward.started() && command.efforts[0] == 7.0));
 
     feed_forward.start();
     feed_forward.change(hexapod());
     CHECK(feed_forward.update(moving, wrench, feedback, 0, followed) == STEWART_OK);
-    CHECK(feed_forward.refusal() == nullptr && feed_forward.refused_leg() == 0);
+    CHECK(feed_forward.rejection() == nullptr && feed_forward.rejected_leg() == 0);
     feed_forward.change(p);
     for (int n = 1; n <= 100; ++n) {
       command = followed;
-      CHECK(feed_forward.update(bad, load, feedback, n * kCycle, command) == refusal.code);
-      CHECK(std::string(feed_forward.refusal()) == refusal.rule);
-      CHECK(feed_forward.refused_leg() == refusal.leg);
+      CHECK(feed_forward.update(bad, load, feedback, n * kCycle, command) == rejection.code);
+      CHECK(std::string(feed_forward.rejection()) == rejection.rule);
+      CHECK(feed_forward.rejected_leg() == rejection.leg);
       CHECK(close(command.positions, followed.positions, 0.0));
       CHECK(close(command.velocities, {}, 0.0));
       CHECK(close(command.efforts, expected.efforts, 0.0));
@@ -361,7 +361,7 @@ void test_hold()
     feed_forward.change(hexapod());
     CHECK(feed_forward.update(moving, wrench, feedback, kTimeout, command) == STEWART_OK);
     CHECK(close(command.efforts, followed.efforts, 0.0));
-    CHECK(feed_forward.refusal() == nullptr);
+    CHECK(feed_forward.rejection() == nullptr);
   }
 }
 
@@ -386,7 +386,7 @@ void test_effort_of_hold()
   CHECK(command.efforts[1] > rest.efforts[1] + 100.0);
 }
 
-/// Nothing that legs can do is refused: parked at a limit, references more rarely than cycles, a
+/// Nothing that legs can do is rejected: parked at a limit, references more rarely than cycles, a
 /// gap shorter than the timeout.
 void test_no_false_hold()
 {

@@ -16,7 +16,7 @@
  * The feed-forward of the controller, without ROS: references in, commands of the legs out. No
  * function allocates memory or throws.
  *
- * A reference is followed or refused as a whole. Refused are one without forces (a return code
+ * A reference is followed or rejected as a whole. Rejected are one without forces (a return code
  * other than STEWART_OK), one with a leg outside limits.length_min and limits.length_max, and one
  * with a leg farther from the last command than limits.velocity_max allows in the timeout. Then
  * the platform is held: positions are those of the last reference that was followed, velocities
@@ -92,10 +92,10 @@ public:
   /// Return whether a reference was followed since start: there is a command.
   bool started() const {return started_;}
 
-  /// Return why the last reference was refused: the rule, nullptr if it was followed; and the
+  /// Return why the last reference was rejected: the rule, nullptr if it was followed; and the
   /// leg that breaks it, 1 to 6, 0 if the rule is not one of a leg.
-  const char * refusal() const {return refusal_;}
-  int refused_leg() const {return refused_leg_;}
+  const char * rejection() const {return rejection_;}
+  int rejected_leg() const {return rejected_leg_;}
 
   /// Return whether the timeout has passed since a time, or since the last reference followed.
   bool timed_out(std::int64_t since, std::int64_t now) const {return now - since > timeout_;}
@@ -117,7 +117,7 @@ private:
     Command & command);
   int check_lengths();
   void hold(const Six & feedback, Command & command) const;
-  int refuse(int code, const char * rule, int leg = 0);
+  int reject(int code, const char * rule, int leg = 0);
 
   stewart_platform hexapod_;
   stewart_pose guess_;
@@ -125,8 +125,8 @@ private:
   bool started_ = false;
   stewart_motion held_{};  // the last reference that was followed, at rest
   Six held_lengths_{}, held_wrench_{};
-  const char * refusal_ = nullptr;
-  int refused_leg_ = 0;
+  const char * rejection_ = nullptr;
+  int rejected_leg_ = 0;
   stewart_state state_{};
   stewart_output output_{};
 };

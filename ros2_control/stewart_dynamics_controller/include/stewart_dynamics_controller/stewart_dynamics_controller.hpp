@@ -68,7 +68,7 @@ private:
   void on_setpoint(const Setpoint & message, const std::string & base_frame);
   Six read(std::size_t first) const;
   int compute(std::int64_t now);
-  /// Name of the leg that is refused, for a line of the log; empty if the rule is not one of a leg.
+  /// Name of the leg that is rejected, for a line of the log; empty if the rule is not one of a leg.
   const char * leg_text() const;
   bool write(const std::string & interface, const Six & values);
 
@@ -84,8 +84,8 @@ private:
   realtime_tools::RealtimeThreadSafeBox<std::optional<PlatformNumbers>> received_;
   std::int64_t received_at_ = -1;  // time of the cycle that took the last setpoint [ns]; none: -1
   std::int64_t deactivated_at_ = 0;  // [ns]
-  bool was_chained_ = false;  // when it was activated last
-  const char * last_refusal_ = nullptr;
+  bool was_chained_ = false, left_chain_ = false;  // when it was activated last
+  const char * last_rejection_ = nullptr;
 };
 
 }  // namespace stewart_dynamics_controller
