@@ -92,6 +92,9 @@ bool finite(const Six & numbers)
   return std::all_of(numbers.begin(), numbers.end(), [](double each) {return std::isfinite(each);});
 }
 
+constexpr char kTooFar[] =
+  "farther from the last command than limits.velocity_max allows in setpoint.timeout";
+
 const char * text_of(int code)
 {
   switch (code) {
@@ -232,7 +235,8 @@ int FeedForward::follow(
   if (!finite(feedback)) {
     return reject(STEWART_NOT_FINITE, text_of(STEWART_NOT_FINITE));
   }
-  state_.followed = 0;  // cycles repeat references that come more rarely: check_lengths judges steps
+  // Cycles repeat references that come more rarely: steps are judged by check_lengths instead.
+  state_.followed = 0;
   int code = stewart_step(&hexapod_, &motion, wrench.data(), nullptr, now, &state_, &output_);
   if (code != STEWART_OK) {
     return reject(code, text_of(code));
@@ -256,7 +260,9 @@ int FeedForward::follow(
   held_wrench_ = wrench;
   followed_at_ = now;
   started_ = true;
-  return reject(STEWART_OK, nullptr);
+  rejection_ = nullptr;
+  rejected_leg_ = 0;
+  return STEWART_OK;
 }
 
 /// Whatever limits.action says: no drive may get a position that its leg cannot have, or a step
@@ -274,9 +280,7 @@ int FeedForward::check_lengths()
     }
     const double step = length - held_lengths_[static_cast<std::size_t>(n)];
     if (started_ && std::fabs(step) > farthest) {
-      return reject(
-        STEWART_SUPPRESSED,
-        "farther from the last command than limits.velocity_max allows in setpoint.timeout", n + 1);
+      return reject(STEWART_SUPPRESSED, kTooFar, n + 1);
     }
   }
   return STEWART_OK;

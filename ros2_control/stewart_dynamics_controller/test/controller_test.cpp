@@ -258,7 +258,7 @@ int main(int count, char ** arguments)
   CHECK(std::fabs(leader->commanded[0] - kPositions[0] - 0.01) < 1e-12);
   CHECK(std::fabs(leader->efforts[0] - kForces[0]) > 0.1);
 
-  // NaN, or a stroke of .81 m where .70 is the most: the platform is held, then the next is answered.
+  // NaN, or a stroke of .81 m where .70 is the most: the platform is held, the next is followed.
   for (const double wrong : {kNaN, 0.81}) {
     leader->positions = kPositions;
     cycle(2);
@@ -286,8 +286,8 @@ int main(int count, char ** arguments)
   CHECK(logged("platform held, reference rejected: suppressed by singularity.action"));
   CHECK(close(leader->commanded, kPositions, 1e-12));
   CHECK(close(leader->efforts, kForces, 1e-6));
-  set({Parameter("singularity.warn_condition", 20.0), Parameter("singularity.stop_condition", 100.0),
-    Parameter("singularity.action", "warn")});
+  set({Parameter("singularity.warn_condition", 20.0),
+    Parameter("singularity.stop_condition", 100.0), Parameter("singularity.action", "warn")});
   leader->positions = kPositions;
   cycle(3);
   CHECK(close(leader->efforts, kForces, 1e-6));

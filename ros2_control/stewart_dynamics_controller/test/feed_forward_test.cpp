@@ -319,7 +319,8 @@ const Rejection kRejections[] = {
 /// no position without its effort, no effort of a motion that has ended.
 void test_hold()
 {
-  const Six wrench = {10.0, -20.0, 30.0, 1.0, 2.0, -3.0}, feedback = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
+  const Six wrench = {10.0, -20.0, 30.0, 1.0, 2.0, -3.0};
+  const Six feedback = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
   const PlatformReference moving = swing(0.02);
   PlatformReference resting = moving;
   resting.linear_velocity = resting.angular_velocity = {};

@@ -68,7 +68,7 @@ private:
   void on_setpoint(const Setpoint & message, const std::string & base_frame);
   Six read(std::size_t first) const;
   int compute(std::int64_t now);
-  /// Name of the leg that is rejected, for a line of the log; empty if the rule is not one of a leg.
+  /// Name of the leg that is rejected, for the log; empty if the rule is not one of a leg.
   const char * leg_text() const;
   bool write(const std::string & interface, const Six & values);
 
