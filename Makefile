@@ -33,7 +33,22 @@ ROS := pypi
 REQUIREMENTS := requirements.txt requirements-ros.txt
 endif
 
-ifneq ($(filter pypi kilted,$(ROS)),)
+# DEPENDENCIES=newest, =oldest: the newest or the oldest versions that setup.py admits, without ROS, in
+# an environment of its own, and for each PYTHON=... Without it, the newest Python that is found, also
+# by pyenv, or the oldest: it has wheels of old versions.
+VERSIONS := $(if $(filter command,$(origin DEPENDENCIES)),$(DEPENDENCIES))
+ifneq ($(filter-out newest oldest,$(VERSIONS)),)
+$(error DEPENDENCIES=$(VERSIONS): must be newest or oldest, or not given)
+endif
+ifneq ($(VERSIONS),)
+ROS := none
+VENV_OPTIONS :=
+REQUIREMENTS := setup.py .ci/setup_requirements.py
+PYTHONS := $(or $(PYTHON),$(foreach version,$(if $(filter oldest,$(VERSIONS)),10 11 12 13,13 12 11 10), \
+  python3.$(version) $(wildcard $(HOME)/.pyenv/versions/3.$(version).*/bin/python3.$(version))))
+endif
+
+ifneq ($(filter pypi kilted none,$(ROS)),)
 # Variables of another ROS installation, or of another environment with these wheels.
 ifneq ($(ROS_DISTRO)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH LD_LIBRARY_PATH RMW_IMPLEMENTATION
@@ -59,14 +74,15 @@ export XDG_CACHE_HOME := $(CACHE)
 # Processes that run the tests.
 TESTERS := 4
 
-VENV := .venv$(if $(filter kilted,$(ROS)),-kilted)
+VENV := .venv$(if $(filter kilted,$(ROS)),-kilted)$(if $(VERSIONS),-$(VERSIONS)$(if $(PYTHON),-$(notdir $(PYTHON))))
 PIP := $(VENV)/bin/python -m pip --quiet
 # One stamp for each kind of environment, with and without a sourced ROS.
-DEPENDENCIES := $(VENV)/dependencies-$(ROS)
+PREPARED := $(VENV)/dependencies-$(ROS)
 INSTALLED := $(VENV)/installed-$(ROS)
 
-# More processes than cores: tests with ROS wait half of the time. One module, one process.
-test: lint
+# More processes than cores: tests with ROS wait half of the time. One module, one process. Linters
+# look at the pinned environment alone.
+test: $(if $(VERSIONS),$(INSTALLED),lint)
 	$(VENV)/bin/python -m pytest --numprocesses $(TESTERS) --dist loadfile --no-loadscope-reorder
 
 # Beside one another: mypy and flake8 take nearly the same time.
@@ -160,7 +176,7 @@ docs-site: $(INSTALLED)
 environment: $(INSTALLED)
 	@$(VENV)/bin/stewart_dynamics --compile
 
-$(DEPENDENCIES): $(REQUIREMENTS)
+$(PREPARED): $(REQUIREMENTS)
 	@for python in $(PYTHONS); do \
 	  if "$$python" -c '$(SUITABLE)' 2>/dev/null; then found=$$python; break; fi; \
 	done; \
@@ -171,18 +187,23 @@ $(DEPENDENCIES): $(REQUIREMENTS)
 	fi; \
 	echo "making $(VENV) with $$("$$found" --version), ROS from $(ROS)"; \
 	"$$found" -m venv --clear $(VENV_OPTIONS) $(VENV)
+ifeq ($(VERSIONS),)
 	@cat $(REQUIREMENTS) > $(VENV)/requirements.txt
+else
+	@$(PIP) install setuptools
+	@$(VENV)/bin/python .ci/setup_requirements.py $(VERSIONS) > $(VENV)/requirements.txt
+endif
 	@$(PIP) install --upgrade --constraint $(VENV)/requirements.txt pip setuptools
 	@$(PIP) install --no-build-isolation --requirement $(VENV)/requirements.txt
 	@touch $@
 
 # Not isolated: the build uses the pinned setuptools. It warns of every editable package that has a
 # folder of its own name.
-$(INSTALLED): $(DEPENDENCIES) requirements-fmi.txt setup.py setup.cfg pyproject.toml
+$(INSTALLED): $(PREPARED) requirements-fmi.txt setup.py setup.cfg pyproject.toml
 	@$(PIP) install --no-deps --requirement requirements-fmi.txt
 	@PYTHONWARNINGS=ignore $(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@
 
 clean:
-	rm -rf .cache .venv .venv-kilted build docs/_build install log *.egg-info
+	rm -rf .cache .venv .venv-* build docs/_build install log *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -33,7 +33,7 @@ install_requires = [
     # Upper bounds: tested up to these; the compiler reads numba's IR and writes object files.
     'llvmlite>=0.44,<0.51; platform_machine in "x86_64 AMD64 aarch64 arm64"',
     'lz4>=4',
-    'mcap>=1.2',
+    'mcap>=1.2.1',
     'numba>=0.61,<0.69; platform_machine in "x86_64 AMD64 aarch64 arm64"',
     'numpy>=1.26',
     'orjson>=3.9',
@@ -49,7 +49,7 @@ extras_require = {
     'differentiate': ['scipy>=1.10'],
     'docs': [
         'docutils>=0.20',
-        'furo>=2024.1',
+        'furo>=2024.1.29',
         'myst-parser>=2',
         'numpydoc>=1.6',
         'sphinx>=7.2',

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import argparse
 from importlib.metadata import version
-import json
 import os
 from pathlib import Path
 import platform
@@ -49,6 +48,7 @@ from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.whole_file import write_json
 
 BEGIN, END = '<!-- replay: begin -->', '<!-- replay: end -->'
 PARAMETERS = HERE.parent / 'config' / 'platform.yaml'
@@ -424,7 +424,7 @@ def main() -> None:
              fleet, '', measured_on(size, options.rounds), '']
     print('\n'.join(lines))
     if options.json:
-        options.json.write_text(json.dumps(rounds, indent=1) + '\n', encoding='utf-8')
+        write_json(options.json, rounds)
     if options.write:
         write(lines, BEGIN, END)
 

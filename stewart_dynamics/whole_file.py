@@ -27,6 +27,7 @@ import secrets
 import stat
 from typing import Any
 
+import numpy as np
 from stewart_dynamics.errors import shown, StewartError
 
 
@@ -112,8 +113,27 @@ def now() -> str:
 
 def write_json(path: Path, document: Any) -> None:
     """Write a document as JSON, complete or not at all."""
-    write_files({path: json.dumps(
-        document, indent=2, allow_nan=False, ensure_ascii=False) + '\n'})
+    write_files({path: to_json(document, indent=2) + '\n'})
+
+
+def to_json(document: Any, indent: int | None = None) -> str:
+    """
+    Return a document as JSON, on one line unless lines are indented.
+
+    Numpy scalars and arrays are written as numbers and lists.
+
+    Raises ValueError: a number is not finite.
+    """
+    # Not orjson: it writes null for NaN, and takes no names that are not UTF-8.
+    return json.dumps(document, indent=indent, separators=None if indent else (',', ':'),
+                      allow_nan=False, ensure_ascii=False, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    """Return a numpy scalar or array as Python's own numbers."""
+    if not isinstance(value, (np.generic, np.ndarray)):
+        raise TypeError(f'{value!r}: {type(value).__name__} has no form in JSON')
+    return value.tolist()
 
 
 @contextmanager

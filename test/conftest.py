@@ -17,11 +17,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing, ExitStack
+from importlib.util import find_spec
 from itertools import count
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
 from subprocess import DEVNULL
@@ -52,6 +54,8 @@ settings.load_profile('repeatable')
 
 # The module running needs ROS; the tests of the library do not, so it is imported where used.
 
+ROS_PACKAGE = re.compile(r'rclpy|\w+_(msgs|srvs|interfaces)')
+
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Before several processes run the tests, compile once what each of them would compile."""
@@ -63,6 +67,20 @@ def pytest_sessionstart(session: pytest.Session) -> None:
                                Path(__file__).parent], stdin=DEVNULL, stdout=DEVNULL) as reading:
             subprocess.run([sys.executable, '-c', COMPILE_ALL], check=True, stdin=DEVNULL)
             reading.terminate()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+        collector: pytest.Collector,
+        ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Skip a module of tests that imports ROS if it is not installed."""
+    report = yield
+    error = report.call.excinfo.value.__cause__ if report.failed else None
+    if isinstance(error, ModuleNotFoundError) and find_spec('rclpy') is None and (
+            ROS_PACKAGE.match(error.name)):
+        report.outcome = 'skipped'
+        report.longrepr = str(collector.path), 0, f'Skipped: needs ROS: no {error.name} here'
+    return report
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

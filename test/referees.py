@@ -41,6 +41,7 @@ from stewart_dynamics import BaseMotion, Motion, Parameters
 Array = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parents[1]
+PLATFORM = ROOT / 'config' / 'platform.yaml'
 SEED = 20180926
 STANDARD_GRAVITY = 9.80665
 

@@ -65,7 +65,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.task import Future
 from rclpy.time import Time
-from referees import ROOT
+from referees import PLATFORM, ROOT  # noqa: F401
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header
 from stewart_dynamics import Motion, Parameters, StewartPlatform
@@ -78,7 +78,6 @@ from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 import yaml
 
-PLATFORM = ROOT / 'config' / 'platform.yaml'
 NODE = '/stewart_dynamics'
 FEEDER = Path(__file__).with_name('feeder.py')
 

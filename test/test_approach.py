@@ -28,8 +28,7 @@ from stewart_dynamics.planned import messages as planned
 from stewart_dynamics.planned.messages import PlannedOutcome
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
-from test_planned_trajectory_messages import decoded
-from trajectories import Array, PARAMETERS, rows_of, STAMP
+from trajectories import Array, decoded, PARAMETERS, rows_of, STAMP
 
 PLATFORM = StewartPlatform(PARAMETERS)
 HOME = PLATFORM.home_pose()

@@ -24,9 +24,9 @@ import numpy as np
 import pytest
 import recorded
 from recorded import Recorded
+from referees import PLATFORM
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
-from running import PLATFORM
 from stewart_dynamics import (
     check_planned_trajectory, Motion, ParameterError, Parameters, Pose, StewartError,
     StewartPlatform)

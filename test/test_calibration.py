@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.testing import assert_allclose
 import pytest
-from running import PLATFORM
+from referees import PLATFORM
 from stewart_dynamics import (
     calibrate, MotionError, ParameterError, Parameters, Pose, StewartError, StewartPlatform)
 from stewart_dynamics.calibration.equations import (

@@ -494,7 +494,7 @@ def test_legs_that_are_too_near_reject_a_pose_and_make_a_motion_impossible(
         platform = StewartPlatform(p.replaced({
             'limits.leg_clearance_min': factor * float(np.min(nearest))}))
         used = uses(platform, recorded)
-        assert judged(platform, recorded, used)['possible'] is possible
+        assert judged(platform, recorded, used)['possible'] == possible
     rated = RatedHexapod(p)
     assert rated.clearance() == pytest.approx(rated.loads.clearance(rated.pose))
     assert RatedHexapod(PARAMETERS).clearance() is None

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import suppress
 import csv
 import errno
 import fcntl
@@ -57,6 +58,7 @@ from stewart_dynamics import BagError, Parameters, StewartError
 from stewart_dynamics.bags.find import folders_of_results
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.bag_task import finished, kept, replay_task, Task
+from stewart_dynamics.replay.local_processes import _start_server
 from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE, Options
@@ -354,6 +356,34 @@ def test_a_process_that_dies_costs_only_its_bag(
     check_only_the_long_one_failed(fleet, pairs, output)
     assert fleet.ended[0].error == (f'{bags / "long"}: every process that replayed it was killed '
                                     '(out of memory?)')
+
+
+def fork_server() -> int:
+    """Return the process that starts the processes of this one."""
+    def is_server(process: Path) -> bool:
+        with suppress(OSError):  # it has ended
+            parent = process.joinpath('stat').read_text().rpartition(')')[2].split()[1]
+            return parent == f'{os.getpid()}' and b'forkserver' in (
+                process / 'cmdline').read_bytes()
+        return False
+
+    return int(next(filter(is_server, Path('/proc').glob('[0-9]*'))).name)
+
+
+@pytest.mark.parametrize('begun', [False, True])
+def test_a_killed_fork_server_costs_no_bag(bags: Path, tmp_path: Path, begun: bool) -> None:
+    output = tmp_path / 'out'
+    pairs = folders_of_results([bags], output)
+    with ThreadPoolExecutor() as apart:
+        if not begun:  # before the first process is started
+            _start_server()
+            os.kill(fork_server(), signal.SIGKILL)
+        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN, 2)
+        if begun:
+            until(lambda: process_in(output, 'long'), 'a process in the middle of a bag')
+            os.kill(fork_server(), signal.SIGKILL)
+        fleet = running.result()
+    check_each_once(fleet, pairs, output)
 
 
 def test_processes_that_cannot_start_are_reported_at_once(bags: Path, tmp_path: Path) -> None:

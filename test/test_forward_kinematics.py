@@ -172,7 +172,7 @@ def test_a_pose_near_singularities_is_found_from_every_guess_on_its_side() -> No
     platform = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
     home, random, count = platform.home_pose(), np.random.default_rng(5), 10_000
     yaw = np.radians(random.uniform(60.0, 90.0, count)) * random.choice([-1.0, 1.0], count)
-    turned = Rotation.from_euler('z', yaw) * Rotation.from_rotvec(
+    turned = Rotation.from_euler('z', yaw[:, None]) * Rotation.from_rotvec(
         random.uniform(-0.1, 0.1, (count, 3)))
     poses = Pose(home.position + random.uniform(-0.1, 0.1, (count, 3)), turned.as_matrix())
     away, about = (axes / np.linalg.norm(axes, axis=1)[:, None]

@@ -32,6 +32,7 @@ from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary_text import _measured_lines, measured_headline
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
+from stewart_dynamics.whole_file import to_json
 
 Array = NDArray[np.float64]
 
@@ -161,7 +162,7 @@ def test_the_external_wrench_is_the_load_missing_in_the_model(seed: int) -> None
             np.sqrt(np.mean(computed[:, number] ** 2)), rel=1e-12)
         assert found['correlation'] == pytest.approx(
             np.corrcoef(measured[:, number], computed[:, number])[0, 1], rel=1e-9)
-    assert 'NaN' not in json.dumps(values)
+    assert 'NaN' not in to_json(values)
 
 
 def test_a_load_in_the_model_leaves_no_residual() -> None:
@@ -319,7 +320,7 @@ def test_nothing_compared_gives_null() -> None:
     comparison = Comparison(case.parameters)
     for each in compared(comparison, case):
         assert len(each) == 0
-    values = json.loads(json.dumps(comparison.values(), allow_nan=False))
+    values = json.loads(to_json(comparison.values()))
     assert values['setpoints_compared'] == values['samples'] == 0
     assert values['setpoints_not_compared']['without_measurement'] == 3
     assert values['legs']['leg_1'] == dict.fromkeys(values['legs']['leg_1'])
@@ -341,7 +342,7 @@ def test_standing_still_gives_no_correlation() -> None:
     comparison.add_setpoints(np.arange(50) * 0.01, batch, outputs)
     comparison.add_measured(stamps, np.full((50, 6), 100.0))
     comparison.finish()
-    leg = json.loads(json.dumps(comparison.values(), allow_nan=False))['legs']['leg_1']
+    leg = json.loads(to_json(comparison.values()))['legs']['leg_1']
     assert leg['correlation'] is None
     assert leg['measured_rms_n'] == pytest.approx(100.0)
 

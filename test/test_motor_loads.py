@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 import re
 from typing import Any
@@ -38,6 +37,7 @@ from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.motor_step import DEMANDED_TORQUES, MOTOR_ROW, SPEEDS
 from stewart_dynamics.setpoints.step import Batch, Step
+from stewart_dynamics.whole_file import to_json
 
 DRIVES = {
     'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01, 'drive.motor_inertia': 5e-5,
@@ -69,7 +69,7 @@ def summary_of(p: Parameters, motion: Motion, times: Array, edges: list[int],
         state = outputs.state
         summary.add(Answered(times[first:end], block, outputs, base.many(block)))
     values = summary.values()
-    json.dumps(values, allow_nan=False)
+    to_json(values)
     return values
 
 

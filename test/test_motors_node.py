@@ -90,13 +90,14 @@ def test_the_simulator_takes_torques_and_gives_motor_states(
     from test_simulator_node import FILE
     simulator = begin(STEPPED, 'commands:=torque', files=(file, FILE))
     states = simulator.peer.listen(f'{SIMULATOR}/motor_states', JointState)
+    simulator.until(lambda: states, 'motor states come')  # the first is repeated until a command
     platform = StewartPlatform.from_yaml(file)
     home = simulator.last('pose').pose.position
     from stewart_dynamics import Motion
     torques = platform.motors(Motion([home.x, home.y, home.z], np.eye(3))).torques
     simulator.step(torques)
     stamp = simulator.step(2.0 * torques)
-    simulator.until(lambda: states and stamp_of(states[-1]) == stamp, 'motor states have come')
+    simulator.until(lambda: stamp_of(states[-1]) == stamp, 'motor states have come')
     state = deserialize_message(states[-1], JointState)
     assert state.name[0] == 'leg_1_motor'
     np.testing.assert_allclose(state.effort, 2.0 * torques, rtol=1e-12)

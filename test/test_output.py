@@ -57,7 +57,7 @@ def turning(number: int, first: int = 0) -> Outputs:
     n = np.arange(first, first + number)
     motions = np.zeros((number, 24))
     motions[:, 2] = 1.1
-    motions[:, 3:12] = Rotation.from_euler('z', 0.01 * n).as_matrix().reshape(-1, 9)
+    motions[:, 3:12] = Rotation.from_euler('z', 0.01 * n[:, None]).as_matrix().reshape(-1, 9)
     motions[:, 17] = 1.0
     return STEP.many(Batch(1_000_000 * (n + 1), motions, np.zeros((number, 6)),
                            np.zeros(number, dtype=bool), times_of(number, first)), None)

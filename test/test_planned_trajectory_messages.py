@@ -39,7 +39,8 @@ from stewart_dynamics.planned.messages import PlannedOutcome
 from stewart_dynamics.planned.trajectory import NOT_INCREASING, PIECE, TOO_FAR
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, NOT_FINITE, NOT_UNIT
 from trajectories import (
-    Array, counted, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, STAMP, UNBOUND)
+    Array, counted, decoded, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, STAMP,
+    UNBOUND)
 
 
 def outcome_of(data: bytes, parameters: Parameters = PARAMETERS, wrench: Six = NO_WRENCH,
@@ -56,12 +57,6 @@ def outcome_of(data: bytes, parameters: Parameters = PARAMETERS, wrench: Six = N
 def efforts(outcome: PlannedOutcome) -> bytes:
     """Return the bits of the efforts of an answer."""
     return np.array([point.effort for point in decoded(outcome).points]).tobytes()
-
-
-def decoded(outcome: PlannedOutcome) -> Any:
-    """Return the answer as another library reads it."""
-    assert outcome.answer, outcome.message
-    return messages.STORE.deserialize_cdr(outcome.answer, planned.OUTPUT_TYPE)
 
 
 # Accepted

@@ -399,7 +399,8 @@ def test_a_simulator_that_was_stopped_takes_what_is_due_and_skips_the_rest(
     simulator.until(lambda: time.monotonic() > end, 'a second goes by')
     simulator.program.process.send_signal(signal.SIGCONT)
     simulator.until_said('WARN', 'fell behind by')
-    simulator.until(lambda: np.diff(simulator.stamps()).max() > 500_000_000, 'a gap of a second')
+    simulator.until(lambda: np.any(np.diff(simulator.stamps()) > 500_000_000),
+                    'a gap of a second')
     many = len(simulator.raw['leg_states'])
     simulator.until(lambda: len(simulator.raw['leg_states']) > many + 100, 'it goes on')
     assert np.all(np.diff(simulator.stamps()) >= 20_000_000)
@@ -491,7 +492,8 @@ def test_in_real_time_the_base_moves_from_the_first_command_on(begin: Start) -> 
         'base_motion.source': 'sine', 'base_motion.ramp': 0.2, 'base_motion.frequency': 1.0,
         'base_motion.amplitude': [0.0, 0.0, 0.2, 0.1, 0.0, 0.0], 'imu.rate': 100.0}))
     of_base = listen_to_base(simulator)
-    simulator.until(lambda: len(of_base['imu']) > 20, 'the IMU is there')
+    simulator.until(lambda: all(of_base.values()) and len(of_base['imu']) > 20,
+                    'the base and the IMU are there')
     for data in of_base['imu']:
         force = deserialize_message(data, Imu).linear_acceleration
         assert (force.x, force.y, force.z) == (0.0, 0.0, 9.80665)

@@ -19,12 +19,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import json
+import math
 import os
 from pathlib import Path
 import resource
 import stat
 import sys
+from typing import Any
 
+import numpy as np
 import pytest
 from referees import ROOT
 from stewart_dynamics import ParameterError, Parameters, StewartError
@@ -32,7 +36,7 @@ from stewart_dynamics.description.describe_command_line import main as describe
 from stewart_dynamics.replay.index import write_fleet
 from stewart_dynamics.replay.replay_command_line import main as replay
 from stewart_dynamics.reporting.results_folder import RESULT, whole_folder
-from stewart_dynamics.whole_file import read_text, write_files, write_json
+from stewart_dynamics.whole_file import read_text, to_json, write_files, write_json
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 FULL = 2000  # [bytes]
@@ -178,3 +182,24 @@ def test_pipes_and_devices_are_rejected_without_waiting(tmp_path: Path) -> None:
             read_text(path, 100, ParameterError)
     with pytest.raises(ParameterError, match='cannot be read: Is a directory'):
         read_text(tmp_path, 100, ParameterError)
+
+
+def test_json_takes_numpy_scalars_and_arrays(tmp_path: Path) -> None:
+    document = {'count': np.count_nonzero(np.ones(3)), 'flag': np.bool_(True), 'a': np.arange(2),
+                'b': [np.float32(0.5), np.int64(3)], 'c': (np.float64(0.1), np.str_('x')),
+                'd': None, 'e': np.eye(2), 'f': 'ä\udcff'}
+    write_json(tmp_path / 'a.json', document)
+    assert json.loads((tmp_path / 'a.json').read_text('utf-8')) == {
+        'count': 3, 'flag': True, 'a': [0, 1], 'b': [0.5, 3], 'c': [0.1, 'x'], 'd': None,
+        'e': [[1.0, 0.0], [0.0, 1.0]], 'f': 'ä\udcff'}
+    assert to_json(document['a']) == '[0,1]'
+
+
+@pytest.mark.parametrize('value', [
+    math.nan, np.float64(math.inf), np.float32(math.nan), np.array([[0.0, -math.inf]])])
+def test_json_has_no_numbers_that_are_not_finite(tmp_path: Path, value: Any) -> None:
+    with pytest.raises(ValueError, match='not JSON compliant'):
+        write_json(tmp_path / 'a.json', {'a': [value]})
+    assert not any(tmp_path.iterdir())
+    with pytest.raises(TypeError, match='PosixPath has no form in JSON'):
+        to_json(tmp_path)

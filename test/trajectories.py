@@ -16,6 +16,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import messages
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -24,6 +27,7 @@ from referees import rng, ROOT
 from stewart_dynamics import Motion, Parameters
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
+from stewart_dynamics.planned.messages import OUTPUT_TYPE, PlannedOutcome
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
@@ -86,3 +90,9 @@ def some(points: int) -> tuple[list[int], Array]:
     rows = rows_of(motion_at(motion, times * 1e-9))
     rows[:, 3:7] *= random.uniform(0.9995, 1.0005, (points, 1))
     return times.tolist(), rows
+
+
+def decoded(outcome: PlannedOutcome) -> Any:
+    """Return the answer as another library reads it."""
+    assert outcome.answer, outcome.message
+    return messages.STORE.deserialize_cdr(outcome.answer, OUTPUT_TYPE)

@@ -57,14 +57,14 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
                 strict=True)],
         'combinations': combined(what, found.names, units, found.values, found.covariance),
         'rank': what.rank, 'unknowns': len(found.names) - found.states.count(FIXED),
-        'singular_values': what.singular_values.tolist(),
+        'singular_values': what.singular_values,
         'not_identified': found.not_identified,
         'noise': {'given': found.noise_given, 'length_m': found.noise.length,
                   'position_m': found.noise.position, 'rotation_rad': found.noise.rotation},
         'frames': None if found.frames is None else {
             'device_in_base': _pose(found.frames.device),
             'target_in_platform': _pose(inverse(found.frames.target))},
-        'residuals': {'legs': {joint: {'before_rms_m': float(before), 'after_rms_m': float(after)}
+        'residuals': {'legs': {joint: {'before_rms_m': before, 'after_rms_m': after}
                                for joint, before, after in zip(
                                    joints, found.before, found.after, strict=True)},
                       'before_rms_m': math.sqrt((found.before ** 2).mean()),
@@ -81,8 +81,8 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
         'calibrated': found.parameters.plain()}
 
 
-def _pose(pose: Pose) -> dict[str, list[float]]:
-    return {'position_m': pose.position.tolist(), 'quaternion': pose.quaternion.tolist()}
+def _pose(pose: Pose) -> dict[str, Any]:
+    return {'position_m': pose.position, 'quaternion': pose.quaternion}
 
 
 def _errors(errors: PoseErrors) -> dict[str, float]:

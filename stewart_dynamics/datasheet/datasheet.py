@@ -39,6 +39,7 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.reporting.block_statistics import finite
 from stewart_dynamics.reporting.results_folder import (
     DATASHEET, DATASHEET_PAGE, whole_folder, WORKSPACE)
 from stewart_dynamics.whole_file import now, write_files, write_json
@@ -183,26 +184,22 @@ def _checked(hexapod: RatedHexapod, ranges: Array) -> dict[str, Any]:
     worst = found.worst
     factor = None
     if (ranges[:, 0] <= 0.0).all() and (ranges[:, 1] >= 0.0).all():
-        factor = _finite(hexapod.reachable_factor(ranges).value)
+        factor = finite(hexapod.reachable_factor(ranges).value)
     moved = hexapod.displacement(Pose(
         worst.pose.position + worst.pose.rotation @ hexapod.pivot, worst.pose.rotation))
-    return {'possible': bool(found.certain), 'ranges': claimed_box.in_words(ranges),
+    return {'possible': found.certain, 'ranges': claimed_box.in_words(ranges),
             'factor': factor, 'limit': worst.limit,
             'leg': hexapod.joints[worst.leg] if worst.leg >= 0 else None,
-            'excess': _finite(worst.excess),
-            'displacement': dict(zip(AXES, moved.tolist(), strict=True)),
-            'position': worst.pose.position.tolist(),
-            'angles': to_euler(worst.pose.rotation).tolist()}
-
-
-def _finite(value: Any) -> float | None:
-    return float(value) if math.isfinite(value) else None
+            'excess': finite(worst.excess),
+            'displacement': dict(zip(AXES, moved, strict=True)),
+            'position': worst.pose.position,
+            'angles': to_euler(worst.pose.rotation)}
 
 
 def _smallest_tilt(boundary: workspace.Boundary, hexapod: RatedHexapod) -> dict[str, Any]:
     """Return the tilt toward every azimuth, and the azimuth of the smallest [rad]."""
     n = int(np.argmin(boundary.values))
-    found = answer(float(boundary.values[n]), boundary.limits[n], boundary.legs[n],
+    found = answer(boundary.values[n], boundary.limits[n], boundary.legs[n],
                    hexapod.joints)
     return found | {'azimuth': 2.0 * math.pi * n / len(boundary.values)}
 

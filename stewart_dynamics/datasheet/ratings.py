@@ -90,16 +90,16 @@ DIRECTIONS = np.repeat(np.eye(6), 2, axis=0) * np.tile([1.0, -1.0], 6)[:, None]
 """(12, 6): translation and rotation of KEYS, base axes."""
 
 
-def answer(value: float, limit: str, leg: int, joints: Sequence[str]) -> dict[str, Any]:
+def answer(value: Any, limit: Any, leg: Any, joints: Sequence[str]) -> dict[str, Any]:
     """Return an extent for JSON: null where nothing limits, legs by their names."""
     limited = math.isfinite(value)
-    return {'value': float(value) if limited else None, 'limit': str(limit) if limited else None,
+    return {'value': value if limited else None, 'limit': limit if limited else None,
             'leg': joints[leg] if limited and leg >= 0 else None}
 
 
 def answers(found: Extent, joints: Sequence[str], keys: Sequence[str] = KEYS) -> dict[str, Any]:
     """Return the extents (N,) of some directions for JSON."""
-    return {key: answer(value, limit, int(leg), joints) for key, value, limit, leg in zip(
+    return {key: answer(value, limit, leg, joints) for key, value, limit, leg in zip(
         keys, found.value, found.limit, found.leg, strict=True)}
 
 

@@ -39,6 +39,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics
 from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.reporting.block_statistics import finite
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.step import Batch
 
@@ -155,13 +156,12 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
     joints = p['joints']
     worst = max(used, key=lambda name: float(used[name].max()))
     sample = int(used[worst].argmax())
-    singular = bool(used[SINGULARITY].max() >= 1.0)
+    singular = used[SINGULARITY].max() >= 1.0
     found: dict[str, Any] = {
-        'possible': not singular and bool(used[worst][sample] <= 1.0 + limits.TOLERANCE),
-        'samples': len(recorded.seconds), 'duration_s': float(recorded.seconds[-1]),
-        'largest_use': {name: float(each.max()) if np.isfinite(each.max()) else None
-                        for name, each in used.items()},
-        'largest_use_limit': worst, 'largest_use_at_s': float(recorded.seconds[sample])}
+        'possible': not singular and used[worst][sample] <= 1.0 + limits.TOLERANCE,
+        'samples': len(recorded.seconds), 'duration_s': recorded.seconds[-1],
+        'largest_use': {name: finite(each.max()) for name, each in used.items()},
+        'largest_use_limit': worst, 'largest_use_at_s': recorded.seconds[sample]}
     if found['possible'] and not (c.limits_rates or c.limits_forces):
         found |= {'factor': None, 'limit': None, 'leg': None, 'at_s': None}
     else:
@@ -172,10 +172,10 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
         between = _between(c, recorded, joints)
     if len(recorded.seconds) <= _MOST and not singular:
         larger = c.amplitude_factor(recorded.motion, None, recorded.wrench, recorded.base)
-        amplitude = answer(float(larger.value), str(larger.limit), int(larger.leg), joints)
+        amplitude = answer(larger.value, larger.limit, larger.leg, joints)
     if c.limits_forces and found['factor'] != 0.0:
         more = c.payload(recorded.motion, np.zeros(3))
-        payload = answer(float(more.value), str(more.limit), int(more.leg), joints)
+        payload = answer(more.value, more.limit, more.leg, joints)
     return found | {'between_setpoints': between, 'amplitude': amplitude, 'payload': payload}
 
 
@@ -208,6 +208,6 @@ def _between(capability: Capability, recorded: RecordedMotion, joints: Any) -> d
 
 
 def _named(name: str, extent: Any, recorded: RecordedMotion, joints: Any) -> dict[str, Any]:
-    plain = answer(float(extent.value), str(extent.limit), int(extent.leg), joints)
+    plain = answer(extent.value, extent.limit, extent.leg, joints)
     return {name: plain['value'], 'limit': plain['limit'], 'leg': plain['leg'],
-            'at_s': None if extent.sample is None else float(recorded.seconds[extent.sample])}
+            'at_s': None if extent.sample is None else recorded.seconds[extent.sample]}

@@ -234,9 +234,9 @@ class Identification:
             self.extracts.add(len(self.bags), (window.begin - begin) * NANOSECOND, last)
             counts.update({
                 'samples': len(window.positions), 'stops': last.stops,
-                'outliers': int(np.count_nonzero(window.outliers)), 'speeds': speeds.size,
-                'slow': int(np.count_nonzero(
-                    speeds < self.parameters['actuator.coulomb_velocity']))})
+                'outliers': np.count_nonzero(window.outliers), 'speeds': speeds.size,
+                'slow': np.count_nonzero(
+                    speeds < self.parameters['actuator.coulomb_velocity'])})
             end = window.begin + round(len(window.positions) * window.period * SECOND)
         if extraction is None or last is None or motion is None:
             return None

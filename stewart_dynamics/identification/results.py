@@ -126,8 +126,8 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
         'date': now(),
         'bags': [{
             **bag._asdict(), 'bag': str(bag.bag),
-            'delay_s': float(delay + bag.delay_s) if error else None,
-            'delay_standard_error_s': float(error) if error else None,
+            'delay_s': delay + bag.delay_s if error else None,
+            'delay_standard_error_s': error if error else None,
         } for bag, delay, error in zip(
             found.bags, found.fit.delays, found.errors.delays, strict=True)],
         'options': {
@@ -141,7 +141,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
         'combinations': combined(
             what, u.names, u.units, found.fit.values, found.errors.covariance),
         'rank': what.rank, 'unknowns': len(u.names),
-        'singular_values': what.singular_values.tolist(),
+        'singular_values': what.singular_values,
         'residuals': _residuals(joints, found.residuals),
         'validation': None if found.validation is None else {
             'samples': found.validation.samples, **_residuals(joints, found.validation)},
@@ -174,9 +174,9 @@ def _residuals(joints: Sequence[str], residuals: Residuals) -> dict[str, Any]:
     """Return the residuals of each leg, and their RMS of all legs."""
     rms = {'before_rms_n': residuals.before, 'after_rms_n': residuals.after,
            'measured_rms_n': residuals.measured}
-    return {'legs': {joint: {key: float(values[leg]) for key, values in rms.items()}
+    return {'legs': {joint: {key: values[leg] for key, values in rms.items()}
                      for leg, joint in enumerate(joints)},
-            **{key: float(np.sqrt(np.mean(values ** 2))) for key, values in rms.items()}}
+            **{key: np.sqrt(np.mean(values ** 2)) for key, values in rms.items()}}
 
 
 def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:

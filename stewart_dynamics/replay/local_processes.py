@@ -26,7 +26,7 @@ import multiprocessing
 from multiprocessing import forkserver, parent_process, resource_tracker
 import os
 import signal
-from threading import Lock, Thread
+from threading import Event, Lock, Thread
 from typing import Any
 
 from stewart_dynamics.errors import StewartError
@@ -36,6 +36,10 @@ from stewart_dynamics.replay.bag_task import (
 
 _CONTEXT = multiprocessing.get_context('forkserver')
 _CONTEXT.set_forkserver_preload(['stewart_dynamics.replay.one_bag'])
+
+# Raised where a process, or the server that starts it, was killed during the start.
+_KILLED = BrokenProcessPool, EOFError, OSError
+_STARTS = 3  # attempts
 
 
 @contextmanager
@@ -51,13 +55,14 @@ def processes(jobs: int, at: At) -> Iterator[Replayed]:
         if n in pools:
             with suppress(BrokenProcessPool):  # it has been killed
                 return pools[n].submit(_work, task)
-        # Pools of one process each: the death of one does not break the others.
-        pools[n] = ProcessPoolExecutor(1, _CONTEXT, _begin, (stopped, counts, 2 * n))
-        try:
-            pools[n].submit(os.getpid).result()
-        except BrokenProcessPool:
-            raise StewartError('the processes to replay bags could not start') from None
-        return pools[n].submit(_work, task)
+        for _ in range(_STARTS):
+            # Pools of one process each: the death of one does not break the others.
+            pools[n] = ProcessPoolExecutor(1, _CONTEXT, _begin, (stopped, counts, 2 * n))
+            with suppress(*_KILLED):
+                pools[n].submit(os.getpid).result()
+                return pools[n].submit(_work, task)
+            _start_server()
+        raise StewartError('the processes to replay bags could not start')
 
     def replayed(tasks: Sequence[Task]) -> Iterator[tuple[Task, Ended | None]]:
         waiting, idle = deque(tasks), deque(range(min(jobs, len(tasks))))
@@ -104,6 +109,7 @@ def _start_server() -> None:
 # -- in a process ---------------------------------------------------------------------------------
 
 _working = Lock()
+_orphaned = Event()
 _shared: list[Any] = []
 
 
@@ -113,7 +119,7 @@ def _begin(*shared: Any) -> None:
         parent = parent_process()
         assert parent is not None
         parent.join()
-        _shared[0].value = 1
+        _orphaned.set()  # this process alone: the shared flag would stop all others
         with _working:
             os._exit(1)
 
@@ -125,7 +131,7 @@ def _work(task: Task) -> Ended:
     stopped, counts, place = _shared
 
     def progress(read: int, setpoints: int) -> None:
-        if stopped.value:
+        if stopped.value or _orphaned.is_set():
             raise Cancelled
         counts[place] += read
         counts[place + 1] += setpoints

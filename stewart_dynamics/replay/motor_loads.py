@@ -116,7 +116,7 @@ class MotorLoads:
     def _motor(self, leg: int) -> dict[str, float | None]:
         p = self._parameters
         limited = p[TORQUE_MAX] is not None or p[TORQUE_SPEED] is not None
-        continuous, fastest = (None if p[name] is None else float(p[name][leg])
+        continuous, fastest = (None if p[name] is None else p[name][leg]
                                for name in (CONTINUOUS, SPEED_MAX))
         rms, heat = math.sqrt(self._means.mean[leg]), self._electrical.mean[leg]
         speed, constant = self._speed.values[leg], p['drive.torque_constant']
@@ -145,8 +145,8 @@ class MotorLoads:
     def _bus(self, cycles: int) -> dict[str, float | None] | None:
         if self._quasi_static or not math.isfinite(self._drawn.values[0]):
             return None
-        *_, drawn, regenerated = self._electrical.values.tolist()
-        *_, mean_drawn, mean_regenerated = self._electrical.mean.tolist()
+        *_, drawn, regenerated = self._electrical.values
+        *_, mean_drawn, mean_regenerated = self._electrical.mean
         back = self._regenerated.values[0] < 0.0
         return {
             **self._drawn.named(0, 'power_peak', 'w'),

@@ -207,24 +207,23 @@ class Comparison:
 
     def _of_all_legs(self) -> dict[str, float | None]:
         number = 6 * self._legs.count
-        residual, measured = float(np.sum(self._legs.squares)), float(
-            np.sum(self._measured_squares))
-        return {'residual_rms_n': float(np.sqrt(residual / number)) if number else None,
-                'residual_share': float(np.sqrt(residual / measured)) if measured else None}
+        residual, measured = np.sum(self._legs.squares), np.sum(self._measured_squares)
+        return {'residual_rms_n': np.sqrt(residual / number) if number else None,
+                'residual_share': np.sqrt(residual / measured) if measured else None}
 
     def _leg(self, leg: int) -> dict[str, float | None]:
         number = self._legs.count
         named = self._legs.named(leg, 'residual_', 'n')
-        measured_squares = float(self._measured_squares[leg])
-        total, squares, products = self._computed[:, leg].tolist()
-        measured_total = total + float(self._legs.sums[leg])
+        measured_squares = self._measured_squares[leg]
+        total, squares, products = self._computed[:, leg]
+        measured_total = total + self._legs.sums[leg]
         rms = [np.sqrt(each / number) if number else None for each in (measured_squares, squares)]
         spread = ((squares * number - total ** 2)
                   * (measured_squares * number - measured_total ** 2))
         # the correlation of constant forces is rounding error
         constant = not spread > 1e-20 * squares * measured_squares * number ** 2
-        correlation = None if constant else float(np.clip(
-            (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0))
+        correlation = None if constant else np.clip(
+            (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0)
         return {**named, 'measured_rms_n': rms[0], 'computed_rms_n': rms[1],
                 'correlation': correlation}
 
@@ -239,7 +238,7 @@ class Comparison:
         strongest = sorted(sorted(found, key=lambda each: -each.excess)[:100])
         return {
             'count': len(found),
-            'threshold': {f'{axis}_{unit}': float(each) for axis, unit, each in zip(
+            'threshold': {f'{axis}_{unit}': each for axis, unit, each in zip(
                 AXES, _UNITS, threshold, strict=True)},
             'resolution_s': self._bins.width,
             'strongest': [
@@ -270,9 +269,8 @@ class _Statistics:
         if not self.count:
             return dict.fromkeys(names)
         return dict(zip(names, [
-            float(np.sqrt(self.squares[number] / self.count)),
-            float(self.sums[number] / self.count),
-            float(self._peaks.values[number]), float(self._peaks.at[number])], strict=True))
+            np.sqrt(self.squares[number] / self.count), self.sums[number] / self.count,
+            self._peaks.values[number], self._peaks.at[number]], strict=True))
 
 
 # -- contacts: intervals with an external load ----------------------------------------------------

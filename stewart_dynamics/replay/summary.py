@@ -239,8 +239,8 @@ class Summary:
         }
 
     def _leg(self, leg: int) -> dict[str, float | None]:
-        squares, driving, braking = self._means.mean.reshape(3, 6)[:, leg].tolist()
-        _, energy_driving, energy_braking = self._means.values.reshape(3, 6)[:, leg].tolist()
+        squares, driving, braking = self._means.mean.reshape(3, 6)[:, leg]
+        _, energy_driving, energy_braking = self._means.values.reshape(3, 6)[:, leg]
         solved = self._without_force < self._answered
         peaks = self._peaks
         found: dict[str, float | None] = {
@@ -321,9 +321,8 @@ class _BaseWrench:
 
     def values(self) -> dict[str, dict[str, float | None]]:
         """Return the part of summary.json."""
-        squares, means = self._squares_and_sizes.mean.reshape(2, len(_BASE_WRENCH)).tolist()
-        numbers = zip(np.sqrt(squares).tolist(), means, self._peaks.values.tolist(),
-                      self._peaks.at.tolist(), strict=True)
+        squares, means = self._squares_and_sizes.mean.reshape(2, len(_BASE_WRENCH))
+        numbers = zip(np.sqrt(squares), means, self._peaks.values, self._peaks.at, strict=True)
         return {name: dict(zip(
             (f'rms_{unit_key(unit)}', f'mean_{unit_key(unit)}', f'peak_{unit_key(unit)}',
              'peak_at_s'), map(finite, each), strict=True))

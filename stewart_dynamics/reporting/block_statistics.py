@@ -107,9 +107,9 @@ class Exceeded:
 
     def entries(self, limit: str, legs: Sequence[str]) -> list[dict[str, Any]]:
         """Return the legs that exceed the limit, for summary.json."""
-        return [{'limit': limit, 'leg': legs[leg], 'setpoints': int(self._samples[leg]),
-                 'worst': finite(self._worst[leg]), 'bound': float(self._bounds[leg]),
-                 'first_at_s': float(self._first_at[leg])}
+        return [{'limit': limit, 'leg': legs[leg], 'setpoints': self._samples[leg],
+                 'worst': finite(self._worst[leg]), 'bound': self._bounds[leg],
+                 'first_at_s': self._first_at[leg]}
                 for leg in np.flatnonzero(self._samples)]
 
 
@@ -207,8 +207,8 @@ class Warnings:
 
 
 def finite(value: float | None) -> float | None:
-    """Return a plain number, None if it is not known or not finite."""
-    return float(value) if value is not None and math.isfinite(value) else None
+    """Return a number, None if it is not known or not finite."""
+    return value if value is not None and math.isfinite(value) else None
 
 
 def with_nan(values: Array) -> Flags:

@@ -65,12 +65,12 @@ def estimate(name: str, unit: str, start: float, value: float, state: str, error
         identified.
     """
     return {
-        'name': name, 'unit': unit, 'file': float(start), 'value': float(value),
+        'name': name, 'unit': unit, 'file': start, 'value': value,
         'state': state, 'standard_error': (
-            float(error) if state != NOT_IDENTIFIABLE and math.isfinite(error) else None),
-        'interval': ([float(value - TWO_SIDED * error), float(value + TWO_SIDED * error)]
+            error if state != NOT_IDENTIFIABLE and math.isfinite(error) else None),
+        'interval': ([value - TWO_SIDED * error, value + TWO_SIDED * error]
                      if state == IDENTIFIED and sure else None),
-        'unknown_share': float(share), 'at_bound': at_bound}
+        'unknown_share': share, 'at_bound': at_bound}
 
 
 def combined(what: Identifiability, names: Sequence[str], units: Sequence[str], values: Array,
@@ -82,8 +82,8 @@ def combined(what: Identifiability, names: Sequence[str], units: Sequence[str], 
         c = each.coefficients
         variance = float(c @ covariance[np.ix_(places, places)] @ c)
         result.append({
-            'parameters': [names[n] for n in places], 'coefficients': c.tolist(),
-            'unit': units[places[0]], 'value': float(c @ values[places]),
+            'parameters': [names[n] for n in places], 'coefficients': c,
+            'unit': units[places[0]], 'value': c @ values[places],
             'standard_error': math.sqrt(max(variance, 0.0)),
             'words': in_words(c, [names[n] for n in places])})
     return result

@@ -39,6 +39,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.reporting.colors import custom_properties
+from stewart_dynamics.whole_file import to_json
 
 _SHARED = Path(__file__).with_name('templates')
 
@@ -85,12 +86,12 @@ def typeset(text: str) -> str:
 def _environment(folder: Path) -> Environment:
     made = Environment(loader=FileSystemLoader([folder, _SHARED]), autoescape=True,
                        undefined=StrictUndefined, keep_trailing_newline=True)
-    made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr,
+    made.filters.update(number=number, digits=digits, thousands=thousands, exactly=to_json,
                         decimals=decimals,
                         unit=lambda text: text.replace('^2', '²'))
     made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
     # Data cannot end the element that contains them: the filter escapes < > & and '.
-    made.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
+    made.policies.update({'json.dumps_function': to_json, 'json.dumps_kwargs': {}})
     return made
 
 

@@ -1,0 +1,39 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Print what setup.py requires, without ROS: the newest or the oldest versions it admits."""
+
+from __future__ import annotations
+
+from distutils.core import run_setup  # from Python 3.12 on it is in setuptools
+import sys
+
+
+def oldest(requirement: str) -> str:
+    """Return a requirement for the version of its lower bound, if it has one."""
+    versions, *marker = requirement.partition(';')
+    return ''.join((versions.replace('>=', '=='), *marker))
+
+
+def main() -> None:
+    """Print the requirements, one in a line."""
+    chosen = {'newest': str, 'oldest': oldest}[sys.argv[1]]
+    package = run_setup('setup.py', stop_after='init')
+    extras = [requirement for name, listed in package.extras_require.items()
+              if not name.startswith('ros') for requirement in listed]
+    print(*sorted({*map(chosen, [*package.install_requires, *extras])}), sep='\n')
+
+
+if __name__ == '__main__':
+    main()
