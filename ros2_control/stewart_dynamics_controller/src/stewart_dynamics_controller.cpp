@@ -35,18 +35,6 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kPose = 7;  // numbers of a pose among the references of the platform
 const char * const kState[] = {"determinant", "condition_number", "warning", "status"};
 
-const char * text_of(int code)
-{
-  switch (code) {
-    case STEWART_NOT_FINITE: return "a reference is NaN or infinite";
-    case STEWART_NOT_UNIT: return "the orientation is not a unit quaternion";
-    case STEWART_SINGULAR: return "det(J) is zero";
-    case STEWART_SUPPRESSED: return "suppressed by singularity.action or limits.action";
-    case STEWART_NO_POSE: return "the legs' positions belong to no pose near the last one";
-    default: return "a reference is out of range";
-  }
-}
-
 }  // namespace
 
 CallbackReturn StewartDynamicsController::on_init()
@@ -54,6 +42,8 @@ CallbackReturn StewartDynamicsController::on_init()
   try {
     parameter_listener_ = std::make_shared<ParamListener>(get_node());
     parameters_ = parameter_listener_->get_params();
+    parameter_listener_->setUserCallback(
+      [this](const Params & parameters) {on_parameters(parameters);});
   } catch (const std::exception & error) {
     RCLCPP_ERROR(get_node()->get_logger(), "%s", error.what());
     return CallbackReturn::ERROR;
@@ -63,6 +53,7 @@ CallbackReturn StewartDynamicsController::on_init()
 
 CallbackReturn StewartDynamicsController::on_configure(const rclcpp_lifecycle::State &)
 {
+  changed_.set(std::nullopt);
   parameters_ = parameter_listener_->get_params();
   const auto & commanded = parameters_.command_interfaces;
   if (std::find(commanded.begin(), commanded.end(), "effort") == commanded.end()) {
@@ -80,11 +71,16 @@ CallbackReturn StewartDynamicsController::on_configure(const rclcpp_lifecycle::S
     RCLCPP_ERROR(get_node()->get_logger(), "%s", error.what());
     return CallbackReturn::ERROR;
   }
+  for (std::size_t n = 0; n < 6; ++n) {
+    leg_texts_[n] = parameters_.joints[n] + " ";
+  }
   subscription_.reset();
   if (of_platform()) {
     subscription_ = get_node()->create_subscription<Setpoint>(
       "~/setpoint/combined", rclcpp::SystemDefaultsQoS(),
-      [this](const Setpoint & message) {on_setpoint(message);});
+      [this, frame = parameters_.base_frame](const Setpoint & message) {
+        on_setpoint(message, frame);
+      });
   }
   return CallbackReturn::SUCCESS;
 }
@@ -97,14 +93,22 @@ CallbackReturn StewartDynamicsController::on_activate(const rclcpp_lifecycle::St
   }
   received_.set(std::nullopt);
   received_at_ = -1;
-  last_code_ = STEWART_OK;
+  // A manager that deactivates the controller before this one alone activates this one again at
+  // once, not chained.
+  left_chain_ = was_chained_ && !is_in_chained_mode() &&
+    !feed_forward_->timed_out(deactivated_at_, get_node()->now().nanoseconds());
+  was_chained_ = is_in_chained_mode();
+  last_rejection_ = nullptr;
   feed_forward_->start();
   return CallbackReturn::SUCCESS;
 }
 
+/// No force without a controller, and no drive that goes on; positions keep the last command.
 CallbackReturn StewartDynamicsController::on_deactivate(const rclcpp_lifecycle::State &)
 {
-  return write("effort", Six{}) ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
+  deactivated_at_ = get_node()->now().nanoseconds();
+  const bool stopped = write("velocity", Six{});
+  return write("effort", Six{}) && stopped ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
 }
 
 controller_interface::InterfaceConfiguration
@@ -174,13 +178,24 @@ StewartDynamicsController::on_export_state_interfaces_list()
   return states;
 }
 
-void StewartDynamicsController::on_setpoint(const Setpoint & message)
+/// In the thread that sets parameters; update_and_write_commands takes what is left in changed_.
+void StewartDynamicsController::on_parameters(const Params & parameters)
+{
+  try {
+    changed_.set(std::optional<stewart_platform>(hexapod_of(parameters)));
+  } catch (const std::exception & error) {
+    RCLCPP_ERROR(get_node()->get_logger(), "parameters are not used: %s", error.what());
+  }
+}
+
+void StewartDynamicsController::on_setpoint(
+  const Setpoint & message, const std::string & base_frame)
 {
   const auto & frame = message.header.frame_id;
-  if (!frame.empty() && frame != parameters_.base_frame) {
+  if (!frame.empty() && frame != base_frame) {
     RCLCPP_WARN_THROTTLE(
       get_node()->get_logger(), *get_node()->get_clock(), 1000,
-      "setpoint rejected: frame_id %s, must be %s", frame.c_str(), parameters_.base_frame.c_str());
+      "setpoint rejected: frame_id %s, must be %s", frame.c_str(), base_frame.c_str());
     return;
   }
   if (message.points.size() != 1 || message.points[0].transforms.size() != 1 ||
@@ -205,10 +220,15 @@ void StewartDynamicsController::on_setpoint(const Setpoint & message)
 return_type StewartDynamicsController::update_reference_from_subscribers(
   const rclcpp::Time & time, const rclcpp::Duration &)
 {
+  if (left_chain_ || !of_platform()) {
+    RCLCPP_ERROR(
+      get_node()->get_logger(), "not chained%s: activate and deactivate this controller together "
+      "with the one before it", of_platform() ? " any more" : ", with reference: legs");
+    return return_type::ERROR;
+  }
   std::optional<PlatformNumbers> setpoint;
-  received_.try_get([&](const auto & received) {setpoint = received;});
+  received_.try_set([&](auto & received) {received.swap(setpoint);});
   if (setpoint) {
-    received_.try_set([](auto & received) {received.reset();});
     received_at_ = time.nanoseconds();
     for (std::size_t n = 0; n < setpoint->size(); ++n) {
       (void)ordered_exported_reference_interfaces_[n]->set_value((*setpoint)[n]);
@@ -223,21 +243,17 @@ return_type StewartDynamicsController::update_reference_from_subscribers(
 return_type StewartDynamicsController::update_and_write_commands(
   const rclcpp::Time & time, const rclcpp::Duration &)
 {
-  if (parameter_listener_->try_update_params(parameters_)) {
-    try {
-      feed_forward_->change(hexapod_of(parameters_));
-    } catch (const std::exception & error) {
-      RCLCPP_ERROR(get_node()->get_logger(), "parameters are not used: %s", error.what());
-    }
+  std::optional<stewart_platform> changed;
+  changed_.try_set([&](auto & waiting) {waiting.swap(changed);});
+  if (changed) {
+    feed_forward_->change(*changed);
   }
-  Command command;
-  const int code = compute(time.nanoseconds(), command);
+  const int code = compute(time.nanoseconds());
   bool written = true;
-  if (code == STEWART_OK || code == STEWART_SUPPRESSED || code == STEWART_SINGULAR) {
-    written = write("position", command.positions) && write("velocity", command.velocities);
-  }
-  if (code == STEWART_OK) {
-    written = write("effort", command.efforts) && written;
+  if (feed_forward_->started()) {
+    written = write("position", command_.positions);
+    written = write("velocity", command_.velocities) && written;
+    written = write("effort", command_.efforts) && written;
   }
   const stewart_result & result = feed_forward_->result();
   const double states[] = {result.determinant, result.condition_number,
@@ -245,13 +261,18 @@ return_type StewartDynamicsController::update_and_write_commands(
   for (std::size_t n = 0; n < std::size(states); ++n) {
     (void)ordered_exported_state_interfaces_[n]->set_value(states[n]);
   }
-  if (code != last_code_ && code != STEWART_OK && feed_forward_->started()) {
-    RCLCPP_WARN(get_node()->get_logger(), "no forces: %s", text_of(code));
+  const bool given = feed_forward_->started() || code != STEWART_NOT_FINITE;
+  const char * rejection = given ? feed_forward_->rejection() : nullptr;
+  if (rejection && rejection != last_rejection_) {
+    RCLCPP_WARN(
+      get_node()->get_logger(), "%s: %s%s",
+      feed_forward_->started() ? "platform held, reference rejected" : "reference rejected",
+      leg_text(), rejection);
   }
-  last_code_ = code;
+  last_rejection_ = rejection;
   if (feed_forward_->timed_out(time.nanoseconds())) {
     RCLCPP_ERROR(
-      get_node()->get_logger(), "no forces for setpoint.timeout: %s", text_of(code));
+      get_node()->get_logger(), "platform held for setpoint.timeout: %s%s", leg_text(), rejection);
     return return_type::ERROR;
   }
   return written ? return_type::OK : return_type::ERROR;
@@ -267,12 +288,18 @@ Six StewartDynamicsController::read(std::size_t first) const
   return values;
 }
 
-int StewartDynamicsController::compute(std::int64_t now, Command & command)
+const char * StewartDynamicsController::leg_text() const
+{
+  const int leg = feed_forward_->rejected_leg();
+  return leg == 0 ? "" : leg_texts_[static_cast<std::size_t>(leg - 1)].c_str();
+}
+
+int StewartDynamicsController::compute(std::int64_t now)
 {
   const Six wrench = read(motion_size()), feedback = read(motion_size() + 6);
   if (!of_platform()) {
     return feed_forward_->update(
-      LegReference{read(0), read(6), read(12)}, wrench, feedback, now, command);
+      LegReference{read(0), read(6), read(12)}, wrench, feedback, now, command_);
   }
   PlatformReference reference;
   auto at = ordered_exported_reference_interfaces_.begin();
@@ -287,7 +314,7 @@ int StewartDynamicsController::compute(std::int64_t now, Command & command)
   take(reference.angular_velocity);
   take(reference.linear_acceleration);
   take(reference.angular_acceleration);
-  return feed_forward_->update(reference, wrench, feedback, now, command);
+  return feed_forward_->update(reference, wrench, feedback, now, command_);
 }
 
 /// Write the values of an interface, if it is commanded.

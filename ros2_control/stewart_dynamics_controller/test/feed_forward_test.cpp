@@ -20,6 +20,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
+#include <string>
 
 #include "stewart_dynamics_controller/feed_forward.hpp"
 
@@ -190,7 +191,7 @@ void test_legs()
   CHECK(*std::min_element(largest.begin(), largest.end()) > 100.0);
 }
 
-/// What is not valid has a code and changes nothing; the next valid reference is answered.
+/// What is not valid has a code; the next valid reference is answered.
 void test_bad_input()
 {
   FeedForward feed_forward(hexapod(), guess(), kTimeout);
@@ -255,7 +256,7 @@ void test_bad_legs()
   CHECK(close(command.efforts, at.efforts, 1e-8));
 }
 
-/// Suppressed: lengths without efforts; other parameters while it runs.
+/// Other parameters while it runs.
 void test_parameters()
 {
   stewart_platform p = hexapod();
@@ -274,6 +275,180 @@ void test_parameters()
   CHECK(feed_forward.update(home(), {}, {}, 2, command) == STEWART_SUPPRESSED);
   CHECK(feed_forward.warning());
   CHECK(close(command.positions, heavy.positions, 0.0));
+}
+
+/// A way in which a reference cannot be followed, with the code that it has.
+struct Rejection
+{
+  const char * rule;
+  int code, leg;
+  void (* spoil)(stewart_platform & p, PlatformReference & reference, Six & wrench);
+};
+
+const Rejection kRejections[] = {
+  {"a reference is NaN or infinite", STEWART_NOT_FINITE, 0,
+    [](auto &, auto & r, auto &) {r.linear_velocity[1] = kNaN;}},
+  {"a reference is NaN or infinite", STEWART_NOT_FINITE, 0,
+    [](auto &, auto &, auto & wrench) {wrench[4] = kInfinite;}},
+  {"the orientation is not a unit quaternion", STEWART_NOT_UNIT, 0,
+    [](auto &, auto & r, auto &) {r.orientation[3] = 2.0;}},
+  {"a reference is out of range", STEWART_OUT_OF_RANGE, 0,
+    [](auto &, auto & r, auto &) {r.position[0] = 1e200;}},
+  {"det(J) is zero", STEWART_SINGULAR, 0,
+    [](auto &, auto & r, auto &) {r = home(); r.position[2] = 0.0;}},
+  {"suppressed by singularity.action or limits.action", STEWART_SUPPRESSED, 0,
+    [](auto & p, auto &, auto &) {
+      p.warn_condition = p.stop_condition = 1.0;
+      p.suppress_near_singularity = 1;
+    }},
+  {"suppressed by singularity.action or limits.action", STEWART_SUPPRESSED, 0,
+    [](auto & p, auto &, auto &) {
+      p.legs[1].velocity_max = 1e-3;
+      p.suppress_at_limits = 1;
+    }},
+  {"shorter than limits.length_min", STEWART_SUPPRESSED, 3,
+    [](auto & p, auto & r, auto &) {p.legs[2].length_min = 1.1; r.position[2] -= 0.3;}},
+  {"longer than limits.length_max", STEWART_SUPPRESSED, 4,
+    [](auto & p, auto & r, auto &) {p.legs[3].length_max = 1.4; r.position[2] += 0.3;}},
+  {"farther from the last command than limits.velocity_max allows in setpoint.timeout",
+    STEWART_SUPPRESSED, 6,
+    [](auto & p, auto & r, auto &) {p.legs[5].velocity_max = 2.0; r.position[2] += 0.3;}},
+};
+
+/// What cannot be followed holds the platform where it is, with the force that it needs there:
+/// no position without its effort, no effort of a motion that has ended.
+void test_hold()
+{
+  const Six wrench = {10.0, -20.0, 30.0, 1.0, 2.0, -3.0};
+  const Six feedback = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
+  const PlatformReference moving = swing(0.02);
+  PlatformReference resting = moving;
+  resting.linear_velocity = resting.angular_velocity = {};
+  resting.linear_acceleration = resting.angular_acceleration = {};
+  FeedForward at_rest(hexapod(), guess(), kTimeout);
+  Command followed, expected, command;
+  CHECK(at_rest.update(resting, wrench, feedback, 0, expected) == STEWART_OK);
+  for (const Rejection & rejection : kRejections) {
+    stewart_platform p = hexapod();
+    FeedForward feed_forward(p, guess(), kTimeout);
+    PlatformReference bad = moving;
+    Six load = wrench;
+    rejection.spoil(p, bad, load);
+
+    // Not before a first reference that can be followed; a step is one from a command.
+    command.efforts.fill(7.0);
+    feed_forward.change(p);
+    const int code = feed_forward.update(bad, load, feedback, 0, command);
+    CHECK(code == rejection.code || (code == STEWART_OK && rejection.leg == 6));
+    CHECK(code == STEWART_OK || (!feed_forward.started() && command.efforts[0] == 7.0));
+
+    feed_forward.start();
+    feed_forward.change(hexapod());
+    CHECK(feed_forward.update(moving, wrench, feedback, 0, followed) == STEWART_OK);
+    CHECK(feed_forward.rejection() == nullptr && feed_forward.rejected_leg() == 0);
+    feed_forward.change(p);
+    for (int n = 1; n <= 100; ++n) {
+      command = followed;
+      CHECK(feed_forward.update(bad, load, feedback, n * kCycle, command) == rejection.code);
+      CHECK(std::string(feed_forward.rejection()) == rejection.rule);
+      CHECK(feed_forward.rejected_leg() == rejection.leg);
+      CHECK(close(command.positions, followed.positions, 0.0));
+      CHECK(close(command.velocities, {}, 0.0));
+      CHECK(close(command.efforts, expected.efforts, 0.0));
+      CHECK(std::fabs(command.efforts[0] - followed.efforts[0]) > 100.0);
+    }
+    CHECK(!feed_forward.timed_out(kTimeout));
+    CHECK(feed_forward.timed_out(kTimeout + 1));
+    feed_forward.change(hexapod());
+    CHECK(feed_forward.update(moving, wrench, feedback, kTimeout, command) == STEWART_OK);
+    CHECK(close(command.efforts, followed.efforts, 0.0));
+    CHECK(feed_forward.rejection() == nullptr);
+  }
+}
+
+/// The effort that holds the platform: feedback that is a number goes on; at most force_max.
+void test_effort_of_hold()
+{
+  stewart_platform p = hexapod();
+  FeedForward feed_forward(p, guess(), kTimeout);
+  Command rest, command;
+  CHECK(feed_forward.update(home(), {}, {}, 0, rest) == STEWART_OK);
+  const Six feedback = {1.0, kNaN, -1e6, 4.0, 1e6, kInfinite};
+  CHECK(feed_forward.update(home(), {}, feedback, 1, command) == STEWART_NOT_FINITE);
+  CHECK(command.efforts[0] == rest.efforts[0] + 1.0);
+  CHECK(command.efforts[1] == rest.efforts[1]);
+  CHECK(command.efforts[2] == -5000.0);
+  CHECK(command.efforts[3] == rest.efforts[3] + 4.0);
+  CHECK(command.efforts[4] == 5000.0);
+  CHECK(command.efforts[5] == rest.efforts[5]);
+  p.mass += 100.0;  // a payload while the platform is held
+  feed_forward.change(p);
+  CHECK(feed_forward.update(home(), {}, feedback, 2, command) == STEWART_NOT_FINITE);
+  CHECK(command.efforts[1] > rest.efforts[1] + 100.0);
+}
+
+/// Nothing that legs can do is rejected: parked at a limit, references more rarely than cycles, a
+/// gap shorter than the timeout.
+void test_no_false_hold()
+{
+  stewart_platform p = hexapod();
+  FeedForward free(p, guess(), kTimeout);
+  Command at, command;
+  CHECK(free.update(home(), {}, {}, 0, at) == STEWART_OK);
+  for (std::size_t n = 0; n < 6; ++n) {  // as the example: position 0 is at length_min
+    p.legs[n].zero_length = p.legs[n].length_min = at.positions[n] + 0.95;
+    p.legs[n].length_max = 1.6;
+    p.legs[n].velocity_max = 0.5;
+  }
+  p.suppress_at_limits = 1;
+  FeedForward of_legs(p, guess(), kTimeout);
+  CHECK(of_legs.update(LegReference{}, {}, {}, 0, command) == STEWART_OK);
+
+  FeedForward feed_forward(p, guess(), kTimeout);
+  PlatformReference moving = home();
+  moving.linear_velocity[2] = 0.4;
+  for (int n = 0; n < 500; ++n) {  // at 100 Hz, with cycles of 1 ms
+    moving.position[2] = 1.1 + 0.4e-3 * (n - n % 10);
+    CHECK(feed_forward.update(moving, {}, {}, n * kCycle, command) == STEWART_OK);
+  }
+  moving.position[2] += 0.4 * 0.09;
+  CHECK(feed_forward.update(moving, {}, {}, 590 * kCycle, command) == STEWART_OK);
+  p.suppress_at_limits = 0;
+  feed_forward.change(p);
+  moving.linear_velocity[2] = 50.0;
+  CHECK(feed_forward.update(moving, {}, {}, 591 * kCycle, command) == STEWART_OK);
+  CHECK(close(command.velocities, {0.5, 0.5, 0.5, 0.5, 0.5, 0.5}, 0.0));
+}
+
+/// Legs: the same hold; the next pose is found from the one that is held.
+void test_hold_of_legs()
+{
+  stewart_platform p = hexapod();
+  for (stewart_leg & leg : p.legs) {
+    leg.length_max = 1.5;
+    leg.velocity_max = 1.0;
+  }
+  FeedForward feed_forward(p, guess(), kTimeout), of_platform(p, guess(), kTimeout);
+  Command at, command;
+  CHECK(of_platform.update(home(), {}, {}, 0, at) == STEWART_OK);
+  LegReference legs{at.positions, {}, {}};
+  CHECK(feed_forward.update(legs, {}, {}, 0, command) == STEWART_OK);
+  for (const double stroke : {0.05, 0.16, 0.883, -0.4, 1e3, kNaN}) {
+    for (std::size_t n = 0; n < 6; ++n) {
+      legs.positions[n] = at.positions[n] + stroke;
+      legs.velocities[n] = 0.3;
+    }
+    const bool followed = feed_forward.update(legs, {}, {}, 1, command) == STEWART_OK;
+    CHECK(followed == (stroke == 0.05));
+    CHECK(close(command.velocities, followed ? legs.velocities : Six{}, 1e-12));
+    for (std::size_t n = 0; n < 6; ++n) {
+      CHECK(std::fabs(command.positions[n] - at.positions[n] - 0.05) < 1e-12);
+      CHECK(command.efforts[n] > 100.0);
+    }
+  }
+  legs = {at.positions, {}, {}};
+  CHECK(feed_forward.update(legs, {}, {}, 2, command) == STEWART_OK);
+  CHECK(close(command.efforts, at.efforts, 1e-8));
 }
 
 /// Rz(gamma) Ry(beta) Rx(alpha): the columns of a turn about each axis.
@@ -297,6 +472,10 @@ int main()
   test_bad_input();
   test_bad_legs();
   test_parameters();
+  test_hold();
+  test_effort_of_hold();
+  test_no_false_hold();
+  test_hold_of_legs();
   test_rotation();
   std::printf("all checks passed\n");
   return 0;

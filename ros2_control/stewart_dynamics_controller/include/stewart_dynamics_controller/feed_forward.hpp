@@ -13,8 +13,16 @@
 // limitations under the License.
 
 /*
- * The feed-forward of the controller, without ROS: references in, leg forces out. No function
- * allocates memory or throws.
+ * The feed-forward of the controller, without ROS: references in, commands of the legs out. No
+ * function allocates memory or throws.
+ *
+ * A reference is followed or rejected as a whole. Rejected are one without forces (a return code
+ * other than STEWART_OK), one with a leg outside limits.length_min and limits.length_max, and one
+ * with a leg farther from the last command than limits.velocity_max allows in the timeout. Then
+ * the platform is held: positions are those of the last reference that was followed, velocities
+ * zero, and efforts what keeps the platform at rest there, under the wrench of that reference.
+ * So position and effort always belong together, and no effort is kept from a motion that has
+ * ended. The caller ends it after the timeout.
  */
 
 #ifndef STEWART_DYNAMICS_CONTROLLER__FEED_FORWARD_HPP_
@@ -45,11 +53,12 @@ struct LegReference
   Six positions, velocities, accelerations;
 };
 
-/// Commands of a cycle; valid for a return code of STEWART_OK.
+/// Commands of a cycle, which follow the reference or hold the platform.
 struct Command
 {
-  Six positions, velocities;  // of the legs; valid with STEWART_SUPPRESSED and _SINGULAR, too
-  Six efforts;                // [N]
+  Six positions;   // length - zero_length [m]
+  Six velocities;  // clipped to velocity_max [m/s]
+  Six efforts;     // clipped to force_max [N]
 };
 
 /// Return the row-by-row rotation Rz(gamma) Ry(beta) Rx(alpha).
@@ -71,7 +80,8 @@ public:
 
   /// Compute the command of a reference at a time [ns], which rises from call to call.
   /// feedback: efforts that are added, before the limit force_max.
-  /// Return a code of stewart_dynamics.h.
+  /// Return a code of stewart_dynamics.h: STEWART_OK if the reference is followed. If not, the
+  /// command holds the platform; before the first one that was followed there is no command.
   int update(
     const PlatformReference & reference, const Six & wrench, const Six & feedback,
     std::int64_t now, Command & command);
@@ -79,27 +89,44 @@ public:
     const LegReference & reference, const Six & wrench, const Six & feedback,
     std::int64_t now, Command & command);
 
-  /// Return whether a cycle had forces since start.
+  /// Return whether a reference was followed since start: there is a command.
   bool started() const {return started_;}
 
-  /// Return whether the timeout has passed since a time, or since the last cycle with forces.
+  /// Return why the last reference was rejected: the rule, nullptr if it was followed; and the
+  /// leg that breaks it, 1 to 6, 0 if the rule is not one of a leg.
+  const char * rejection() const {return rejection_;}
+  int rejected_leg() const {return rejected_leg_;}
+
+  /// Return whether the timeout has passed since a time, or since the last reference followed.
   bool timed_out(std::int64_t since, std::int64_t now) const {return now - since > timeout_;}
-  bool timed_out(std::int64_t now) const {return started_ && timed_out(last_forces_, now);}
+  bool timed_out(std::int64_t now) const {return started_ && timed_out(followed_at_, now);}
 
   /// Return the result of the last cycle with valid input.
   const stewart_result & result() const {return output_.result;}
   bool warning() const {return state_.warning != STEWART_NO_WARNING;}
 
 private:
-  int step(
+  int motion_of(const PlatformReference & reference, stewart_motion & motion) const;
+  int motion_of(const LegReference & reference, stewart_motion & motion) const;
+  template<typename Reference>
+  int answer(
+    const Reference & reference, const Six & wrench, const Six & feedback, std::int64_t now,
+    Command & command);
+  int follow(
     const stewart_motion & motion, const Six & wrench, const Six & feedback, std::int64_t now,
     Command & command);
-  int motion_of(const LegReference & reference, stewart_motion & motion) const;
+  int check_lengths();
+  void hold(const Six & feedback, Command & command) const;
+  int reject(int code, const char * rule, int leg = 0);
 
   stewart_platform hexapod_;
-  stewart_pose guess_, pose_;
-  std::int64_t timeout_, last_forces_ = 0;
+  stewart_pose guess_;
+  std::int64_t timeout_, followed_at_ = 0;
   bool started_ = false;
+  stewart_motion held_{};  // the last reference that was followed, at rest
+  Six held_lengths_{}, held_wrench_{};
+  const char * rejection_ = nullptr;
+  int rejected_leg_ = 0;
   stewart_state state_{};
   stewart_output output_{};
 };

@@ -17,6 +17,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -63,19 +64,28 @@ private:
   bool of_platform() const {return parameters_.reference == "platform";}
   /// Number of reference interfaces of the motion; those of wrench and effort follow.
   std::size_t motion_size() const {return of_platform() ? 19 : 18;}
-  void on_setpoint(const Setpoint & message);
+  void on_parameters(const Params & parameters);
+  void on_setpoint(const Setpoint & message, const std::string & base_frame);
   Six read(std::size_t first) const;
-  int compute(std::int64_t now, Command & command);
+  int compute(std::int64_t now);
+  /// Name of the leg that is rejected, for the log; empty if the rule is not one of a leg.
+  const char * leg_text() const;
   bool write(const std::string & interface, const Six & values);
 
   std::shared_ptr<ParamListener> parameter_listener_;
-  Params parameters_;
+  Params parameters_;  // of on_configure: not written while the controller is active
   std::optional<FeedForward> feed_forward_;
+  Command command_;  // the last one
+  std::array<std::string, 6> leg_texts_;
+  /// The hexapod of parameters that were set since the last cycle.
+  realtime_tools::RealtimeThreadSafeBox<std::optional<stewart_platform>> changed_;
   rclcpp::Subscription<Setpoint>::SharedPtr subscription_;
   /// The setpoint that the topic has brought since the last cycle.
   realtime_tools::RealtimeThreadSafeBox<std::optional<PlatformNumbers>> received_;
   std::int64_t received_at_ = -1;  // time of the cycle that took the last setpoint [ns]; none: -1
-  int last_code_ = STEWART_OK;
+  std::int64_t deactivated_at_ = 0;  // [ns]
+  bool was_chained_ = false, left_chain_ = false;  // when it was activated last
+  const char * last_rejection_ = nullptr;
 };
 
 }  // namespace stewart_dynamics_controller
