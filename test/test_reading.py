@@ -526,7 +526,8 @@ def test_limits_of_zero_are_left_out_and_not_listed_as_missing(tmp_path):
 def test_what_gazebo_and_ros2_control_add_in_a_urdf_is_named_or_taken(tmp_path):
     extra = ''.join(
         f'<gazebo reference="slide{n}"><springStiffness>40</springStiffness></gazebo>'
-        f'<ros2_control><joint name="slide{n}"><command_interface name="effort"><param name="min">-90</param>'
+        f'<ros2_control><joint name="slide{n}"><command_interface name="effort">'
+        f'<param name="min">-90</param>'
         '<param name="max">90</param></command_interface></joint></ros2_control>'
         for n in range(6))
     found = from_text(cad_urdf(HEAVY, extra=extra), tmp_path)

@@ -586,7 +586,7 @@ def _turn(rotations: Array) -> Array:
 
 def _crossed(vectors: Array, matrices: Array) -> Array:
     """Return the cross products of vectors (N, 3) with the columns of matrices (N, 3, 3)."""
-    return np.cross(vectors[:, :, None], matrices, axis=1)
+    return np.asarray(np.cross(vectors[:, :, None], matrices, axis=1), dtype=np.float64)
 
 
 def _norm(vectors: Array) -> Array:
