@@ -549,7 +549,7 @@ def group_is_gone(leader: int) -> bool:
 
 @pytest.mark.parametrize('where, sent', [
     ('here', signal.SIGINT), ('processes', signal.SIGINT), ('processes', signal.SIGHUP),
-    ('cluster', signal.SIGINT)])
+    ('processes', signal.SIGTERM), ('cluster', signal.SIGINT)])
 @pytest.mark.slow
 def test_an_interrupt_leaves_no_partial_results(
         huge: Path, tmp_path: Path, where: str, sent: signal.Signals,

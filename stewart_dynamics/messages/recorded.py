@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Bytes, Integers, Stamps
+from stewart_dynamics.messages.layout import at_any_byte
 
 
 class Messages(NamedTuple):
@@ -53,8 +54,12 @@ class Messages(NamedTuple):
         if self.data.size == self.sizes.sum():
             return self
         starts = np.cumsum(self.sizes) - self.sizes
-        places = np.arange(self.sizes.sum()) + np.repeat(self.starts - starts, self.sizes)
-        return self._replace(data=self.data[places], starts=starts)
+        data = np.empty(self.sizes.sum(), dtype=np.uint8)
+        for size in np.unique(self.sizes).tolist():
+            which = self.sizes == size
+            at_any_byte(data, size)[starts[which]] = at_any_byte(self.data, size)[
+                self.starts[which]]
+        return self._replace(data=data, starts=starts)
 
     def each(self) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, time and bytes of each message."""

@@ -96,12 +96,13 @@ def processes(jobs: int, at: At) -> Iterator[Replayed]:
 
 def _start_server() -> None:
     """Start the process that starts the others."""
-    # They inherit its mask: Ctrl-C and the end of the terminal end this process, which ends them.
-    # Starting the resource tracker later would lift the mask of SIGINT.
+    # They inherit its mask: what ends a group of processes ends this one, which ends the others
+    # when their partial results are removed.
+    # Starting the resource tracker later would lift the mask of SIGINT and SIGTERM.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
     try:
         resource_tracker.ensure_running()
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -168,12 +168,12 @@ class OutputBag:
         if not len(recorded.times):
             return
         groups = []
-        kinds, of_kind = np.unique(
-            np.column_stack([recorded.of_topic, recorded.sizes]), axis=0, return_inverse=True)
-        for n, (topic, size) in enumerate(kinds.tolist()):
-            which = np.flatnonzero(of_kind.ravel() == n)
-            groups.append((recorded.topics[topic], which,
-                           at_any_byte(recorded.data, size)[recorded.starts[which]]))
+        for topic, places in recorded.places().items():
+            sizes = recorded.sizes[places]
+            for size in np.unique(sizes).tolist():
+                which = places[sizes == size]
+                groups.append((topic, which,
+                               at_any_byte(recorded.data, size)[recorded.starts[which]]))
         self._write_messages(recorded.times, groups)
 
     def _write_messages(self, times: Stamps, groups: Sequence[Written]) -> None:
