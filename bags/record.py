@@ -25,14 +25,15 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 import random
-import shutil
 import struct
 import subprocess
+import tempfile
 import time
 from typing import Any
 
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped
 import rclpy
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -120,11 +121,22 @@ class DamagingRelay(Node):
 
 
 def record(name: str) -> None:
-    """Record one bag, and replace the existing one."""
+    """Record one bag, and replace the existing one when the new one is complete."""
+    final = HERE / name
+    with tempfile.TemporaryDirectory(dir=HERE, prefix='.') as hidden:
+        partial = Path(hidden) / name
+        messages = record_into(partial, name)
+        if final.exists():
+            final.rename(Path(hidden) / 'replaced')
+        partial.rename(final)
+    print(f'{final.relative_to(HERE.parent)}: {messages} messages, '
+          f'{(final / f"{name}.mcap").stat().st_size} bytes')
+
+
+def record_into(folder: Path, name: str) -> int:
+    """Record one bag into a new folder, and return the number of its messages."""
     config, damaged = BAGS[name]
-    partial, final = HERE / f'{name}.partial', HERE / name
-    shutil.rmtree(partial, ignore_errors=True)
-    recorder = Recorder(partial)
+    recorder = Recorder(folder)
     nodes: list[Any] = [recorder, *([DamagingRelay()] if damaged else [])]
     executor = rclpy.executors.SingleThreadedExecutor()
     for node in nodes:
@@ -153,14 +165,7 @@ def record(name: str) -> None:
         executor.remove_node(node)
         node.destroy_node()
     executor.shutdown()
-    mcap = partial / f'{name}.mcap'
-    (partial / f'{name}.partial.mcap').rename(mcap)
-    metadata = partial / 'metadata.yaml'
-    metadata.write_text(metadata.read_text().replace(f'{name}.partial.mcap', mcap.name))
-    shutil.rmtree(final, ignore_errors=True)
-    partial.rename(final)
-    print(f'{final.relative_to(HERE.parent)}: {recorder.messages} messages, '
-          f'{(final / mcap.name).stat().st_size} bytes')
+    return recorder.messages
 
 
 def main() -> None:
@@ -172,9 +177,13 @@ def main() -> None:
     if unknown := [name for name in names if name not in BAGS]:
         parser.error(f'unknown bag {unknown[0]}')
     rclpy.init()
-    for name in names:
-        record(name)
-    rclpy.try_shutdown()
+    try:
+        for name in names:
+            record(name)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        raise SystemExit('record.py: interrupted') from None
+    finally:
+        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

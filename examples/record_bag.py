@@ -17,17 +17,18 @@ Example: record topics into a bag, where there is no ros2 bag record. Copy what 
 
 Without TOPIC it records joint_states and all topics of stewart_dynamics and stewart_simulator, in
 any namespace, those that appear later, too; with --ros-args -r __ns:=/cell only those in /cell. It
-ends with Ctrl-C, or after --duration; the bag is an MCAP for stewart_replay and stewart_identify.
-Only types of ROS itself can be recorded. Exit code: 0 recorded, 1 not, as without any message.
+ends with Ctrl-C, or after --duration; the bag is an MCAP for stewart_replay and stewart_identify,
+and gets its name when it is complete. Only types of ROS itself can be recorded. Exit code: 0
+recorded, 1 not, as without any message.
 """
 
 import argparse
 from functools import partial
 import importlib
 from pathlib import Path
-import shutil
 import signal
 import sys
+import tempfile
 import time
 
 import rclpy
@@ -88,6 +89,29 @@ class Recorder(Node):
         self.counts[topic] += 1
 
 
+def record(bag: Path, topics: list[str], duration: float, signals: list[int]) -> dict[str, int]:
+    """Record until a signal or the end of the time; return the number of messages by topic."""
+    if bag.exists() or bag.is_symlink():
+        raise WriterError(f'{bag}: exists already')
+    bag.parent.mkdir(parents=True, exist_ok=True)
+    # The bag is moved to its name when it is complete; until then, it is in a hidden folder.
+    with tempfile.TemporaryDirectory(dir=bag.parent, prefix='.record_bag.') as hidden:
+        partial = Path(hidden) / bag.name
+        with Writer(partial, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            recorder = Recorder(topics, writer)
+            executor = SingleThreadedExecutor()
+            executor.add_node(recorder)
+            end = time.monotonic() + duration
+            while not signals and time.monotonic() < end:
+                executor.spin_once(timeout_sec=0.1)
+        if any(recorder.counts.values()):
+            try:
+                partial.rename(bag)
+            except OSError as exc:
+                raise WriterError(f'{bag}: cannot be written: {exc.strerror}') from exc
+    return recorder.counts
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -96,35 +120,31 @@ def main() -> None:
                         help='the new folder of the bag (default: %(default)s)')
     parser.add_argument('--duration', type=float, default=float('inf'), help='[s]')
     signals: list[int] = []
+    ending = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as under nohup
+        ending.append(signal.SIGHUP)
     # The handlers of rclpy would shut ROS down in the middle of a call.
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as exc:  # bad ROS arguments
         sys.exit(f'record_bag: {exc}')
-    for each in (signal.SIGINT, signal.SIGTERM):
+    for each in ending:
         signal.signal(each, lambda number, _: signals.append(number))
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     try:
-        with Writer(options.output, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-            recorder = Recorder(options.topics, writer)
-            executor = SingleThreadedExecutor()
-            executor.add_node(recorder)
-            end = time.monotonic() + options.duration
-            while not signals and time.monotonic() < end:
-                executor.spin_once(timeout_sec=0.1)
+        counts = record(options.output, options.topics, options.duration, signals)
     except (OSError, WriterError) as exc:
         sys.exit(f'record_bag: {exc}')
     finally:
-        for each in (signal.SIGINT, signal.SIGTERM):
+        for each in ending:
             signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         rclpy.try_shutdown()
-    if not any(recorder.counts.values()):
-        shutil.rmtree(options.output)  # which it has made
+    if not any(counts.values()):
         sys.exit('record_bag: no message was received on ' + (
             ', '.join(options.topics) or 'a topic of stewart_dynamics or stewart_simulator'))
-    for topic, count in sorted(recorder.counts.items()):
+    for topic, count in sorted(counts.items()):
         print(f'{count:8} {topic}')
-    for topic in sorted(set(options.topics) - set(recorder.counts)):
+    for topic in sorted(set(options.topics) - set(counts)):
         print(f'       0 {topic}: no publisher')
 
 

@@ -264,7 +264,7 @@ def test_nothing_recorded_is_no_success(domain: int, tmp_path: Path) -> None:
     assert line_at_the_end(
         'record_bag.py', domain, '--duration', '0.1', '--output', str(tmp_path / 'bag')) == (
         'record_bag: no message was received on a topic of stewart_dynamics or stewart_simulator')
-    assert not (tmp_path / 'bag').exists()
+    assert [*tmp_path.iterdir()] == []
 
 
 @pytest.mark.parametrize('arguments', [(), ('--ros-args', '-r', '__ns:=/cell')])
@@ -273,19 +273,21 @@ def test_nodes_in_a_namespace_are_recorded(
     peer = Peer(domain)
     topic = '/cell/stewart_dynamics/leg_states'
     writer = peer.writer(topic, JointState)
-    program = run('record_bag.py', domain, '--output', tmp_path / 'bag', *arguments)
+    folder = tmp_path / 'recorded'
+    program = run('record_bag.py', domain, '--output', folder / 'bag', *arguments)
     peer.watched = program
     try:
         peer.until(lambda: writer.get_subscription_count() == 1, 'it is recorded')
         writer.publish(serialize_message(JointState(name=['leg_1'])))
-        peer.until(lambda: (tmp_path / 'bag').exists(), 'the bag is there')
         peer.spin(0.5)
+        assert not (folder / 'bag').exists()  # until it is complete
     finally:
         peer.watched = None
         code = program.stop()
         peer.close()
     assert code == 0, program.stderr
     assert re.search(rf'^ +1 {topic}$', program.stdout, re.MULTILINE), program.stdout
+    assert [path.name for path in folder.iterdir()] == ['bag']
 
 
 def test_gains_and_heights_are_those_of_the_hexapod() -> None:
