@@ -168,7 +168,7 @@ docs: $(INSTALLED)
 
 # The pages as a site: docs/_build/html/index.html.
 docs-site: $(INSTALLED)
-	$(VENV)/bin/python -m sphinx --fresh-env --write-all --fail-on-warning --keep-going --quiet \
+	$(VENV)/bin/python -m sphinx -E -a -W --keep-going -q \
 	  docs docs/_build/html
 	@echo 'file://$(CURDIR)/docs/_build/html/index.html'
 
@@ -192,6 +192,7 @@ ifeq ($(VERSIONS),)
 else
 	@$(PIP) install setuptools
 	@$(VENV)/bin/python .ci/setup_requirements.py $(VERSIONS) > $(VENV)/requirements.txt
+	@echo lark >> $(VENV)/requirements.txt  # for FMPy: otherwise in the ROS wheels
 endif
 	@$(PIP) install --upgrade --constraint $(VENV)/requirements.txt pip setuptools
 	@$(PIP) install --no-build-isolation --requirement $(VENV)/requirements.txt
