@@ -22,6 +22,7 @@ import gc
 from pathlib import Path
 import re
 import runpy
+import signal
 import sys
 
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
@@ -288,6 +289,19 @@ def test_nodes_in_a_namespace_are_recorded(
     assert code == 0, program.stderr
     assert re.search(rf'^ +1 {topic}$', program.stdout, re.MULTILINE), program.stdout
     assert [path.name for path in folder.iterdir()] == ['bag']
+
+
+def test_a_second_interrupt_does_not_disturb_the_end(domain: int, run: Run) -> None:
+    peer = Peer(domain)
+    program = run('leg_controller.py', domain, '--ros-args', '-p', f'params_file:={PLATFORM}')
+    try:
+        peer.until(lambda: program.ended or peer.node.count_subscribers(
+            '/stewart_dynamics/leg_states'), 'it has started')
+        program.process.send_signal(signal.SIGINT)
+        assert program.stop() == 0, program.stderr
+    finally:
+        peer.close()
+    assert 'Traceback' not in program.stderr
 
 
 def test_gains_and_heights_are_those_of_the_hexapod() -> None:
