@@ -84,7 +84,7 @@ class BaseInput:
         self.consistency = Consistency(
             parameters['singularity.characteristic_length'],
             (parameters['world_frame'], parameters['base_frame'])) if source == MOVING else None
-        """The check of the samples' twists and accelerations; None if there are none."""
+        """The check of the samples' twists and accelerations; None without samples."""
 
     @property
     def last(self) -> tuple[int, _Row] | None:
