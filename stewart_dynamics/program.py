@@ -20,6 +20,7 @@ import argparse
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 import io
+import math
 import os
 from pathlib import Path
 import re
@@ -65,6 +66,8 @@ class Program:
             epilog='\n'.join([files, '', 'exit codes:', *lines]),
             formatter_class=argparse.RawDescriptionHelpFormatter)
         parser.register('action', None, _StoreOnce)
+        # Before Python 3.14, argparse takes -1e-3 for an option.
+        parser._negative_number_matcher = re.compile(r'-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$')
         parser.add_argument('--version', action='version', version=SOFTWARE)
         return parser
 
@@ -252,37 +255,54 @@ def arguments_of(given: argparse.Namespace, names: Container[str]) -> dict[str, 
     return {name: value for name, value in vars(given).items() if name in names}
 
 
+def number(text: str) -> float:
+    """Return a finite number as an option gives it."""
+    try:
+        value = float(_digits(text))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'{text or repr(text)}: must be a number')
+    return value
+
+
 def frequency(text: str) -> float:
     """Return a cut-off frequency as an option gives it [Hz]."""
-    value = float(text)
-    if not 1e-6 <= value <= 1e6:
-        raise argparse.ArgumentTypeError(f'{text}: must be at least 1e-6, at most 1e6')
-    return value
+    return between(1e-6, 1e6)(text)
 
 
 def between(least: float, most: float) -> Callable[[str], float]:
     """Return the type of an option that is a number within bounds."""
     def read(text: str) -> float:
-        value = float(text)
+        value = number(text)
         if not least <= value <= most:
             raise argparse.ArgumentTypeError(
                 f'{text}: must be at least {least:g}, at most {most:g}')
         return value
 
-    read.__name__ = 'number'
     return read
 
 
 def whole(least: int, most: int) -> Callable[[str], int]:
     """Return the type of an option that is a whole number within bounds."""
     def read(text: str) -> int:
-        value = int(text)
+        try:
+            value = int(_digits(text))
+        except ValueError:
+            raise argparse.ArgumentTypeError(
+                f'{text or repr(text)}: must be a whole number') from None
         if not least <= value <= most:
             raise argparse.ArgumentTypeError(f'{text}: must be at least {least}, at most {most}')
         return value
 
-    read.__name__ = 'whole number'
     return read
+
+
+def _digits(text: str) -> str:
+    """Return the text of a number; Python alone reads 1_0 as 10, and other scripts' digits."""
+    if '_' in text or not text.isascii():
+        raise ValueError(text)
+    return text
 
 
 def _printable(text: str) -> str:

@@ -213,7 +213,7 @@ def test_a_failed_design_is_reported_in_one_line(
     (('--params', 'x', '--design', 'a_bag'), '--design takes no BAG'),
     (('--params', 'x'), 'the following arguments are required: BAG'),
     (('--params', 'x', '--design', '--duration', '0'), 'must be at least 2'),
-    (('--params', 'x', '--design', '--harmonics', '2.5'), 'invalid whole number value'),
+    (('--params', 'x', '--design', '--harmonics', '2.5'), '2.5: must be a whole number'),
 ])
 def test_arguments_that_do_not_fit_are_named(
         capsys: pytest.CaptureFixture[str], arguments: Any, said: str) -> None:

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import os
 from pathlib import Path
 import signal
@@ -27,7 +28,7 @@ import pytest
 
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.program import BAD_INPUT, Program, STRICT
+from stewart_dynamics.program import BAD_INPUT, between, frequency, number, Program, STRICT, whole
 from stewart_dynamics.signals import ending_signals, interrupt_on_signals
 
 PROGRAM = Program('some_program', 'parameters', 'something is found')
@@ -110,3 +111,23 @@ def test_signals_are_handled_before_anything_large_is_imported(module: str) -> N
         capture_output=True, text=True, timeout=300, check=True)
     assert not {'argparse', 'numpy', 'yaml', 'threading', 'stewart_dynamics.program'} & set(
         done.stdout.split())
+
+
+@pytest.mark.parametrize('kind', [number, frequency, between(-1.0, 1.0), whole(1, 9)])
+@pytest.mark.parametrize('text', ['nan', 'inf', '1e400', '', 'abc', '1_0', '\u0661'])
+def test_what_is_no_number_says_so_for_every_option(
+        kind: Callable[[str], float], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    parser = Program('program', 'input').parser('text', 'files')
+    parser.add_argument('--value', type=kind)
+    with pytest.raises(SystemExit) as end:
+        parser.parse_args([f'--value={text}'])
+    assert end.value.code == BAD_INPUT
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.startswith('program: error: argument --value: ') and 'must be a' in last
+
+
+@pytest.mark.parametrize('text', ['-1e-3', '-1.e+3', '-.5E2', '-2'])
+def test_a_negative_number_with_an_exponent_is_no_option(text: str) -> None:
+    parser = Program('program', 'input').parser('text', 'files')
+    parser.add_argument('--value', type=number, nargs=2)
+    assert parser.parse_args(['--value', '0', text]).value == [0.0, float(text)]

@@ -18,12 +18,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-import math
 from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.program import (
-    add_node, add_parameters, frequency, NODE, Program)
+    add_node, add_parameters, frequency, NODE, number, Program)
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import DATASHEETS
 from stewart_dynamics.signals import interrupt_on_signals
@@ -44,16 +43,16 @@ def _arguments() -> argparse.ArgumentParser:
                     'what limits it.',
         files='DIR/ gets datasheet.html, datasheet.json and workspace.csv.')
     add_parameters(parser, '; with the limits that rate it')
-    parser.add_argument('--pose', nargs=6, type=_number, metavar=(
+    parser.add_argument('--pose', nargs=6, type=number, metavar=(
         'X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA'),
         help='pose that is rated [m, rad] (default: home)')
-    parser.add_argument('--pivot', nargs=3, type=_number, metavar=('X', 'Y', 'Z'),
+    parser.add_argument('--pivot', nargs=3, type=number, metavar=('X', 'Y', 'Z'),
                         help='point that the platform turns about and forces act on, platform '
                              'frame [m] (default: its origin)')
-    parser.add_argument('--payload', nargs=4, type=_number, metavar=('KG', 'X', 'Y', 'Z'),
+    parser.add_argument('--payload', nargs=4, type=number, metavar=('KG', 'X', 'Y', 'Z'),
                         help='mass on the platform, and its center of mass in the platform frame '
                              '[m]')
-    parser.add_argument('--leg-stiffness', type=_number, metavar='K',
+    parser.add_argument('--leg-stiffness', type=number, metavar='K',
                         help='stiffness of a leg along its axis [N/m]: adds stiffness and natural '
                              'frequencies')
     parser.add_argument('--box', type=Path, metavar='FILE',
@@ -70,16 +69,6 @@ def _arguments() -> argparse.ArgumentParser:
                         help='compute twist and acceleration from the poses by smoothing splines '
                              'of this cut-off frequency')
     return parser
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f'{text}: must be a number')
-    return value
 
 
 def _run(given: argparse.Namespace) -> int:

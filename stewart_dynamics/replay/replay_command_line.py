@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.program import (
-    add_node, add_parameters, add_report, frequency, Program)
+    add_node, add_parameters, add_report, frequency, Program, whole)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
 from stewart_dynamics.reporting.results_folder import REPLAYS
 from stewart_dynamics.signals import interrupt_on_signals
@@ -88,7 +88,7 @@ def _arguments() -> argparse.ArgumentParser:
     output.add_argument('--parquet', action='store_true',
                         help='write legs.parquet in place of legs.csv')
     many = parser.add_argument_group('many bags')
-    many.add_argument('--jobs', type=_number, default=1, metavar='N',
+    many.add_argument('--jobs', type=whole(1, 10_000), default=1, metavar='N',
                       help='bags that are replayed at the same time (default: 1)')
     many.add_argument('--scheduler', metavar='ADDRESS',
                       help='replay on the workers of this Dask scheduler; they must see '
@@ -156,10 +156,3 @@ def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, stri
     _PROGRAM.say(replayed.text)
     return _PROGRAM.end(folder, {bag: replayed.summary['missing']},
                         strict and replayed.code == LIMIT_MET)
-
-
-def _number(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f'{text}: must be at least 1')
-    return value
