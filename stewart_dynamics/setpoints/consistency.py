@@ -66,8 +66,9 @@ _GATHERED = 64
 
 # Relative difference that is consistent, besides noise, jitter and delay.
 _TOLERANCE = 0.06
-# Delay of a derivative that is consistent: in samples, and at least in seconds.
-_DELAY_IN_SAMPLES, _DELAY = 1.5, 0.004
+# Delay of a derivative that is consistent: in samples (a difference with the sample before is half
+# a sample late, and messages may be two), and at least in seconds: that of a filter of 5 Hz.
+_DELAY_IN_SAMPLES, _DELAY = 3.0, 0.035
 # Largest noise of a window, as part of its motion, with which it is judged.
 _NOISE_SHARE = 0.25
 # A pause this many times as long as usual is a gap.
@@ -439,8 +440,9 @@ class _Periods:
             moving = (broken[:, lag:] == broken[:, :-lag]) & (
                 (change >= smallest) | (integral >= smallest_integral)) & (
                 size >= slowest * lasts) & (uncertain <= _NOISE_SHARE * size)
-            shifted = delay * _norm(given[:, lag:] - given[:, :-lag])
-            bad = moving & (_norm(d - u) > _TOLERANCE * size + uncertain + shifted)
+            off, tolerance = _without_delay(
+                u - d, u, given[:, lag:] - given[:, :-lag], moving, delay)
+            bad = moving & (_norm(off) > tolerance * size + uncertain)
             # Reasons are found the better, the smaller the noise is.
             moved = moving.sum(axis=1)
             score = moved + (moving & (10.0 * of_path <= change)).sum(axis=1)
@@ -570,6 +572,27 @@ def _summed(values: Array) -> Array:
     found = np.zeros(shape)
     np.cumsum(values, axis=1, out=found[:, 1:])
     return found
+
+
+def _without_delay(
+        off: Array, integral: Array, change: Array, moving: Flags, most: Array,
+        ) -> tuple[Array, Array]:
+    """
+    Return the differences of windows less what a delay explains, and the relative tolerance.
+
+    off, integral, change: of windows (m, windows, 3), the difference from what is expected, the
+    integral of the given values, and their change.
+    moving: windows that count.
+    most: largest delay, to either side (m, 1) [s].
+    """
+    kept = np.where(moving[..., None], change, 0.0)
+    squares = np.einsum('nwi,nwi->n', kept, change)[:, None]
+    product = np.einsum('nwi,nwi->n', kept, off)[:, None]
+    delay = np.clip(-product / np.maximum(squares, 1e-300), -most, most)
+    whole = np.einsum('nwi,nwi,nw->n', integral, integral, moving)[:, None]
+    # The delay in radians, squared; half of it is the next term of the series.
+    phase = delay ** 2 * squares / np.maximum(whole, 1e-300)
+    return off + delay[..., None] * change, _TOLERANCE + 0.5 * phase
 
 
 def _turn(rotations: Array) -> Array:
