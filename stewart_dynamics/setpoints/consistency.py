@@ -25,12 +25,15 @@ inconsistent if most windows with enough motion are, in two periods in a row.
 The likeliest reason is the one under which the difference vanishes: each is a hypothesis with a
 residual, computed from sums over all windows of inconsistent periods.
 
-Arrays in, no clock. The result does not depend on how samples are split into batches.
+Arrays in, no clock. The result does not depend on how samples are split into batches, nor on when
+the work is done: ``judge`` does it in steps, so that no setpoint waits for a whole period.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from itertools import chain
 import math
 from typing import NamedTuple
 
@@ -185,6 +188,7 @@ class Consistency:
         self._radius = radius
         self._frame = frame
         self._pending: list[tuple[Stamps, Array, Flags]] = []
+        self._steps: Iterator[None] = iter(())  # those that ``judge`` has not yet done
         self.noted: list[tuple[int, Sequence[float], bool]] = []
         """Single samples for ``judge``: stamp [ns], row of motion, whether time jumped back."""
         self._held = 0
@@ -200,34 +204,42 @@ class Consistency:
         """Those of the last periods with enough motion."""
 
     def judge(self) -> None:
-        """Check the samples noted so far, if they are enough."""
+        """Do one step, a fraction of a millisecond, of the check of the samples noted so far."""
+        with np.errstate(all='ignore'):  # numbers that overflow are not judged
+            for _ in self._steps:
+                return
         if len(self.noted) >= _GATHERED:
-            self._take_ones()
+            self._steps = self._take_noted()
 
     def add(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
         """Add N samples: stamps [ns], rows of motion (N, MOTION), whether time jumped back."""
-        self._take_ones()
-        self._add(stamps, motions, restarts)
+        self._do(self._add(stamps, motions, restarts))
 
     def finish(self) -> None:
         """Judge the remaining samples."""
-        self._take_ones()
-        self._periods(ended=True)
+        self._do(self._periods(ended=True))
 
-    def _take_ones(self) -> None:
+    def _do(self, steps: Iterator[None]) -> None:
+        """Do all steps, after those that are left."""
+        with np.errstate(all='ignore'):
+            deque(chain(self._steps, self._take_noted(), steps), maxlen=0)
+        self._steps = iter(())
+
+    def _take_noted(self) -> Iterator[None]:
         if self.noted:
             stamps, motions, restarts = zip(*self.noted, strict=True)
             self.noted = []
-            self._add(np.array(stamps, dtype=np.int64), np.array(motions), np.array(restarts))
+            yield from self._add(
+                np.array(stamps, dtype=np.int64), np.array(motions), np.array(restarts))
 
-    def _add(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
+    def _add(self, stamps: Stamps, motions: Array, restarts: Flags) -> Iterator[None]:
         self._pending.append((stamps, motions, restarts))
         self._held += len(stamps)
         if self._held >= self._due:
-            self._periods()
+            yield from self._periods()
 
-    def _periods(self, ended: bool = False) -> None:
-        """Judge all complete periods."""
+    def _periods(self, ended: bool = False) -> Iterator[None]:
+        """Judge all complete periods, step by step."""
         if not self._held:
             return
         stamps, motions, restarts = (np.concatenate(each) for each in zip(
@@ -241,11 +253,10 @@ class Consistency:
             self._begun = begun, begun + _INTERVAL
             knots = knots[at + PERIOD:]
             at = self._begin(cells[knots])
-        with np.errstate(all='ignore'):  # numbers that overflow are not judged
-            if kept:
-                self._judge(stamps, motions, restarts, np.array(kept))
-            if ended and at is not None and len(knots) - at > _FEWEST:
-                self._judge(stamps, motions, restarts, knots[None, at:])
+        if kept:
+            yield from self._judge(stamps, motions, restarts, np.array(kept))
+        if ended and at is not None and len(knots) - at > _FEWEST:
+            yield from self._judge(stamps, motions, restarts, knots[None, at:])
         # Without a period that has begun, the last sample shows whether the next one is a knot.
         begin = len(stamps) if ended else len(stamps) - 1 if at is None else int(knots[at])
         self._pending = [(stamps[begin:], motions[begin:], restarts[begin:])]
@@ -265,20 +276,24 @@ class Consistency:
         may = np.flatnonzero((cells >= following) | (cells < begun))
         return int(may[0]) if len(may) else None
 
-    def _judge(self, stamps: Stamps, motions: Array, restarts: Flags, at: Integers) -> None:
-        """Judge periods, given by their knots (n, length + 1)."""
+    def _judge(self, stamps: Stamps, motions: Array, restarts: Flags, at: Integers,
+               ) -> Iterator[None]:
+        """Judge periods, given by their knots (n, length + 1), step by step."""
+        yield
         periods = _Periods(stamps, motions, restarts, at)
         radius = self._radius
-        twists = periods.windows(_TWISTS, None, [
+        yield
+        twists = yield from periods.windows(_TWISTS, None, [
             (size * _SMALLEST, size * _SMALLEST_INTEGRAL, size * _SLOWEST)
             for size in (radius, 1.0)])
-        rates = periods.windows(RATES, {
+        rates = yield from periods.windows(RATES, {
             twist: found.bad for twist, found in twists.items()}, [
             (size * _WEAKEST * 1e-3, size * _WEAKEST, size * _WEAKEST)
             for size in (1.0, 1.0 / radius)])
         for n in range(len(at)):
             for quantity, found in (twists | rates).items():
                 if found.moving[n]:
+                    yield
                     twist = _TWIST_OF.get(quantity, quantity)
                     self._note(quantity, bool(found.bad[n]), periods, n, int(found.lag[n]),
                                bool(twists[twist].bad[n]))
@@ -405,9 +420,10 @@ class _Periods:
         return found
 
     def windows(self, quantities: Sequence[str], by_poses: Mapping[str, Flags] | None,
-                floors: Sequence[tuple[float, float, float]]) -> dict[str, _Windows]:
+                floors: Sequence[tuple[float, float, float]],
+                ) -> Generator[None, None, dict[str, _Windows]]:
         """
-        Judge windows of the length that has most of those with motion.
+        Judge windows of the length that has most of those with motion, step by step.
 
         by_poses: of each twist, the periods in which it is not the derivative of the poses.
         floors: of each quantity, the smallest change, integral and mean value of a window.
@@ -432,6 +448,7 @@ class _Periods:
         for lag in _LAGS:
             if 2 * lag > self._length:
                 break
+            yield
             lasts = times[:, lag:] - times[:, :-lag]
             d, u = paths[:, lag:] - paths[:, :-lag], integrals[:, lag:] - integrals[:, :-lag]
             change, integral = _norm(d), _norm(u)
@@ -580,19 +597,21 @@ def _without_delay(
     """
     Return the differences of windows less what a delay explains, and the relative tolerance.
 
+    Differences of windows that do not count are zero.
+
     off, integral, change: of windows (m, windows, 3), the difference from what is expected, the
     integral of the given values, and their change.
     moving: windows that count.
     most: largest delay, to either side (m, 1) [s].
     """
-    kept = np.where(moving[..., None], change, 0.0)
-    squares = np.einsum('nwi,nwi->n', kept, change)[:, None]
-    product = np.einsum('nwi,nwi->n', kept, off)[:, None]
+    late, differing, given = (
+        np.where(moving[..., None], each, 0.0) for each in (change, off, integral))
+    squares, product, whole = (np.einsum('nwi,nwi->n', *pair)[:, None] for pair in (
+        (late, late), (late, differing), (given, given)))
     delay = np.clip(-product / np.maximum(squares, 1e-300), -most, most)
-    whole = np.einsum('nwi,nwi,nw->n', integral, integral, moving)[:, None]
     # The delay in radians, squared; half of it is the next term of the series.
     phase = delay ** 2 * squares / np.maximum(whole, 1e-300)
-    return off + delay[..., None] * change, _TOLERANCE + 0.5 * phase
+    return differing + delay[..., None] * late, _TOLERANCE + 0.5 * phase
 
 
 def _turn(rotations: Array) -> Array:
