@@ -192,6 +192,7 @@ ifeq ($(VERSIONS),)
 else
 	@$(PIP) install setuptools
 	@$(VENV)/bin/python .ci/setup_requirements.py $(VERSIONS) > $(VENV)/requirements.txt
+	@echo lark >> $(VENV)/requirements.txt  # for FMPy: otherwise in the ROS wheels
 endif
 	@$(PIP) install --upgrade --constraint $(VENV)/requirements.txt pip setuptools
 	@$(PIP) install --no-build-isolation --requirement $(VENV)/requirements.txt

@@ -75,12 +75,30 @@ def pytest_make_collect_report(
         ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
     """Skip a module of tests that imports ROS if it is not installed."""
     report = yield
-    error = report.call.excinfo.value.__cause__ if report.failed else None
-    if isinstance(error, ModuleNotFoundError) and find_spec('rclpy') is None and (
-            ROS_PACKAGE.match(error.name)):
-        report.outcome = 'skipped'
-        report.longrepr = str(collector.path), 0, f'Skipped: needs ROS: no {error.name} here'
+    if report.failed:
+        skip_without_ros(report, report.call.excinfo.value.__cause__, str(collector.path), 0)
     return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+        item: pytest.Item, call: pytest.CallInfo[None],
+        ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Skip a test that imports ROS, itself or in a fixture, if it is not installed."""
+    report = yield
+    if report.failed and call.excinfo is not None:
+        skip_without_ros(report, call.excinfo.value, *item.reportinfo()[:2])
+    return report
+
+
+def skip_without_ros(report: pytest.CollectReport | pytest.TestReport,
+                     error: BaseException | None, path: str | os.PathLike[str],
+                     line: int | None) -> None:
+    """Make the report one of a skipped test if the error is that ROS is not installed."""
+    if isinstance(error, ModuleNotFoundError) and find_spec('rclpy') is None and (
+            ROS_PACKAGE.match(error.name or '')):
+        report.outcome = 'skipped'
+        report.longrepr = str(path), line or 0, f'Skipped: needs ROS: no {error.name} here'
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
