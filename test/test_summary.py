@@ -360,7 +360,7 @@ def assert_same(found: Any, truth: Any, at: str = '') -> None:
         for n, (each, other) in enumerate(zip(found, truth, strict=True)):
             assert_same(each, other, f'{at}/{n}')
     elif isinstance(truth, float):
-        assert type(found) is float, at
+        assert isinstance(found, float), at
         assert found == pytest.approx(truth, rel=1e-12, abs=1e-12), at
     else:
         assert type(found) is type(truth), at

@@ -51,6 +51,7 @@ VELOCITY, SPIN, ACCELERATION, SPIN_RATE = (
     'velocity', 'angular velocity', 'acceleration', 'angular acceleration')
 QUANTITIES = VELOCITY, SPIN, ACCELERATION, SPIN_RATE
 _TWISTS, RATES = (VELOCITY, SPIN), (ACCELERATION, SPIN_RATE)
+_POSES, _TWISTS_GIVEN = 'the poses', 'the twists'
 _TWIST_OF = {ACCELERATION: VELOCITY, SPIN_RATE: SPIN}
 UNITS = {VELOCITY: 'm/s', SPIN: 'rad/s', ACCELERATION: 'm/s^2', SPIN_RATE: 'rad/s^2'}
 _COLUMNS = {VELOCITY: LINEAR_VELOCITY, SPIN: ANGULAR_VELOCITY, ACCELERATION: LINEAR_ACCELERATION,
@@ -115,14 +116,17 @@ class Inconsistency(NamedTuple):
     difference: float  # RMS
     reason: str  # likeliest reason, with a question mark; empty if it is not known
     first: int  # stamp of the beginning [ns]
+    of: str  # of what it is not the derivative
 
     @property
     def words(self) -> str:
         """Return the difference and the reason in one line."""
-        of = 'the poses' if self.quantity in (VELOCITY, SPIN) else 'the twists'
+        of, derivative = self.of, 'derivative'
+        if self.quantity in RATES and of == _POSES:  # the twists are wrong, too
+            derivative = 'second derivative'
         unit = UNITS[self.quantity]
         reason = f': likely mistake: {self.reason}' if self.reason else ''
-        return (f'{self.quantity} is not the derivative of {of}: {self.given:.3g} {unit} RMS, by '
+        return (f'{self.quantity} is not the {derivative} of {of}: {self.given:.3g} {unit} RMS, by '
                 f'differences of {of} {self.expected:.3g} {unit}, they differ by '
                 f'{self.difference:.3g} {unit}{reason}')
 
@@ -322,7 +326,8 @@ class Consistency:
         expected, given, difference = np.sqrt(sums.rates / sums.windows).tolist()
         found = Inconsistency(
             quantity, given, expected, difference,
-            _reason(quantity, sums, self._frame), sums.first)
+            _reason(quantity, sums, self._frame), sums.first,
+            _POSES if quantity in _TWISTS or 'same' in sums.candidates else _TWISTS_GIVEN)
         self.present[quantity] = found
         if quantity not in self.found or self.found[quantity].first == found.first:
             self.found[quantity] = found
