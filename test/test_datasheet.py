@@ -399,6 +399,8 @@ def test_a_motion_whose_twists_are_zero_is_not_judged(
     assert all(each.endswith('it is zero, never filled?') for each in motion['mistakes'])
     page = (tmp_path / 'a' / 'datasheet.html').read_text()
     assert 'not judged, its messages contradict each other' in page
+    assert '<p>setpoint/twist: velocity is not the derivative' in page
+    assert 'payload that can be added' not in page
 
 
 class _Loaded(HTMLParser):

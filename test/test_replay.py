@@ -593,6 +593,7 @@ def test_twists_that_are_not_those_of_the_poses_are_no_motion_that_holds_all_lim
     assert run(bag, tmp_path / 'strict', '--strict') == LIMIT_MET
     printed = ' '.join(capsys.readouterr().out.split())  # without line breaks
     assert 'all limits held' not in printed
+    assert 'no limit was met by inputs that contradict each other' in printed
     found = summary_of(tmp_path / 'out' / 'bag')['mistakes']
     # accelerations are too small to matter
     assert {each['topic'] for each in found} == {TWIST}
