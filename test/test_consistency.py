@@ -36,8 +36,9 @@ from stewart_dynamics.mechanics.rows import (
     POSE, POSITION, ROTATION, TWIST)
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
-from stewart_dynamics.setpoints.consistency import (
-    ACCELERATION as ACCEL, Consistency, Inconsistency, SPIN, SPIN_RATE, VELOCITY)
+from stewart_dynamics.setpoints.consistency import Consistency
+from stewart_dynamics.setpoints.inconsistency import (
+    ACCELERATION as ACCEL, Inconsistency, SPIN, SPIN_RATE, VELOCITY)
 from stewart_dynamics.setpoints.inputs import (
     ACCEL as ACCELS, BASE_ACCEL, BASE_POSE, BASE_TWIST, POSE as POSES, TWIST as TWISTS)
 
