@@ -168,7 +168,7 @@ docs: $(INSTALLED)
 
 # The pages as a site: docs/_build/html/index.html.
 docs-site: $(INSTALLED)
-	$(VENV)/bin/python -m sphinx --fresh-env --write-all --fail-on-warning --keep-going --quiet \
+	$(VENV)/bin/python -m sphinx -E -a -W --keep-going -q \
 	  docs docs/_build/html
 	@echo 'file://$(CURDIR)/docs/_build/html/index.html'
 

@@ -52,7 +52,7 @@ extras_require = {
         'furo>=2024.1.29',
         'myst-parser>=2',
         'numpydoc>=1.6',
-        'sphinx>=7.2',
+        'sphinx>=7.2.5',  # has the event include-read
     ],
     'mujoco': ['mujoco>=3.2'],
     'parquet': ['pyarrow>=14'],

@@ -68,8 +68,8 @@ class Page(HTMLParser):
 def build(source: Path, output: Path) -> subprocess.CompletedProcess[str]:
     """Build a site as `make docs-site` does."""
     return subprocess.run(
-        [sys.executable, '-m', 'sphinx', '--fresh-env', '--fail-on-warning', '--keep-going',
-         '--quiet', str(source), str(output)],
+        [sys.executable, '-m', 'sphinx', '-E', '-W', '--keep-going', '-q', str(source),
+         str(output)],
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         timeout=300)
 

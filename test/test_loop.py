@@ -163,7 +163,8 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
     weight = platform.inverse_dynamics(Motion.from_pose(pose)).forces
     held = JointState(name=joints, position=moving.position, velocity=[0.0] * 6, effort=weight)
     program = Program([sys.executable, CONTROLLER, '--ros-args', '-p', 'timeout:=1.0', '-p',
-                       f'params_file:={PLATFORM}'], domain, tmp_path)
+                       f'params_file:={PLATFORM}', '-p', 'proportional_gain:=4e5', '-p',
+                       'derivative_gain:=1.6e4'], domain, tmp_path)
     peer = Peer(domain)
     peer.watched = program
     commands = peer.listen('/stewart_simulator/commands', Float64MultiArray)

@@ -332,7 +332,7 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
     # Along the whole stroke, with all the force of a leg for a sixth of the platform.
     needed = fastest ** 2 / (2.0 * (high - low))
     largest = np.full(6, _LARGEST_ACCELERATION / min(shape.radius, 1.0))
-    if most is not None:
+    if most is not None and weight <= most.sum():
         largest = np.minimum(largest, most / (p['platform.mass'] / 6.0 + p[
             'legs.piston.mass'] + p['actuator.reflected_mass']))
     at = int(np.argmax(needed / largest))
