@@ -472,11 +472,11 @@ def _without_delay(
         off: Array, integral: Array, change: Array, moving: Flags, most: Array,
         ) -> tuple[Array, Array]:
     """
-    Return the differences of windows less what a delay explains, and the relative tolerance.
+    Return the differences of windows without those of a delay, and the relative tolerance.
 
     Differences of windows that do not count are zero.
 
-    off, integral, change: of windows (m, windows, 3), the difference from what is expected, the
+    off, integral, change: of windows (m, windows, 3), the difference from the expected value, the
     integral of the given values, and their change.
     moving: windows that count.
     most: largest delay, to either side (m, 1) [s].

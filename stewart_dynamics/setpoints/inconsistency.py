@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Motions that contradict themselves: in what, by how much, and the likeliest reason.
+Contradictions within a motion: the quantity, the size of the difference, the likeliest reason.
 
 Each reason is a hypothesis with a residual, computed from sums over windows; the likeliest is the
 one under which the difference vanishes.
