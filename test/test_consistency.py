@@ -36,8 +36,9 @@ from stewart_dynamics.mechanics.rows import (
     POSE, POSITION, ROTATION, TWIST)
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
-from stewart_dynamics.setpoints.consistency import (
-    ACCELERATION as ACCEL, Consistency, Inconsistency, SPIN, SPIN_RATE, VELOCITY)
+from stewart_dynamics.setpoints.consistency import Consistency
+from stewart_dynamics.setpoints.inconsistency import (
+    ACCELERATION as ACCEL, Inconsistency, SPIN, SPIN_RATE, VELOCITY)
 from stewart_dynamics.setpoints.inputs import (
     ACCEL as ACCELS, BASE_ACCEL, BASE_POSE, BASE_TWIST, POSE as POSES, TWIST as TWISTS)
 
@@ -126,6 +127,23 @@ def differences(given: Stream) -> Stream:
     return stamps[2:], rows[2:]
 
 
+def filtered(given: Stream, part: slice, cutoff: float = 5.0) -> Stream:
+    """Filter poses or accelerations alone, as games do: of first order."""
+    stamps, rows = given
+    share = 1.0 - math.exp(-2.0 * math.pi * cutoff * (stamps[1] - stamps[0]) / SECOND)
+    pose = part == POSE
+    rotations = rows[:, ROTATION].reshape(-1, 3, 3)
+    values = (np.concatenate([rows[:, POSITION], to_euler(rotations)], axis=1) if pose
+              else rows[:, part])
+    for n in range(1, len(values)):
+        values[n] = values[n - 1] + share * (values[n] - values[n - 1])
+    if pose:
+        rows[:, POSITION] = values[:, :3]
+        rows[:, ROTATION] = from_euler(values[:, 3:]).reshape(-1, 9)
+    settled = np.searchsorted(stamps, stamps[0] + SECOND)
+    return stamps[settled:], rows[settled:]
+
+
 def some_dropped(given: Stream) -> Stream:
     kept = rng(4).random(len(given[0])) > 0.15
     return given[0][kept], given[1][kept]
@@ -152,7 +170,12 @@ RIGHT: dict[str, Callable[[Stream], Stream]] = {
     'tracker noise': lambda given: noisy(given, 2e-4),
     'in tenths of a millimetre': lambda given: quantized(given, 1e-4),
     'single precision': lambda given: (given[0], given[1].astype(np.float32).astype(float)),
+    'stamps with jitter of 20 %': lambda given: jittered(
+        given, 0.1e-9 * float(given[0][1] - given[0][0])),
     'differences': differences,
+    'differences, two samples late': lambda given: late(differences(given), 2),
+    'filtered poses': lambda given: filtered(given, POSE),
+    'filtered accelerations': lambda given: filtered(given, ACCELERATION),
     'dropped samples': some_dropped,
     'noisy twist': with_noisy_twist,
     'a jump': with_a_jump,
@@ -169,6 +192,33 @@ def test_right_streams_are_consistent(name: str, rate: float) -> None:
 @pytest.mark.parametrize('samples', [1, 2])
 def test_a_delay_of_two_samples_at_1_khz_is_consistent(samples: int) -> None:
     assert found(late(stream(1000.0), samples)) == {}
+
+
+@pytest.mark.parametrize('rate', [200.0, 500.0, 1000.0])
+@pytest.mark.parametrize('frequency', [20.0, 50.0, 80.0])
+@pytest.mark.parametrize('size', [1e-5, 1e-3])
+def test_vibration_is_consistent(rate: float, frequency: float, size: float) -> None:
+    times = np.arange(round(4.0 * rate)) / rate
+    w = 2.0 * math.pi * np.array([0.3, frequency])
+    amplitude = np.array([0.05, size])
+    phase = times[:, None] * w
+    place, speed, acceleration = (np.sum(each, axis=1)[:, None] * [1.0, 0.5, -0.7] for each in (
+        amplitude * np.sin(phase), amplitude * w * np.cos(phase),
+        -amplitude * w ** 2 * np.sin(phase)))
+    rows = Motion.from_euler(place + [0.0, 0.0, 0.6], place, speed, speed, acceleration,
+                             acceleration).rows
+    assert found((stamps_of(times), rows.copy())) == {}
+
+
+@pytest.mark.parametrize('rate', RATES)
+def test_accelerations_of_zero_are_found_from_those_that_matter(rate: float) -> None:
+    """Half a percent of gravity is where inertia begins to matter."""
+    for frequency, matters in ((0.1, False), (0.5, True)):
+        stamps, rows = stream(rate, frequency=frequency)
+        size = float(np.sqrt(np.mean(np.sum(rows[:, LINEAR_ACCELERATION] ** 2, axis=1))))
+        assert size > 0.3 if matters else size < 0.05
+        rows[:, LINEAR_ACCELERATION] = 0.0
+        assert (ACCEL in found((stamps, rows))) is matters
 
 
 def test_rest_and_noise_at_rest_are_consistent() -> None:

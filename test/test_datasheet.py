@@ -375,6 +375,34 @@ def test_a_bag_through_a_singularity_is_not_possible(
     assert f'results: {tmp_path / "a"}' in printed.out
 
 
+def test_a_motion_whose_twists_are_zero_is_not_judged(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = [writer.add_connection(
+            f'{NODE}/~/setpoint/{name}'.replace('/~', ''), f'geometry_msgs/msg/{kind}Stamped',
+            typestore=messages.STORE) for name, kind in (
+                ('pose', 'Pose'), ('twist', 'Twist'), ('accel', 'Accel'))]
+        for n in range(600):
+            stamp = messages.NOW + round(n * 1e7)
+            height = 1.1 + 0.05 * math.sin(0.03 * n)
+            for connection, data in zip(connections, (
+                    messages.pose(stamp, [0.0, 0.0, height]), messages.twist(stamp),
+                    messages.accel(stamp)), strict=True):
+                writer.write(connection, stamp, data)
+    assert run('--params', PLATFORM, '--motion', tmp_path / 'bag',
+               '--output', tmp_path / 'a', '--strict') == 1
+    printed = capsys.readouterr().out
+    assert 'motion not judged, its messages contradict each other: ' in printed
+    assert 'no limit at any speed' not in printed
+    motion = json.loads((tmp_path / 'a' / 'datasheet.json').read_text())['motion']
+    assert len(motion['mistakes']) == 2
+    assert all(each.endswith('it is zero, never filled?') for each in motion['mistakes'])
+    page = (tmp_path / 'a' / 'datasheet.html').read_text()
+    assert 'not judged, its messages contradict each other' in page
+    assert '<p>setpoint/twist: velocity is not the derivative' in page
+    assert 'payload that can be added' not in page
+
+
 class _Loaded(HTMLParser):
     """Resources and scripts of a page."""
 
@@ -586,8 +614,8 @@ def test_rejected_messages_of_a_motion_are_counted() -> None:
     ('fixed', ('', 3.0)), ('pose', (', base in any orientation', 2.0))])
 def test_the_payload_of_a_base_that_turns_is_that_of_any_orientation(
         source: str, payload: tuple[str, float]) -> None:
-    assert rated_payload({'payload': {'value': 3.0, 'any_orientation': 2.0},
-                          'parameters': {'base.source': source}}) == payload
+    assert rated_payload({'parameters': {'base.source': source}},
+                         {'value': 3.0, 'any_orientation': 2.0}) == payload
 
 
 def test_results_are_replaced_only_by_option(

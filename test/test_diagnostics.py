@@ -20,6 +20,7 @@ import re
 from typing import Any
 
 from hypothesis import given, strategies as st
+import messages
 import pytest
 from referees import ROOT, symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
@@ -27,7 +28,8 @@ from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.node.diagnostics.levels import ERROR, OK, STALE, Status, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.ros.repeated_log import RepeatedLog, SECONDS
-from stewart_dynamics.setpoints.inputs import ACCEL, POSE, TWIST
+from stewart_dynamics.setpoints.consistency import Mistake
+from stewart_dynamics.setpoints.inputs import ACCEL, BASE_IMU, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE, UNSTAMPED)
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
@@ -323,6 +325,32 @@ def test_the_age_of_the_last_setpoint_is_stated() -> None:
 
 
 # Singularity
+
+def test_likely_mistakes_are_a_warning_of_their_topics_as_long_as_they_are_there() -> None:
+    parameters = PARAMETERS.replaced({'base.source': 'imu'})
+    diagnostics = DynamicsDiagnostics(parameters, TOPICS, (BASE_IMU,), BEGIN)
+    answered(diagnostics, BEGIN)
+    diagnostics.base.heard[BASE_IMU] = BEGIN
+    diagnostics.base.sampled(messages.Feed(parameters).setpoints.base, BEGIN)
+    diagnostics.mistaken([
+        Mistake(TWIST, 'velocity is not the derivative of the poses', 0, (('given', '0'),)),
+        Mistake(BASE_IMU, 'measured gravity: in g?')], BEGIN)
+    statuses, lines = diagnostics.report(BEGIN)
+    setpoints, base = (next(each for each in statuses if each.name == name)
+                       for name in ('setpoints', 'base'))
+    assert (setpoints.level, base.level) == (WARN, WARN)
+    assert setpoints.message == f'{TWIST}: velocity is not the derivative of the poses'
+    assert ('given', '0') in setpoints.values
+    assert f'{BASE_IMU}: measured gravity: in g?' in base.message
+    line = WARN, f'setpoints: {setpoints.message}'
+    assert line in [(level, text) for level, text, _ in lines]
+    # Once, not with each report.
+    assert line not in logged(diagnostics, BEGIN)
+    answered(diagnostics, BEGIN + 2.0)
+    diagnostics.mistaken([], BEGIN + 2.0)
+    answered(diagnostics, BEGIN + 3.5)
+    assert status(diagnostics, 'setpoints', BEGIN + 3.5).level == OK
+
 
 def test_a_clear_motion_is_ok() -> None:
     diagnostics = begun()

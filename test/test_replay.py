@@ -579,6 +579,29 @@ def test_strict_exits_with_1_at_a_limit_without_a_warning(tmp_path: Path) -> Non
     assert np.all(np.abs(forces_of(rows_of(tmp_path / 'out' / 'bag'))) == 100.0)
 
 
+def test_twists_that_are_not_those_of_the_poses_are_no_motion_that_holds_all_limits(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Twists and accelerations that are never filled."""
+    empty = {TWIST: messages.twist, ACCEL: messages.accel}
+    given = [(topic.removeprefix(f'{NODE}/'), when, message)
+             for topic, when, message in decoded(bag_file('clear'))]
+    whole = {(topic, when): data for topic, when, data in recorded(bag_file('clear'))}
+    bag = write_bag(tmp_path / 'bag', (
+        (topic, when, empty[topic](nanoseconds(message)) if topic in empty
+         else whole[topic, when]) for topic, when, message in given if topic in TOPICS))
+    assert run(bag, tmp_path / 'out') == DONE
+    assert run(bag, tmp_path / 'strict', '--strict') == LIMIT_MET
+    printed = ' '.join(capsys.readouterr().out.split())  # without line breaks
+    assert 'all limits held' not in printed
+    assert 'no limit was met by inputs that contradict each other' in printed
+    found = summary_of(tmp_path / 'out' / 'bag')['mistakes']
+    # accelerations are too small to matter
+    assert {each['topic'] for each in found} == {TWIST}
+    for each in found:
+        assert each['text'].endswith('likely mistake: it is zero, never filled?')
+        assert f'{each["topic"]}: {each["text"]}' in printed
+
+
 @pytest.fixture
 def rejected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Rejected:
     """Return a function that gives the one line printed for a bag; the code is 2, no results."""

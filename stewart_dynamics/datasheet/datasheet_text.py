@@ -211,7 +211,7 @@ def _fastest(found: dict[str, Any]) -> str:
 def between_setpoints(found: dict[str, Any]) -> str:
     """Return a sentence on the limits between the setpoints of a motion."""
     between = found['between_setpoints']
-    if between is None:
+    if between is None or found.get('mistakes'):
         return 'Limits are checked at the setpoints.'
     if between['reason'] is not None:
         return f'Checked at the setpoints, not between them: {between["reason"]}.'

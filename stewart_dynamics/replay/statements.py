@@ -191,10 +191,15 @@ def _limits(summary: Summary) -> Iterator[Statement]:
             why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
                                   for number, cause in causes if number)
         yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
-    problems = points['jumps'] or summary.get('mistakes', ()) or (
-        summary['limits'] or summary['limits_not_checked'])
+    problems = points['jumps'] or summary['limits'] or summary['limits_not_checked']
     if not problems and _has_margins(summary['legs']):
-        yield Statement(LIMITS, 'good', 'all limits held')
+        yield (Statement(LIMITS, 'warn', 'no limit was met by inputs that contradict each other')
+               if _contradicting(summary) else Statement(LIMITS, 'good', 'all limits held'))
+
+
+def _contradicting(summary: Summary) -> bool:
+    """Return whether inputs contradict each other: nothing is proven by them."""
+    return bool(summary.get('mistakes'))
 
 
 def _topic(limit: str) -> str:
@@ -246,7 +251,7 @@ def _motors(summary: Summary) -> Iterator[Statement]:
         yield Statement(
             MOTORS, 'warn', f'drive.torque_continuous, exceeded by the RMS torque of {worst}'
             f'{others}: {legs[worst]["torque_rms_n_m"]:.4g} N m, by {-margin:.4g} N m')
-    elif values_of(legs, 'torque_continuous_margin_n_m'):
+    elif values_of(legs, 'torque_continuous_margin_n_m') and not _contradicting(summary):
         yield Statement(MOTORS, 'good', 'drive.torque_continuous held')
     if _motors_hold(summary):
         yield Statement(MOTOR_LIMITS, 'good', 'all limits of the motors held')
@@ -264,14 +269,15 @@ def _motors(summary: Summary) -> Iterator[Statement]:
                         bus['power_peak_at_s'], 'bus_power',
                         f'; {bus["regenerated_peak_w"]:.4g} W back to it at most')
     # Near a singularity peaks depend on the sampling.
-    if not summary['singularity']['warnings'] and (text := needed_words(motors['needed'])):
+    known = not summary['singularity']['warnings'] and not _contradicting(summary)
+    if known and (text := needed_words(motors['needed'])):
         yield Statement(MOTORS, 'none', f'motor needed: {text}')
 
 
 def _motors_hold(summary: Summary) -> bool:
     """Return whether a limit of the motors is given, and all are checked and held."""
     problems = [*(each['limit'] for each in summary['limits']), *summary['limits_not_checked']]
-    return _has_margins(summary['motors']['legs']) and not any(
+    return _has_margins(summary['motors']['legs']) and not _contradicting(summary) and not any(
         limit in OF_MOTORS for limit in problems)
 
 

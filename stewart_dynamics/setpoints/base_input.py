@@ -37,8 +37,8 @@ from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import BASE, GRAVITY, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import BY_IMU, MOVING, Parameters
-from stewart_dynamics.setpoints.consistency import (
-    Consistency, inconsistencies, Mistake, QUANTITIES, RATES)
+from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, Mistake
+from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
 from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_SOURCES, BASE_TWIST
 from stewart_dynamics.setpoints.measured_gravity import MeasuredGravity
 from stewart_dynamics.setpoints.rejections import Rejections

@@ -19,37 +19,31 @@ Samples are thinned to knots, at least TICK apart, and the knots are grouped int
 period the change of a pose over windows of a few knots is compared with the integral of the twist
 by the trapezoidal rule, and the change of the twist with the integral of the acceleration. A
 difference counts where it exceeds what stamps that jitter, noise or quantization of the poses, and
-a delay of one or two samples explain; all three are estimated from the samples. A quantity is
-inconsistent if most windows with enough motion are, in two periods in a row.
+a delay of a few samples or of a filter explain; all three are estimated from the samples. A
+quantity is inconsistent if most windows with enough motion are, in two periods in a row.
 
-The likeliest reason is the one under which the difference vanishes: each is a hypothesis with a
-residual, computed from sums over all windows of inconsistent periods.
-
-Arrays in, no clock. The result does not depend on how samples are split into batches.
+Arrays in, no clock. The result does not depend on how samples are split into batches, nor on when
+the work is done: ``judge`` does it in steps, so that no setpoint waits for a whole period.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-import math
+from collections import deque
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, Stamps
-from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.frames.rotation import euler_rate_matrix, to_euler
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
     POSITION, ROTATION, TWIST)
-from stewart_dynamics.parameters.table import STANDARD_GRAVITY
+from stewart_dynamics.setpoints.inconsistency import (
+    ACCELERATION, Inconsistency, POSES, QUANTITIES, RATES, reason_of, SPIN, SPIN_RATE, Sums,
+    TWIST_OF, TWISTS, TWISTS_GIVEN, VELOCITY)
 
-VELOCITY, SPIN, ACCELERATION, SPIN_RATE = (
-    'velocity', 'angular velocity', 'acceleration', 'angular acceleration')
-QUANTITIES = VELOCITY, SPIN, ACCELERATION, SPIN_RATE
-_TWISTS, RATES = (VELOCITY, SPIN), (ACCELERATION, SPIN_RATE)
-_TWIST_OF = {ACCELERATION: VELOCITY, SPIN_RATE: SPIN}
-UNITS = {VELOCITY: 'm/s', SPIN: 'rad/s', ACCELERATION: 'm/s^2', SPIN_RATE: 'rad/s^2'}
 _COLUMNS = {VELOCITY: LINEAR_VELOCITY, SPIN: ANGULAR_VELOCITY, ACCELERATION: LINEAR_ACCELERATION,
             SPIN_RATE: ANGULAR_ACCELERATION}
 
@@ -66,8 +60,9 @@ _GATHERED = 64
 
 # Relative difference that is consistent, besides noise, jitter and delay.
 _TOLERANCE = 0.06
-# Delay of a derivative that is consistent: in samples, and at least in seconds.
-_DELAY_IN_SAMPLES, _DELAY = 1.5, 0.004
+# Delay of a derivative that is consistent: in samples (a difference with the sample before is half
+# a sample late, and messages may be two), and at least in seconds: that of a filter of 5 Hz.
+_DELAY_IN_SAMPLES, _DELAY = 3.0, 0.035
 # Largest noise of a window, as part of its motion, with which it is judged.
 _NOISE_SHARE = 0.25
 # A pause this many times as long as usual is a gap.
@@ -84,51 +79,6 @@ _MOST_PERIODS = 100
 _SLOWEST, _WEAKEST = 2e-3, 0.05
 # Smallest changes of a window: in platform radii (or rad) of the pose, of the integrated twist.
 _SMALLEST, _SMALLEST_INTEGRAL = 1e-5, 5e-3
-
-# A reason explains a difference if its residual is at most this part of it (both squared); of
-# those whose residuals are alike, or below _EXACT, the simplest is named.
-_EXPLAINED, _CLEAR, _EXACT = 0.05, 0.3, 1e-4
-# Relative difference of a factor from a known one.
-_NEAR = 0.03
-_FACTORS = {
-    VELOCITY: {1e3: 'in mm/s?', 100.0: 'in cm/s?', 1e-3: 'in m/ms?', -1.0: 'a sign?'},
-    SPIN: {180.0 / math.pi: 'in deg/s?', math.pi / 180.0: 'converted to radians twice?',
-           30.0 / math.pi: 'in rpm?', 0.5 / math.pi: 'in turns per second?', 1e3: 'in mrad/s?',
-           1e-3: 'in rad/ms?', -1.0: 'a sign?'},
-    ACCELERATION: {1e3: 'in mm/s^2?', 100.0: 'in cm/s^2?', 1e-6: 'in m/ms^2?', -1.0: 'a sign?',
-                   1.0 / -STANDARD_GRAVITY[2]: 'in g?'},
-    SPIN_RATE: {180.0 / math.pi: 'in deg/s^2?', math.pi / 180.0: 'converted to radians twice?',
-                1e3: 'in mrad/s^2?', 1e-6: 'in rad/ms^2?', -1.0: 'a sign?'},
-}
-
-
-class Inconsistency(NamedTuple):
-    """A quantity that is not the derivative of the other one."""
-
-    quantity: str  # one of QUANTITIES
-    given: float  # RMS of the given values, mean values of windows [m/s, rad/s, ...]
-    expected: float  # RMS of the differences of the poses, or of the twists
-    difference: float  # RMS
-    reason: str  # likeliest reason, with a question mark; empty if it is not known
-    first: int  # stamp of the beginning [ns]
-
-    @property
-    def words(self) -> str:
-        """Return the difference and the reason in one line."""
-        of = 'the poses' if self.quantity in (VELOCITY, SPIN) else 'the twists'
-        unit = UNITS[self.quantity]
-        reason = f': likely mistake: {self.reason}' if self.reason else ''
-        return (f'{self.quantity} is not the derivative of {of}: {self.given:.3g} {unit} RMS, by '
-                f'differences of {of} {self.expected:.3g} {unit}, they differ by '
-                f'{self.difference:.3g} {unit}{reason}')
-
-    @property
-    def values(self) -> tuple[tuple[str, str], ...]:
-        """Return keys with their units, and values."""
-        unit = UNITS[self.quantity]
-        return ((f'{self.quantity} given, RMS ({unit})', f'{self.given:.6g}'),
-                (f'{self.quantity} by differences, RMS ({unit})', f'{self.expected:.6g}'),
-                (f'likely mistake in {self.quantity}', self.reason or 'not known'))
 
 
 class Mistake(NamedTuple):
@@ -153,25 +103,6 @@ class _Windows(NamedTuple):
     lag: Integers  # (n,): length of a window in intervals
 
 
-class _Sums:
-    """Sums over the windows of inconsistent periods of one quantity."""
-
-    def __init__(self, first: int) -> None:
-        self.first = first
-        self.periods = 0
-        self.windows = 0
-        self.seconds = 0.0
-        self.squares = np.zeros(3)  # of changes d, of integrals u, of their difference
-        self.rates = np.zeros(3)  # the same divided by the times of the windows
-        self.product = 0.0  # d u
-        self.candidates: dict[str, float] = {}  # squares of the residual of each
-        self.late = np.zeros(2)  # normal equation of a delay
-        self.point = np.zeros((3, 3)), np.zeros(3)  # that of another point
-        self.gravity = 0.0, np.zeros(3)  # that of a constant acceleration
-        self.step = 0.0  # seconds between two samples, the sum over periods
-        self.tolerance = 0.0  # squares of what is consistent
-
-
 class Consistency:
     """
     The check of a stream of motions.
@@ -184,6 +115,7 @@ class Consistency:
         self._radius = radius
         self._frame = frame
         self._pending: list[tuple[Stamps, Array, Flags]] = []
+        self._steps: Iterator[None] = iter(())  # those that ``judge`` has not yet done
         self.noted: list[tuple[int, Sequence[float], bool]] = []
         """Single samples for ``judge``: stamp [ns], row of motion, whether time jumped back."""
         self._held = 0
@@ -192,41 +124,49 @@ class Consistency:
         self._begun: tuple[int, int] | None = None
         self._judged = dict.fromkeys(QUANTITIES, 0)  # periods
         self._row = dict.fromkeys(QUANTITIES, 0)  # inconsistent periods in a row
-        self._sums: dict[str, _Sums] = {}  # of the present inconsistency
+        self._sums: dict[str, Sums] = {}  # of the present inconsistency
         self.found: dict[str, Inconsistency] = {}
         """The first inconsistency of each quantity, with all of the same that followed."""
         self.present: dict[str, Inconsistency] = {}
         """Those of the last periods with enough motion."""
 
     def judge(self) -> None:
-        """Check the samples noted so far, if they are enough."""
+        """Do one step, a fraction of a millisecond, of the check of the samples noted so far."""
+        with np.errstate(all='ignore'):  # numbers that overflow are not judged
+            for _ in self._steps:
+                return
         if len(self.noted) >= _GATHERED:
-            self._take_ones()
+            self._steps = self._take_noted()
 
     def add(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
         """Add N samples: stamps [ns], rows of motion (N, MOTION), whether time jumped back."""
-        self._take_ones()
-        self._add(stamps, motions, restarts)
+        self._do(self._add(stamps, motions, restarts))
 
     def finish(self) -> None:
         """Judge the remaining samples."""
-        self._take_ones()
-        self._periods(ended=True)
+        self._do(self._periods(ended=True))
 
-    def _take_ones(self) -> None:
+    def _do(self, steps: Iterator[None]) -> None:
+        """Do all steps, after those that are left."""
+        with np.errstate(all='ignore'):
+            deque(chain(self._steps, self._take_noted(), steps), maxlen=0)
+        self._steps = iter(())
+
+    def _take_noted(self) -> Iterator[None]:
         if self.noted:
             stamps, motions, restarts = zip(*self.noted, strict=True)
             self.noted = []
-            self._add(np.array(stamps, dtype=np.int64), np.array(motions), np.array(restarts))
+            yield from self._add(
+                np.array(stamps, dtype=np.int64), np.array(motions), np.array(restarts))
 
-    def _add(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
+    def _add(self, stamps: Stamps, motions: Array, restarts: Flags) -> Iterator[None]:
         self._pending.append((stamps, motions, restarts))
         self._held += len(stamps)
         if self._held >= self._due:
-            self._periods()
+            yield from self._periods()
 
-    def _periods(self, ended: bool = False) -> None:
-        """Judge all complete periods."""
+    def _periods(self, ended: bool = False) -> Iterator[None]:
+        """Judge all complete periods, step by step."""
         if not self._held:
             return
         stamps, motions, restarts = (np.concatenate(each) for each in zip(
@@ -240,11 +180,10 @@ class Consistency:
             self._begun = begun, begun + _INTERVAL
             knots = knots[at + PERIOD:]
             at = self._begin(cells[knots])
-        with np.errstate(all='ignore'):  # numbers that overflow are not judged
-            if kept:
-                self._judge(stamps, motions, restarts, np.array(kept))
-            if ended and at is not None and len(knots) - at > _FEWEST:
-                self._judge(stamps, motions, restarts, knots[None, at:])
+        if kept:
+            yield from self._judge(stamps, motions, restarts, np.array(kept))
+        if ended and at is not None and len(knots) - at > _FEWEST:
+            yield from self._judge(stamps, motions, restarts, knots[None, at:])
         # Without a period that has begun, the last sample shows whether the next one is a knot.
         begin = len(stamps) if ended else len(stamps) - 1 if at is None else int(knots[at])
         self._pending = [(stamps[begin:], motions[begin:], restarts[begin:])]
@@ -264,21 +203,25 @@ class Consistency:
         may = np.flatnonzero((cells >= following) | (cells < begun))
         return int(may[0]) if len(may) else None
 
-    def _judge(self, stamps: Stamps, motions: Array, restarts: Flags, at: Integers) -> None:
-        """Judge periods, given by their knots (n, length + 1)."""
+    def _judge(self, stamps: Stamps, motions: Array, restarts: Flags, at: Integers,
+               ) -> Iterator[None]:
+        """Judge periods, given by their knots (n, length + 1), step by step."""
+        yield
         periods = _Periods(stamps, motions, restarts, at)
         radius = self._radius
-        twists = periods.windows(_TWISTS, None, [
+        yield
+        twists = yield from periods.windows(TWISTS, None, [
             (size * _SMALLEST, size * _SMALLEST_INTEGRAL, size * _SLOWEST)
             for size in (radius, 1.0)])
-        rates = periods.windows(RATES, {
+        rates = yield from periods.windows(RATES, {
             twist: found.bad for twist, found in twists.items()}, [
             (size * _WEAKEST * 1e-3, size * _WEAKEST, size * _WEAKEST)
             for size in (1.0, 1.0 / radius)])
         for n in range(len(at)):
             for quantity, found in (twists | rates).items():
                 if found.moving[n]:
-                    twist = _TWIST_OF.get(quantity, quantity)
+                    yield
+                    twist = TWIST_OF.get(quantity, quantity)
                     self._note(quantity, bool(found.bad[n]), periods, n, int(found.lag[n]),
                                bool(twists[twist].bad[n]))
 
@@ -293,7 +236,7 @@ class Consistency:
         self._row[quantity] += 1
         sums = self._sums.get(quantity)
         if sums is None:
-            sums = self._sums[quantity] = _Sums(periods.first(n))
+            sums = self._sums[quantity] = Sums(periods.first(n))
         if sums.periods < _MOST_PERIODS:
             periods.add_windows(quantity, n, lag, twist_bad, sums)
             if self._row[quantity] >= _PERSISTENT:
@@ -306,7 +249,8 @@ class Consistency:
         expected, given, difference = np.sqrt(sums.rates / sums.windows).tolist()
         found = Inconsistency(
             quantity, given, expected, difference,
-            _reason(quantity, sums, self._frame), sums.first)
+            reason_of(quantity, sums, self._frame), sums.first,
+            POSES if quantity in TWISTS or 'same' in sums.candidates else TWISTS_GIVEN)
         self.present[quantity] = found
         if quantity not in self.found or self.found[quantity].first == found.first:
             self.found[quantity] = found
@@ -389,7 +333,7 @@ class _Periods:
             return places - places[:, :1]
         if quantity == SPIN:
             return self._turned
-        twist = _TWIST_OF[quantity]
+        twist = TWIST_OF[quantity]
         found = self._given(twist)
         if by_poses is not None and by_poses.any():
             found = found.copy()
@@ -404,9 +348,10 @@ class _Periods:
         return found
 
     def windows(self, quantities: Sequence[str], by_poses: Mapping[str, Flags] | None,
-                floors: Sequence[tuple[float, float, float]]) -> dict[str, _Windows]:
+                floors: Sequence[tuple[float, float, float]],
+                ) -> Generator[None, None, dict[str, _Windows]]:
         """
-        Judge windows of the length that has most of those with motion.
+        Judge windows of the length that has most of those with motion, step by step.
 
         by_poses: of each twist, the periods in which it is not the derivative of the poses.
         floors: of each quantity, the smallest change, integral and mean value of a window.
@@ -414,7 +359,7 @@ class _Periods:
         count = len(quantities)
         # One row for each quantity and period: (m, length + 1, 3).
         paths = np.concatenate([self.paths(each, None if by_poses is None else by_poses[
-            _TWIST_OF[each]]) for each in quantities])
+            TWIST_OF[each]]) for each in quantities])
         integrals = np.concatenate([self._integral(each) for each in quantities])
         given = np.concatenate([self._given(each) for each in quantities])
         times, broken = np.tile(self._times, (count, 1)), np.tile(self._broken, (count, 1))
@@ -431,6 +376,7 @@ class _Periods:
         for lag in _LAGS:
             if 2 * lag > self._length:
                 break
+            yield
             lasts = times[:, lag:] - times[:, :-lag]
             d, u = paths[:, lag:] - paths[:, :-lag], integrals[:, lag:] - integrals[:, :-lag]
             change, integral = _norm(d), _norm(u)
@@ -439,8 +385,9 @@ class _Periods:
             moving = (broken[:, lag:] == broken[:, :-lag]) & (
                 (change >= smallest) | (integral >= smallest_integral)) & (
                 size >= slowest * lasts) & (uncertain <= _NOISE_SHARE * size)
-            shifted = delay * _norm(given[:, lag:] - given[:, :-lag])
-            bad = moving & (_norm(d - u) > _TOLERANCE * size + uncertain + shifted)
+            off, tolerance = _without_delay(
+                u - d, u, given[:, lag:] - given[:, :-lag], moving, delay)
+            bad = moving & (_norm(off) > tolerance * size + uncertain)
             # Reasons are found the better, the smaller the noise is.
             moved = moving.sum(axis=1)
             score = moved + (moving & (10.0 * of_path <= change)).sum(axis=1)
@@ -457,7 +404,7 @@ class _Periods:
         columns = _COLUMNS[quantity]
         return self._integrals[..., columns.start - TWIST.start:columns.stop - TWIST.start]
 
-    def add_windows(self, quantity: str, n: int, lag: int, twist_bad: bool, sums: _Sums) -> None:
+    def add_windows(self, quantity: str, n: int, lag: int, twist_bad: bool, sums: Sums) -> None:
         """Add the windows of a period to the sums from which the reason is found."""
         one = np.arange(self._number) == n
         paths = self.paths(quantity, one if twist_bad else None)[n]
@@ -513,63 +460,35 @@ class _Periods:
             sums.candidates[name] = sums.candidates.get(name, 0.0) + square
 
 
-def _reason(quantity: str, sums: _Sums, frame: tuple[str, str]) -> str:
-    """Return the likeliest reason, with a question mark; empty if it is not clear."""
-    axes, body = frame
-    dd, uu, difference = sums.squares.tolist()
-    if uu <= 1e-14 * dd:
-        return 'it is zero, never filled?'
-    found: list[tuple[float, str]] = []  # what is left of the difference, and the reason
-    similar = sums.product * sums.product / (dd * uu) if dd > 0.0 else 0.0
-    if similar > 0.0:
-        # Noise is in the differences of poses, rather than in the integral.
-        found.append((1.0 - similar, _factor(
-            quantity, uu / sums.product, sums.step / sums.periods)))
-    of = _TWIST_OF.get(quantity, '')
-    names = {'body': f'in {body} axes? It is expected in {axes} axes',
-             'euler': 'rates of Euler angles? An angular velocity is expected',
-             'same': f'the derivative of the given {of}, which is wrong?'}
-    found += [(square / difference, names[name]) for name, square in sums.candidates.items()]
-    product, square = sums.late.tolist()
-    if square > 0.0:
-        late = -product / square
-        found.append((1.0 - product * product / square / difference,
-                      f'{abs(late) * 1e3:.3g} ms {"late" if late > 0.0 else "early"}?'))
-    if quantity in (VELOCITY, ACCELERATION):
-        matrix, right = sums.point
-        place: Array = np.asarray(
-            np.linalg.lstsq(matrix, right, rcond=1e-6)[0].round(6), dtype=np.float64)
-        found.append((1.0 - float(right @ place) / difference,
-                      f'of another point, {listed(place, 3)} m in the {body} frame?'))
-    if quantity == ACCELERATION:
-        total, mean = sums.gravity
-        constant = mean / total if total > 0.0 else np.zeros(3)
-        if abs(float(np.linalg.norm(constant)) / -STANDARD_GRAVITY[2] - 1.0) < 0.1:
-            found.append((1.0 - float(mean @ constant) / difference,
-                          f'gravity is in it, {listed(constant.round(2), 3)} m/s^2?'))
-    best = min(left for left, _ in found)
-    if best > _EXPLAINED:
-        return ''
-    # The first of those that explain the difference as well as the best one: simpler ones first.
-    return next(words for left, words in found if left <= max(best / _CLEAR, _EXACT))
-
-
-def _factor(quantity: str, factor: float, step: float) -> str:
-    """Return a constant factor in words, with the mistake that has it."""
-    words = next((words for known, words in _FACTORS[quantity].items()
-                  if abs(factor / known - 1.0) < _NEAR), '')
-    if abs(factor / step - 1.0) < _NEAR:
-        words = 'differences not divided by the time between two samples?'
-    rounded = float(f'{factor:.3g}')
-    return f'{rounded:g} times: {words}' if words else f'{rounded:g} times what is expected'
-
-
 def _summed(values: Array) -> Array:
     """Return the sums up to each knot (n, length + 1, ...) of intervals (n, length, ...)."""
     shape = (values.shape[0], values.shape[1] + 1, *values.shape[2:])
     found = np.zeros(shape)
     np.cumsum(values, axis=1, out=found[:, 1:])
     return found
+
+
+def _without_delay(
+        off: Array, integral: Array, change: Array, moving: Flags, most: Array,
+        ) -> tuple[Array, Array]:
+    """
+    Return the differences of windows without those of a delay, and the relative tolerance.
+
+    Differences of windows that do not count are zero.
+
+    off, integral, change: of windows (m, windows, 3), the difference from the expected value, the
+    integral of the given values, and their change.
+    moving: windows that count.
+    most: largest delay, to either side (m, 1) [s].
+    """
+    late, differing, given = (
+        np.where(moving[..., None], each, 0.0) for each in (change, off, integral))
+    squares, product, whole = (np.einsum('nwi,nwi->n', *pair)[:, None] for pair in (
+        (late, late), (late, differing), (given, given)))
+    delay = np.clip(-product / np.maximum(squares, 1e-300), -most, most)
+    # The delay in radians, squared; half of it is the next term of the series.
+    phase = delay ** 2 * squares / np.maximum(whole, 1e-300)
+    return differing + delay[..., None] * late, _TOLERANCE + 0.5 * phase
 
 
 def _turn(rotations: Array) -> Array:

@@ -34,8 +34,8 @@ from stewart_dynamics.mechanics.rows import BASE, MOTION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.consistency import (
-    Consistency, inconsistencies, Mistake, QUANTITIES, RATES)
+from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, Mistake
+from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
 from stewart_dynamics.setpoints.inputs import (
     ACCEL, COMBINED, SOURCES, TopicSamples, TWIST, WRENCH, WrenchInput)
 from stewart_dynamics.setpoints.rejections import Rejection, Rejections
