@@ -122,7 +122,7 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
 
 
 def _lines(text: str) -> io.StringIO:
-    """Return the lines of a text, which can end in any way: newline=None reads them as '\\n'."""
+    """Return the lines of a text, which can end in any way."""
     return io.StringIO(text, newline=None)
 
 
@@ -136,7 +136,7 @@ def _first_row(text: str, separator: str) -> list[str]:
 
 
 def _decimal_mark(separator: str, cells: Sequence[str]) -> str:
-    """Return the decimal mark: a comma only beside other separators, and if no cell has a point."""
+    """Return the decimal mark: a comma beside other separators, if no cell has a point."""
     commas = separator != ',' and any(',' in cell for cell in cells)
     return ',' if commas and not any('.' in cell for cell in cells) else '.'
 
