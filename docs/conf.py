@@ -62,6 +62,7 @@ html_theme_options = {
 }
 html_static_path = ['_static']
 html_css_files = ['site.css']
+_LONG = 60  # characters of a text that makes a table too wide for a phone
 
 
 # Formulas as MathML, which browsers draw themselves: the pages need no network and no script.
@@ -76,6 +77,26 @@ def visit_displaymath(translator: Any, node: nodes.math_block) -> None:
     """Write a formula on lines of its own."""
     translator.body.append(f'<div class="math">{tex2mathml(node.astext(), as_block=True)}</div>')
     raise nodes.SkipNode
+
+
+# A table of texts is wider than a phone: there each row becomes a list, whose cells are labeled by
+# the heads (site.css).
+
+def label_cells(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Give tables with long texts the class ``texts``, and their cells the heads as labels."""
+    for table in doctree.findall(nodes.table):
+        heads = [each.astext() for head in table.findall(nodes.thead)
+                 for each in head.findall(nodes.entry)]
+        rows = [[*row.findall(nodes.entry)] for body in table.findall(nodes.tbody)
+                for row in body.findall(nodes.row)]
+        longest = max((len(cell.astext()) for row in rows for cell in row), default=0)
+        if len(heads) < 3 or longest < _LONG:
+            continue
+        table['classes'].append('texts')
+        for row in rows:
+            for head, cell in zip(heads[1:], row[1:], strict=True):
+                if cell.astext():
+                    cell[0].insert(0, nodes.inline('', f'{head}: ', classes=['label']))
 
 
 # Links lead to the files that GitHub shows; on the site these are included in pages.
@@ -93,6 +114,7 @@ def lead_to_pages(*arguments: Any) -> None:
 
 def setup(app: Sphinx) -> None:
     """Register the formulas and the rewriting of links."""
+    app.connect('doctree-resolved', label_cells)
     app.connect('source-read', lead_to_pages)
     app.connect('include-read', lead_to_pages)
     app.add_html_math_renderer('mathml', (visit_math, None), (visit_displaymath, None))

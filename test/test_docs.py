@@ -24,11 +24,15 @@ import inspect
 from pathlib import Path
 import subprocess
 import sys
+from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
 import pytest
 
 import stewart_dynamics
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -115,6 +119,25 @@ def test_the_site_needs_no_network(site: dict[str, Page]) -> None:
             assert not parts.scheme or parts.scheme == 'data', link
             assert not parts.netloc, link
             assert parts.scheme or (page.path.parent / unquote(parts.path)).is_file(), link
+
+
+def test_a_phone_shows_headings_and_tables_of_texts_whole(
+        site: dict[str, Page], browser: Browser) -> None:
+    page = browser.new_page(viewport={'width': 390, 'height': 844})
+    for name in ('index.html', 'node.html', 'parameters.html', 'summary.html'):
+        page.goto(site[name].path.as_uri())
+        beyond = page.evaluate(
+            "[...document.querySelectorAll('h1, h2, h3, table.texts, table.texts td')].filter("
+            'each => each.getBoundingClientRect().right > 390).map(each => each.textContent)')
+        assert beyond == [], name
+        assert page.locator('table.texts td .label').first.is_visible()
+        lines = page.evaluate(
+            "document.querySelector('h1').clientHeight / parseFloat("
+            "getComputedStyle(document.querySelector('h1')).lineHeight)")
+        assert lines < 1.5, name
+    page.set_viewport_size({'width': 1440, 'height': 900})
+    assert not page.locator('table.texts td .label').first.is_visible()
+    page.close()
 
 
 def test_the_api_reference_has_every_public_name(site: dict[str, Page]) -> None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+import re
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.replay.index import row_of, write_fleet
-from stewart_dynamics.replay.motor_charts import Deliverable, OperatingPoints
+from stewart_dynamics.replay.motor_charts import Deliverable, motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import MARGIN, needed
 from stewart_dynamics.replay.statements import Card, cards, motion_statements
 from stewart_dynamics.replay.summary import Answered, Summary
@@ -164,7 +165,9 @@ def test_the_card_of_the_motors_says_whether_their_limits_are_held() -> None:
 
     limits = ('torque_max', 'torque_speed', 'speed_max', 'temperature_rise_max')
     ample = {'torque_max': 1e3, 'torque_continuous': 1e2, 'speed_max': 1e4, 'torque_speed': None}
-    assert card(**ample)[:2] == ('good', 'All limits of the motors are held')
+    assert card(**ample)[:2] == ('good', 'Motors are large enough')
+    said = [each.line for of in of_limits(P, **ample).values() for each in of.statements]
+    assert said.count('all limits of the motors held') == 1
     assert card(**ample, efficiency=None).level == 'good'
     assert card(**ample | {'torque_continuous': 1e-3}).level == 'warn'
     exceeded = card(**ample | {'torque_max': 1e-2, 'torque_continuous': None})
@@ -218,6 +221,24 @@ def test_the_drawn_curve_is_the_available_torque() -> None:
     assert drawn.min() == 0.0 and drawn.max() == 3.0
     outline = Deliverable(p, 2).outline(1e4)
     assert outline[0].tolist() == [0.0, 3.0] and outline[-1].tolist() == [800.0, 0.0]
+
+
+@pytest.mark.parametrize(('bound', 'drawn'), [(3.0, True), (100.0, False)])
+def test_a_bound_far_above_all_loads_is_stated_and_does_not_set_the_scale(
+        bound: float, drawn: bool) -> None:
+    p = P.replaced({'drive.torque_max': bound, 'drive.speed_max': 4.0 * bound,
+                    'drive.torque_speed': None, 'drive.torque_continuous': bound})
+    points = OperatingPoints()
+    points.add(rows_of(np.full((1, 6), 9.0), np.full((1, 6), -2.0)))
+    load = {'speed_mean_rad_s': 4.0, 'torque_rms_n_m': 1.0}
+    charts = motor_charts(points, p, dict.fromkeys(p['joints'], load))
+    for chart in charts.values():
+        assert ('class="curve"' in chart) is drawn
+        assert ('deliverable to 100 N m and 400 rad/s' in chart) is not drawn
+        assert ('class="continuous"' in chart) is drawn
+        highest = max(float(re.search(r'[\d.]+', each)[0])  # type: ignore[index]
+                      for each in re.findall(r'>([\d.]+)</text>', chart))
+        assert highest <= 13.0
 
 
 def test_the_motor_needed_is_that_of_all_bags_but_those_near_a_singularity(tmp_path: Path) -> None:

@@ -225,4 +225,4 @@ def _design_lines(designed: Design, asked: DesignOptions) -> Iterator[str]:
     for name, (half, unit) in of_legs.items():
         yield f'  {name:32} +- {half:<10.2g} {unit}'
     used = ', '.join(f'{part:.0%} of {name}' for name, part in designed.use.items())
-    yield f'uses, of what is free between home and the limits less their margins: {used}'
+    yield f'use of the range between home and the limits with their margins: {used}'

@@ -135,8 +135,9 @@ PUBLISHED = (
     Topic(TRAVEL, type_names.FLOAT64_MULTI_ARRAY, 'how far x, y, z and the rotations about them '
           'can go from the pose of the last setpoint, to minus and to plus, the others held: 6 x '
           '2, m and rad', '; up to the first limit of lengths, joint angles or clearance of the '
-          'legs, or `singularity.stop_condition`, about the origin of the platform; 0 where one '
-          'is exceeded, one turn or the largest number where nothing limits; at most '
+          'legs, or `singularity.stop_condition`, about the origin of the platform. It is 0 if '
+          'the pose exceeds a limit already; without a limit on the way it is one turn for a '
+          'rotation, the largest finite number for a translation. At most '
           f'{TRAVEL_RATE:g} Hz, computed while somebody subscribes', depth=1),
     Topic(JOINT_STATES, MODEL_TYPES[JOINT_STATES], 'positions of all joints of the URDF',
           ', for [robot_state_publisher](visualization.md#as-a-model); at most '

@@ -159,9 +159,10 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'platform, in order, platform frame; cylinders keep limits.leg_clearance_min from '
               'it', 'm', (), sizes=(3,), repeated=True),
     Parameter('geometry.platform_side', 'string', 'side of the base joints on which the platform '
-              'is: positive where the base axis nearest to the normal of their plane points, '
-              'usually z, or negative; auto: positive, unless only the other side has a level '
-              'pose within the limits of length', '', AUTO, choices=(AUTO, POSITIVE, NEGATIVE)),
+              'is. positive: the side to which the base axis most nearly normal to their plane, '
+              'usually z, points; negative: the other side; auto: positive, unless only the '
+              'other side has a level pose within the limits of length', '', AUTO,
+              choices=(AUTO, POSITIVE, NEGATIVE)),
     _legs('geometry.zero_length', 'length of a leg at which its published position is zero', 'm',
           minimum=0.0),
     Parameter('platform.mass', 'double', 'mass of the platform with its payload', 'kg',

@@ -37,6 +37,8 @@ _CELLS = 128
 _FINEST = -40  # exponent of two of the smallest cell
 _WIDTH, _HEIGHT = 400.0, 280.0
 _FRAME = (46.0, 26.0, 344.0, 212.0)
+# Bounds that are farther than this factor above all setpoints do not set the scale.
+_FAR = 4.0
 # Opacities of cells with few and many samples.
 _SHADES = (0.35, 0.6, 0.85)
 
@@ -134,15 +136,19 @@ def motor_charts(points: OperatingPoints, parameters: Parameters,
     The loads are ``motors.legs`` of summary.json.
     """
     limits = [Deliverable(parameters, leg) for leg in range(6)]
+    continuous = parameters[CONTINUOUS]
     speed, torque = points.extent
-    speed = 1.06 * _largest([speed, *(limit.speed for limit in limits)])
-    torque = 1.08 * _largest([torque, *(limit.torque for limit in limits)])
+    speed = 1.06 * _scale(speed, [limit.speed for limit in limits])
+    torque = 1.08 * _scale(torque, [*(limit.torque for limit in limits),
+                                    *(() if continuous is None else continuous)])
     return {name: _chart(points, leg, name, limits[leg], parameters, load, (speed, torque)).svg()
             for leg, (name, load) in enumerate(loads.items())}
 
 
-def _largest(values: Sequence[float]) -> float:
-    return max(each for each in values if math.isfinite(each)) or 1.0
+def _scale(used: float, bounds: Sequence[float]) -> float:
+    """Return the end of an axis: the largest value in use, or a bound that is not far above."""
+    near = _FAR * used if used > 0.0 else math.inf
+    return max([used, *(each for each in bounds if each <= near and math.isfinite(each))]) or 1.0
 
 
 def _chart(points: OperatingPoints, leg: int, name: str, limit: Deliverable,
@@ -152,9 +158,9 @@ def _chart(points: OperatingPoints, leg: int, name: str, limit: Deliverable,
     speed, torque = largest
     chart = Chart(picture, _FRAME, (0.0, speed), (-torque, torque))
     outline = limit.outline(speed)
-    mirrored = outline[::-1] * [1.0, -1.0]
-    picture.path(chart.at(np.clip(np.vstack([outline, mirrored]), -torque, np.inf).clip(
-        None, [speed, torque])), closed=True, css='deliverable')
+    within = np.minimum(outline, [speed, torque])
+    picture.path(chart.at(np.vstack([within, within[::-1] * [1.0, -1.0]])), closed=True,
+                 css='deliverable')
     chart.draw_axes('speed [rad/s]', 'torque [N m]')
     cells, counts = points.cells(leg)
     # A cell is beyond if all of it is.
@@ -165,9 +171,20 @@ def _chart(points: OperatingPoints, leg: int, name: str, limit: Deliverable,
     for n, opacity in enumerate(_SHADES):
         for which, css in ((~beyond, f'points leg{leg}'), (beyond, 'points beyond')):
             _draw_cells(picture, chart, cells[which & (shade == n)], css, opacity)
-    picture.path(chart.at(outline), chart.at(mirrored), css='curve')
+    # The curve is drawn where it, or the next point of it, is in the frame.
+    over = outline[:, 1] > torque
+    over &= np.r_[True, over[:-1]] & np.r_[over[1:], True]
+    curve = np.where(over[:, None], math.nan, within)
+    picture.path(chart.at(curve), chart.at(curve * [1.0, -1.0]), css='curve')
+    outside = [f'{bound:.4g} {unit}' for bound, end, unit in (
+        (limit.torque, torque, 'N m'), (limit.speed, speed, 'rad/s'))
+        if end < bound < math.inf]
+    if outside:
+        left, top, width, _ = _FRAME
+        picture.text([left + width, top - 8.0], f'deliverable to {" and ".join(outside)}', 'end',
+                     css='tick')
     continuous = parameters[CONTINUOUS]
-    if continuous is not None:
+    if continuous is not None and continuous[leg] <= torque:
         for level in (continuous[leg], -continuous[leg]):
             picture.line(*chart.at([[0.0, level], [speed, level]]), css='continuous')
     if load['speed_mean_rad_s'] is not None and load['torque_rms_n_m'] is not None:

@@ -51,7 +51,7 @@ _CARDS = {
     (SINGULARITY,): {'none': 'Singularity', 'good': 'Clear of singularities',
                      'warn': 'A singularity is near', 'bad': 'A singularity is reached'},
     (MOTORS, MOTOR_LIMITS): {
-        'none': 'Motors', 'good': 'All limits of the motors are held',
+        'none': 'Motors', 'good': 'Motors are large enough',
         'warn': 'Motors may be too small', 'bad': 'Limits of the motors are exceeded'},
     (MEASURED,): {'none': 'Measured forces', 'good': 'Measured forces',
                   'warn': 'Measured forces differ'}}
@@ -102,11 +102,14 @@ class Card(NamedTuple):
 
 def cards(summary: Summary) -> dict[str, Card]:
     """Return the cards of the report by their first topic."""
-    about, found = statements(summary), {}
+    about, found, shown = statements(summary), {}, set[Statement]()
     for topics, titles in _CARDS.items():
         on_it = [each for each in about if each.topic in topics]
         level = max((each.level for each in on_it), key=LEVELS.index, default='none')
-        found[topics[0]] = Card(level, titles[level], on_it)
+        # Limits that are held are listed on one card alone.
+        listed = [each for each in on_it if each.level != 'good' or each not in shown]
+        shown.update(on_it)
+        found[topics[0]] = Card(level, titles[level], listed)
     return found
 
 

@@ -62,7 +62,6 @@ class Plot(NamedTuple):
     """A plot over time, or over frequency; the user selects one of its variants."""
 
     key: str  # Quantity.key of a quantity with a limit
-    figure: str
     title: str
     unit: str
     variants: Mapping[str, Sequence[Curve]]
@@ -92,48 +91,48 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
     """
     joints, begin = p['joints'], ', '.join(f'{each:.6g}' for each in first)
     of_motion = [
-        Plot('velocity', '13', 'Velocity of the platform', 'm/s',
+        Plot('velocity', 'Velocity of the platform', 'm/s',
              _of_axes(at['velocity'], 'v x', 'v y', 'v z'), 'of its origin, base axes'),
-        Plot('angular_velocity', '13', 'Angular velocity of the platform', 'deg/s',
+        Plot('angular_velocity', 'Angular velocity of the platform', 'deg/s',
              _of_axes(at['angular_velocity'], 'w x', 'w y', 'w z'),
              'base axes; not the rates of alpha, beta, gamma'),
-        Plot('acceleration', '14', 'Acceleration of the platform', 'm/s²',
+        Plot('acceleration', 'Acceleration of the platform', 'm/s²',
              _of_axes(at['acceleration'], 'a x', 'a y', 'a z'), 'of its origin, base axes'),
-        Plot('angular_acceleration', '14', 'Angular acceleration of the platform', 'deg/s²',
+        Plot('angular_acceleration', 'Angular acceleration of the platform', 'deg/s²',
              _of_axes(at['angular_acceleration'], 'dw/dt x', 'dw/dt y', 'dw/dt z'), 'base axes')]
     of_rates = [
         _bounded(p, [VELOCITY_MAX], 'Leg rates', at['rates'], '+ extends', both=True),
-        Plot('powers', '', 'Mechanical power of the legs', 'W', _of_legs(joints, at['powers']),
+        Plot('powers', 'Mechanical power of the legs', 'W', _of_legs(joints, at['powers']),
              'demanded force times rate; + drives, − brakes', spikes=True)]
     return [
         # one scale for all axes: the height above the base is far larger than the motion
-        Plot('position', '12', 'Inputs: position of the platform, from the first setpoint', 'm',
+        Plot('position', 'Inputs: position of the platform, from the first setpoint', 'm',
              _of_axes(at['position'], 'X', 'Y', 'Z'),
              f'of its origin, base axes; the first setpoint is at ({begin}) m'),
-        Plot('angles', '12', 'Inputs: orientation of the platform', 'deg',
+        Plot('angles', 'Inputs: orientation of the platform', 'deg',
              _of_axes(at['angles'], 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
         *(of_motion if velocities_known else ()),
         _bounded(p, [LENGTH_MIN, LENGTH_MAX], 'Leg lengths', at['lengths'],
-                 'between the joint centers', figure='15'),
+                 'between the joint centers'),
         *(_of_joints(p, limit, at['joint_angles'].start) for limit in OF_JOINTS
           if p[limit] is not None),
         *([] if p[CLEARANCE_MIN] is None else [
             _bounded(p, [CLEARANCE_MIN], 'Clearance between the legs', at['clearances'],
                      'from each leg to the nearest other leg')]),
-        Plot('determinant', '17', 'det(J)', 'm³',
+        Plot('determinant', 'det(J)', 'm³',
              {'': [Curve('det(J)', LEG_COLORS[0], at['determinant'].start)]},
              'zero at a singularity', [Bound(0.0, 'singular', ROLES['singular'])],
              spikes=True),
-        Plot('condition', '17', 'Condition number of J_inv', '–',
+        Plot('condition', 'Condition number of J_inv', '–',
              {'': [Curve('condition', LEG_COLORS[1], at['condition'].start)]},
              'dimensionless; 1 is best', [
                  Bound(p['singularity.warn_condition'], 'warn', ROLES['near']),
                  Bound(p['singularity.stop_condition'], 'stop', ROLES['singular'])], log=True),
         _bounded(p, [FORCE_MAX], 'Leg forces', at['forces'], 'demanded by the motion, + pushes',
-                 figure='18', both=True, spikes=True),
+                 both=True, spikes=True),
         *(of_rates if velocities_known else ()),
         *(_of_motors(p, at, velocities_known) if p.drives else ()),
-        Plot('force_breakdown', '', 'Leg force by source', 'N', {
+        Plot('force_breakdown', 'Leg force by source', 'N', {
             leg: [Curve('sum', ROLES['zero'], at['forces'].start + n, width=4.5),
                   *(Curve(source, _SOURCE_COLORS[source], at['breakdown'].start + 6 * k + n)
                     for k, source in enumerate(sources_of(p)))]
@@ -141,10 +140,10 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
 
 
 def _bounded(p: Parameters, limits: Sequence[str], title: str, channels: slice, note: str,
-             figure: str = '', both: bool = False, spikes: bool = False) -> Plot:
+             both: bool = False, spikes: bool = False) -> Plot:
     """Return the plot of a quantity with limits, the lower one first; both: of either sign."""
     quantity = QUANTITIES[limits[0]]
-    return Plot(quantity.key, figure, title, quantity.unit, _of_legs(p['joints'], channels), note,
+    return Plot(quantity.key, title, quantity.unit, _of_legs(p['joints'], channels), note,
                 [bound for limit in limits for bound in _bounds(limit, p[limit], both)],
                 spikes=spikes)
 
@@ -153,7 +152,7 @@ def _of_joints(p: Parameters, limit: str, first: int) -> Plot:
     """Return the plot of the angles of the joints that a limit bounds, in degrees."""
     which, joint = ANGLES[limit], 'base' if limit == BASE_ANGLE_MAX else 'platform'
     return Plot(
-        QUANTITIES[limit].key, '', f'Angles of the {joint} joints', 'deg',
+        QUANTITIES[limit].key, f'Angles of the {joint} joints', 'deg',
         _of_legs(p['joints'], slice(first + which.start, first + which.stop)),
         f'between the leg and geometry.{joint}_joint_axes, by default its direction at home',
         _bounds(limit, np.degrees(p[limit])))
@@ -162,10 +161,10 @@ def _of_joints(p: Parameters, limit: str, first: int) -> Plot:
 def base_wrench_plots(at: Places) -> list[Plot]:
     """Return the plots of the base wrench over time."""
     return [
-        Plot('base_force', '', 'Force on the base', 'N',
+        Plot('base_force', 'Force on the base', 'N',
              _all_or_one(_of_axes(at['base_force'], 'F x', 'F y', 'F z')),
              'of the whole hexapod, base axes', spikes=True, section=BASE_SECTION),
-        Plot('base_moment', '', 'Moment on the base', 'N m',
+        Plot('base_moment', 'Moment on the base', 'N m',
              _all_or_one(_of_axes(at['base_moment'], 'M x', 'M y', 'M z')),
              "about the base's origin, base axes", spikes=True, section=BASE_SECTION)]
 
@@ -179,7 +178,7 @@ def spectrum_plots(density: Density, first: int) -> list[Plot]:
         note += (f'; {100.0 * density.uneven:.2g} % of the steps in time are uneven, values are '
                  'interpolated: the upper half of the frequencies may be too low')
     return [
-        Plot(f'base_{name}_spectrum', '', f'Spectrum of the {name} on the base', f'{unit}/√Hz',
+        Plot(f'base_{name}_spectrum', f'Spectrum of the {name} on the base', f'{unit}/√Hz',
              _of_axes(slice(begin, begin + 3), *(f'{letter} {axis}' for axis in 'xyz')), note,
              log=True, section=BASE_SECTION, spectrum=True)
         for name, unit, letter, begin in (
@@ -189,19 +188,19 @@ def spectrum_plots(density: Density, first: int) -> list[Plot]:
 def measured_plots(p: Parameters, at: Places) -> list[Plot]:
     """Return the plots of a comparison with measured forces."""
     return [
-        Plot('measured', '', 'Measured and computed leg force', 'N', {
+        Plot('measured', 'Measured and computed leg force', 'N', {
             leg: [Curve('measured', _BLACK, at['measured'].start + n),
                   Curve('computed', LEG_COLORS[n], at['computed'].start + n),
                   Curve('residual', ROLES['faint'], at['residual'].start + n, 'dot')]
             for n, leg in enumerate(p['joints'])}, 'residual: measured less computed',
             contacts=True, spikes=True),
-        Plot('residuals', '', 'Residual of every leg', 'N', _of_legs(p['joints'], at['residual']),
+        Plot('residuals', 'Residual of every leg', 'N', _of_legs(p['joints'], at['residual']),
              'measured less computed force', contacts=True, spikes=True),
-        Plot('external_force', '', 'External force', 'N',
+        Plot('external_force', 'External force', 'N',
              _of_axes(at['external_force'], 'F x', 'F y', 'F z'),
              'J_inv^T (computed − measured): the load that the model does not include, base axes',
              contacts=True, spikes=True),
-        Plot('external_moment', '', 'External moment', 'N m',
+        Plot('external_moment', 'External moment', 'N m',
              _of_axes(at['external_moment'], 'M x', 'M y', 'M z'),
              "about the platform's origin, base axes", contacts=True, spikes=True)]
 
@@ -213,7 +212,7 @@ def _of_motors(p: Parameters, at: Places, velocities_known: bool) -> Iterator[Pl
         yield _bounded(p, [SPEED_MAX], 'Speeds of the motors', at['speeds'], '+ extends',
                        both=True)
         if p['drive.resistance'] is not None:
-            yield Plot('bus_power', '', 'Power of the bus', 'W', {
+            yield Plot('bus_power', 'Power of the bus', 'W', {
                 '': [Curve('bus', _BLACK, at['bus_power'].start)]},
                 'electrical, of all motors; − flows back', spikes=True)
     if p['drive.thermal_resistance'] is not None:

@@ -17,8 +17,9 @@ The motors of each setpoint: angles, speeds, torques and temperatures, and the c
 
 Torques are clipped to those that are available at their speed, as forces are clipped to
 limits.force_max: a drive can deliver that much. Speed and temperature cannot be clipped; they
-follow limits.action, as lengths and rates of the legs do. Limits are checked, and windings warm,
-with the torques that setpoints demand: a clipped or suppressed force does not hide a limit.
+follow limits.action, as lengths and rates of the legs do. Limits and the
+temperatures of the windings are computed from the torques that setpoints demand: a clipped or
+suppressed force does not hide a limit.
 """
 
 from __future__ import annotations

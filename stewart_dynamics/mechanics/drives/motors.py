@@ -23,7 +23,7 @@ the screw is the load f - m_r L'', and J = m_r / k^2 is the inertia at the motor
     c = 1 + (1 / efficiency - 1) sat(|L'| / coulomb_velocity)              the motor drives
     c = 1 + (back_driving_efficiency - 1) sat(|L'| / coulomb_velocity)     the leg drives
 
-The losses are friction in proportion to the load, and like Coulomb friction they are linear near
+The losses are friction proportional to the load, and like Coulomb friction they are linear near
 standstill (``friction``): the torque does not jump where a leg reverses. At rest it is the one
 without losses. There friction can help to hold or be in the way, whichever way the leg moves off:
 the larger of the two torques, the breakaway torque, is what limits are checked with.

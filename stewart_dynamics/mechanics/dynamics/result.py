@@ -57,7 +57,7 @@ class InverseDynamics:
         Largest force of each leg under a unit load on the platform: any force F and moment M
         with F^2 + (M / l)^2 = 1, l the characteristic length.
     determinant : (...)
-        det(J) := det(J_inv) [m^3].
+        det(J), the determinant of J_inv [m^3].
     determinant_rate : (...)
         d(det(J))/dt [m^3/s].
     condition_number : (...)

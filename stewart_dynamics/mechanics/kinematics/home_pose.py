@@ -22,9 +22,9 @@ has all legs within their limits, the platform is turned about the normal by the
 that brings them there.
 
 A pose and its mirror image at the plane of the base joints have nearly the same lengths. The side
-is that of ``geometry.platform_side``: ``positive`` where the base axis nearest to the normal
-points, usually z, or ``negative``. By default, ``auto``, it is ``positive`` unless all legs can be
-within their limits on the other side alone.
+is that of ``geometry.platform_side``: ``positive`` is the side to which the base axis most nearly
+parallel to the normal, usually z, points, ``negative`` the other one. By default, ``auto``, it is
+``positive`` unless all legs can be within their limits on the other side alone.
 """
 
 from __future__ import annotations

@@ -178,10 +178,7 @@ class Drawing {
   get inView() { return this.drawn && inView.has(this); }
 }
 
-function titled(title, figure) {
-  return element('h3', {}, title,
-    ...(figure ? [element('span', {className: 'figure', textContent: ` figure ${figure} of the paper`})] : []));
-}
+const titled = title => element('h3', {}, title);
 
 const AXIS = {gridcolor: color('grid'), zerolinecolor: color('zero'), linecolor: FAINT,
   ticks: 'outside', tickcolor: FAINT, ticklen: 4, showline: true, mirror: true};
@@ -202,7 +199,7 @@ function layoutOf(xTitle, xaxis, yTitle, yaxis, more = {}) {
 class TimePlot extends Drawing {
   constructor(spec, place) {
     const tools = element('div', {className: 'tools'});
-    super(place, {className: 'canvas time', id: `plot_${spec.key}`}, titled(spec.title, spec.figure),
+    super(place, {className: 'canvas time', id: `plot_${spec.key}`}, titled(spec.title),
       element('span', {className: 'note', textContent: spec.note}), tools);
     this.spec = spec;
     this.variant = 0;
@@ -549,7 +546,7 @@ function legColors(frame) {
 }
 
 // A narrow scene is seen from farther away.
-function distance(width) { return Math.max(1, 620 / width, width < NARROW ? 720 / width : 0); }
+function distance(width) { return Math.max(1, 620 / width); }
 
 // Axes of equal scale that contain base and platform in all frames.
 function scene(numbers, width) {
@@ -571,24 +568,44 @@ function shortened(name) { return name.length > 14 ? `${name.slice(0, 13)}…` :
 // Plotly interprets markup in texts that it draws, and cannot escape it in all of them.
 function plainText(name) { return name.replace(/</g, '‹').replace(/>/g, '›'); }
 
-// Positions of the names of the legs: outside of the base joints.
+// Positions of the names of the legs: outside of the base joints and on the far side of the platform,
+// where no leg hides them, those of near joints apart.
 function besideBase() {
-  const middle = [0, 1, 2].map(k => column(report.baseJoints, k).reduce((a, b) => a + b) / 6);
-  return report.baseJoints.map(joint => joint.map((value, k) => value + 0.14 * (value - middle[k])));
+  const mean = points => [0, 1, 2].map(k => column(points, k).reduce((a, b) => a + b) / 6);
+  const minus = (a, b) => a.map((value, k) => value - b[k]), size = a => Math.hypot(...a) || 1;
+  const middle = mean(report.baseJoints), away = minus(middle, mean(platformJoints(frameAt(0))));
+  const radius = Math.max(...report.baseJoints.map(joint => size(minus(joint, middle))));
+  const places = report.baseJoints.map(joint => joint.map(
+    (value, k) => value + 0.14 * (value - middle[k]) + 0.22 * radius * away[k] / size(away)));
+  return places.map((place, n) => {
+    const [gap, other] = places.map((each, m) => [m === n ? Infinity : size(minus(place, each)), each])
+      .reduce((a, b) => (a[0] <= b[0] ? a : b));
+    const aside = Math.max(0, 0.5 * (0.5 * radius - gap)) / gap;
+    return place.map((value, k) => value + aside * (value - other[k]));
+  });
 }
 
-function baseTraces() {
+// Without the letters that all names begin with, where there is no room for more.
+function namesInScene(narrow) {
+  const [first, ...others] = report.legs;
+  let common = 0;
+  while (narrow && common < first.length - 1 && others.every(
+    name => name[common] === first[common] && name.length > common + 1)) common++;
+  return report.legs.map(name => plainText(shortened(name.slice(common))));
+}
+
+function baseTraces(narrow) {
   return [
     plate(report.baseJoints, color('faint'), 0.35),
     outline(report.baseJoints, {line: {color: color('soft'), width: 4}, marker: {size: 4, color: color('soft')}}),
-    {type: 'scatter3d', mode: 'text', ...xyz(besideBase()), text: report.legs.map(name => plainText(shortened(name))),
+    {type: 'scatter3d', mode: 'text', ...xyz(besideBase()), text: namesInScene(narrow),
       textposition: 'middle center', textfont: {size: 11, color: INK}, ...SILENT}];
 }
 
 // A scene of the hexapod is not much higher than wide.
 function drawScene(canvas, traces, numbers, below = 0) {
   const height = Math.min(520, Math.max(300, Math.round(1.15 * canvas.clientWidth)));
-  Plotly.newPlot(canvas, [...baseTraces(), ...traces], {height, margin: {l: 0, r: 0, t: 0, b: below}, font: FONT,
+  Plotly.newPlot(canvas, [...baseTraces(canvas.clientWidth < NARROW), ...traces], {height, margin: {l: 0, r: 0, t: 0, b: below}, font: FONT,
     showlegend: false, hovermode: false, separators: `.${THIN_SPACE}`, scene: scene(numbers, canvas.clientWidth),
     paper_bgcolor: PAPER}, CONFIG_3D);
 }
@@ -683,7 +700,7 @@ class Player extends Drawing {
 class InitialAndFinal extends Drawing {
   constructor(place) {
     super(place, {className: 'canvas tall', id: 'plot_ends'},
-      titled('Platform at initial and final position', 16));
+      titled('Platform at initial and final position'));
     this.ends = [[0, FAINT, 4, 'initial'], [frames.times.length - 1, color('leg1'), 5, 'final']];
     listIn(this.readout, [], this.ends.map(
       ([number, of, , name]) => [swatch(of), `${name}, t = ${grouped(frames.times[number], 3)} s`]));
