@@ -78,8 +78,8 @@ def measured_headline(measured: Mapping[str, Any]) -> str:
     worst, leg = max((leg['residual_rms_n'], name) for name, leg in measured['legs'].items())
     share = '' if measured['residual_share'] is None else (
         f', {100.0 * measured["residual_share"]:.3g} % of the measured force')
-    return (f'{likely}measured and computed forces differ by {measured["residual_rms_n"]:.3g} N RMS'
-            f'{share}; most in {leg}, by {worst:.3g} N')
+    return (f'{likely}measured and computed forces differ by {measured["residual_rms_n"]:.3g} N '
+            f'RMS{share}; most in {leg}, by {worst:.3g} N')
 
 
 def _measured_lines(measured: Mapping[str, Any]) -> list[str]:

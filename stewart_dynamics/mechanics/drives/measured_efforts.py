@@ -34,7 +34,7 @@ ZERO, SIGN, UNIT, TORQUE, SCALE = 'zero', 'sign', 'unit', 'torque', 'scale'
 
 def force_per_effort(parameters: Parameters, torques: bool, currents: bool) -> Array | None:
     """
-    Return the leg force for an effort of 1 (6,), without losses; None: efforts are forces.
+    Return the leg force for an effort of 1 (6,), without losses; or None where efforts are forces.
 
     torques, currents: whether efforts are motor torques [N m], or motor currents [A].
 
