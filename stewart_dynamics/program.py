@@ -230,6 +230,17 @@ def add_node(parser: argparse._ActionsContainer, more: str = '') -> None:
                         help=f'node whose parameters are read{more} (default: {NODE})')
 
 
+def add_motor_efforts(group: argparse._ArgumentGroup) -> None:
+    """Add the options for measured efforts that are torques or currents of the motors."""
+    motors = group.add_mutually_exclusive_group()
+    motors.add_argument('--motor-torque', action='store_true',
+                        help='efforts are torques of the motors [N m]; needs actuator.screw_lead, '
+                             'and drive.gear_ratio where there is a gear')
+    motors.add_argument('--motor-current', action='store_true',
+                        help='efforts are currents of the motors [A]; needs drive.torque_constant '
+                             'as well')
+
+
 def add_accepted(parser: argparse._ActionsContainer) -> None:
     """Add the option that writes results in spite of a likely mistake."""
     parser.add_argument('--accept-mistakes', action='store_true',

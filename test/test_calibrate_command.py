@@ -119,6 +119,69 @@ def test_units_and_angles(table: Path, tmp_path: Path) -> None:
         read_poses(path, JOINTS, millimeters=True, degrees=True).lengths, found.lengths)
 
 
+@pytest.mark.parametrize('separator', [';', '\t'])
+def test_decimal_commas_are_read_beside_semicolons_and_tabs(
+        separator: str, table: Path, tmp_path: Path) -> None:
+    given = read_poses(table, JOINTS)
+    path = tmp_path / 'commas.csv'
+    text = table.read_text().replace(',', separator).replace('.', ',')
+    path.write_text('\ufeff' + text)
+    found = read_poses(path, JOINTS)
+    np.testing.assert_array_equal(found.lengths, given.lengths)
+    np.testing.assert_array_equal(found.poses.rows, given.poses.rows)
+    # one number with a point: then the comma may be that of thousands
+    first, second, *others = text.splitlines()
+    cells = second.split(separator)
+    cells[3] = cells[3].replace(',', '.')
+    path.write_text('\n'.join([first, separator.join(cells), *others]))
+    with pytest.raises(StewartError, match=r'row 2: leg_1: .*: must be .* with a decimal point'):
+        read_poses(path, JOINTS)
+
+
+@pytest.mark.parametrize('ignored', ['a;b', 'a\tb', '"a,b"', 'x;y;z'])
+def test_a_separator_in_the_header_of_an_ignored_column_separates_nothing(
+        ignored: str, table: Path, tmp_path: Path) -> None:
+    first, *rows = table.read_text().splitlines()
+    path = tmp_path / 'ignored.csv'
+    path.write_text('\n'.join([f'{first},{ignored}', *(f'{row},0' for row in rows)]))
+    np.testing.assert_array_equal(
+        read_poses(path, JOINTS).lengths, read_poses(table, JOINTS).lengths)
+
+
+@pytest.mark.parametrize('cell', [
+    '1_0', '\u0661', '\uff11', '1\u20090', '1 0', '0x1', 'inf', '1e', '.', '', '\u22121', '"0,5"',
+    '1e999'])
+def test_what_is_no_plain_number_is_rejected(cell: str, table: Path, tmp_path: Path) -> None:
+    first, row, *rows = table.read_text().splitlines()
+    path = tmp_path / 'odd.csv'
+    path.write_text('\n'.join([first, cell + row[row.index(','):], *rows]))
+    with pytest.raises(StewartError, match='row 2: leg_1: .*: must be a finite number'):
+        read_poses(path, JOINTS)
+
+
+@pytest.mark.parametrize('axis', range(3))
+def test_poses_of_a_mirrored_frame_are_named(axis: int, table: Path) -> None:
+    given, platform = read_poses(table, JOINTS), StewartPlatform.from_yaml(PLATFORM)
+    mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
+    poses = Pose(mirror * given.poses.position, mirror[:, None] * given.poses.rotation * mirror)
+    with pytest.raises(StewartError, match=r'mirrored \(left-handed\)|legs are in another order'):
+        calibrate(platform, given.lengths, poses)
+
+
+def test_a_hexapod_below_its_base_is_calibrated_if_its_file_says_so(table: Path) -> None:
+    given, p = read_poses(table, JOINTS), Parameters.from_yaml(PLATFORM)
+    turn = np.diag([1.0, -1.0, -1.0])
+    hanging = StewartPlatform(p.replaced({
+        'geometry.platform_side': 'negative',
+        'geometry.base_joints': (p['geometry.base_joints'] @ turn).ravel().tolist(),
+        'geometry.platform_joints': (p['geometry.platform_joints'] @ turn).ravel().tolist()}))
+    poses = Pose(given.poses.position @ turn, turn @ given.poses.rotation @ turn)
+    assert not calibrate(hanging, given.lengths, poses).likely
+    with pytest.raises(StewartError, match='geometry.platform_side'):
+        calibrate(StewartPlatform(hanging.parameters.replaced({
+            'geometry.platform_side': 'positive'})), given.lengths, poses)
+
+
 def edited(change: Callable[[list[str]], list[str]], table: Path, tmp_path: Path) -> Path:
     path = tmp_path / 'edited.csv'
     path.write_text('\n'.join(change(table.read_text().splitlines())) + '\n')

@@ -31,7 +31,7 @@ from scipy.interpolate import make_smoothing_spline
 
 from stewart_dynamics import Motion
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.replay.differentiate import Differentiator, TOO_FAR, TOO_FAST, TOO_FEW
+from stewart_dynamics.replay.differentiate import Differentiator, TOO_FAR, TOO_FAST
 from stewart_dynamics.replay.smoothing_spline import FEWEST, smoothing_spline
 from stewart_dynamics.setpoints.step import Batch
 
@@ -338,10 +338,30 @@ def test_too_few_poses_in_a_row_are_left_out_and_counted() -> None:
     batch = batch_of(times, motion_at(times).rows, [24])
     differentiator = Differentiator(10.0, 0.1)
     done = differentiated(differentiator, [batch])
-    assert differentiator.left_out == {TOO_FEW: FEWEST - 1 + 3}
+    assert differentiator.left_out == {differentiator.too_few: FEWEST - 1 + 3}
     assert np.array_equal(done.stamps, batch.stamps[[*range(20), *range(27, 27 + FEWEST)]])
     # the restart before the three poses applies to the next pose
     assert np.flatnonzero(done.restarts).tolist() == [20]
+
+
+@pytest.mark.parametrize(('step', 'proposed'), [
+    (0.5, '--cutoff 1.6'), (1.0, '--cutoff 0.8'), (0.2, '--cutoff 4'), (0.01, '')])
+def test_poses_that_are_slower_than_the_gap_name_the_cutoff_that_joins_them(
+        step: float, proposed: str) -> None:
+    times = np.arange(20) * step
+    if not proposed:  # one gap, which no cut-off should bridge
+        times[16:] += 7.0
+    batch = batch_of(times, motion_at(0.01 * times).rows)
+    differentiator = Differentiator(10.0, 0.1)
+    differentiated(differentiator, [batch])
+    reason, = differentiator.left_out
+    assert 'more than 0.1 s between two poses' in reason
+    assert reason.endswith('computed') if not proposed else proposed in reason
+    if proposed:
+        cutoff = float(proposed.split()[1])
+        again = Differentiator(cutoff, 1.0 / cutoff)
+        assert len(differentiated(again, [batch]).stamps) == len(times)
+        assert not again.left_out
 
 
 @pytest.mark.parametrize('far', [1e10, 1e300])

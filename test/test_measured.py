@@ -208,6 +208,23 @@ def test_the_headline_names_the_difference_and_the_leg_where_it_is_largest() -> 
 
 # Contacts
 
+@pytest.mark.parametrize(('factor', 'what', 'words'), [
+    (-1.0, 'sign', 'the efforts have the opposite sign'), (1e-3, 'unit', 'kN in place of N'),
+    (0.0, 'zero', 'all efforts are zero'), (3.0, 'scale', 'or a wrong platform.mass')])
+def test_a_likely_mistake_in_the_efforts_is_named(factor: float, what: str, words: str) -> None:
+    case = case_of()
+    right = values_of(case, case.forces())
+    assert right['likely_mistake'] is None and right['external_wrench_given']
+    found = values_of(case, factor * case.forces())
+    assert found['likely_mistake']['what'] == what
+    assert words in found['likely_mistake']['text']
+    assert words in measured_headline(found)
+    # the load may be three times that of the file; of another unit there is no external wrench
+    known = found['external_wrench']['force_z']['mean_n'] is not None
+    assert known == found['external_wrench_given'] == (what == 'scale')
+    assert known or not found['contacts']['count']
+
+
 def test_a_contact_is_found_with_its_time_and_load() -> None:
     case = case_of(many=3000)
     load = np.zeros((3000, 6))

@@ -887,6 +887,37 @@ def test_a_listed_file_that_does_not_exist_is_missing(tmp_path: Path) -> None:
     assert len(found.missing) == 2
 
 
+@pytest.mark.parametrize('name', [
+    'bag_1.mcap', 'bag_1.db3', 'bag_1.mcap.zstd', 'bag_1.db3.zstd', 'bag_12.mcap', 'bag.mcap'])
+def test_a_part_that_metadata_does_not_list_is_missing(name: str, tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    given_ = split_bag(bag, 1, lambda n: f'bag_{n}.mcap')
+    (bag / name).write_bytes(b'not read')
+    found = read(bag)
+    assert found.messages == given_
+    assert found.missing == [f'{name} is in the folder but not in metadata.yaml: it is not read '
+                             '(ros2 bag reindex lists it)']
+    assert not found.notices
+
+
+def test_other_files_beside_a_recording_are_no_part_of_it(tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    given_ = split_bag(bag, 1, lambda n: f'bag_{n}.mcap')
+    # the same part compressed, a file of the Finder, and files that are no bags
+    for name in ('bag_0.mcap.zstd', '._bag_1.mcap', 'bag_1.txt', 'bag_0.db3-wal'):
+        (bag / name).write_bytes(b'not read')
+    assert read(bag) == (given_, [], [])
+    (bag / 'other_0.mcap').write_bytes(b'not read')
+    messages, missing, notices = read(bag)
+    assert (messages, missing, len(notices)) == (given_, [], 1)
+    assert notices[0].startswith('other_0.mcap is in the folder but not in metadata.yaml')
+    # and where the compressed one is listed
+    listed(bag, ['bag_0.mcap.zstd', 'other_0.mcap'])
+    (bag / 'bag_0.mcap.zstd').write_bytes(zstandard.compress(mcap(given_)))
+    (bag / 'other_0.mcap').unlink()
+    assert read(bag).messages == given_
+
+
 @pytest.mark.parametrize('text', [
     '', '\0', 'a: b', '- 1', 'rosbag2_bagfile_information: 1', '\xff', '*a', '[' * 300,
     'rosbag2_bagfile_information: {relative_file_paths: }',

@@ -135,12 +135,33 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
     there = [file for file in listed if file.exists()]
     if there:
         missing += [f'{file.name}: no such file' for file in listed if file not in there]
+        for file in found:
+            if not (file in there or file.name.startswith('.') or _is_packed_twin(file, there)):
+                (missing if _name_of(file) in map(_name_of, listed) else notices).append(
+                    f'{file.name} is in the folder but not in metadata.yaml: it is not read '
+                    '(ros2 bag reindex lists it)')
         return there
     if not found:
         raise BagError(f'{bag}: not a bag that can be read: {why}')
     if not all(file.suffix == '.bag' for file in found):  # ROS 1 writes none
         notices.append('metadata.yaml is missing or damaged: the files in the folder are read')
     return found
+
+
+def _name_of(file: Path) -> str:
+    """Return the name of a file of a recording, without its number and suffixes."""
+    return re.sub(r'_\d+$', '', _without_suffix(file))
+
+
+def _without_suffix(file: Path) -> str:
+    return next((file.name.removesuffix(suffix) for suffix in STORAGES
+                 if file.name.endswith(suffix)), file.name)
+
+
+def _is_packed_twin(file: Path, others: Sequence[Path]) -> bool:
+    """Return whether this is one of the others compressed, or decompressed by its reader."""
+    return any(file.name.removesuffix('.zstd') == other.name.removesuffix('.zstd')
+               for other in others)
 
 
 def _is_inside(file: Path, folder: Path) -> bool:

@@ -33,10 +33,12 @@ from stewart_dynamics.calibration.equations import (
 from stewart_dynamics.calibration.fit import Outliers
 from stewart_dynamics.calibration.frames import find_frames
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_euler, to_quaternion
+from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
 from stewart_dynamics.mechanics.least_squares import Information, normal, solve
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import AUTO, Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # A mistake is likely if the misfit without it is smaller than this part.
@@ -87,6 +89,27 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
     if best < _BETTER * given:
         yield mistake._replace(text=f'{mistake.text} (misfit {best:.2g} of the motion'
                                + (f' instead of {given:.2g})' if given < math.inf else ')'))
+    else:
+        yield from _on_other_side(parameters, equations, unknown_frames)
+
+
+def _on_other_side(parameters: Parameters, equations: Equations, unknown_frames: bool,
+                   ) -> Iterator[LikelyMistake]:
+    """Yield a mistake if the platform is on the other side of its base, where lengths can fit."""
+    try:
+        frames = find_frames(parameters, equations) if unknown_frames else SAME
+    except StewartError:
+        return
+    pose = equations.in_base(frames)
+    determinants = np.linalg.det(lagrange.inverse_jacobian(
+        lagrange.unchecked_legs(parameters, pose.position, pose.rotation)))
+    if np.median(determinants) * determinant_at_home(parameters) < 0.0:
+        yield LikelyMistake(
+            'side', 'the poses are on the other side of the base than at home: likely a mirrored '
+            '(left-handed) frame, with one axis of the opposite sign'
+            + ('; or geometry.platform_side, which is not given'
+               if parameters['geometry.platform_side'] == AUTO else
+               f'; or geometry.platform_side, {parameters["geometry.platform_side"]}, is wrong'))
 
 
 def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, size: float,
@@ -130,6 +153,12 @@ def _without_mistakes(parameters: Parameters, given: Equations,
             lengths=factor * lengths)
         yield LikelyMistake('unit', f'positions and leg positions {text}'), given._replace(
             lengths=factor * lengths, pose=moved)
+    for axis, name in enumerate('xyz'):
+        mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
+        yield LikelyMistake(
+            'mirrored', f'the poses are of a mirrored (left-handed) frame: {name} has the '
+            'opposite sign'), given._replace(pose=Pose(
+                mirror * pose.position, mirror[:, None] * pose.rotation * mirror))
     q = to_quaternion(pose.rotation)
     yield LikelyMistake('quaternion', 'quaternions have w first, not last'), given._replace(
         pose=Pose.from_quaternion(pose.position, np.roll(q, -1, axis=1)))

@@ -16,10 +16,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import csv
 import io
 import math
 from pathlib import Path
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +41,9 @@ ANGLES = ('alpha', 'beta', 'gamma')
 _LARGEST, _MOST = 64 << 20, 20_000
 # Squares of larger numbers, and their squares, would overflow.
 _END = 1e30
+_SEPARATORS = (',', ';', '\t')
+_NUMBERS = {mark: re.compile(rf'[+-]?([0-9]+{re.escape(mark)}?[0-9]*|{re.escape(mark)}[0-9]+)'
+                             r'([eE][+-]?[0-9]+)?') for mark in '.,'}
 
 
 class MeasuredPoses(NamedTuple):
@@ -59,18 +64,19 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
     Return the poses of a file with the columns of ``joints``, x, y, z and the rotation.
 
     Row 1 has the names of the columns, separated by commas, semicolons or tabs; others than the
-    names of the legs, ``joints``, and those of the pose are ignored. The rotation is a quaternion,
+    names of the legs, ``joints``, and those of the pose are ignored. Beside semicolons and tabs
+    numbers may have decimal commas, then all of them. The rotation is a quaternion,
     qx, qy, qz, qw, or the angles alpha, beta, gamma of Rz(gamma) Ry(beta) Rx(alpha). Units are m
     and rad, or ``millimeters`` and ``degrees``. StewartError if the file cannot be read, lacks a
     column, or has a value that is not a number.
     """
-    # Lines end in any way: newline=None reads them as '\n'.
-    lines = io.StringIO(read_text(path, _LARGEST, StewartError).lstrip('\ufeff'), newline=None)
-    first = next((line for line in lines if line.strip()), '')
-    lines.seek(0)
-    separator = next((each for each in (';', '\t') if each in first), ',')
+    text = read_text(path, _LARGEST, StewartError).lstrip('\ufeff')
+    # The separator is the one by which the first row names the most columns: headers of ignored
+    # columns can contain the others.
+    separator = max(_SEPARATORS, key=lambda each: len(
+        {*joints, *POSITION, *QUATERNION, *ANGLES} & set(_first_row(text, each))))
     try:
-        reader = csv.reader(lines, delimiter=separator, strict=True)
+        reader = csv.reader(_lines(text), delimiter=separator, strict=True)
         numbered = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except csv.Error as exc:
         raise StewartError(f'{path}: not a CSV file: {exc}') from exc
@@ -93,13 +99,17 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
     places = [header.index(name) for name in wanted]
     names = tuple(f'row {line}' for line, _ in numbered)
     values = np.empty((len(names), len(wanted)))
+    mark = _decimal_mark(separator, [row[place] for _, row in numbered for place in places
+                                     if place < len(row)])
     for n, (_, row) in enumerate(numbered):
         if len(row) != len(header):
             raise StewartError(f'{path}: {names[n]}: has {len(row)} cells, row 1 has '
-                               f'{len(header)}')
+                               f'{len(header)}' + (
+                                   ': decimal commas need semicolons between the columns'
+                                   if separator == ',' and len(row) > len(header) else ''))
         for column, place in enumerate(places):
             values[n, column] = _number(
-                row[place], f'{path}: {names[n]}: {shown_name(header[place])}')
+                row[place], f'{path}: {names[n]}: {shown_name(header[place])}', mark)
     unit = 1e-3 if millimeters else 1.0
     lengths, positions, turns = unit * values[:, :6], unit * values[:, 6:9], values[:, 9:]
     if rotation == ANGLES:
@@ -111,13 +121,33 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
     return MeasuredPoses(lengths, Pose.from_quaternion(positions, turns), names)
 
 
-def _number(cell: str, where: str) -> float:
+def _lines(text: str) -> io.StringIO:
+    """Return the lines of a text, which can end in any way."""
+    return io.StringIO(text, newline=None)
+
+
+def _first_row(text: str, separator: str) -> list[str]:
     try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
+        rows = csv.reader(_lines(text), delimiter=separator, strict=True)
+        return next(([cell.strip() for cell in row] for row in rows
+                     if any(map(str.strip, row))), [])
+    except csv.Error:
+        return []
+
+
+def _decimal_mark(separator: str, cells: Sequence[str]) -> str:
+    """Return the decimal mark: a comma beside other separators, if no cell has a point."""
+    commas = separator != ',' and any(',' in cell for cell in cells)
+    return ',' if commas and not any('.' in cell for cell in cells) else '.'
+
+
+def _number(cell: str, where: str, mark: str) -> float:
+    text = cell.strip()
+    # float() also takes 1_0, and digits of other scripts.
+    value = float(text.replace(mark, '.')) if _NUMBERS[mark].fullmatch(text) else math.nan
     if not abs(value) < _END:
-        raise StewartError(f'{where}: {shown(cell)}: must be a finite number below {_END:g}')
+        raise StewartError(f'{where}: {shown(cell)}: must be a finite number below {_END:g}, with '
+                           f'a decimal {"comma" if mark == "," else "point"} and digits 0 to 9')
     return value
 
 

@@ -86,7 +86,8 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         missing = list(recording.missing)
     batches = [each for each in batches if len(each.stamps)]
     if not batches:
-        raise BagError(f'{bag}: has no valid setpoint')
+        why = '' if splines is None else ''.join(f'; {reason}' for reason in splines.left_out)
+        raise BagError(f'{bag}: has no valid setpoint{why}')
     stamps = np.concatenate([each.stamps for each in batches])
     rows = np.concatenate([each.motions for each in batches])
     wrenches = np.concatenate([np.broadcast_to(each.wrenches, (len(each.stamps), 6))

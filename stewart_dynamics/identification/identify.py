@@ -41,12 +41,12 @@ from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import (
     lack_of_fit, LackOfFit, LEFT_BY_FILTERS, long_pieces)
 from stewart_dynamics.identification.likely_mistakes import (
-    FAR, LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose, scale_of_efforts)
+    LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose, scale_of_efforts)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.drives.motors import motor_ratio
+from stewart_dynamics.mechanics.drives.measured_efforts import FAR, force_per_effort
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -151,16 +151,8 @@ class Identification:
             raise ParameterError(
                 f'base.source: {parameters["base.source"]}: hexapods are identified on a base at '
                 'rest: must be fixed')
-        self._per_effort: Array | None = None  # leg force for an effort of 1
-        for option, given, name in (
-                ('--motor-torque', options.motor_torque, 'actuator.screw_lead'),
-                ('--motor-current', options.motor_current, 'actuator.screw_lead'),
-                ('--motor-current', options.motor_current, 'drive.torque_constant')):
-            if given and parameters[name] is None:
-                raise ParameterError(f'{name}: has no value: {option} needs it')
-        if options.motor_torque or options.motor_current:
-            self._per_effort = motor_ratio(parameters) * (
-                parameters['drive.torque_constant'] if options.motor_current else 1.0)
+        self._per_effort = force_per_effort(
+            parameters, options.motor_torque, options.motor_current)
         self.parameters, self._options = parameters, options
         self.platform = StewartPlatform(parameters)
         self.unknowns = Unknowns(parameters, options.kinds, options.prior)
@@ -380,9 +372,11 @@ class Identification:
         if outliers:
             sums = sums_of(extracts)
             found = fit(sums, unknowns, noise, self._cutoffs)
-        likely = [*of_delay(bag.delay_s + delay for bag, delay in zip(
-                      self.bags, found.delays, strict=True)),
-                  *of_efforts(sums, unknowns, self.parameters, self._per_effort is not None)]
+        # The sign first: a delay of half a period fits the moving part of opposite efforts.
+        likely = list(of_efforts(
+            sums, unknowns, self.parameters, self._per_effort is not None)) or list(of_delay(
+                bag.delay_s + delay for bag, delay in zip(
+                    self.bags, found.delays, strict=True)))
         errors = errors_of(extracts, sums, unknowns, found)
         shift = shift_of_noise(
             Sums.stacked(clean), Sums.stacked(noisy), unknowns, found, self._cutoffs)

@@ -27,8 +27,8 @@ from stewart_dynamics.identification.identification_options import (
     CUTOFF, DesignOptions, IdentificationOptions)
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
 from stewart_dynamics.program import (
-    add_accepted, add_node, add_parameters, add_report, arguments_of, between, DONE,
-    names_of, Program, whole)
+    add_accepted, add_motor_efforts, add_node, add_parameters, add_report, arguments_of, between,
+    DONE, names_of, Program, whole)
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_MOTION, IDENTIFIED
 from stewart_dynamics.signals import interrupt_on_signals
@@ -75,13 +75,7 @@ def _arguments() -> argparse.ArgumentParser:
     what.add_argument('--identify', dest='kinds', type=_kinds, default=DEFAULT, metavar='LIST',
                       help=f'of {", ".join(KINDS)}, with commas (default: {",".join(DEFAULT)}); '
                            'tilt is the direction of gravity, for a base that is not level')
-    motors = what.add_mutually_exclusive_group()
-    motors.add_argument('--motor-torque', action='store_true',
-                        help='efforts are torques of the motors [N m]; needs actuator.screw_lead, '
-                             'and drive.gear_ratio where there is a gear')
-    motors.add_argument('--motor-current', action='store_true',
-                        help='efforts are currents of the motors [A]; needs drive.torque_constant '
-                             'as well')
+    add_motor_efforts(what)
     what.add_argument('--cutoff', type=between(0.1, 1000.0), default=CUTOFF, metavar='HZ',
                       help='cut-off frequency of the filter on both sides of the regression '
                            f'(default: {CUTOFF:g}): above the frequencies of the motion')

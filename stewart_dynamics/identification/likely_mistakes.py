@@ -36,18 +36,12 @@ from stewart_dynamics.identification.lack_of_fit import LackOfFit
 from stewart_dynamics.identification.sums import shifted_by, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.drives.motors import motor_ratio
+from stewart_dynamics.mechanics.drives.measured_efforts import FAR, mistake_of_scale
 from stewart_dynamics.mechanics.least_squares import (
     Information, information, solve)
-from stewart_dynamics.parameters.table import AUTO, Parameters, STANDARD_GRAVITY
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
-# A scale of the efforts within this ratio of a known factor is attributed to that factor.
-_NEAR = 1.35
-# A scale that differs from 1 by a larger ratio is a mistake; a smaller one is that of torques.
-FAR, _TORQUES = 2.0, 0.05
-_FACTORS = ((1e-3, 'kN in place of N'), (-1.0 / STANDARD_GRAVITY[2], 'kgf in place of N'),
-            (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
 # A residual above this fraction of the efforts starts the search for swapped legs.
 _SUSPICIOUS = 0.03
 # A residual above this fraction means that the model does not describe the recording.
@@ -103,46 +97,15 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, of_motors: bool,
     scale, error = scale_of_efforts(sums, unknowns, platform_too=False)
     by_file, _ = scale_of_efforts(sums, unknowns, platform_too=True)
     if not np.isfinite(by_file) or by_file == 0.0:
-        yield LikelyMistake('scale', 'all efforts are zero')
-        return
-    if not (np.isfinite(scale) and error < 0.1 * abs(scale)) or (
+        scale = 0.0
+    elif not (np.isfinite(scale) and error < 0.1 * abs(scale)) or (
             # the file's legs may be wrong, but not by this ratio
             not 0.1 < scale / by_file < 10.0):
         scale = by_file
     elif (scale > 0.0) == (by_file > 0.0) and 1.0 / FAR < abs(by_file) < FAR:
         scale = by_file  # the platform's weight shows that the unit is right
-    if scale < 0.0:
-        other = '' if p['geometry.platform_side'] != AUTO else (
-            '; or the platform is on the other side of the base: geometry.platform_side')
-        yield LikelyMistake(
-            'sign', 'the efforts have the opposite sign: + must push, as the forces of '
-            f'the node do (they are {scale:.3g} times what the model computes)'
-            f'{other}')
-        return
-    if 1.0 / FAR < scale < FAR:
-        return
-    lead, ratio = p['actuator.screw_lead'], p['drive.gear_ratio']
-    torques = 'likely torques of the motors in place of forces: --motor-torque takes them'
-    units = [unit for factor, unit in _FACTORS if _is_near(scale, factor)]
-    if of_motors:
-        what, likely = 'scale', (
-            f'likely actuator.screw_lead, {lead[0]:g} m, is wrong: about {lead[0] * scale:.3g} m '
-            f'would fit; or drive.gear_ratio, {ratio[0]:g}: about {ratio[0] / scale:.3g}')
-    elif lead is not None and _is_near(scale, float(np.mean(1.0 / motor_ratio(p)))):
-        what, likely = 'torque', torques
-    elif units:
-        what, likely = 'unit', f'likely {units[0]}'
-    elif scale < _TORQUES:
-        what, likely = 'torque', (f'{torques}, with actuator.screw_lead (a lead of '
-                                  f'{2.0 * np.pi * scale:.2g} m would fit)')
-    else:
-        what, likely = 'scale', 'another unit, or a wrong platform.mass'
-    yield LikelyMistake(
-        what, f'the efforts are {scale:.3g} times what the model computes: {likely}')
-
-
-def _is_near(scale: float, factor: float) -> bool:
-    return 1.0 / _NEAR < scale / factor < _NEAR
+    if mistake := mistake_of_scale(scale, p, of_motors):
+        yield LikelyMistake(*mistake)
 
 
 def of_fit(p: Parameters, extraction: Extraction, window: Window, fit: Fit,

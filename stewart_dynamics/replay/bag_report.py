@@ -190,9 +190,11 @@ class Report:
             plots += spectrum_plots(density, len(curves))
             curves += [drawn(density.frequencies, each) for each in density.amplitudes]
         if self._compared is not None and self._compared.samples:
-            plots += measured_plots(p, {
+            shown = measured_plots(p, {
                 name: slice(len(curves) + at.start, len(curves) + at.stop)
                 for name, at in self._places_compared.items()})
+            plots += [plot for plot in shown if summary['measured']['external_wrench_given']
+                      or not plot.key.startswith('external')]
             curves += _lines(self._compared)
         return {
             'samples': self._curves.samples,

@@ -37,7 +37,6 @@ from stewart_dynamics.setpoints.step import Batch, restarts_of
 # Poses in a window.
 WINDOW = 4096
 
-TOO_FEW = f'fewer than {FEWEST} poses between gaps: no acceleration can be computed'
 TOO_FAR = f'position beyond {LARGEST:g} m'
 TOO_FAST = 'turns faster than the cut-off frequency can follow'
 
@@ -50,6 +49,8 @@ _REACH = 5.0
 _REACH_IN_POSES = 32
 # The condition of the system grows with its fourth power: the relative error is 4e-6 here.
 _MOST_POSES_IN_A_CUTOFF = 2000
+# The proposed cut-off frequency bridges steps that are longer by this factor.
+_JITTER = 1.25
 # Smoothing makes a quaternion shorter than one.
 _SHORTEST_QUATERNION = 0.5
 
@@ -102,6 +103,7 @@ class Differentiator:
         """Number of setpoints left out, without twist and acceleration, by reason."""
         self.near_ends = 0  # setpoints within 1 / cutoff of an end of their segment
         self._gap = round(gap * SECOND)
+        self._step = 0.0  # median time between the first poses [ns]
         self._reach = round(_REACH / cutoff * SECOND)
         self._window = window
         self._pending: list[Batch] = []
@@ -149,6 +151,18 @@ class Differentiator:
         self._pending, self._held = [], 0
         return done
 
+    @property
+    def too_few(self) -> str:
+        """Return the reason for leaving out poses of a segment that is too short."""
+        text = (f'fewer than {FEWEST} poses without a gap, a time of more than '
+                f'{self._gap * NANOSECOND:.3g} s between two poses: no acceleration can be '
+                'computed')
+        if self._step <= self._gap:
+            return text
+        cutoff = _rounded_down(SECOND / (_JITTER * self._step))
+        return (f'{text}; poses are {self._step * NANOSECOND:.3g} s apart: --cutoff {cutoff:g} '
+                'makes the gap longer, for a motion that is slower than that')
+
     def notices(self) -> list[str]:
         """Return notices to the user about the results."""
         off = self.deviation
@@ -169,6 +183,8 @@ class Differentiator:
         held = _joined(self._pending)
         stamps = held.stamps
         steps = np.diff(stamps)
+        if not self._step and len(steps):
+            self._step = float(np.median(steps[:max(self._window - 1, 1)]))
         begins = [0, *(np.flatnonzero(
             held.restarts[1:] | (steps < _NEAREST) | (steps > self._gap)) + 1).tolist()]
         ends = [*begins[1:], len(stamps)]
@@ -188,7 +204,7 @@ class Differentiator:
         stamps = segment.stamps
         if closed and not self._given and len(stamps) < FEWEST:
             if len(stamps):
-                self.left_out[TOO_FEW] += len(stamps)
+                self.left_out[self.too_few] += len(stamps)
                 self._restart = self._restart or bool(segment.restarts.any())
             return []
         if not self._given:
@@ -287,6 +303,12 @@ class Differentiator:
         if n:
             given, motions = given.chosen(followed), motions[followed]
         return given._replace(motions=motions, restarts=restarts)
+
+
+def _rounded_down(value: float) -> float:
+    """Return a positive number rounded down to two significant digits."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.floor(value / unit) * unit
 
 
 def _vector_of_quotient(a: Array, b: Array) -> Array:

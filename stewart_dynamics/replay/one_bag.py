@@ -35,6 +35,7 @@ from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.bags import recording as bag_recording
 from stewart_dynamics.bags.find import bytes_of, RESULT
 from stewart_dynamics.bags.recording import LISTED, listed, Recording
+from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
@@ -170,7 +171,10 @@ class _Run:
         self._elapsed = 0, 0  # [s], [ns]
         self._summary = Summary(parameters, self._quasi_static)
         self._differentiator = differentiator(parameters, options)
-        self._comparison = None if options.measured is None else Comparison(parameters)
+        self._per_effort = force_per_effort(
+            parameters, options.motor_torque, options.motor_current)
+        self._comparison = None if options.measured is None else Comparison(
+            parameters, self._per_effort is not None)
         self._efforts = Efforts(parameters['joints'])
         self.report: Report | None = None
         if options.report:
@@ -236,7 +240,9 @@ class _Run:
             'inputs': {
                 'node': self._options.node, 'topics': self._topics,
                 'differentiated_cutoff_hz': self._options.cutoff,
-                'measured': self._options.measured},
+                'measured': self._options.measured,
+                'motor_torque': self._options.motor_torque,
+                'motor_current': self._options.motor_current},
             'rejected': [{'topic': rejection.topic, 'reason': rejection.reason, 'count': number,
                           'first': self._firsts[rejection].details,
                           'first_at_s': self._rejected_at(
@@ -328,6 +334,8 @@ class _Run:
             messages.data, messages.starts[which], messages.sizes[which])
         for reason, number in rejected.items():
             self._setpoints.reject(MEASURED, reason, '', number)
+        if self._per_effort is not None:
+            efforts = efforts * self._per_effort
         self._compared(self._comparison.add_measured(stamps, efforts))
 
     def _compared(self, compared: Any) -> None:

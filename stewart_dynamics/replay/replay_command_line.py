@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.program import (
-    add_node, add_parameters, add_report, frequency, Program, whole)
+    add_motor_efforts, add_node, add_parameters, add_report, frequency, Program, whole)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
 from stewart_dynamics.reporting.results_folder import REPLAYS
 from stewart_dynamics.signals import interrupt_on_signals
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
 _PROGRAM = Program('stewart_replay', 'parameters or bags',
-                   'a limit or singularity warning was met', partly=True)
+                   'a limit or singularity warning was met, or a mistake in measured '
+                   'efforts is likely', partly=True)
 _CUTOFF = 10.0
 _TOPICS = {
     'pose': 'poses', 'twist': 'twists', 'accel': 'accelerations',
@@ -50,6 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.cutoff and not given.differentiate:
         parser.error('--cutoff: needs --differentiate')
+    if (given.motor_torque or given.motor_current) and not given.measured:
+        parser.error('--motor-torque, --motor-current: need --measured')
     return _PROGRAM.exit_code(lambda: _run(given, _options(given)))
 
 
@@ -74,6 +77,7 @@ def _arguments() -> argparse.ArgumentParser:
                             help=f'topic of the {what}')
     topics.add_argument('--measured', metavar='TOPIC',
                         help='JointState whose efforts are compared with the computed forces')
+    add_motor_efforts(topics)
     poses = parser.add_argument_group('bags that have only poses')
     poses.add_argument('--differentiate', action='store_true',
                        help='compute twist and acceleration from the poses by smoothing splines')
@@ -102,6 +106,7 @@ def _options(given: argparse.Namespace) -> Options:
         topics={name: getattr(given, name) for name in _TOPICS if getattr(given, name)},
         cutoff=(given.cutoff or _CUTOFF) if given.differentiate else None,
         measured=given.measured or None,
+        motor_torque=given.motor_torque, motor_current=given.motor_current,
         parquet=given.parquet, report=given.report, force=given.force)
 
 

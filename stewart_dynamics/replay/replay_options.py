@@ -42,6 +42,8 @@ class Options(NamedTuple):
     cutoff: float | None = None
     """Cut-off frequency [Hz]: read only poses, and differentiate them by smoothing splines."""
     measured: str | None = None  # topic of a sensor_msgs/JointState with the measured efforts
+    motor_torque: bool = False  # measured efforts are motor torques [N m]
+    motor_current: bool = False  # measured efforts are motor currents [A]
     parquet: bool = False  # write legs.parquet in place of legs.csv
     report: bool = True  # write report.html
     plotly: Path | None = None
@@ -58,5 +60,5 @@ class Options(NamedTuple):
 
 def code_of(summary: Mapping[str, Any]) -> int:
     """Return the exit code of a replayed bag."""
-    return (PARTLY_READ if not summary['complete'] else LIMIT_MET if summary['limit_met']
-            else DONE)
+    return (PARTLY_READ if not summary['complete'] else LIMIT_MET
+            if summary['limit_met'] or (summary['measured'] or {}).get('likely_mistake') else DONE)

@@ -37,6 +37,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Bytes, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.external_wrench.estimate import external_wrenches
+from stewart_dynamics.mechanics.drives.measured_efforts import mistake_of_scale, SCALE
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -88,6 +89,8 @@ class Efforts:
 _SETPOINTS_WAITING = 2 ** 15
 _SAMPLES_WAITING = 2 ** 18
 
+# Cosine between measured and computed forces from which on they are alike but for a factor.
+_ALIKE = 0.9
 AXES = tuple(COMPONENTS)
 _UNITS = tuple(map(unit_key, COMPONENTS.values()))
 
@@ -115,8 +118,8 @@ class Comparison:
     number. A single stamp that is late or in the future begins no pass and is left out.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
+    def __init__(self, parameters: Parameters, of_motors: bool = False) -> None:
+        self._parameters, self._of_motors = parameters, of_motors
         self._platform = StewartPlatform(parameters)
         gap = parameters['setpoint.timeout']
         self._gap = round(gap * SECOND)
@@ -184,9 +187,20 @@ class Comparison:
         self._computed += [np.sum(computed, axis=1), np.sum(computed ** 2, axis=1),
                            np.sum(computed * measured, axis=1)]
 
+    def _mistake(self) -> tuple[str, str] | None:
+        """Return keyword and text of the likely mistake in sign and unit of the efforts."""
+        measured, computed = float(self._measured_squares.sum()), float(self._computed[1].sum())
+        products = float(self._computed[2].sum())
+        if not computed or measured and abs(products) < _ALIKE * np.sqrt(measured * computed):
+            return None
+        return mistake_of_scale(products / computed, self._parameters, self._of_motors)
+
     def values(self) -> dict[str, Any]:
         """Return the part of summary.json."""
-        joints = self._parameters['joints']
+        joints, mistake = self._parameters['joints'], self._mistake()
+        # A load can be several times the file's; of efforts of another kind there is no wrench.
+        load_known = mistake is None or mistake[0] == SCALE
+        wrench = self._wrench if load_known else _Statistics()
         return {
             'setpoints_compared': self._legs.count,
             'setpoints_not_compared': {
@@ -199,10 +213,12 @@ class Comparison:
             'gap_limit_s': self._gap * NANOSECOND,
             **self._of_all_legs(),
             'legs': {joint: self._leg(leg) for leg, joint in enumerate(joints)},
-            'external_wrench': {axis: self._wrench.named(number, '', unit)
+            'external_wrench_given': load_known,
+            'likely_mistake': mistake and {'what': mistake[0], 'text': mistake[1]},
+            'external_wrench': {axis: wrench.named(number, '', unit)
                                 for number, (axis, unit) in enumerate(
                                     zip(AXES, _UNITS, strict=True))},
-            'contacts': self._contacts(),
+            'contacts': self._contacts(load_known),
         }
 
     def _of_all_legs(self) -> dict[str, float | None]:
@@ -227,14 +243,15 @@ class Comparison:
         return {**named, 'measured_rms_n': rms[0], 'computed_rms_n': rms[1],
                 'correlation': correlation}
 
-    def _contacts(self) -> dict[str, Any]:
+    def _contacts(self, load_known: bool) -> dict[str, Any]:
         number = max(self._legs.count, 1)
         force = float(np.sqrt(np.mean(self._computed[1] + self._measured_squares) / number))
         length = self._parameters['singularity.characteristic_length']
         smallest = 1e-3 * force * np.array([1.0, 1.0, 1.0, length, length, length])
         middle, deviation = self._bins.middle()
         threshold = np.maximum(6.0 * deviation, smallest)
-        found = self._bins.contacts(middle, threshold, self._gap * NANOSECOND)
+        found = (self._bins.contacts(middle, threshold, self._gap * NANOSECOND)
+                 if load_known else [])
         strongest = sorted(sorted(found, key=lambda each: -each.excess)[:100])
         return {
             'count': len(found),

@@ -21,6 +21,7 @@ from collections.abc import Mapping, Sequence
 import textwrap
 from typing import Any
 
+from stewart_dynamics.mechanics.drives.measured_efforts import SCALE
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
@@ -71,11 +72,14 @@ def measured_headline(measured: Mapping[str, Any]) -> str:
     """Return by how much measured and computed forces differ, from the values of Comparison."""
     if not measured['setpoints_compared']:
         return 'no setpoint could be compared'
+    mistake = measured['likely_mistake']
+    likely = '' if mistake is None else f'likely mistake: {mistake["text"]}; ' + (
+        '' if mistake['what'] == SCALE else 'no external wrench is given; ')
     worst, leg = max((leg['residual_rms_n'], name) for name, leg in measured['legs'].items())
     share = '' if measured['residual_share'] is None else (
         f', {100.0 * measured["residual_share"]:.3g} % of the measured force')
-    return (f'measured and computed forces differ by {measured["residual_rms_n"]:.3g} N RMS'
-            f'{share}; most in {leg}, by {worst:.3g} N')
+    return (f'{likely}measured and computed forces differ by {measured["residual_rms_n"]:.3g} N '
+            f'RMS{share}; most in {leg}, by {worst:.3g} N')
 
 
 def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
