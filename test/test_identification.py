@@ -29,9 +29,10 @@ import pytest
 from recorded import about, at_rest, fourier, MotionAt, Noise, Recorded, recorded, write_bag
 from referees import rng, ROOT, rotation_about
 
-from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.identification.identify_command_line import main
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.drives.motors import motor_ratio
 
 Array = NDArray[np.float64]
 
@@ -323,6 +324,58 @@ def test_efforts_of_motors_need_the_drive(
         code, _, _, err = identified('fourier', '--force', option, params=params)
         assert code == 2
         assert 'likely actuator.screw_lead, 0.04 m, is wrong: about 0.0' in err
+
+
+def test_losses_of_drives_are_no_mass_and_no_friction(
+        identified: Callable[..., Any], tmp_path: Path) -> None:
+    p = GIVEN.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01,
+        'drive.motor_inertia': 7.6e-5, 'drive.efficiency': 0.8})
+    p.to_yaml(tmp_path / 'driven.yaml')
+    per_newton = 1.0 / motor_ratio(p)
+
+    def torques(given: Recorded) -> Recorded:
+        assert given.rates is not None
+        of_rotors = p['actuator.reflected_mass'] * np.gradient(given.rates, given.times, axis=0)
+        loads = given.efforts - of_rotors
+        slip = np.minimum(np.abs(given.rates) / p['actuator.coulomb_velocity'], 1.0)
+        full = np.where(loads * given.rates > 0.0, 1.0 / 0.8, 2.0 - 1.0 / 0.8)
+        return given._replace(efforts=per_newton * (
+            loads * (1.0 + (full - 1.0) * slip) + of_rotors))
+
+    code, result, _, _ = identified(
+        'fourier', '--no-report', '--motor-torque', params=tmp_path / 'driven.yaml',
+        change=torques)
+    assert code == 0
+    assert values_of(result)['platform.mass'] == pytest.approx(180.0, rel=0.003)
+
+
+@pytest.mark.parametrize('frequency', [0.2, 0.5, 1.0])
+@pytest.mark.parametrize('factor', [1.0, -1.0])
+def test_opposite_efforts_in_heave_are_not_taken_for_a_delay(
+        identified: Callable[..., Any], frequency: float, factor: float) -> None:
+    """Half a period of delay fits the moving part of efforts with the opposite sign."""
+    w = 2.0 * np.pi * frequency
+
+    def heave(given: Recorded) -> Recorded:
+        wave = 0.05 * np.sin(w * given.times[:, None])
+        motion = Motion(
+            np.array([0.0, 0.0, 1.15]) + wave * [0.0, 0.0, 1.0],
+            np.broadcast_to(np.eye(3), (len(wave), 3, 3)),
+            linear_velocity=0.05 * w * np.cos(w * given.times[:, None]) * [0.0, 0.0, 1.0],
+            linear_acceleration=-w * w * wave * [0.0, 0.0, 1.0])
+        found = StewartPlatform(GIVEN).inverse_dynamics(motion)
+        return given._replace(
+            positions=found.lengths - GIVEN['geometry.zero_length'], rates=found.rates,
+            efforts=factor * found.forces)
+
+    code, result, _, err = identified('fourier', '--no-report', change=heave)
+    if factor < 0.0:
+        assert (code, result) == (2, None)
+        assert 'the efforts have the opposite sign' in err
+    else:
+        assert code == 0
+        assert abs(result['bags'][0]['delay_s']) < 1e-4
 
 
 def test_mistakes_may_be_accepted(identified: Callable[..., Any]) -> None:

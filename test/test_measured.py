@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 import pytest
 from referees import random_parameters, rng, size_of
 
-from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics import Motion, ParameterError, Parameters, StewartPlatform
+from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary_text import _measured_lines, measured_headline
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
@@ -204,6 +205,32 @@ def test_the_headline_names_the_difference_and_the_leg_where_it_is_largest() -> 
     assert measured_headline(values) == (
         f'measured and computed forces differ by {rms:.3g} N RMS, {100.0 * share:.3g} % of the '
         'measured force; most in leg_5, by 20 N')
+
+
+@pytest.mark.parametrize('screws', ['guided', 'universal'])
+@pytest.mark.parametrize('back', [None, 0.3])
+def test_torques_of_motors_are_compared_without_the_losses_of_the_drives(
+        screws: str, back: float | None) -> None:
+    case = case_of()
+    p = case.parameters.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.02, 'drive.motor_inertia': 1e-4,
+        'drive.efficiency': 0.8, 'drive.back_driving_efficiency': back,
+        'drive.screw_rotation': screws})
+    torques = StewartPlatform(p).motors(case.motion).torques
+    comparison = Comparison(p, of_motors=True)
+    per_effort = force_per_effort(p, torques=True, currents=False)
+    _, measured, computed, _ = compared(
+        comparison, case._replace(parameters=p, outputs=Step(p).many(case.setpoints, None)),
+        (case.setpoints.stamps, torques * per_effort))
+    np.testing.assert_allclose(measured, computed, rtol=1e-9, atol=1e-9 * np.abs(computed).max())
+    assert np.abs(torques * per_effort - computed).max() > 0.05 * np.abs(computed).max()
+
+
+def test_torques_of_self_locking_screws_are_rejected() -> None:
+    p = case_of().parameters.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.02, 'drive.efficiency': 0.3})
+    with pytest.raises(ParameterError, match=r'^drive\.back_driving_efficiency: -1\.33333: must '):
+        force_per_effort(p, torques=True, currents=False)
 
 
 # Contacts

@@ -38,6 +38,7 @@ from stewart_dynamics.identification.filters import convolved, decimated, LowPas
 from stewart_dynamics.identification.kinematics import motions, poses
 from stewart_dynamics.identification.unknowns import regression, Unknowns
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.drives.measured_efforts import has_losses, without_losses
 from stewart_dynamics.mechanics.dynamics.friction import friction
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.rows import POSE
@@ -151,12 +152,14 @@ class Extraction:
 
     ``platform`` has the parameters of the file; ``cutoff`` is the frequency of the narrow band
     [Hz]. ``speeds`` are the rates of the friction shapes [m/s], by default those of the first
-    window that moves.
+    window that moves. ``of_motors``: efforts are forces by the torques of the motors, with losses.
     """
 
     def __init__(self, platform: StewartPlatform, unknowns: Unknowns, period: float,
-                 cutoff: float, speeds: tuple[float, ...] | None = None) -> None:
+                 cutoff: float, speeds: tuple[float, ...] | None = None,
+                 of_motors: bool = False) -> None:
         self.platform, self._unknowns, self._period = platform, unknowns, period
+        self._losses = of_motors and has_losses(platform.parameters)
         self._size = float(platform.parameters['singularity.characteristic_length'])
         self._wide = LowPass.of(period, WIDE * cutoff, _TRANSITION * cutoff)
         self._narrow = LowPass.of(period, cutoff, _TRANSITION * cutoff)
@@ -179,9 +182,13 @@ class Extraction:
         lengths, rates, accelerations = self._filtered(window, deviations, noise)
         found = poses(self.platform, lengths, guess)
         rows = motions(self.platform, found, rates, accelerations)
-        efforts = np.stack([decimated(
-            window.efforts[self._wide.half:-self._wide.half], self._narrow.taps(order), self.step)
-            for order in range(ORDERS)], axis=-1)
+        drive_rates = self.platform.drive_rates(rows, rates)
+        forces = window.efforts[self._wide.half:-self._wide.half]
+        if self._losses:
+            forces = without_losses(
+                forces, drive_rates, accelerations, self.platform.parameters)
+        efforts = np.stack([decimated(forces, self._narrow.taps(order), self.step)
+                            for order in range(ORDERS)], axis=-1)
         columns = np.concatenate([self._decimated(rows), efforts], axis=-1)
         wrong, stops = self._wrong(window)
         count = len(columns)
@@ -192,8 +199,7 @@ class Extraction:
         legs = np.stack([decimated(each, taps, self.step)
                          for each in (lengths, rates, accelerations)], axis=-1)
         at = self._narrow.half + self.step * np.arange(count)
-        slip = decimated(self._slip(self.platform.drive_rates(rows, rates), speeds), taps,
-                         self.step)
+        slip = decimated(self._slip(drive_rates, speeds), taps, self.step)
         extract = Extract(times, columns, ~wrong[:count], legs, slip, found.rows[at][:, POSE])
         return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]), moves,
                           1.0 - _rms(legs[..., 1]) / _rms(rates[at]) if moves else 0.0)

@@ -272,7 +272,8 @@ class Identification:
     def _extraction(self, window: Window) -> Extraction:
         cutoff = min(self._options.cutoff, 1.0 / (_FEWEST_SAMPLES * window.period))
         speeds = self._first[0].speeds if self._first else None
-        return Extraction(self.platform, self.unknowns, window.period, cutoff, speeds)
+        return Extraction(self.platform, self.unknowns, window.period, cutoff, speeds,
+                          self._per_effort is not None)
 
     def _lag(self, extraction: Extraction, window: Window) -> tuple[int, float]:
         """Return the lag of the efforts in samples, and the squared misfit."""

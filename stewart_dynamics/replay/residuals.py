@@ -37,7 +37,9 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Bytes, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.external_wrench.estimate import external_wrenches
-from stewart_dynamics.mechanics.drives.measured_efforts import mistake_of_scale, SCALE
+from stewart_dynamics.mechanics.drives.measured_efforts import (
+    has_losses, mistake_of_scale, SCALE, without_losses)
+from stewart_dynamics.mechanics.drives.motors import motor_ratio, Motors
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -46,6 +48,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.summary import COMPONENTS, unit_key
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
 from stewart_dynamics.reporting.block_statistics import Extreme
+from stewart_dynamics.setpoints.motor_step import OF_DRIVES
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
@@ -95,7 +98,8 @@ AXES = tuple(COMPONENTS)
 _UNITS = tuple(map(unit_key, COMPONENTS.values()))
 
 # Columns of the rows kept of setpoints.
-_SECONDS, _POSE, _FORCES = 0, slice(1, 13), slice(13, 19)
+_SECONDS, _POSE, _FORCES, _RATES, _ACCELERATIONS = (
+    0, slice(1, 13), slice(13, 19), slice(19, 25), slice(25, 31))
 
 
 class Compared(NamedTuple):
@@ -120,6 +124,8 @@ class Comparison:
 
     def __init__(self, parameters: Parameters, of_motors: bool = False) -> None:
         self._parameters, self._of_motors = parameters, of_motors
+        self._losses = of_motors and has_losses(parameters)
+        self._ratio = motor_ratio(parameters)
         self._platform = StewartPlatform(parameters)
         gap = parameters['setpoint.timeout']
         self._gap = round(gap * SECOND)
@@ -134,8 +140,11 @@ class Comparison:
 
     def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
         """Add setpoints, see Summary.add; return the compared setpoints."""
-        self._setpoints.add(setpoints.stamps, np.column_stack([
-            seconds, setpoints.motions[:, POSE], outputs.demanded_forces]))
+        columns = [seconds, setpoints.motions[:, POSE], outputs.demanded_forces]
+        if self._losses:
+            motors = Motors.of_rows(outputs.motors[:, OF_DRIVES])
+            columns += [motors.speeds / self._ratio, motors.accelerations / self._ratio]
+        self._setpoints.add(setpoints.stamps, np.column_stack(columns))
         return self._compared()
 
     def add_measured(self, stamps: Stamps, efforts: Array) -> Compared:
@@ -156,7 +165,7 @@ class Comparison:
             six = np.empty((0, 6))
             return Compared(np.empty(0), six, six, six)
         samples = self._samples.rows
-        measured = np.full((len(rows), 6), np.nan)
+        measured: Array = np.full((len(rows), 6), np.nan)
         for number in np.unique(setpoints.passes):
             mine, same = setpoints.passes == number, samples.passes == number
             measured[mine] = interpolated(
@@ -167,6 +176,9 @@ class Comparison:
         self._without_force += int(np.count_nonzero(there & ~known))
         if not known.all():
             rows, measured = rows[known], measured[known]
+        if self._losses:
+            measured = without_losses(
+                measured, rows[:, _RATES], rows[:, _ACCELERATIONS], self._parameters)
         computed = rows[:, _FORCES]
         compared = Compared(rows[:, _SECONDS], measured, computed, external_wrenches(
             self._platform, rows[:, _POSE], computed, measured))

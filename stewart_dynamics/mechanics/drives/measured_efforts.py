@@ -34,11 +34,12 @@ ZERO, SIGN, UNIT, TORQUE, SCALE = 'zero', 'sign', 'unit', 'torque', 'scale'
 
 def force_per_effort(parameters: Parameters, torques: bool, currents: bool) -> Array | None:
     """
-    Return the leg force for an effort of 1 (6,), without losses; or None where efforts are forces.
+    Return the leg force for an effort of 1 (6,), with the losses; None where efforts are forces.
 
     torques, currents: whether efforts are motor torques [N m], or motor currents [A].
 
-    Raises ParameterError if a parameter of the drives that this needs has no value.
+    Raises ParameterError if a parameter of the drives that this needs has no value, or if screws
+    are self-locking: the torque of a motor then does not show the load that drives it back.
     """
     for option, given, name in (
             ('--motor-torque', torques, 'actuator.screw_lead'),
@@ -48,9 +49,38 @@ def force_per_effort(parameters: Parameters, torques: bool, currents: bool) -> A
             raise ParameterError(f'{name}: has no value: {option} needs it')
     if not (torques or currents):
         return None
+    back = parameters['drive.back_driving_efficiency']
+    if np.any(back <= 0.0):
+        raise ParameterError(
+            f'drive.back_driving_efficiency: {back.min():g}: must be more than 0 where efforts '
+            'are those of motors: the torque at a self-locking screw does not show its load')
     per_effort: Array = motor_ratio(parameters) * (
         parameters['drive.torque_constant'] if currents else 1.0)
     return per_effort
+
+
+def has_losses(parameters: Parameters) -> bool:
+    """Return whether screw or gear lose a part of the torque."""
+    return bool(np.any(parameters['drive.efficiency'] != 1.0)
+                or np.any(parameters['drive.back_driving_efficiency'] != 1.0))
+
+
+def without_losses(forces: Array, rates: Array, accelerations: Array, p: Parameters) -> Array:
+    """
+    Return the forces (N, 6) of drives whose motors have the torques of ``force_per_effort``.
+
+    It is the inverse of the law in ``motors``: the part m_r q'' of a force turns the rotor and
+    passes no screw.
+
+    rates, accelerations (N, 6): of the drives, q' and q'' [m/s, m/s^2].
+    """
+    of_rotors = p['actuator.reflected_mass'] * accelerations
+    through = forces - of_rotors
+    slip = np.minimum(np.abs(rates) / p['actuator.coulomb_velocity'], 1.0)
+    full = np.where(through * rates > 0.0, 1.0 / p['drive.efficiency'],
+                    p['drive.back_driving_efficiency'])
+    loads: Array = through / (1.0 + (full - 1.0) * slip) + of_rotors
+    return loads
 
 
 def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> tuple[str, str] | None:
