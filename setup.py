@@ -48,11 +48,11 @@ extras_require = {
     'cluster': ['distributed>=2024.1'],
     'differentiate': ['scipy>=1.10'],
     'docs': [
-        'docutils>=0.20',
+        'docutils>=0.21',  # tex2mathml has as_block
         'furo>=2024.1.29',
-        'myst-parser>=2',
+        'myst-parser>=3',  # for this docutils
         'numpydoc>=1.6',
-        'sphinx>=7.2.5',  # has the event include-read
+        'sphinx>=7.3.7',  # for this docutils; 7.3.0 warns of any type of a setting
     ],
     'mujoco': ['mujoco>=3.2'],
     'parquet': ['pyarrow>=14'],
