@@ -52,8 +52,8 @@ _EXACT = 1e-9
 # proof takes longer.
 _EXACT_OF_CLEARANCE = 0.01
 _EXACT_OF_CONDITION = 1e-3
-# Smaller bounds that are not zero are below the rounding errors of poses [m, rad].
-SMALLEST = 1e-12
+# Smaller bounds that are not zero have no finite factor [m, rad].
+SMALLEST = 1e-300
 # Boxes of translations are proven up to this multiple of the hexapod's size.
 _LARGEST = 1e6
 

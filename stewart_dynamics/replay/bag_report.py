@@ -193,8 +193,9 @@ class Report:
             shown = measured_plots(p, {
                 name: slice(len(curves) + at.start, len(curves) + at.stop)
                 for name, at in self._places_compared.items()})
-            plots += [plot for plot in shown if summary['measured']['external_wrench_given']
-                      or not plot.key.startswith('external')]
+            measured = summary['measured']
+            plots += [plot for plot in shown if not plot.key.startswith('external')
+                      or measured is None or measured['external_wrench_given']]
             curves += _lines(self._compared)
         return {
             'samples': self._curves.samples,
