@@ -888,7 +888,7 @@ def test_a_listed_file_that_does_not_exist_is_missing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('name', [
-    'bag_1.mcap', 'bag_1.db3', 'bag_1.mcap.zstd', 'bag_1.db3.zstd', 'bag_12.mcap', 'bag.mcap'])
+    'bag_1.mcap', 'bag_1.db3', 'bag_1.mcap.zstd', 'bag_1.db3.zstd', 'bag_12.mcap'])
 def test_a_part_that_metadata_does_not_list_is_missing(name: str, tmp_path: Path) -> None:
     bag = tmp_path / 'bag'
     given_ = split_bag(bag, 1, lambda n: f'bag_{n}.mcap')
@@ -911,11 +911,28 @@ def test_other_files_beside_a_recording_are_no_part_of_it(tmp_path: Path) -> Non
     messages, missing, notices = read(bag)
     assert (messages, missing, len(notices)) == (given_, [], 1)
     assert notices[0].startswith('other_0.mcap is in the folder but not in metadata.yaml')
+    (bag / 'bag.mcap').write_bytes(b'not read')  # the parts merged
+    messages, missing, notices = read(bag)
+    assert (messages, missing, len(notices)) == (given_, [], 2)
+    (bag / 'bag.mcap').unlink()
     # and where the compressed one is listed
     listed(bag, ['bag_0.mcap.zstd', 'other_0.mcap'])
     (bag / 'bag_0.mcap.zstd').write_bytes(zstandard.compress(mcap(given_)))
     (bag / 'other_0.mcap').unlink()
     assert read(bag).messages == given_
+
+
+@pytest.mark.parametrize(('names', 'beside', 'is_part'), [
+    (['run_2024'], 'run_2023', False), (['run'], 'run_1', False), (['run'], 'run_0', False),
+    (['run_2'], 'run_1', False), (['run_0_2024'], 'run_0_2023', False),
+    (['run_0'], 'run_1', True), (['run_1'], 'run_0', True), (['a_2024_0'], 'a_2023_0', False)])
+def test_only_files_counted_from_0_are_parts_of_one_recording(
+        names: list[str], beside: str, is_part: bool, tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    split_bag(bag, len(names), lambda n: f'{names[n]}.mcap')
+    (bag / f'{beside}.mcap').write_bytes(b'not read')
+    found = read(bag)
+    assert (len(found.missing), len(found.notices)) == ((1, 0) if is_part else (0, 1))
 
 
 @pytest.mark.parametrize('text', [

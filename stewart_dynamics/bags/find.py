@@ -135,9 +135,10 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
     there = [file for file in listed if file.exists()]
     if there:
         missing += [f'{file.name}: no such file' for file in listed if file not in there]
+        names = _counted_from_zero(listed, found)
         for file in found:
             if not (file in there or file.name.startswith('.') or _is_packed_twin(file, there)):
-                (missing if _name_of(file) in map(_name_of, listed) else notices).append(
+                (missing if _name_of(file) in names else notices).append(
                     f'{file.name} is in the folder but not in metadata.yaml: it is not read '
                     '(ros2 bag reindex lists it)')
         return there
@@ -148,9 +149,21 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
     return found
 
 
-def _name_of(file: Path) -> str:
-    """Return the name of a file of a recording, without its number and suffixes."""
-    return re.sub(r'_\d+$', '', _without_suffix(file))
+def _counted_from_zero(listed: Sequence[Path], found: Sequence[Path]) -> set[str]:
+    """
+    Return the names of listed recordings whose files are numbered as rosbag2 does, from 0.
+
+    Other files that end with numbers, as those of years, are recordings of their own.
+    """
+    first = {_name_of(file) for file in (*listed, *found)
+             if _without_suffix(file).endswith('_0')}
+    return {name for file in listed if (name := _name_of(file)) is not None and name in first}
+
+
+def _name_of(file: Path) -> str | None:
+    """Return the name of the recording of a numbered file, None of a file without a number."""
+    found = re.fullmatch(r'(.*)_\d+', _without_suffix(file))
+    return found[1] if found else None
 
 
 def _without_suffix(file: Path) -> str:
