@@ -27,6 +27,7 @@ from multiprocessing import forkserver, parent_process, resource_tracker
 import os
 import signal
 from threading import Event, Lock, Thread
+import time
 from typing import Any
 
 from stewart_dynamics.errors import StewartError
@@ -39,7 +40,9 @@ _CONTEXT.set_forkserver_preload(['stewart_dynamics.replay.one_bag'])
 
 # Raised where a process, or the server that starts it, was killed during the start.
 _KILLED = BrokenProcessPool, EOFError, OSError
-_STARTS = 3  # attempts
+# Before each attempt to start a process [s]: a killed server refuses connections for some time
+# before its end can be seen.
+_PAUSES = 0.0, 0.2, 2.0
 
 
 @contextmanager
@@ -55,13 +58,15 @@ def processes(jobs: int, at: At) -> Iterator[Replayed]:
         if n in pools:
             with suppress(BrokenProcessPool):  # it has been killed
                 return pools[n].submit(_work, task)
-        for _ in range(_STARTS):
+        for pause in _PAUSES:
+            if pause:
+                time.sleep(pause)
+                _start_server()
             # Pools of one process each: the death of one does not break the others.
             pools[n] = ProcessPoolExecutor(1, _CONTEXT, _begin, (stopped, counts, 2 * n))
             with suppress(*_KILLED):
                 pools[n].submit(os.getpid).result()
                 return pools[n].submit(_work, task)
-            _start_server()
         raise StewartError('the processes to replay bags could not start')
 
     def replayed(tasks: Sequence[Task]) -> Iterator[tuple[Task, Ended | None]]:
