@@ -289,6 +289,13 @@ SEVERAL = {'all joints in mm', 'all joints in mm of a hexapod as long as a stree
            'the base joints in mm', 'one base joint in mm', 'limits in mm'}
 
 
+def test_a_rotor_that_its_motor_cannot_accelerate_so_much_is_no_mistake() -> None:
+    p = PLATFORM.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01,
+        'drive.motor_inertia': 7.6e-5, 'drive.torque_max': 8.0, 'limits.force_max': 20e3})
+    assert not any('reflected_mass' in each for each in likely_mistakes(p))
+
+
 @pytest.mark.parametrize('name', SLIPS)
 def test_a_mistake_is_reported_once(name: str) -> None:
     changes, texts = SLIPS[name]

@@ -293,6 +293,8 @@ def _reflected_mass(p: Parameters, shape: Shape) -> Iterator[str]:
     force, rate = p['limits.force_max'], p['limits.velocity_max']
     if least == 0.0 or force is None:
         return
+    if p.drives and p['drive.torque_max'] is not None:
+        force = np.minimum(force, motor_ratio(p) * p['drive.torque_max'])
     acceleration = force / p[name]
     at = int(np.argmax(acceleration))
     start = 0.0 if rate is None else rate[at] / acceleration[at]
