@@ -19,6 +19,8 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 from pathlib import Path
+import subprocess
+import sys
 from typing import Any
 
 import messages
@@ -374,6 +376,23 @@ def test_pieces_give_the_same_as_the_whole(rate: float) -> None:
     assert whole.found
     assert whole.found == pieces.found == ones.found
     assert whole.present == pieces.present == ones.present
+
+
+def test_nothing_is_imported_while_setpoints_are_answered() -> None:
+    """Numpy imports some modules on first use, which takes 50 ms: a setpoint would wait."""
+    script = (
+        'import sys\nimport numpy as np\n'
+        'from stewart_dynamics.setpoints.consistency import Consistency\n'
+        'rows = np.zeros((2000, 24))\nrows[:, 3:12] = np.eye(3).ravel()\n'
+        'rows[:, 0] = np.sin(np.arange(2000) * 1e-2)\n'
+        'before, check = {*sys.modules}, Consistency(0.3)\n'
+        'for n, row in enumerate(rows.tolist()):\n'
+        '    check.noted.append((n * 1_000_000, row, False))\n'
+        '    check.judge()\n'
+        'print(sorted({*sys.modules} - before), sorted(check.present))\n')
+    done = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True,
+                          timeout=300, check=True)
+    assert done.stdout == "[] ['acceleration', 'velocity']\n"
 
 
 def test_the_present_state_follows_the_stream() -> None:
