@@ -269,7 +269,7 @@ def arguments_of(given: argparse.Namespace, names: Container[str]) -> dict[str, 
 def number(text: str) -> float:
     """Return a finite number as an option gives it."""
     try:
-        value = float(_digits(text))
+        value = float(plain_digits(text))
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
@@ -298,7 +298,7 @@ def whole(least: int, most: int) -> Callable[[str], int]:
     """Return the type of an option that is a whole number within bounds."""
     def read(text: str) -> int:
         try:
-            value = int(_digits(text))
+            value = int(plain_digits(text))
         except ValueError:
             raise argparse.ArgumentTypeError(
                 f'{text or repr(text)}: must be a whole number') from None
@@ -309,8 +309,8 @@ def whole(least: int, most: int) -> Callable[[str], int]:
     return read
 
 
-def _digits(text: str) -> str:
-    """Return the text of a number; Python alone reads 1_0 as 10, and other scripts' digits."""
+def plain_digits(text: str) -> str:
+    """Return a text; ValueError for numbers of Python alone: 1_0, digits of other scripts."""
     if '_' in text or not text.isascii():
         raise ValueError(text)
     return text

@@ -31,7 +31,7 @@ from stewart_dynamics.ros.repeated_log import RepeatedLog, SECONDS
 from stewart_dynamics.setpoints.consistency import Mistake
 from stewart_dynamics.setpoints.inputs import ACCEL, BASE_IMU, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import (
-    DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE, UNSTAMPED)
+    DROPPED, NOT_FINITE, NOT_JOINED, Rejection, STAMP_ZERO, TWICE)
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
@@ -176,7 +176,7 @@ def test_stamps_that_are_never_equal_are_logged() -> None:
 
 def test_zero_stamps_that_are_never_joined_are_named() -> None:
     diagnostics = begun()
-    diagnostics.rejected(Rejection(POSE, NOT_JOINED), UNSTAMPED, BEGIN)
+    diagnostics.rejected(Rejection(POSE, NOT_JOINED), STAMP_ZERO, BEGIN)
     assert come(diagnostics, 3.0, TOPICS) == [
         'setpoints: no setpoint: all topics arrive, but none is joined: header stamps of '
         'setpoint/pose are zero: such messages are joined in order of arrival, one of each topic']

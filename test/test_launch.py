@@ -118,18 +118,14 @@ def test_a_payload_that_is_no_number_ends_the_launch(
 
 
 @pytest.mark.parametrize('file', FILES)
-def test_a_missing_file_is_named(launch: Launch, file: str) -> None:
-    program = launch(file, 'params_file:=/nowhere/hexapod.yaml')
+@pytest.mark.parametrize(('argument', 'words'), [
+    ('params_file:=/nowhere/hexapod.yaml', 'params_file: /nowhere/hexapod.yaml: no such file'),
+    ('param_file:=/my/hexapod.yaml', 'param_file: unknown argument; did you mean params_file?')])
+def test_a_wrong_argument_is_named_and_starts_nothing(
+        launch: Launch, file: str, argument: str, words: str) -> None:
+    program = launch(file, argument)
     assert program.wait() == 1
-    assert 'params_file: /nowhere/hexapod.yaml: no such file' in said(program)
-    assert 'process started' not in said(program)
-
-
-@pytest.mark.parametrize('file', FILES)
-def test_an_unknown_argument_starts_nothing(launch: Launch, file: str) -> None:
-    program = launch(file, 'param_file:=/my/hexapod.yaml')
-    assert program.wait() == 1
-    assert 'param_file: unknown argument; did you mean params_file?' in said(program)
+    assert words in said(program)
     assert 'process started' not in said(program)
 
 

@@ -35,7 +35,7 @@ _LARGEST_METADATA = 1_000_000
 FLEET_TABLE, FLEET_PAGE = 'fleet.csv', 'index.html'
 
 # rosbag2 numbers the files of a recording: <name of the bag>_0.mcap, ...
-_NUMBERED = re.compile(r'(.*)_\d+(\.\w+(?:\.zstd)?)')
+_NUMBERED = re.compile(r'(?P<name>.*)_(?P<number>\d+)(?P<suffix>\.\w+(?:\.zstd)?)')
 
 
 def is_bag_file(path: Path) -> bool:
@@ -88,7 +88,8 @@ def _below(folder: Path, leave_out: Path | None) -> Iterator[Path]:
 
 
 def _one_recording(files: Sequence[Path]) -> bool:
-    names = {(found[1], found[2]) if (found := _NUMBERED.fullmatch(file.name)) else file.name
+    names = {found.group('name', 'suffix') if (found := _NUMBERED.fullmatch(file.name))
+             else file.name
              for file in files}
     return len(names) == 1
 
@@ -138,7 +139,8 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
         names = _counted_from_zero(listed, found)
         for file in found:
             if not (file in there or file.name.startswith('.') or _is_packed_twin(file, there)):
-                (missing if _name_of(file) in names else notices).append(
+                numbered = _NUMBERED.fullmatch(file.name)
+                (missing if numbered and numbered['name'] in names else notices).append(
                     f'{file.name} is in the folder but not in metadata.yaml: it is not read '
                     '(ros2 bag reindex lists it)')
         return there
@@ -155,20 +157,10 @@ def _counted_from_zero(listed: Sequence[Path], found: Sequence[Path]) -> set[str
 
     Other files that end with numbers, as those of years, are recordings of their own.
     """
-    first = {_name_of(file) for file in (*listed, *found)
-             if _without_suffix(file).endswith('_0')}
-    return {name for file in listed if (name := _name_of(file)) is not None and name in first}
-
-
-def _name_of(file: Path) -> str | None:
-    """Return the name of the recording of a numbered file, None of a file without a number."""
-    found = re.fullmatch(r'(.*)_\d+', _without_suffix(file))
-    return found[1] if found else None
-
-
-def _without_suffix(file: Path) -> str:
-    return next((file.name.removesuffix(suffix) for suffix in STORAGES
-                 if file.name.endswith(suffix)), file.name)
+    numbered = [(file, match) for file in dict.fromkeys((*listed, *found))
+                if (match := _NUMBERED.fullmatch(file.name))]
+    begun = {match['name'] for _, match in numbered if match['number'] == '0'}
+    return begun & {match['name'] for file, match in numbered if file in listed}
 
 
 def _is_packed_twin(file: Path, others: Sequence[Path]) -> bool:

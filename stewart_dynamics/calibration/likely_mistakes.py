@@ -101,8 +101,8 @@ def _on_other_side(parameters: Parameters, equations: Equations, unknown_frames:
     except StewartError:
         return
     pose = equations.in_base(frames)
-    determinants = np.linalg.det(lagrange.inverse_jacobian(
-        lagrange.unchecked_legs(parameters, pose.position, pose.rotation)))
+    determinants = lagrange.determinant(
+        lagrange.unchecked_legs(parameters, pose.position, pose.rotation))
     if np.median(determinants) * determinant_at_home(parameters) < 0.0:
         yield LikelyMistake(
             'side', 'the poses are on the other side of the base than at home: likely a mirrored '

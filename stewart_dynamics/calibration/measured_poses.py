@@ -21,7 +21,6 @@ import csv
 import io
 import math
 from pathlib import Path
-import re
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +29,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import shown, shown_name, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
+from stewart_dynamics.program import plain_digits
 from stewart_dynamics.whole_file import read_text
 
 # Minimum number of poses: one for each of the 7 unknowns of a leg, and one for the noise.
@@ -42,8 +42,6 @@ _LARGEST, _MOST = 64 << 20, 20_000
 # Squares of larger numbers, and their squares, would overflow.
 _END = 1e30
 _SEPARATORS = (',', ';', '\t')
-_NUMBERS = {mark: re.compile(rf'[+-]?([0-9]+{re.escape(mark)}?[0-9]*|{re.escape(mark)}[0-9]+)'
-                             r'([eE][+-]?[0-9]+)?') for mark in '.,'}
 
 
 class MeasuredPoses(NamedTuple):
@@ -142,9 +140,10 @@ def _decimal_mark(separator: str, cells: Sequence[str]) -> str:
 
 
 def _number(cell: str, where: str, mark: str) -> float:
-    text = cell.strip()
-    # float() also takes 1_0, and digits of other scripts.
-    value = float(text.replace(mark, '.')) if _NUMBERS[mark].fullmatch(text) else math.nan
+    try:
+        value = float(plain_digits(cell.strip().replace(mark, '.')))
+    except ValueError:
+        value = math.nan
     if not abs(value) < _END:
         raise StewartError(f'{where}: {shown(cell)}: must be a finite number below {_END:g}, with '
                            f'a decimal {"comma" if mark == "," else "point"} and digits 0 to 9')

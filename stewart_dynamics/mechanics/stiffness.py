@@ -34,8 +34,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
-from stewart_dynamics.mechanics.dynamics.lagrange import (
-    drive_jacobian_rate, Legs, skew)
+from stewart_dynamics.mechanics.dynamics.lagrange import drive_jacobian_rate, Legs
 from stewart_dynamics.parameters.table import DRIVE_INERTIAS
 
 HELD_MOTORS = {'actuator.reflected_mass': 0.0, **dict.fromkeys(DRIVE_INERTIAS)}
@@ -91,16 +90,9 @@ def geometric_stiffness(legs: Legs, forces: Array, rotation: Array, screws: Arra
     It is symmetric if the moment of all forces (..., 6) [N] about the platform's origin is zero.
     screws (6, SCREW): constants of the screws, see ``drives.screws``.
     """
-    if screws.any():
-        slopes = np.stack([drive_jacobian_rate(legs, rotation, each[:3], each[3:], screws)
-                           for each in np.eye(6)], axis=-1)
-        by_drives: Array = -np.einsum('...n,...nij->...ij', forces, slopes)
-        return by_drives
-    s, arm = skew(legs.directions), skew(legs.arms)
-    across = s @ s / legs.lengths[..., None, None]  # -(1 - s s^T) / L
-    turning = -across @ arm
-    stiffness: Array = np.einsum('...n,...nij->...ij', forces, np.block([
-        [across, turning], [arm @ across, arm @ turning - s @ arm]]))
+    slopes = np.stack([drive_jacobian_rate(legs, rotation, each[:3], each[3:], screws)
+                       for each in np.eye(6)], axis=-1)
+    stiffness: Array = -np.einsum('...n,...nij->...ij', forces, slopes)
     return stiffness
 
 

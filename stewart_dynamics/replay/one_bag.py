@@ -251,7 +251,7 @@ class _Run:
             **values,
             'mistakes': [
                 {'topic': each.topic, 'text': each.text,
-                 'first_at_s': self._mistaken_at(each.first, values['setpoints'])}
+                 'first_at_s': _since_first(each.first, values['setpoints'])}
                 for each in mistakes],
             'measured': measured and {'headline': measured_headline(measured), **measured},
             'parameters': self._parameters.plain(),
@@ -264,19 +264,10 @@ class _Run:
 
     def _rejected_at(self, first: _First, setpoints: Mapping[str, Any]) -> float | None:
         """Return when a message was rejected, since the first setpoint [s]; None: not known."""
-        begin, restarts = setpoints['first_stamp_ns'], setpoints['restarts']
-        if begin is not None and first.stamp is not None and not restarts:
-            return (first.stamp - int(begin)) * NANOSECOND
-        if self._first_time is not None and first.recorded is not None:
+        at = _since_first(first.stamp, setpoints)
+        if at is None and self._first_time is not None and first.recorded is not None:
             return (first.recorded - self._first_time) * NANOSECOND
-        return None
-
-    def _mistaken_at(self, stamp: int | None, setpoints: Mapping[str, Any]) -> float | None:
-        """Return the time of a stamp since the first setpoint [s]; None: not known."""
-        begin = setpoints['first_stamp_ns']
-        if stamp is None or begin is None or setpoints['restarts']:
-            return None
-        return (stamp - int(begin)) * NANOSECOND
+        return at
 
     def _notice(self, text: str) -> None:
         if len(self.notices) < LISTED:
@@ -341,3 +332,11 @@ class _Run:
     def _compared(self, compared: Any) -> None:
         if self.report is not None and len(compared[0]):
             self.report.add_measured(*compared)
+
+
+def _since_first(stamp: int | None, setpoints: Mapping[str, Any]) -> float | None:
+    """Return the time of a stamp since the first setpoint [s]; None: not known."""
+    begin = setpoints['first_stamp_ns']
+    if stamp is None or begin is None or setpoints['restarts']:
+        return None
+    return (stamp - int(begin)) * NANOSECOND

@@ -207,9 +207,9 @@ def _remove_if_abandoned(path: Path, final: Path) -> bool:
     Returns whether it has done so.
     """
     partial = path.with_name(path.name.removesuffix(_REPLACED))
-    locked = partial if partial.exists() else final
+    owner = partial if partial.exists() else final
     try:
-        descriptor = os.open(locked, os.O_RDONLY)
+        descriptor = os.open(owner, os.O_RDONLY)
     except FileNotFoundError:
         with suppress(OSError):
             path.rename(final)

@@ -94,7 +94,6 @@ class Sums:
         self.first = first
         self.periods = 0
         self.windows = 0
-        self.seconds = 0.0
         self.squares = np.zeros(3)  # of changes d, of integrals u, of their difference
         self.rates = np.zeros(3)  # the same divided by the times of the windows
         self.product = 0.0  # d u
@@ -103,7 +102,6 @@ class Sums:
         self.point = np.zeros((3, 3)), np.zeros(3)  # that of another point
         self.gravity = 0.0, np.zeros(3)  # that of a constant acceleration
         self.step = 0.0  # seconds between two samples, the sum over periods
-        self.tolerance = 0.0  # squares of what is consistent
 
 
 def reason_of(quantity: str, sums: Sums, frame: tuple[str, str]) -> str:

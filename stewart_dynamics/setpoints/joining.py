@@ -67,6 +67,7 @@ class Setpoints:
         self._consistency = None if parameters['setpoint.source'] == POSES_ALONE else Consistency(
             parameters['singularity.characteristic_length'],
             (parameters['base_frame'], parameters['platform_frame']))
+        self._checks = [each for each in (self._consistency, self.base.consistency) if each]
         self._topic_of = dict.fromkeys(QUANTITIES, COMBINED) if COMBINED in self.topics else (
             dict.fromkeys(QUANTITIES, TWIST) | dict.fromkeys(RATES, ACCEL))
         self.recorded: int | None = None
@@ -93,9 +94,8 @@ class Setpoints:
 
     def judge(self) -> None:
         """Check the samples noted by ``take``, if there are enough; called when there is time."""
-        for consistency in (self._consistency, self.base.consistency):
-            if consistency is not None:
-                consistency.judge()
+        for consistency in self._checks:
+            consistency.judge()
 
     def take_wrench(self, data: bytes) -> None:
         """Use this geometry_msgs/WrenchStamped for all later setpoints, if it is valid."""
@@ -163,9 +163,8 @@ class Setpoints:
         """Drop and count waiting samples: no more messages arrive."""
         self._joining.end(why)
         self.base.joining.end(why)
-        for consistency in (self._consistency, self.base.consistency):
-            if consistency is not None:
-                consistency.finish()
+        for consistency in self._checks:
+            consistency.finish()
 
     def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
         """Count and report messages that are not used."""

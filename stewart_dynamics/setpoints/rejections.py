@@ -26,7 +26,7 @@ from stewart_dynamics.messages.cdr import MALFORMED, NOT_FINITE
 
 __all__ = ['BASE_NOT_KNOWN', 'DROPPED', 'frame_details', 'MALFORMED', 'NOT_EXCLUSIVE',
            'NOT_FINITE', 'NOT_JOINED', 'NOT_MEASURED', 'NOT_UNIT', 'OUT_OF_RANGE', 'Rejection',
-           'Rejections', 'TOO_OLD', 'TWICE', 'UNSTAMPED', 'WRONG_FRAME']
+           'Rejections', 'STAMP_ZERO', 'TOO_OLD', 'TWICE', 'WRONG_FRAME']
 
 BASE_NOT_KNOWN = "the base's motion is not known"
 NOT_UNIT = 'quaternion not of unit length'
@@ -58,7 +58,7 @@ class Rejection(NamedTuple):
         return self._replace(topic=f'{self.topic}: {count}')
 
 
-UNSTAMPED = 'stamp 0'  # details of a message that is joined in order of arrival
+STAMP_ZERO = 'stamp 0'  # details of a message that is joined in order of arrival
 _STAMP = re.compile(r'stamp (\d+) ns(: | is )?')
 
 

@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.setpoints.inputs import SampleReader, TopicSamples
 from stewart_dynamics.setpoints.rejections import (
-    jumped_back, NOT_JOINED, Rejections, stamp_words, TOO_OLD, too_old, TWICE, UNSTAMPED)
+    jumped_back, NOT_JOINED, Rejections, stamp_words, STAMP_ZERO, TOO_OLD, too_old, TWICE)
 
 # Maximum number of samples of a topic that wait for samples of the other topics, and depth of the
 # queues in the middleware, which may deliver all messages of one topic before another topic's.
@@ -173,7 +173,7 @@ class SampleJoining:
             # From now on a stamp of zero is a time like any other.
             self._stamped.add(topic)
             if self._unstamped.pop(topic, None):
-                self._reject(topic, NOT_JOINED, UNSTAMPED)
+                self._reject(topic, NOT_JOINED, STAMP_ZERO)
         if not self._in_time(topic, stamp):
             return None
         waiting = self._waiting[topic]
@@ -330,5 +330,5 @@ class SampleJoining:
     def _drop_unstamped(self) -> None:
         for topic, values in self._unstamped.items():
             if values is not None:
-                self._reject(topic, NOT_JOINED, UNSTAMPED)
+                self._reject(topic, NOT_JOINED, STAMP_ZERO)
         self._unstamped.clear()

@@ -83,6 +83,12 @@ def inverse_jacobian(at: Legs) -> Array:
     return np.concatenate([at.directions, np.cross(at.arms, at.directions)], axis=-1)
 
 
+def determinant(at: Legs) -> Array:
+    """Return det(J), the determinant of J_inv (...) [m^3]."""
+    found: Array = np.linalg.det(inverse_jacobian(at))
+    return found
+
+
 def inverse_jacobian_rate(at: Legs, velocity: Array, omega: Array) -> Array:
     """Return dJ_inv/dt (..., 6, 6) under a twist."""
     arm_rates = np.cross(omega[..., None, :], at.arms)

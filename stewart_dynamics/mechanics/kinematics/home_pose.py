@@ -123,7 +123,7 @@ def determinant_at_home(parameters: Parameters) -> float:
     except ParameterError:
         return math.nan
     legs = lagrange.unchecked_legs(parameters, home.position, home.rotation)
-    return float(np.linalg.det(lagrange.inverse_jacobian(legs)))
+    return float(lagrange.determinant(legs))
 
 
 def other_side(determinant: float, at_home: float) -> str:

@@ -30,8 +30,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
-from stewart_dynamics.mechanics.kinematics.home_pose import (
-    determinant_at_home, home_pose, other_side)
+from stewart_dynamics.mechanics.kinematics.home_pose import home_pose, other_side
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, TOLERANCE
 from stewart_dynamics.parameters.table import Parameters
 
@@ -55,8 +54,7 @@ def pose_mistake(parameters: Parameters, position: Array, rotation: Array) -> st
         home = home_pose(parameters)
     except ParameterError:
         return ''
-    at_home = determinant_at_home(parameters)
-    lengths_at_home, _ = _legs(parameters, home.position, home.rotation)
+    lengths_at_home, at_home = _legs(parameters, home.position, home.rotation)
     low, high = parameters[LENGTH_MIN], parameters[LENGTH_MAX]
     shortest = _SHORTEST * lengths_at_home if low is None else low * (1.0 - TOLERANCE)
     longest = _LONGEST * lengths_at_home if high is None else high * (1.0 + TOLERANCE)
@@ -92,4 +90,4 @@ def pose_mistake(parameters: Parameters, position: Array, rotation: Array) -> st
 def _legs(parameters: Parameters, position: Array, rotation: Array) -> tuple[Array, float]:
     """Return the lengths of the legs (6,) [m], and det(J) [m^3]."""
     legs = lagrange.unchecked_legs(parameters, position, rotation)
-    return legs.lengths, float(np.linalg.det(lagrange.inverse_jacobian(legs)))
+    return legs.lengths, float(lagrange.determinant(legs))

@@ -32,7 +32,7 @@ from stewart_dynamics.node.diagnostics.levels import (
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import SECONDS
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejection, UNSTAMPED
+from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejection, STAMP_ZERO
 from stewart_dynamics.setpoints.step import Setpoint
 
 INCOMPLETE, _UNKNOWN = 'incomplete', 'unknown'  # causes of a level besides rejections
@@ -67,7 +67,7 @@ class SetpointDiagnostics(StatusPart):
         """Note a rejection; one for lack of the other messages is a cause of silence."""
         super().rejected(rejection, details, now, cause)
         if rejection.reason == NOT_JOINED:
-            self._unstamped = rejection.topic if details == UNSTAMPED else ''
+            self._unstamped = rejection.topic if details == STAMP_ZERO else ''
 
     def found(self, writers: Mapping[str, int], readers: Mapping[str, int],
               namesakes: str) -> None:
