@@ -125,7 +125,7 @@ def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
 
 
 def _springs(chain: Chain) -> Iterator[str]:
-    """Yield what acts on the joints of a leg at rest, too."""
+    """Yield remarks about forces on the joints of a leg at rest, too."""
     for n, step in enumerate(chain.steps):
         for spring in step.joint.springs:
             yield f'{spring},{_place(chain, n)} is left out'
@@ -139,7 +139,7 @@ def _place(chain: Chain, n: int) -> str:
 
 
 def _left_out(chain: Chain) -> Iterator[str]:
-    """Yield what acts on the joints of a leg while it moves, or limits it."""
+    """Yield remarks about forces on the joints of a moving leg, and about their limits."""
     yield from chain.steps[chain.slide].joint.remarks
     for n, step in enumerate(chain.steps):
         for what in [*step.joint.left_out, *([] if n == chain.slide else _passive(step.joint))]:
@@ -155,7 +155,7 @@ def _passive(joint: Joint) -> Iterator[str]:
 
 def _add_of_platform_joints(mechanism: Mechanism, found: Topology, remarks: list[str],
                             warnings: list[str]) -> None:
-    """Add what acts on joints of the platform that are of no leg, as a free joint."""
+    """Add remarks about forces on joints of the platform outside the legs, as a free joint."""
     of_legs = {step.joint.name for chain in found.chains for step in chain.steps}
     platform = {part.name for part in found.platform_parts}
     for joint in mechanism.joints:

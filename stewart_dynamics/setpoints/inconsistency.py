@@ -64,7 +64,7 @@ class Inconsistency(NamedTuple):
     difference: float  # RMS
     reason: str  # likeliest reason, with a question mark; empty if it is not known
     first: int  # stamp of the beginning [ns]
-    of: str  # of what it is not the derivative
+    of: str  # the quantity whose derivative was expected
 
     @property
     def words(self) -> str:
@@ -110,7 +110,7 @@ def reason_of(quantity: str, sums: Sums, frame: tuple[str, str]) -> str:
     dd, uu, difference = sums.squares.tolist()
     if uu <= 1e-14 * dd:
         return 'it is zero, never filled?'
-    found: list[tuple[float, str]] = []  # what is left of the difference, and the reason
+    found: list[tuple[float, str]] = []  # remaining part of the difference, and the reason
     similar = sums.product * sums.product / (dd * uu) if dd > 0.0 else 0.0
     if similar > 0.0:
         # Noise is in the differences of poses, rather than in the integral.
