@@ -461,6 +461,83 @@ def swing(seconds: Any) -> Motion:
                              rate[..., 3:], acceleration[..., :3], acceleration[..., 3:])
 
 
+# Sign and unit of the efforts
+
+def judged(measurements: Sequence[Measurement], parameters: Parameters = HEXAPOD,
+           ) -> list[Estimate]:
+    """Return the estimates from messages, with the likely mistakes in their efforts."""
+    def failed(*said: object) -> None:
+        pytest.fail(f'{said}')
+
+    legs = MeasuredLegs(parameters, ExternalWrench(parameters), failed, failed)
+    found = [legs.take(message_of(each), NO_WRENCH, None) for each in measurements]
+    return [each for each in found if each is not None]
+
+
+def with_noise(measurements: Sequence[Measurement], factor: float = 1.0, noise: float = 0.0,
+          ) -> list[Measurement]:
+    """Return measurements with efforts in another unit, and noise as the accuracy page has it."""
+    random = rng(3)
+    return [each._replace(
+        lengths=six(each.lengths + noise * 1e-5 * random.normal(size=6)),
+        rates=six(each.rates + noise * 1e-4 * random.normal(size=6)),
+        forces=six(factor * (each.forces + noise * 5.0 * random.normal(size=6))))
+        for each in measurements]
+
+
+STREAMS = [(rate, noise, moving) for rate in (1000.0, 100.0, 20.0) for noise in (0.0, 1.0)
+           for moving in (True, False)]
+
+
+def stream(rate: float, moving: bool, load: Any = NO_WRENCH, parameters: Parameters = HEXAPOD,
+           ) -> list[Measurement]:
+    """Return measurements over two seconds."""
+    seconds = np.arange(0.0, 2.0, 1.0 / rate)
+    stamps = [BEGIN + round(each * 1e9) for each in seconds]
+    return measured(parameters, swing(seconds if moving else np.zeros(len(seconds))), load, stamps)
+
+
+@pytest.mark.parametrize(('factor', 'what'), [
+    (-1.0, 'sign'), (1e-3, 'unit'), (0.0, 'zero'), (0.01, 'torque'), (-1e-3, 'sign')])
+@pytest.mark.parametrize(('rate', 'noise', 'moving'), STREAMS)
+def test_efforts_of_another_sign_or_unit_give_no_wrench(
+        factor: float, what: str, rate: float, noise: float, moving: bool) -> None:
+    found = judged(with_noise(stream(rate, moving), factor, noise))
+    assert not noise or found[-1].wrench is not None
+    first = 0 if not noise else len(found) // 4
+    assert all(each.published is None for each in found[first:])
+    assert {each.mistake.what for each in found[max(first, 1):] if each.mistake} == {what}
+
+
+@pytest.mark.parametrize(('rate', 'noise', 'moving'), STREAMS)
+def test_loads_and_a_wrong_mass_are_no_mistake_in_the_efforts(
+        rate: float, noise: float, moving: bool) -> None:
+    weight, mass = 9.81 * HEXAPOD['platform.mass'], HEXAPOD['platform.mass']
+    push = np.zeros((round(2.0 * rate), 6))
+    push[len(push) // 4:, 2] = 3.0 * weight  # lifted: all legs pull
+    loads = [np.array(LOAD), push, np.array([0.3 * weight, 0.0, -0.3 * weight, 0.0, 0.0, 0.0])]
+    streams = [stream(rate, moving, load) for load in loads] + [
+        stream(rate, moving, parameters=HEXAPOD.replaced({'platform.mass': factor * mass}))
+        for factor in (0.8, 1.2, 1.3)]
+    for each in streams:
+        found = judged(with_noise(each, noise=noise))
+        late = found[len(found) // 8 if noise else 0:]
+        assert all(estimate.mistake is None for estimate in late)
+
+
+def test_a_changed_mass_is_judged_anew() -> None:
+    heavy = HEXAPOD.replaced({'platform.mass': 6.0 * HEXAPOD['platform.mass']})
+    legs = MeasuredLegs(HEXAPOD, ExternalWrench(HEXAPOD), print, print)
+    *first, last = [message_of(each) for each in stream(100.0, True, parameters=heavy)]
+    for message in first:
+        found = legs.take(message, NO_WRENCH, None)
+    assert found is not None and found.mistake is not None
+    assert found.mistake.what == 'scale' and found.published is not None
+    legs.use(heavy, ExternalWrench(heavy))
+    found = legs.take(last, NO_WRENCH, None)
+    assert found is not None and found.mistake is None
+
+
 @pytest.mark.parametrize('rate', [1000.0, 500.0, 100.0])
 def test_a_wrench_on_the_moving_plant_is_found_within_5_percent(rate: float) -> None:
     """Compare force and moment from 0.1 s after each change of the load: 0.2 % of it is left."""

@@ -23,6 +23,7 @@ from referees import rotation_about, symmetric_parameters
 from stewart_dynamics import Motion
 from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
+from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
 from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS
 from stewart_dynamics.node.diagnostics.levels import (
@@ -188,6 +189,28 @@ def test_a_rejection_is_reported_and_counted() -> None:
     assert (now.level, now.message) == (
         STALE, 'no wrench: measured_legs: lacks one of the joints (leg_6)')
     assert dict(now.values)['rejected, measured_legs: lacks one of the joints'] == '11'
+
+
+@pytest.mark.parametrize('what', ['sign', 'scale'])
+def test_a_likely_mistake_in_the_efforts_is_a_warning_while_it_is_there(what: str) -> None:
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
+    mistaken = CLEAR._replace(mistake=EffortMistake(what, 'all are wrong'))
+    felt(diagnostics, 1.0, mistaken)
+    felt(diagnostics, 1.1, mistaken)
+    message = 'measured_legs: likely mistake: all are wrong' + (
+        '; no external wrench is published' * (what == 'sign'))
+    assert status(diagnostics, 1.1)[1:3] == (WARN, message)
+    values = dict(status(diagnostics, 1.1).values)
+    assert values['likely mistake in the efforts'] == what
+    assert values['wrenches'] == ('0' if what == 'sign' else '2')
+    assert logged(diagnostics, 1.1) == [(WARN, f'external wrench: {message}')]
+    # an overload may be real
+    felt(diagnostics, 1.2, OVER._replace(mistake=mistaken.mistake))
+    assert status(diagnostics, 1.2).level == ERROR
+    assert status(diagnostics, 1.2).message.startswith(f'{message}; force ')
+    felt(diagnostics, 3.0)
+    assert status(diagnostics, 3.05)[1:3] == (OK, 'no overload')
+    assert 'likely mistake in the efforts' not in dict(status(diagnostics, 3.05).values)
 
 
 def test_rejections_after_an_overload_are_named() -> None:

@@ -234,6 +234,33 @@ def test_measured_legs_that_stop_or_are_too_far_apart_are_reported(felt: Felt) -
     felt.until_status(OK, 'no overload')
 
 
+def test_efforts_of_the_opposite_sign_are_named_and_give_no_wrench(
+        begin: Callable[..., Felt]) -> None:
+    felt = begin()
+
+    def rest(factor: float) -> None:
+        felt.stamp += MILLISECOND
+        at = resting(HEXAPOD, AT_HOME, NO_WRENCH, [felt.stamp])[0]
+        felt.publish(message_of(at._replace(forces=six(factor * np.array(at.forces)))))
+
+    def reported() -> bool:
+        rest(-1.0)
+        status = felt.node.status(STATUS)
+        return bool(status.level == WARN) and (
+            'measured_legs: likely mistake: the efforts have the opposite sign' in status.message)
+
+    felt.node.until(reported, 'diagnostics name the sign')
+    assert not felt.raw
+    assert any('the efforts have the opposite sign' in line
+               for line in log_lines(felt.node.program.stderr, 'WARN'))
+
+    def published() -> bool:
+        rest(1.0)
+        return bool(felt.raw)
+
+    felt.node.until(published, 'right efforts give a wrench')
+
+
 def test_measured_legs_are_forgotten_at_a_deactivation(felt: Felt) -> None:
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
         assert felt.node.change(transition)

@@ -252,6 +252,65 @@ def test_a_likely_mistake_in_the_efforts_is_named(factor: float, what: str, word
     assert known or not found['contacts']['count']
 
 
+@pytest.mark.parametrize('seed', range(4))
+def test_the_efforts_of_single_legs_are_judged(seed: int) -> None:
+    case, random = case_of(seed), rng(seed)
+    forces = case.forces()
+    noisy = forces * random.uniform(0.98, 1.02, 6) + 0.01 * np.std(forces) * random.normal(
+        size=forces.shape)
+    assert values_of(case, noisy)['likely_mistake'] is None
+    a, b = sorted(random.choice(6, 2, replace=False))
+    order = list(range(6))
+    order[a], order[b] = order[b], order[a]
+    found = values_of(case, noisy[:, order])
+    joints = case.parameters['joints']
+    assert found['likely_mistake']['what'] == 'swapped'
+    assert f'of {joints[a]} and {joints[b]} look swapped' in found['likely_mistake']['text']
+    assert not found['external_wrench_given']
+    for factor, what in ((-1.0, 'sign'), (0.0, 'zero')):
+        factors = np.where(np.arange(6) == a, factor, 1.0)
+        found = values_of(case, noisy * factors)['likely_mistake']
+        assert found['what'] == what
+        assert found['text'].startswith(f'the effort of {joints[a]} ')
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_loads_friction_and_a_wrong_mass_are_no_mistake_in_the_efforts(seed: int) -> None:
+    case, random = case_of(seed), rng(seed)
+    p = case.parameters
+    size, weight = size_of(p), 9.81 * p['platform.mass']
+    heavier = p.replaced({'platform.mass': 1.2 * p['platform.mass']})
+    lighter = p.replaced({'platform.mass': 0.8 * p['platform.mass']})
+    payload = heavier.replaced({'platform.mass': 1.3 * p['platform.mass'],
+                                'platform.center_of_mass': p['platform.center_of_mass']
+                                + 0.3 / 1.3 * size * random.uniform(-0.3, 0.3, 3)})
+    contact = np.zeros((500, 6))
+    contact[200:350, :3] = weight * random.uniform(-1.0, 1.0, 3)
+    contact[200:350, 3:] = 0.3 * size * weight * random.uniform(-1.0, 1.0, 3)
+    constant = np.concatenate([0.5 * weight * random.uniform(-1.0, 1.0, 3),
+                               0.2 * size * weight * random.uniform(-1.0, 1.0, 3)])
+    friction = 0.1 * weight / 6.0 * np.sign(np.diff(
+        case.outputs.lengths, axis=0, prepend=case.outputs.lengths[:1]))
+    for measured in (
+            case.forces(parameters=heavier), case.forces(parameters=lighter),
+            case.forces(parameters=payload), case.forces(contact), case.forces(constant),
+            case.forces() + friction):
+        assert values_of(case, measured)['likely_mistake'] is None
+
+
+def test_friction_may_hold_a_resting_platform_with_any_force() -> None:
+    case = case_of()
+    still = case._replace(motion=Motion(case.motion.position, case.motion.rotation))
+    forces = still.forces()
+    strong = {'actuator.coulomb_friction': 2.5 * float(np.abs(forces).max())}
+    p = case.parameters.replaced(strong)
+    batch = case.setpoints._replace(motions=still.motion.rows)
+    stuck = Case(p, still.motion, case.seconds, batch, Step(p).many(batch, None))
+    assert values_of(stuck, -forces)['likely_mistake'] is None
+    assert values_of(still._replace(setpoints=batch, outputs=Step(case.parameters).many(
+        batch, None)), -forces)['likely_mistake']['what'] == 'sign'
+
+
 def test_a_contact_is_found_with_its_time_and_load() -> None:
     case = case_of(many=3000)
     load = np.zeros((3000, 6))

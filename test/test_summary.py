@@ -637,6 +637,23 @@ def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
             in [each.line for each in cards(jumps)['limits'].statements])
 
 
+@pytest.mark.parametrize(('mistake', 'level', 'line'), [
+    (None, 'good', 'all limits held by the demands of the setpoints'),
+    ({'what': 'sign', 'text': 'the efforts have the opposite sign'}, 'warn',
+     'all limits held by the demands of the setpoints, which the measured efforts contradict '
+     '(likely mistake: sign)')])
+def test_limits_are_held_by_demands_which_measured_efforts_may_contradict(
+        mistake: dict[str, str] | None, level: str, line: str) -> None:
+    measured = {'setpoints_compared': 2, 'contacts': {'count': 0}, 'residual_share': None,
+                'headline': '', 'likely_mistake': mistake}
+    found = {**Samples(2).summary(hexapod(**FORCE_LIMIT)).values(), 'missing': [], 'rejected': [],
+             'measured': measured}
+    card = cards(found)['limits']
+    assert (card.level, [each.line for each in card.statements]) == (level, [line])
+    assert cards(found)['measured'].level == level
+    assert line in ' '.join(' '.join(summary_lines(found)).split())
+
+
 def test_dropped_messages_are_not_called_rejected() -> None:
     samples = Samples(2)
     found = {**samples.summary(hexapod()).values(), 'missing': [], 'measured': None,

@@ -62,6 +62,7 @@ from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.bodies import drive_row
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
+from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import (
@@ -118,6 +119,12 @@ class Estimate(NamedTuple):
     """Measured - model, not filtered (6) [N]; none of the first measurement."""
     base: tuple[float, ...] = NO_BASE  # a row of the base's motion; of nan: it is still
     overloads: tuple[Overload, ...] = ()
+    mistake: EffortMistake | None = None  # likely mistake in the efforts
+
+    @property
+    def published(self) -> Six | None:
+        """Return the wrench; None without one, or where the efforts are likely no forces."""
+        return self.wrench if self.mistake is None or self.mistake.leaves_wrench else None
 
     @property
     def force(self) -> float:

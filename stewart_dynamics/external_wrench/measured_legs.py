@@ -28,7 +28,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND, Six, Stamps
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError, StewartError
+from stewart_dynamics.external_wrench.effort_check import EffortCheck
 from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench, Measurement
+from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, NO_BASE, TWIST, WRENCH
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
@@ -111,15 +113,16 @@ class MeasuredLegs:
     """
     Follows the measured legs.
 
-    ``step`` may be replaced at any time. ``rejected`` is called with each rejection and its
-    details, ``noticed`` with texts for the log; ``history`` gets the measurements that are used.
+    ``rejected`` is called with each rejection and its details, ``noticed`` with texts for the log;
+    ``history`` gets the measurements that are used.
     """
 
     def __init__(
             self, parameters: Parameters, step: ExternalWrench,
             rejected: Callable[[Rejection, str], None],
             noticed: Callable[[str], object], history: LegHistory | None = None) -> None:
-        self.step = step
+        self._step = step
+        self._efforts = EffortCheck(parameters)
         self._reader = JointStateReader(parameters['joints'])
         self._zero_lengths = tuple(parameters['geometry.zero_length'].tolist())
         self._timeout = round(parameters['setpoint.timeout'] * SECOND)
@@ -132,6 +135,17 @@ class MeasuredLegs:
     def motion(self) -> tuple[float, ...] | None:
         """Row of motion of the last message that was used."""
         return self._last.motion if self._last else None
+
+    @property
+    def mistake(self) -> EffortMistake | None:
+        """Likely mistake in the efforts."""
+        return self._efforts.mistake
+
+    def use(self, parameters: Parameters, step: ExternalWrench) -> None:
+        """Use changed parameters from now on."""
+        self._step = step
+        if self._efforts.mistake is not None:
+            self._efforts = EffortCheck(parameters)  # they may have been the mistake
 
     def take(self, data: bytes, known: Six, target: tuple[float, ...] | None,
              base: BaseInput | None = None) -> Estimate | None:
@@ -148,10 +162,13 @@ class MeasuredLegs:
             self._reject(BASE_NOT_KNOWN, stamp_words(measurement.stamp))
             return None
         try:
-            self._last = self.step(measurement, self._last, known, target, row)
+            last = self._step(measurement, self._last, known, target, row)
         except StewartError as exc:
             self._reject(_OF_ERROR[type(exc)], str(exc))
             return None
+        self._efforts.add(last.stamp, measurement.forces, last.differences)
+        mistake = self._efforts.mistake
+        self._last = last if mistake is None else last._replace(mistake=mistake)
         if self._history is not None:
             self._history.add(measurement.forces, self._last, known)
         return self._last

@@ -361,9 +361,9 @@ class DynamicsNode(LifecycleNode):
         if self._model_measured:
             self._moved(estimate.stamp, estimate.motion)
             self._joint_states.publish_due(now)
-        if estimate.wrench is not None:
+        if estimate.published is not None:
             self._topics.publishers[EXTERNAL_WRENCH].publish(
-                self._messages.of_wrench(estimate.stamp, estimate.wrench))
+                self._messages.of_wrench(estimate.stamp, estimate.published))
         diagnostics.estimated(estimate, self._target, now)
         if self._diagnostics.level_changed(now):
             self._report()
@@ -378,6 +378,9 @@ class DynamicsNode(LifecycleNode):
                 'the hexapod for payload.window after that, and ask again')
         if silence := self._diagnostics.external_wrench.silence(time.monotonic()):
             return payload.PayloadOutcome(silence)
+        mistake = self._measured_legs.mistake
+        if mistake is not None and not mistake.leaves_wrench:
+            return payload.PayloadOutcome(f'likely mistake: {mistake.text}')
         # Parameters are those of now, whatever changes meanwhile.
         return payload.identify(self._history, StewartPlatform(self._settings))
 
@@ -467,7 +470,7 @@ class DynamicsNode(LifecycleNode):
         self._log.write(log_changes(self._settings, parameters))
         self._settings, self._models = parameters, models
         if self._active:
-            self._measured_legs.step = models.external_wrench
+            self._measured_legs.use(parameters, models.external_wrench)
             self._diagnostics.answers.parameters = parameters
             self._markers.write = Markers(parameters).write  # a payload moves the centre of mass
             self._travel.use(parameters)

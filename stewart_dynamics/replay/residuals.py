@@ -38,7 +38,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Bytes, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.external_wrench.estimate import external_wrenches
 from stewart_dynamics.mechanics.drives.measured_efforts import (
-    has_losses, mistake_of_scale, SCALE, without_losses)
+    EffortSums, has_losses, without_losses)
 from stewart_dynamics.mechanics.drives.motors import motor_ratio, Motors
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.rows import POSE
@@ -92,8 +92,6 @@ class Efforts:
 _SETPOINTS_WAITING = 2 ** 15
 _SAMPLES_WAITING = 2 ** 18
 
-# Cosine between measured and computed forces from which on they are alike but for a factor.
-_ALIKE = 0.9
 AXES = tuple(COMPONENTS)
 _UNITS = tuple(map(unit_key, COMPONENTS.values()))
 
@@ -123,7 +121,7 @@ class Comparison:
     """
 
     def __init__(self, parameters: Parameters, of_motors: bool = False) -> None:
-        self._parameters, self._of_motors = parameters, of_motors
+        self._parameters = parameters
         self._losses = of_motors and has_losses(parameters)
         self._ratio = motor_ratio(parameters)
         self._platform = StewartPlatform(parameters)
@@ -133,8 +131,7 @@ class Comparison:
         self._samples = Waiting(self._gap, _SAMPLES_WAITING)
         self._without_force = 0
         self._legs = _Statistics()
-        self._measured_squares = np.zeros(6)
-        self._computed = np.zeros((3, 6))  # sums of it, its squares, its products with measured
+        self._sums = EffortSums(parameters, of_motors)
         self._wrench = _Statistics()
         self._bins = WrenchBins()
 
@@ -195,23 +192,12 @@ class Comparison:
         residual = measured - computed
         self._legs.add(seconds, residual)
         self._wrench.add(seconds, loads)
-        self._measured_squares += np.sum(measured ** 2, axis=1)
-        self._computed += [np.sum(computed, axis=1), np.sum(computed ** 2, axis=1),
-                           np.sum(computed * measured, axis=1)]
-
-    def _mistake(self) -> tuple[str, str] | None:
-        """Return keyword and text of the likely mistake in sign and unit of the efforts."""
-        measured, computed = float(self._measured_squares.sum()), float(self._computed[1].sum())
-        products = float(self._computed[2].sum())
-        if not computed or measured and abs(products) < _ALIKE * np.sqrt(measured * computed):
-            return None
-        return mistake_of_scale(products / computed, self._parameters, self._of_motors)
+        self._sums.add(measured, computed)
 
     def values(self) -> dict[str, Any]:
         """Return the part of summary.json."""
-        joints, mistake = self._parameters['joints'], self._mistake()
-        # A load can be several times the file's; of efforts of another kind there is no wrench.
-        load_known = mistake is None or mistake[0] == SCALE
+        joints, mistake = self._parameters['joints'], self._sums.mistake()
+        load_known = mistake is None or mistake.leaves_wrench
         wrench = self._wrench if load_known else _Statistics()
         return {
             'setpoints_compared': self._legs.count,
@@ -226,7 +212,7 @@ class Comparison:
             **self._of_all_legs(),
             'legs': {joint: self._leg(leg) for leg, joint in enumerate(joints)},
             'external_wrench_given': load_known,
-            'likely_mistake': mistake and {'what': mistake[0], 'text': mistake[1]},
+            'likely_mistake': mistake and mistake._asdict(),
             'external_wrench': {axis: wrench.named(number, '', unit)
                                 for number, (axis, unit) in enumerate(
                                     zip(AXES, _UNITS, strict=True))},
@@ -235,16 +221,17 @@ class Comparison:
 
     def _of_all_legs(self) -> dict[str, float | None]:
         number = 6 * self._legs.count
-        residual, measured = np.sum(self._legs.squares), np.sum(self._measured_squares)
+        residual, measured = np.sum(self._legs.squares), np.sum(self._sums.measured_squares)
         return {'residual_rms_n': np.sqrt(residual / number) if number else None,
                 'residual_share': np.sqrt(residual / measured) if measured else None}
 
     def _leg(self, leg: int) -> dict[str, float | None]:
         number = self._legs.count
         named = self._legs.named(leg, 'residual_', 'n')
-        measured_squares = self._measured_squares[leg]
-        total, squares, products = self._computed[:, leg]
-        measured_total = total + self._legs.sums[leg]
+        sums = self._sums
+        measured_squares, squares = sums.measured_squares[leg], sums.computed_squares[leg]
+        measured_total, total = sums.measured[leg], sums.computed[leg]
+        products = sums.products[leg, leg]
         rms = [np.sqrt(each / number) if number else None for each in (measured_squares, squares)]
         spread = ((squares * number - total ** 2)
                   * (measured_squares * number - measured_total ** 2))
@@ -257,7 +244,8 @@ class Comparison:
 
     def _contacts(self, load_known: bool) -> dict[str, Any]:
         number = max(self._legs.count, 1)
-        force = float(np.sqrt(np.mean(self._computed[1] + self._measured_squares) / number))
+        force = float(np.sqrt(np.mean(
+            self._sums.computed_squares + self._sums.measured_squares) / number))
         length = self._parameters['singularity.characteristic_length']
         smallest = 1e-3 * force * np.array([1.0, 1.0, 1.0, length, length, length])
         middle, deviation = self._bins.middle()

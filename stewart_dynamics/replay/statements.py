@@ -48,7 +48,7 @@ _CARDS = {
     (INPUTS,): {'none': 'Inputs', 'bad': 'Inputs contradict each other'},
     (LIMITS, MOTOR_LIMITS): {
         'none': 'No limits are given', 'good': 'All limits are held',
-        'warn': 'Not all limits could be checked', 'bad': 'Limits are exceeded'},
+        'warn': 'It is not proven that limits are held', 'bad': 'Limits are exceeded'},
     (SINGULARITY,): {'none': 'Singularity', 'good': 'Clear of singularities',
                      'warn': 'A singularity is near', 'bad': 'A singularity is reached'},
     (MOTORS, MOTOR_LIMITS): {
@@ -194,7 +194,19 @@ def _limits(summary: Summary) -> Iterator[Statement]:
     problems = points['jumps'] or summary['limits'] or summary['limits_not_checked']
     if not problems and _has_margins(summary['legs']):
         yield (Statement(LIMITS, 'warn', 'no limit was met by inputs that contradict each other')
-               if _contradicting(summary) else Statement(LIMITS, 'good', 'all limits held'))
+               if _contradicting(summary) else _held(summary, LIMITS, 'all limits'))
+
+
+def _held(summary: Summary, topic: str, limits: str) -> Statement:
+    """Return that limits are held, by what, and whether measured efforts contradict that."""
+    measured = summary.get('measured')
+    if not measured:
+        return Statement(topic, 'good', f'{limits} held')
+    demands = f'{limits} held by the demands of the setpoints'
+    if measured['likely_mistake'] is None:
+        return Statement(topic, 'good', demands)
+    return Statement(topic, 'warn', f'{demands}, which the measured efforts contradict (likely '
+                                    f'mistake: {measured["likely_mistake"]["what"]})')
 
 
 def _contradicting(summary: Summary) -> bool:
@@ -252,9 +264,9 @@ def _motors(summary: Summary) -> Iterator[Statement]:
             MOTORS, 'warn', f'drive.torque_continuous, exceeded by the RMS torque of {worst}'
             f'{others}: {legs[worst]["torque_rms_n_m"]:.4g} N m, by {-margin:.4g} N m')
     elif values_of(legs, 'torque_continuous_margin_n_m') and not _contradicting(summary):
-        yield Statement(MOTORS, 'good', 'drive.torque_continuous held')
+        yield _held(summary, MOTORS, 'drive.torque_continuous')
     if _motors_hold(summary):
-        yield Statement(MOTOR_LIMITS, 'good', 'all limits of the motors held')
+        yield _held(summary, MOTOR_LIMITS, 'all limits of the motors')
     for name, peak, of in ((TORQUE_MAX, 'torque_peak', ''), (SPEED_MAX, 'speed_peak', ''),
                            (TEMPERATURE_RISE_MAX, 'temperature_rise_max', ' of the winding')):
         quantity = QUANTITIES[name]
@@ -333,7 +345,8 @@ def _measured(measured: Summary | None) -> Iterator[Statement]:
     if not measured:
         return
     compared, contacts = measured['setpoints_compared'], measured['contacts']
-    differs = contacts['count'] or (measured['residual_share'] or 0.0) > _DIFFERENT
+    differs = (contacts['count'] or measured['likely_mistake']
+               or (measured['residual_share'] or 0.0) > _DIFFERENT)
     yield Statement(MEASURED, 'none' if not compared else 'warn' if differs else 'good',
                     measured['headline'])
     if contacts['count']:

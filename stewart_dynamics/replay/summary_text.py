@@ -21,7 +21,6 @@ from collections.abc import Mapping, Sequence
 import textwrap
 from typing import Any
 
-from stewart_dynamics.mechanics.drives.measured_efforts import SCALE
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
@@ -74,7 +73,7 @@ def measured_headline(measured: Mapping[str, Any]) -> str:
         return 'no setpoint could be compared'
     mistake = measured['likely_mistake']
     likely = '' if mistake is None else f'likely mistake: {mistake["text"]}; ' + (
-        '' if mistake['what'] == SCALE else 'no external wrench is given; ')
+        '' if measured['external_wrench_given'] else 'no external wrench is given; ')
     worst, leg = max((leg['residual_rms_n'], name) for name, leg in measured['legs'].items())
     share = '' if measured['residual_share'] is None else (
         f', {100.0 * measured["residual_share"]:.3g} % of the measured force')

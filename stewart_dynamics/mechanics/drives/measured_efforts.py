@@ -16,6 +16,9 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+from typing import NamedTuple
+
 import numpy as np
 
 from stewart_dynamics.arrays import Array
@@ -29,7 +32,16 @@ _NEAR = 1.35
 FAR, _TORQUES = 2.0, 0.05
 _FACTORS = ((1e-3, 'kN in place of N'), (-1.0 / STANDARD_GRAVITY[2], 'kgf in place of N'),
             (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
-ZERO, SIGN, UNIT, TORQUE, SCALE = 'zero', 'sign', 'unit', 'torque', 'scale'
+ZERO, SIGN, UNIT, TORQUE, SCALE, SWAPPED = (
+    'zero', 'sign', 'unit', 'torque', 'scale', 'swapped')
+
+# Cosine between measured and computed forces from which on they are alike but for a factor.
+_ALIKE = 0.9
+# Largest residual of the other legs, as part of that of the one that is wrong (squared).
+_OTHERS = 0.1
+# Legs are swapped if the residual is at least this part of the varying forces, and swapping
+# reduces it to this part (both squared).
+_SUSPICIOUS, _BETTER = 0.03 ** 2, 0.25
 
 
 def force_per_effort(parameters: Parameters, torques: bool, currents: bool) -> Array | None:
@@ -83,20 +95,131 @@ def without_losses(forces: Array, rates: Array, accelerations: Array, p: Paramet
     return loads
 
 
-def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> tuple[str, str] | None:
+class EffortMistake(NamedTuple):
+    """A likely mistake in measured efforts."""
+
+    what: str  # keyword: ZERO, SIGN, ...
+    text: str
+
+    @property
+    def leaves_wrench(self) -> bool:
+        """Return whether there is an external wrench: a load may be several times the file's."""
+        return self.what == SCALE
+
+
+class EffortSums:
     """
-    Return keyword and text of the likely mistake if efforts are ``scale`` times the model's.
+    Sums over measured and computed forces of the legs, and the likely mistake that they show.
+
+    of_motors: whether the efforts were torques or currents of the motors.
+    """
+
+    def __init__(self, parameters: Parameters, of_motors: bool = False) -> None:
+        self._parameters, self._of_motors = parameters, of_motors
+        self.count = 0.0
+        self.measured, self.computed = np.zeros((2, 6))  # [N]
+        self.measured_squares, self.computed_squares = np.zeros((2, 6))  # [N^2]
+        self.products = np.zeros((6, 6))  # of leg i measured, leg j computed [N^2]
+
+    def add(self, measured: Array, computed: Array, weight: float = 1.0) -> None:
+        """Add forces (6, N) [N], + pushes; each counts ``weight`` times."""
+        self.count += weight * measured.shape[1]
+        self.measured += weight * np.sum(measured, axis=1)
+        self.computed += weight * np.sum(computed, axis=1)
+        self.measured_squares += weight * np.sum(measured ** 2, axis=1)
+        self.computed_squares += weight * np.sum(computed ** 2, axis=1)
+        self.products += weight * (measured @ computed.T)
+
+    @property
+    def own_products(self) -> Array:
+        """Return the products of measured and computed force of the same leg (6,) [N^2]."""
+        return np.diag(self.products)
+
+    @property
+    def alike(self) -> bool:
+        """Return whether measured and computed forces are alike, in size as well."""
+        scale = self._scale()
+        return scale is not None and 1.0 / FAR < scale < FAR
+
+    def mistake(self) -> EffortMistake | None:
+        """Return the likely mistake in the efforts; None without one."""
+        residual = float(self._residuals.sum())
+        # Friction may hold the platform with any force up to its own.
+        friction = self.count * float(np.sum(self._parameters['actuator.coulomb_friction'] ** 2))
+        if residual <= friction:
+            return None
+        scale = self._scale()
+        found = None if scale is None else mistake_of_scale(
+            scale, self._parameters, self._of_motors)
+        return found or self._of_one_leg() or self._swapped()
+
+    def _scale(self) -> float | None:
+        """Return the factor from computed to measured forces; None if they are not alike."""
+        measured, computed = float(self.measured_squares.sum()), float(self.computed_squares.sum())
+        products = float(self.own_products.sum())
+        if not computed or (
+                measured and abs(products) < _ALIKE * np.sqrt(measured * computed)):
+            return None
+        return products / computed
+
+    @property
+    def _residuals(self) -> Array:
+        """Return the squared differences of measured and computed forces (6,) [N^2]."""
+        return self.measured_squares - 2.0 * self.own_products + self.computed_squares
+
+    def _of_one_leg(self) -> EffortMistake | None:
+        """Return the mistake in one leg's sign, if the other legs are right; a load moves all."""
+        leg, joints = int(np.argmax(self._residuals)), self._parameters['joints']
+        residual = float(self._residuals[leg])
+        if not self.computed_squares[leg] or (
+                float(self._residuals.sum()) - residual > _OTHERS * residual):
+            return None
+        if not self.measured_squares[leg]:
+            return EffortMistake(ZERO, f'the effort of {joints[leg]} is zero')
+        product = self.products[leg, leg]
+        if _is_near(product / self.computed_squares[leg], -1.0) and (
+                product ** 2 > _ALIKE ** 2 * self.measured_squares[leg]
+                * self.computed_squares[leg]):
+            return EffortMistake(SIGN, f'the effort of {joints[leg]} has the opposite sign of '
+                                       'those of the other legs: + must push')
+        return None
+
+    def _swapped(self) -> EffortMistake | None:
+        """Return the two legs whose efforts are swapped, if they vary and show it."""
+        if not self.count:
+            return None
+        number, joints = self.count, self._parameters['joints']
+        varying = self.products - np.outer(self.measured, self.computed) / number
+        best, text = _BETTER, ''
+        means = (self.measured - self.computed) ** 2 / number
+        residuals = float(self._residuals.sum()), float(np.sum(self._residuals - means))
+        moved = float(np.sum(self.computed_squares - self.computed ** 2 / number))
+        if residuals[1] < _SUSPICIOUS * moved or moved < _SUSPICIOUS * self.computed_squares.sum():
+            return None
+        for a, b in combinations(range(6), 2):
+            left = [1.0 - 2.0 * float(each[a, b] + each[b, a] - each[a, a] - each[b, b]) / residual
+                    for each, residual in zip((self.products, varying), residuals, strict=True)]
+            if max(left) < best:
+                best, text = max(left), (
+                    f'the efforts of {joints[a]} and {joints[b]} look swapped: the residual '
+                    f'becomes {np.sqrt(max(*left, 0.0)):.2f} times as large')
+        return EffortMistake(SWAPPED, text) if text else None
+
+
+def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> EffortMistake | None:
+    """
+    Return the likely mistake if efforts are ``scale`` times the model's.
 
     of_motors: whether the efforts were torques or currents of the motors.
     """
     if not np.isfinite(scale) or scale == 0.0:
-        return ZERO, 'all efforts are zero'
+        return EffortMistake(ZERO, 'all efforts are zero')
     if scale < 0.0:
         other = '' if p['geometry.platform_side'] != AUTO else (
             '; or the platform is on the other side of the base: geometry.platform_side')
-        return SIGN, ('the efforts have the opposite sign: + must push, as the forces of '
-                      f'the node do (they are {scale:.3g} times what the model computes)'
-                      f'{other}')
+        return EffortMistake(SIGN, (
+            'the efforts have the opposite sign: + must push, as the forces of the node do (they '
+            f'are {scale:.3g} times what the model computes){other}'))
     if 1.0 / FAR < scale < FAR:
         return None
     lead, ratio = p['actuator.screw_lead'], p['drive.gear_ratio']
@@ -115,7 +238,8 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> tuple[str,
                                 f'{2.0 * np.pi * scale:.2g} m would fit)')
     else:
         what, likely = SCALE, 'another unit, or a wrong platform.mass'
-    return what, f'the efforts are {scale:.3g} times what the model computes: {likely}'
+    return EffortMistake(
+        what, f'the efforts are {scale:.3g} times what the model computes: {likely}')
 
 
 def _is_near(scale: float, factor: float) -> bool:

@@ -28,11 +28,13 @@ import math
 from stewart_dynamics.external_wrench.estimate import Estimate, Overload, WRENCH_LIMITS
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome, rows_of
+from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.node.diagnostics.levels import (
-    ERROR, Level, LogLine, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
+    ERROR, Level, LogLine, MISTAKEN, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.messages import PlannedOutcome
+from stewart_dynamics.setpoints.consistency import Mistake
 
 _OVERLOAD = 'overload'  # a cause of a level
 _COMPONENTS = [f'{part} {axis} ({unit})'
@@ -46,7 +48,7 @@ class ExternalWrenchDiagnostics(StatusPart):
     name = 'external wrench'
 
     def __init__(self, parameters: Parameters) -> None:
-        super().__init__(_OVERLOAD, REJECTED)
+        super().__init__(MISTAKEN, _OVERLOAD, REJECTED)
         self._joints = parameters['joints']
         self._timeout: float = parameters['setpoint.timeout']
         # Times of the first and the last message, and of the last one that was not rejected.
@@ -55,6 +57,7 @@ class ExternalWrenchDiagnostics(StatusPart):
         self._estimated_at = NEVER
         self._estimate: Estimate | None = None
         self._target: Sequence[float] | None = None
+        self._mistake: EffortMistake | None = None
 
     def heard(self, now: float) -> None:
         """Note that a message has arrived."""
@@ -66,8 +69,11 @@ class ExternalWrenchDiagnostics(StatusPart):
         """Note an estimate, and the row of motion of the last setpoint; None without one."""
         self._estimate, self._target = estimate, target
         self.used_at = now
+        if estimate.mistake != self._mistake:
+            self._mistake = estimate.mistake
+            self.mistaken([] if self._mistake is None else [_mistake(self._mistake)], now)
         if estimate.wrench is not None:
-            self._estimated += 1
+            self._estimated += estimate.published is not None
             self._estimated_at = now
             self.held.see(Level(ERROR if estimate.overloads else OK,
                                 ', '.join(map(_words, estimate.overloads))), now, _OVERLOAD)
@@ -83,10 +89,11 @@ class ExternalWrenchDiagnostics(StatusPart):
         if self._begun == NEVER:
             return None
         values = [('wrenches', str(self._estimated))]
-        if self._estimated:
+        if self._estimated_at != NEVER:
             values.append(('age of the last (s)', f'{now - self._estimated_at:.3f}'))
         if self._estimate is not None:
             values += self._numbers(self._estimate)
+        values += self._mistake_values()
         message = (self._no_wrench(now) if self._is_stale(now)
                    else self.held.at(now).message or 'no overload')
         return Status(self.name, self.level(now), message, values + self._rejection_values())
@@ -121,6 +128,13 @@ class ExternalWrenchDiagnostics(StatusPart):
             values += [('distance from the last setpoint (m)', f'{distance:.6g}'),
                        ('turn from the last setpoint (rad)', f'{angle:.6g}')]
         return values
+
+
+def _mistake(found: EffortMistake) -> Mistake:
+    """Return the likely mistake in the efforts for the status."""
+    wrench = '' if found.leaves_wrench else '; no external wrench is published'
+    return Mistake(MEASURED_LEGS, f'likely mistake: {found.text}{wrench}', values=(
+        ('likely mistake in the efforts', found.what),))
 
 
 def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, float]:
