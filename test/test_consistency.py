@@ -27,12 +27,13 @@ import messages
 from messages import SECOND
 import numpy as np
 import pytest
-from referees import rng, symmetric_parameters
+from referees import rng, ROOT, symmetric_parameters
 
-from stewart_dynamics import Motion
+from stewart_dynamics import Motion, Parameters
 from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.mechanics.frames.rotation import (
-    euler_rate_matrix, from_euler, to_euler, to_quaternion)
+    euler_rate_matrix, from_euler, from_quaternion, to_euler, to_quaternion)
+from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
     POSE, POSITION, ROTATION, TWIST)
@@ -46,6 +47,8 @@ from stewart_dynamics.setpoints.inputs import (
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
 RADIUS = 0.3
+LIMITED = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+HOME = home_pose(LIMITED).position
 RATES = (10.0, 60.0, 200.0, 1000.0)
 
 Stream = tuple[Stamps, Array]
@@ -451,6 +454,40 @@ def test_mistakes_are_those_of_the_topics() -> None:
     text = 'acceleration is not the derivative of the twists'
     assert (ACCELS, text) in mistakes(rows, setpoints)
     assert (BASE_ACCEL, text) in mistakes(rows, base, base__source='motion')
+
+
+def w_first(rows: Array) -> None:
+    quaternions = to_quaternion(rows[:, ROTATION].reshape(-1, 3, 3))
+    rows[:, ROTATION] = np.array([
+        np.ravel(from_quaternion(w, x, y, z)) for x, y, z, w in quaternions.tolist()])
+
+
+def in_mm(rows: Array) -> None:
+    rows[:, :3] *= 1e3
+
+
+def from_home_in_mm(rows: Array) -> None:
+    rows[:, :3] = 1e3 * (rows[:, :3] - HOME)
+
+
+@pytest.mark.parametrize(('mistaken', 'text'), [
+    (in_mm, 'position in mm'), (w_first, 'a quaternion in the order w x y z'),
+    (from_home_in_mm, 'position in mm and a pose counted from home')])
+def test_the_mistake_in_poses_is_named_before_twists_that_are_not_their_derivative(
+        mistaken: Callable[[Array], None], text: str) -> None:
+    rows = stream(100.0, seconds=4.0, tilt=0.1)[1]
+    rows[:, :3] = HOME + np.array([0.05, 0.0, 0.0]) + 0.3 * (rows[:, :3] - rows[0, :3])
+    rows[:, TWIST.start:TWIST.start + 3] *= 0.3
+    rows[:, ACCELERATION.start:ACCELERATION.start + 3] *= 0.3
+    feed = messages.Feed(LIMITED)
+    mistaken(rows)
+    take(feed, rows, 100.0, (POSES, TWISTS, ACCELS))
+    feed.setpoints.end('')
+    for ever, which in ((True, 'first'), (False, 'last')):
+        pose, twist, *others = feed.setpoints.mistakes(ever)
+        assert (pose.topic, pose.text) == (POSES, f'{which} setpoint: likely mistake: {text}')
+        assert 'is not the derivative of the poses' in twist.text
+        assert not any('likely mistake' in each.text for each in (twist, *others))
 
 
 def test_poses_alone_have_no_twist_to_be_wrong() -> None:

@@ -375,9 +375,9 @@ def test_a_bag_through_a_singularity_is_not_possible(
     assert f'results: {tmp_path / "a"}' in printed.out
 
 
-def test_a_motion_whose_twists_are_zero_is_not_judged(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+def heaving_bag(folder: Path, factor: float = 1.0, twist: float = 0.0) -> Path:
+    """Write a bag of poses times a factor, with twists times a factor, without accelerations."""
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connections = [writer.add_connection(
             f'{NODE}/~/setpoint/{name}'.replace('/~', ''), f'geometry_msgs/msg/{kind}Stamped',
             typestore=messages.STORE) for name, kind in (
@@ -385,20 +385,40 @@ def test_a_motion_whose_twists_are_zero_is_not_judged(
         for n in range(600):
             stamp = messages.NOW + round(n * 1e7)
             height = 1.1 + 0.05 * math.sin(0.03 * n)
+            rate = 0.15 * math.cos(0.03 * n)
             for connection, data in zip(connections, (
-                    messages.pose(stamp, [0.0, 0.0, height]), messages.twist(stamp),
+                    messages.pose(stamp, [0.0, 0.0, factor * height]),
+                    messages.twist(stamp, [0.0, 0.0, twist * rate, 0.0, 0.0, 0.0]),
                     messages.accel(stamp)), strict=True):
                 writer.write(connection, stamp, data)
+    return folder
+
+
+def test_a_motion_in_millimetres_is_named_before_its_twists(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = heaving_bag(tmp_path / 'bag', 1e3, twist=1.0)
+    assert run('--params', PLATFORM, '--motion', bag, '--output', tmp_path / 'a',
+               '--strict') == 1
+    printed = ' '.join(capsys.readouterr().out.split())
+    assert ('motion not judged, its messages contradict each other or the parameters: '
+            'setpoint/pose: first setpoint: likely mistake: position in mm; ') in printed
+    assert printed.count('likely mistake') == 1
+    assert 'velocity is not the derivative of the poses' in printed
+
+
+def test_a_motion_whose_twists_are_zero_is_not_judged(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    heaving_bag(tmp_path / 'bag')
     assert run('--params', PLATFORM, '--motion', tmp_path / 'bag',
                '--output', tmp_path / 'a', '--strict') == 1
     printed = capsys.readouterr().out
-    assert 'motion not judged, its messages contradict each other: ' in printed
+    assert 'motion not judged, its messages contradict each other or the parameters: ' in printed
     assert 'no limit at any speed' not in printed
     motion = json.loads((tmp_path / 'a' / 'datasheet.json').read_text())['motion']
     assert len(motion['mistakes']) == 2
     assert all(each.endswith('it is zero, never filled?') for each in motion['mistakes'])
     page = (tmp_path / 'a' / 'datasheet.html').read_text()
-    assert 'not judged, its messages contradict each other' in page
+    assert 'not judged, its messages contradict each other or the parameters' in page
     assert '<p>setpoint/twist: velocity is not the derivative' in page
     assert 'payload that can be added' not in page
 

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import re
 from typing import Any
 
@@ -60,11 +61,12 @@ def begun(**changes: Any) -> DynamicsDiagnostics:
 
 
 def answered(diagnostics: DynamicsDiagnostics, now: float, output: Output = CLEAR,
-             topics: tuple[str, ...] = TOPICS, took: float = 1e-4) -> bool:
+             topics: tuple[str, ...] = TOPICS, took: float = 1e-4,
+             motion: Sequence[float] = HOME.motion) -> bool:
     """Let messages of some topics come, and a setpoint be answered."""
     for topic in topics:
         diagnostics.setpoints.heard[topic] = now
-    return diagnostics.answered(output, now - took, now)
+    return diagnostics.answered(output, motion, now - took, now)
 
 
 def status(diagnostics: DynamicsDiagnostics, name: str, now: float) -> Status:
@@ -524,7 +526,7 @@ def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
     output = step(high, first.state)
     assert output is not None
     diagnostics = begun(limits__action=action, **limits)
-    answered(diagnostics, BEGIN, output)
+    answered(diagnostics, BEGIN, output, motion=high.motion)
     lines = [line.text for line in diagnostics.report(BEGIN)[1]]
     of = status(diagnostics, 'limits', BEGIN)
     assert of.level == ERROR

@@ -22,14 +22,22 @@ import numpy as np
 import pytest
 from referees import rng
 
-from stewart_dynamics import StewartPlatform
+from stewart_dynamics import Pose, StewartPlatform
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.frames.motion import motion_rows
 from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+from stewart_dynamics.parameters.table import Parameters
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
 PLATFORM = StewartPlatform.from_yaml(CONFIG / 'platform.yaml')
 SIZE = PLATFORM.parameters['singularity.characteristic_length']
+
+
+def mistake_of(position: Array, rotation: Array, parameters: Parameters = PLATFORM.parameters,
+               first: bool = True) -> str:
+    """Return the likely mistake in a pose."""
+    return pose_mistake(parameters, motion_rows(Pose(position, rotation))[0], first)
 
 
 def w_first(rotation: Array) -> Array:
@@ -58,17 +66,19 @@ def test_the_mistake_in_a_pose_is_named(seed: int) -> None:
     if np.linalg.norm(move) > 0.01:
         expected['likely mistake: position in mm and a pose counted from home'] = 1e3 * move, turn
     for text, pose in expected.items():
-        assert pose_mistake(PLATFORM.parameters, *pose).split('; ')[-1] == text
+        assert mistake_of(*pose).split('; ')[-1] == text
+        other_side = 'platform_side' in text
+        assert mistake_of(*pose, first=False) == ('' if other_side else text)
 
 
 def test_a_pose_just_outside_the_limits_has_no_likely_mistake() -> None:
     home = PLATFORM.home_pose()
     for by in (-0.3, 0.3):
-        assert pose_mistake(
-            PLATFORM.parameters, home.position + [0.0, 0.0, by], home.rotation) == ''
+        assert mistake_of(home.position + [0.0, 0.0, by], home.rotation) == ''
 
 
-def test_without_a_home_pose_nothing_is_said() -> None:
+def test_without_a_home_pose_only_a_position_in_mm_is_named() -> None:
     parameters = PLATFORM.parameters.replaced({
         'limits.length_min': None, 'limits.length_max': None, 'geometry.zero_length': 0.0})
-    assert pose_mistake(parameters, np.array([0.0, 0.0, 1e3]), np.eye(3)) == ''
+    for z, text in ((1e3, 'likely mistake: position in mm'), (1.0, ''), (10.0, '')):
+        assert mistake_of(np.array([0.0, 0.0, z]), np.eye(3), parameters) == text

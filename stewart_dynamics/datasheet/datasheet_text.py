@@ -172,7 +172,7 @@ def rated_payload(sheet: Mapping[str, Any], payload: Mapping[str, Any],
 def possible(found: Mapping[str, Any]) -> str:
     """Return whether a box or motion is possible, in words."""
     if found.get('mistakes'):
-        return 'not judged, its messages contradict each other'
+        return 'not judged, its messages contradict each other or the parameters'
     return 'possible' if found['possible'] else 'not possible'
 
 

@@ -147,7 +147,7 @@ class RatedHexapod:
         known, motions = PoseLimits(self.given), motion_rows(pose)
         results = whole.solve(motions)
         condition, stop = float(results[0, CONDITION]), known.stop_condition
-        mistake = pose_mistake(whole.parameters, pose.position, pose.rotation)
+        mistake = pose_mistake(whole.parameters, motions[0])
         mistake = f'; {mistake}' if mistake else ''
         if not condition < stop:
             raise SingularityError(

@@ -48,9 +48,6 @@ TOLERANCE = 1e-9
 # time before a setpoint counts as a jump.
 JITTER = 1e-3
 
-# Factor by which legs exceed their maximum length if positions are in mm instead of m.
-_MILLIMETRES = 1000.0
-
 # Thresholds in a row, in the order of OF_RESULTS.
 _SHORTEST, _LONGEST, _FASTEST, _STRONGEST = consecutive(6, 6, 6, 6)
 
@@ -99,18 +96,6 @@ def result_values(lengths: Any, rates: Any, forces: Any) -> dict[str, Any]:
 def angle_values(angles: Sequence[float]) -> dict[str, Sequence[float]]:
     """Return the values of OF_JOINTS of one sample's joint angles (JOINT_ANGLES,)."""
     return {limit: angles[where] for limit, where in ANGLES.items()}
-
-
-def position_in_mm(lengths: Sequence[float], usual: Sequence[float] | None) -> str:
-    """
-    Return the likely mistake that a position is in mm; empty if it is not.
-
-    usual: lengths that the legs may have, such as ``limits.length_max``; None if not known.
-    """
-    if usual and all(0.3 < length / (_MILLIMETRES * most) < 1.5
-                     for length, most in zip(lengths, usual, strict=True)):
-        return 'likely mistake: position in mm'
-    return ''
 
 
 class Exceedance(NamedTuple):

@@ -303,7 +303,7 @@ class DynamicsNode(LifecycleNode):
             self._diagnostics.base.answered(setpoint, now)
         if not self._diagnostics.answers.number:
             self._diagnostics.begins(setpoint.motion, output.determinant)
-        if self._diagnostics.answered(output, came, now):
+        if self._diagnostics.answered(output, setpoint.motion, came, now):
             self._report()
         self._setpoints.judge()
 

@@ -37,9 +37,7 @@ from stewart_dynamics.bags.find import bytes_of, RESULT
 from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
-from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.program import SOFTWARE
@@ -292,10 +290,6 @@ class _Run:
         self._state = outputs.state
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
-            first = setpoints.motions[0]
-            if mistake := pose_mistake(
-                    self._parameters, first[POSITION], first[ROTATION].reshape(3, 3)):
-                self._notice(f'first setpoint: {mistake}')
         block = Answered(self._seconds(setpoints.stamps), setpoints, outputs,
                          self._base_wrench.many(setpoints))
         self._files.write(block)

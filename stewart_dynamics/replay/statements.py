@@ -45,7 +45,7 @@ _CARDS = {
     (READING, MISSING, REJECTED): {
         'good': 'The whole bag was read', 'warn': 'Not all messages could be used',
         'bad': 'The bag could not be read completely'},
-    (INPUTS,): {'none': 'Inputs', 'bad': 'Inputs contradict each other'},
+    (INPUTS,): {'none': 'Inputs', 'bad': 'Inputs contradict each other or the parameters'},
     (LIMITS, MOTOR_LIMITS): {
         'none': 'No limits are given', 'good': 'All limits are held',
         'warn': 'It is not proven that limits are held', 'bad': 'Limits are exceeded'},

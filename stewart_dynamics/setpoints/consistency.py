@@ -259,18 +259,22 @@ class Consistency:
 
 
 def inconsistencies(
-        consistency: Consistency | None, ever: bool, topics: Mapping[str, str]) -> list[Mistake]:
+        consistency: Consistency | None, ever: bool, topics: Mapping[str, str],
+        reasons: bool = True) -> list[Mistake]:
     """
     Return the inconsistencies of a stream as mistakes.
 
     ever: all that were found, else the present ones.
     topics: the topic of each quantity.
+    reasons: whether likely reasons of differences from the poses are named.
     """
     if consistency is None:
         return []
     found = consistency.found if ever else consistency.present
+    shown = {name: each if reasons or each.of != POSES else each._replace(reason='')
+             for name, each in found.items()}
     return [Mistake(topics[name], each.words, each.first, each.values)
-            for name, each in found.items()]
+            for name, each in shown.items()]
 
 
 class _Periods:

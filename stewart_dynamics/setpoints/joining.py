@@ -24,12 +24,13 @@ motion have topics of their own: a setpoint gets the values that are valid when 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
 from stewart_dynamics.arrays import Six
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.rows import BASE, MOTION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
@@ -68,6 +69,10 @@ class Setpoints:
             parameters['singularity.characteristic_length'],
             (parameters['base_frame'], parameters['platform_frame']))
         self._checks = [each for each in (self._consistency, self.base.consistency) if each]
+        self._parameters = parameters
+        # Rows of motion; empty before the first.
+        self._first: Sequence[float] = ()
+        self._last: Sequence[float] = ()
         self._topic_of = dict.fromkeys(QUANTITIES, COMBINED) if COMBINED in self.topics else (
             dict.fromkeys(QUANTITIES, TWIST) | dict.fromkeys(RATES, ACCEL))
         self.recorded: int | None = None
@@ -89,8 +94,21 @@ class Setpoints:
 
         ever: all that were found; by default the present ones.
         """
-        return (inconsistencies(self._consistency, ever, self._topic_of)
-                + self.base.mistakes(ever))
+        found = inconsistencies(self._consistency, ever, self._topic_of)
+        # The last pose is judged only where twists differ: it takes a millisecond.
+        mistake = (self._pose_mistake('first', self._first) if ever
+                   else self._pose_mistake('last', self._last) if found else [])
+        if mistake:
+            # Derivatives of wrong poses do not show what is wrong with twists.
+            found = inconsistencies(self._consistency, ever, self._topic_of, reasons=False)
+        return mistake + found + self.base.mistakes(ever)
+
+    def _pose_mistake(self, which: str, motion: Sequence[float]) -> list[Mistake]:
+        """Return the likely mistake in the pose of a row of motion."""
+        if not len(motion):
+            return []
+        text = pose_mistake(self._parameters, motion, first=motion is self._first)
+        return [Mistake(self.topics[0], f'{which} setpoint: {text}')] if text else []
 
     def judge(self) -> None:
         """Check the samples noted by ``take``, if there are enough; called when there is time."""
@@ -113,6 +131,8 @@ class Setpoints:
         stamp, values, restart, stamped = sample
         # Twist and acceleration are zero if only the pose is given.
         motion = values + _STANDSTILL + _STANDSTILL if len(values) == 12 else values
+        self._first = self._first or motion
+        self._last = motion
         if restart:
             self.base.restarted(stamp)
         if self._consistency is not None:
@@ -186,6 +206,9 @@ class Setpoints:
         if joined is None or base is None:
             return None
         self._joining.accept(joined, places)
+        if len(joined.stamps):
+            self._first = self._first or tuple(joined.motions[0].tolist())
+            self._last = tuple(joined.motions[-1].tolist())
         if self._consistency is not None and len(joined.stamps):
             self._consistency.add(
                 joined.stamps, joined.motions, np.zeros(len(joined.stamps), dtype=bool))

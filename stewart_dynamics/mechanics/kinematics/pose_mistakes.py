@@ -22,6 +22,7 @@ that it has at home.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -30,13 +31,16 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
-from stewart_dynamics.mechanics.kinematics.home_pose import home_pose, other_side
+from stewart_dynamics.mechanics.kinematics.home_pose import home_pose, other_side, shape_of
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, TOLERANCE
+from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
 from stewart_dynamics.parameters.table import Parameters
 
 _MILLIMETRE = 1e-3
 # Lengths of legs without limits, in terms of those at home.
 _SHORTEST, _LONGEST = 0.3, 2.0
+# A thousand times the usual length of a leg, or the radius of the joints, at least and at most.
+_THOUSAND = 100.0, 10_000.0
 # Smallest distance that may be in mm, in terms of the longest leg.
 _FAR = 2.0
 
@@ -44,16 +48,21 @@ _MM, _FROM_HOME, _W_FIRST = (
     'position in mm', 'a pose counted from home', 'a quaternion in the order w x y z')
 
 
-def pose_mistake(parameters: Parameters, position: Array, rotation: Array) -> str:
+def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
+                 first: bool = True) -> str:
     """
-    Return the likely mistake in a pose, position (3,) [m] and rotation (3, 3); empty without one.
+    Return the likely mistake in the pose of a row of motion; empty without one.
 
-    A pose on the other side of a singularity is one as well. Nothing is said without a home pose.
+    first: whether the motion begins there; on the other side of a singularity is a mistake then.
+
+    Without a home pose only a position in mm is named.
     """
+    pose = np.array(motion[POSE])
+    position, rotation = pose[POSITION], pose[ROTATION].reshape(3, 3)
     try:
         home = home_pose(parameters)
     except ParameterError:
-        return ''
+        return _far(parameters, position, rotation)
     lengths_at_home, at_home = _legs(parameters, home.position, home.rotation)
     low, high = parameters[LENGTH_MIN], parameters[LENGTH_MAX]
     shortest = _SHORTEST * lengths_at_home if low is None else low * (1.0 - TOLERANCE)
@@ -84,7 +93,16 @@ def pose_mistake(parameters: Parameters, position: Array, rotation: Array) -> st
                 at, turned = home.position + at, turned @ home.rotation
             if is_possible(at, turned):
                 return f'likely mistake: {" and ".join(each)}'
-        return other_side(_legs(parameters, position, rotation)[1], at_home)
+        return other_side(_legs(parameters, position, rotation)[1], at_home) if first else ''
+
+
+def _far(parameters: Parameters, position: Array, rotation: Array) -> str:
+    """Return that a position is in mm if the legs would be a thousand times as long as usual."""
+    lengths, _ = _legs(parameters, position, rotation)
+    times = lengths / (parameters[LENGTH_MAX] if parameters[LENGTH_MAX] is not None
+                       else shape_of(parameters).radius)
+    thousand = np.all((times > _THOUSAND[0]) & (times < _THOUSAND[1]))
+    return f'likely mistake: {_MM}' if thousand else ''
 
 
 def _legs(parameters: Parameters, position: Array, rotation: Array) -> tuple[Array, float]:

@@ -28,10 +28,10 @@ import math
 from statistics import median
 
 from stewart_dynamics.arrays import NANOSECOND, SECOND
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS,
-    OF_MOTORS, position_in_mm, QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX,
-    VELOCITY_MAX)
+    OF_MOTORS, QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
@@ -46,6 +46,7 @@ _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singular
 _OF_MOTORS = {SPEED_MAX: SPEEDS, TORQUE_MAX: DEMANDED_TORQUES, TEMPERATURE_RISE_MAX: RISES}
 _DEMANDED = FORCE_MAX, TORQUE_MAX
 _LIMITS = *LIMITS, *OF_MOTORS, JUMP
+_OF_POSE = LENGTH_MIN, LENGTH_MAX, JUMP  # those that a wrong pose exceeds
 
 
 @dataclass
@@ -246,15 +247,11 @@ class LimitsDiagnostics(StatusPart):
         self._worst: dict[str, Exceedance] = {}
         self._suppressed = 0
         self._exceeding = False
-        self._first_mistake = ''  # in the first pose, until a pose is within the limits
+        self._mistake = ''  # in the pose with which legs became too long or too short
         self._largest_force, self._its_leg = 0.0, 0
 
-    def begins(self, mistake: str) -> None:
-        """Note the likely mistake in the first pose; empty without one."""
-        self._first_mistake = mistake
-
-    def answered(self, output: Output, now: float) -> None:
-        """Note an output."""
+    def answered(self, output: Output, motion: Sequence[float], now: float) -> None:
+        """Note an output, and its setpoint's row of motion."""
         forces = output.demanded_forces
         if forces is not None:
             largest = abs(self._largest_force)
@@ -262,17 +259,18 @@ class LimitsDiagnostics(StatusPart):
             if max(forces) > largest or min(forces) < -largest:
                 self._largest_force = max(forces, key=abs)
                 self._its_leg = forces.index(self._largest_force)
-        if not output.exceedances:
-            self._first_mistake = ''
         if output.exceedances or self._exceeding:
             self._exceeding = bool(output.exceedances)
-            self._note_exceedances(output, now)
+            self._note_exceedances(output, motion, now)
 
-    def _note_exceedances(self, output: Output, now: float) -> None:
+    def _note_exceedances(self, output: Output, motion: Sequence[float], now: float) -> None:
         suppressed = output.forces is None and output.demanded_forces is not None and (
             self._answers.parameters['limits.action'] == SUPPRESS_FORCES)
         self._suppressed += suppressed
-        mistake = self._mistake(output)
+        if not any(self.held.of(name, now).level for name in _OF_POSE):
+            # At most once in a second: it takes a millisecond.
+            self._mistake = pose_mistake(
+                self._answers.parameters, motion, first=self._answers.number == 1)
         for name in _LIMITS:
             exceeded = [each for each in output.exceedances if each.limit == name]
             if not exceeded:
@@ -282,8 +280,8 @@ class LimitsDiagnostics(StatusPart):
             words = self._words(worst, len(exceeded) - 1)
             if suppressed and name not in CLIPPED:
                 words += '; forces suppressed'
-            if mistake and name in (LENGTH_MIN, LENGTH_MAX, JUMP):
-                words = f'{mistake}; {words}'
+            if self._mistake and name in _OF_POSE:
+                words = f'{self._mistake}; {words}'
             self.held.see(Level(ERROR, words), now, name)
             self._setpoints[name] += 1
             self._worst[name] = max(worst, self._worst.get(name, worst), key=_excess)
@@ -328,14 +326,6 @@ class LimitsDiagnostics(StatusPart):
                 f'{name}: no longer exceeded; {self._setpoints[name]} setpoints since activation, '
                 f'worst: {self._words(worst)}'), name)
         return lines
-
-    def _mistake(self, output: Output) -> str:
-        """Return the likely mistake in the first pose, or where legs are too long."""
-        if self._first_mistake:
-            return self._first_mistake
-        longest = self._answers.parameters['limits.length_max']
-        return position_in_mm(
-            output.lengths, output.state.lengths if longest is None else longest.tolist())
 
     def _words(self, worst: Exceedance, others: int = 0) -> str:
         words = worst.words(self._joints) + ', clipped' * (worst.limit in CLIPPED)

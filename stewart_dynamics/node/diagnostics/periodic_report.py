@@ -18,12 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
-from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
 from stewart_dynamics.node.diagnostics.answers import (
     Answers, LimitsDiagnostics, SingularityDiagnostics, TimingDiagnostics)
 from stewart_dynamics.node.diagnostics.inputs import (
@@ -63,21 +60,19 @@ class DynamicsDiagnostics:
 
     def begins(self, motion: Sequence[float], determinant: float) -> None:
         """Note the first setpoint, a row of motion, and its det(J) [m^3]."""
-        pose = np.array(motion[POSE])
         parameters = self.answers.parameters
-        mistake = pose_mistake(parameters, pose[POSITION], pose[ROTATION].reshape(3, 3))
-        self.limits.begins(mistake)
         self.singularity.begins(
-            mistake, determinant * determinant_at_home(parameters) < 0.0)
+            pose_mistake(parameters, motion),
+            determinant * determinant_at_home(parameters) < 0.0)
 
-    def answered(self, output: Output, came: float, now: float) -> bool:
+    def answered(self, output: Output, motion: Sequence[float], came: float, now: float) -> bool:
         """
-        Note an output and the time of arrival of its setpoint.
+        Note an output, its setpoint's row of motion and time of arrival.
 
         Returns whether a report is due.
         """
         self.answers.add(output, now - came, now)
-        self.limits.answered(output, now)
+        self.limits.answered(output, motion, now)
         crossed = self.singularity.answered(output, now)
         return crossed or self._due(now)
 
