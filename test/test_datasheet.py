@@ -39,6 +39,7 @@ from stewart_dynamics import (
     BaseMotion, Capability, Motion, Parameters, Pose, PoseError, StewartPlatform)
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import main
+from stewart_dynamics.datasheet.claimed_box import doubtful_ranges
 from stewart_dynamics.datasheet.datasheet import soft_legs
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, both_ways, box_verdict, down, LINEAR, motion_verdict, numbers,
@@ -47,6 +48,7 @@ from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads, stiffness
 from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, RecordedMotion, uses
+from stewart_dynamics.mechanics.likely_mistakes import mistakes_in_options
 from stewart_dynamics.replay import main as replay
 from stewart_dynamics.replay.replay_options import NODE, Options
 from stewart_dynamics.reporting.vector_picture import hull, ticks
@@ -481,10 +483,48 @@ def test_a_stiffness_in_another_unit_is_a_likely_mistake() -> None:
     assert found.endswith('in N/um, or in N/mm?')
 
 
+@pytest.mark.parametrize(('option', 'values', 'said'), [
+    ('--pose', (0, 0, 1180, 0, 0, 0), '[0, 0, 1180, 0, 0, 0]: likely mistake: position in mm'),
+    ('--pose', (0, 0, 1.18, 5, 0, 0), 'likely mistake: angles in degrees'),
+    ('--pose', (10, 0, 1180, 0, 0, -8),
+     'likely mistake: position in mm and angles in degrees'),
+    ('--pose', (0, 0, 0.02, 2, 0, 0),
+     'likely mistake: a pose counted from home and angles in degrees'),
+    ('--pivot', (0, 0, 800), '[0, 0, 800] m is 800 m from the middle of the platform joints, '),
+    ('--payload', (0, 0, 200), '[0, 0, 200] m is 200 m from '),
+    ('--box', [[0, 50], [0, 0], [0, 0], [0, 0], [0, 0], [0, 0]],
+     'x: 50 m is more than the longest leg, 1.65 m: in mm?'),
+    ('--box', [[0, 0], [0, 0], [0, 0], [-5, 0], [0, 0], [0, 0]],
+     'rx: 5 rad is more than a quarter of a turn: in degrees?'),
+    ('--pose', (0, 0, 1.18, 0.1, 0, 0), ''), ('--pose', (0, 0, 1.5, 0.9, 0, 0), ''),
+    ('--pivot', (0, 0, 2.5), ''), ('--payload', (1.0, 0, 1.0), ''),
+    ('--box', np.full((6, 2), 0.1), '')])
+def test_units_of_poses_and_points_in_options_are_judged(
+        option: str, values: Any, said: str) -> None:
+    if option == '--box':
+        found = [*doubtful_ranges(np.array(values, dtype=float), PARAMETERS)]
+    elif option == '--pose':
+        found = [*mistakes_in_options(PARAMETERS, {option: values}, {})]
+    else:
+        found = [*mistakes_in_options(PARAMETERS, {}, {option: values, '--given': None})]
+    assert len(found) == bool(said)
+    assert not said or found[0].startswith(f'{option}: ')
+    assert said in ''.join(found)
+
+
+def test_a_likely_mistake_in_a_pose_comes_before_the_error_that_follows(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run('--params', PLATFORM, '--output', tmp_path / 'sheet', '--pose',
+               0, 0, 1180, 0, 0, 0, '--pivot', 0, 0, 800) == 2
+    pose, pivot, error = capsys.readouterr().err.splitlines()
+    assert pose.startswith('stewart_capability: warning: --pose: ')
+    assert pivot.startswith('stewart_capability: warning: --pivot: ')
+    assert error.startswith('stewart_capability: pose: singular: ')
+
+
 BAD: list[tuple[list[str], str]] = [
     (['--pose', '0', '0', '2', '0', '0', '0'], 'above limits.length_max'),
     (['--pose', '0', '0', '1.18', '0', '0', '1.5707963'], 'pose: singular: the condition number'),
-    (['--pose', '0', '0', '1180', '0', '0', '0'], '; likely mistake: position in mm'),
     (['--payload', '0', '0', '0', '0'], '--payload: mass 0 kg: must be above 0'),
     (['--payload', '9e4', '0', '0', '0'], 'above limits.force_max'),
     (['--leg-stiffness', '-1'], '--leg-stiffness: -1 N/m: must be above 0'),

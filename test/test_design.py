@@ -149,6 +149,15 @@ def test_a_center_beyond_a_limit_is_named() -> None:
         design(HEXAPOD, SMALL._replace(center=(0.0, 0.0, 2.0, 0.0, 0.0, 0.0)))
 
 
+def test_a_center_in_degrees_or_millimetres_is_a_likely_mistake(
+        capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, _, err = run(capsys, *QUICK, '--output', tmp_path / 'out', '--center',
+                       0, 0, 990, 5, 0, 0)
+    assert code == 2
+    assert ('warning: --center: [0, 0, 990, 5, 0, 0]: likely mistake: position in mm and angles '
+            'in degrees') in err
+
+
 def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
     """Return exit code, stdout and stderr of stewart_identify --design in this process."""
     code = main(['--design', *map(str, arguments)])

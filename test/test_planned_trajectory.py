@@ -30,7 +30,7 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatfo
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, POSITION, RATES)
 from stewart_dynamics.planned.checks import LIMIT, SINGULAR
 from stewart_dynamics.planned.interpolation import Interpolation
 from stewart_dynamics.planned.trajectory import check_planned_trajectory, PlannedTrajectory
@@ -250,6 +250,15 @@ def test_a_limit_at_a_point_is_found_with_its_leg() -> None:
     assert result.limit == 'limits.length_max'
     assert ' leg_4: length ' in result.message
     assert times[first - 1] * 1e-9 < result.time <= times[first] * 1e-9 + 1e-5
+
+
+def test_a_trajectory_in_millimetres_is_named() -> None:
+    times, rows = np.array([0, 2 * SECOND]), heave(0.02)
+    assert check((times, rows)).accepted
+    rows[:, POSITION] *= 1e3
+    result = check((times, rows))
+    assert not result.accepted
+    assert result.message.endswith('; likely mistake: position in mm')
 
 
 def test_the_first_of_two_violations_is_reported() -> None:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 import math
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.reachable import SMALLEST
 from stewart_dynamics.datasheet.ratings import AXES
 from stewart_dynamics.errors import ParameterError, shown, shown_name
+from stewart_dynamics.mechanics.kinematics.home_pose import shape_of
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import LARGEST, read_value
 from stewart_dynamics.whole_file import read_text
@@ -65,6 +66,18 @@ def read_box(path: Path, parameters: Parameters) -> Array:
     if not np.ptp(ranges, axis=1).any():
         raise ParameterError(f'{path}: all ranges are of size zero: there is nothing to check')
     return ranges
+
+
+def doubtful_ranges(ranges: Array, parameters: Parameters) -> Iterator[str]:
+    """Yield likely mistakes in the unit of ranges (6, 2), which no hexapod reaches."""
+    longest = parameters['limits.length_max']
+    far, than = ((10.0 * shape_of(parameters).radius, 'ten times the radius of the joints')
+                 if longest is None else (float(np.max(longest)), 'the longest leg'))
+    for axis, most in zip(AXES, np.abs(ranges).max(axis=1).tolist(), strict=True):
+        if axis.startswith('r') and most > 0.5 * math.pi:
+            yield f'--box: {axis}: {most:g} rad is more than a quarter of a turn: in degrees?'
+        elif not axis.startswith('r') and most > far:
+            yield f'--box: {axis}: {most:g} m is more than {than}, {far:.4g} m: in mm?'
 
 
 def _range(where: str, value: Any) -> tuple[float, float]:

@@ -77,13 +77,13 @@ def _run(given: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from stewart_dynamics.bags.find import bytes_of
-    from stewart_dynamics.datasheet.claimed_box import read_box
+    from stewart_dynamics.datasheet.claimed_box import doubtful_ranges, read_box
     from stewart_dynamics.datasheet.datasheet import (
         check_order, FUNCTIONS, is_possible, Order, Progress, soft_legs, STAGES, write_datasheet)
     from stewart_dynamics.datasheet.datasheet_text import sheet_text
     from stewart_dynamics.datasheet.rated_hexapod import Payload
     from stewart_dynamics.mechanics.frames.motion import Pose
-    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes, mistakes_in_options
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.reporting.results_folder import (
         check_free, DATASHEET, remove_abandoned)
@@ -105,7 +105,10 @@ def _run(given: argparse.Namespace) -> int:
     check_free(given.output, options, DATASHEET)
     remove_abandoned([given.output])
     _PROGRAM.prepare(FUNCTIONS, (
-        *likely_mistakes(parameters), *soft_legs(parameters, order.leg_stiffness)))
+        *likely_mistakes(parameters), *soft_legs(parameters, order.leg_stiffness),
+        *(() if order.box is None else doubtful_ranges(order.box, parameters)),
+        *mistakes_in_options(parameters, {'--pose': given.pose}, {
+            '--pivot': given.pivot, '--payload': given.payload and given.payload[1:]})))
     size = 0 if given.motion is None else bytes_of(given.motion)
     # Each stage counts as a part of the bag, whose reading is the longest where it is large.
     part = max(size // len(STAGES), 1)

@@ -28,7 +28,6 @@ from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import CONDITION
@@ -147,15 +146,13 @@ class RatedHexapod:
         known, motions = PoseLimits(self.given), motion_rows(pose)
         results = whole.solve(motions)
         condition, stop = float(results[0, CONDITION]), known.stop_condition
-        mistake = pose_mistake(whole.parameters, motions[0])
-        mistake = f'; {mistake}' if mistake else ''
         if not condition < stop:
             raise SingularityError(
                 f'pose: singular: the condition number of J_inv is {condition:.6g}, '
-                f'must be less than singularity.stop_condition, {stop:g}{mistake}')
+                f'must be less than singularity.stop_condition, {stop:g}')
         exceeded = known.first_exceeded(motions[0], results[0])
         if exceeded is not None:
-            raise PoseError(f'pose: {exceeded.words(self.joints)}{mistake}')
+            raise PoseError(f'pose: {exceeded.words(self.joints)}')
 
 
 def _moved(p: Parameters, pivot: Array) -> Parameters:

@@ -22,7 +22,7 @@ telescope on cables of 300 m; a value outside is a warning, not an error.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from itertools import combinations, permutations
 import math
@@ -38,6 +38,7 @@ from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, Home, home_of, is_too_long, poses_of, Shape, shape_of, turns_about)
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import typed_pose_mistake
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -185,11 +186,33 @@ def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
     if moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
         yield (f'platform.inertia: principal moments {_listed(moments)} kg m^2: no body has one '
                'larger than the sum of the other two: is the order ixx ixy ixz iyy iyz izz?')
-    center = p['platform.center_of_mass'] - p['geometry.platform_joints'].mean(axis=0)
-    away = float(np.linalg.norm(center))
+    yield from _far_point('platform.center_of_mass', p['platform.center_of_mass'], p, shape)
+
+
+def _far_point(name: str, point: Array, p: Parameters, shape: Shape) -> Iterator[str]:
+    """Yield that a point of the platform frame is too far away for its unit."""
+    away = float(np.linalg.norm(point - p['geometry.platform_joints'].mean(axis=0)))
     if away > _FARTHEST_CENTER * shape.radius:
-        yield (f'platform.center_of_mass: {_listed(p["platform.center_of_mass"])} m is '
-               f'{away:.3g} m from the middle of the platform joints, but {size}: in mm?')
+        yield (f'{name}: {_listed(point)} m is {away:.3g} m from the middle of the platform '
+               f'joints, but the platform joints are {shape.platform_radius:.3g} m from their '
+               'center: in mm?')
+
+
+def mistakes_in_options(
+        p: Parameters, poses: Mapping[str, Sequence[float] | None],
+        points: Mapping[str, Sequence[float] | None]) -> Iterator[str]:
+    """
+    Yield likely mistakes in poses and points that a user types, each in one line.
+
+    poses: X Y Z ALPHA BETA GAMMA of each option [m, rad]; None if it is not given.
+    points: X Y Z of each option in the platform frame [m].
+    """
+    for name, pose in poses.items():
+        if pose is not None and (text := typed_pose_mistake(p, pose)):
+            yield f'{name}: {listed(np.array(pose), _DIGITS)}: {text}'
+    for name, point in points.items():
+        if point is not None:
+            yield from _far_point(name, np.array(point), p, shape_of(p))
 
 
 def _frames(p: Parameters, home: Home) -> Iterator[str]:

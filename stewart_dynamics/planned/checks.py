@@ -35,6 +35,7 @@ from stewart_dynamics.mechanics.drives.motors import (
 from stewart_dynamics.mechanics.dynamics import friction
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, Limits, result_values,
     SPEED_MAX, TEMPERATURE_RISE_MAX, VELOCITY_MAX)
@@ -96,6 +97,8 @@ class Checks:
     Finds violations in samples of a trajectory that come in the order of time.
 
     violations: violations found so far, in no order.
+    mistake: the likely mistake in the first pose with a leg too long or too short, empty without
+        one; None without such a pose.
     condition_number, condition_time: largest condition number so far, and its time [s].
     force, force_leg: largest absolute force so far [N], and its leg.
     load: the largest absolute force so far as a part of limits.force_max.
@@ -118,6 +121,7 @@ class Checks:
         self._drives = Drives(parameters) if parameters.drives else None
         self._motor_limits = MotorLimits(parameters)
         self._rises = np.zeros(6)
+        self.mistake: str | None = None
 
     def check(self, samples: Samples) -> list[int]:
         """Check samples and between them; return after which of them closer ones are needed."""
@@ -136,9 +140,17 @@ class Checks:
         for limit, values in result_values(
                 results[:, LENGTHS], results[:, RATES], results[:, FORCES]).items():
             self._check_limit(limit, values, _of_legs(samples.times))
+        self._name_mistake(samples)
         self._check_cubics(samples)
         return sorted({
             *unclear, *self._check_singularities(samples), *self._reversals(samples)})
+
+    def _name_mistake(self, samples: Samples) -> None:
+        """Name the likely mistake in the pose with which legs first are too long or too short."""
+        found = [each for each in self.violations if each.limit in (LENGTH_MIN, LENGTH_MAX)]
+        if found and self.mistake is None:
+            at = int(np.argmax(samples.times >= found[0].time))
+            self.mistake = pose_mistake(self._parameters, samples.motions[at], first=False)
 
     def check_path(self, samples: Samples) -> list[int]:
         """Check poses as ``check`` does: singularities, joints and clearance of the legs."""

@@ -442,8 +442,9 @@ class _Work:
     def rejected(self, violation: Violation) -> PlannedTrajectory:
         """Return the result of a trajectory with a violation."""
         when = '' if violation.reason == TOO_FAR else f'at {violation.time:.3f} s'
+        mistake = f'; {self._checks.mistake}' if self._checks.mistake else ''
         return PlannedTrajectory(
-            False, f'rejected: {when}{violation.words}', len(self._times), self._duration,
+            False, f'rejected: {when}{violation.words}{mistake}', len(self._times), self._duration,
             violation.reason, violation.time, violation.leg, violation.limit)
 
     @property

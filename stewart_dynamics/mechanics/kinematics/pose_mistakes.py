@@ -30,7 +30,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.dynamics import lagrange
-from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose, other_side, shape_of
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, TOLERANCE
 from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
@@ -44,16 +44,27 @@ _THOUSAND = 100.0, 10_000.0
 # Smallest distance that may be in mm, in terms of the longest leg.
 _FAR = 2.0
 
-_MM, _FROM_HOME, _W_FIRST = (
-    'position in mm', 'a pose counted from home', 'a quaternion in the order w x y z')
+# Smallest angle that may be in degrees.
+_TILTED = 1.0
+
+_MM, _FROM_HOME, _W_FIRST, _DEGREES = (
+    'position in mm', 'a pose counted from home', 'a quaternion in the order w x y z',
+    'angles in degrees')
+
+
+def typed_pose_mistake(parameters: Parameters, pose: Sequence[float]) -> str:
+    """Return the likely mistake in a pose X Y Z ALPHA BETA GAMMA as a user types it."""
+    row = np.append(pose[:3], from_euler(np.array(pose[3:])))
+    return pose_mistake(parameters, row, angles=np.array(pose[3:]))
 
 
 def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
-                 first: bool = True) -> str:
+                 first: bool = True, angles: Array | None = None) -> str:
     """
     Return the likely mistake in the pose of a row of motion; empty without one.
 
     first: whether the motion begins there; on the other side of a singularity is a mistake then.
+    angles: alpha, beta, gamma in place of a quaternion, which may be in degrees.
 
     Without a home pose only a position in mm is named.
     """
@@ -76,7 +87,7 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
     with np.errstate(all='ignore'):
         if is_possible(position, rotation):
             return ''
-        known = _MM, _FROM_HOME, _W_FIRST
+        known = _MM, _FROM_HOME, _W_FIRST if angles is None else _DEGREES
         # The fewest mistakes first.
         for each in (each for number in (1, 2, 3) for each in combinations(known, number)):
             at, turned = position, rotation
@@ -89,6 +100,10 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
                 if 2.0 * w * w < 1.0:
                     continue  # no platform turns so far
                 turned = np.reshape(from_quaternion(x, y, z, w), (3, 3))
+            if _DEGREES in each:
+                if angles is None or np.abs(angles).max() < _TILTED:
+                    continue  # an angle that large is not reachable, a smaller one may be meant
+                turned = from_euler(np.radians(angles))
             if _FROM_HOME in each:
                 at, turned = home.position + at, turned @ home.rotation
             if is_possible(at, turned):
