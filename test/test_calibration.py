@@ -354,6 +354,23 @@ def test_likely_mistakes_are_named(what: str, words: str) -> None:
     assert words in str(caught.value) and 'nothing is calibrated' in str(caught.value)
 
 
+@pytest.mark.parametrize('noise', [0.0, 1e-4])
+def test_a_mirrored_frame_and_another_order_are_both_named_where_both_explain_the_poses(
+        noise: float) -> None:
+    """Mirrored in y this hexapod is the same, with its legs in the reverse order."""
+    rng, mirror = np.random.default_rng(7), np.array([1.0, -1.0, 1.0])
+    poses = random_poses(rng, 40)
+    lengths = HEXAPOD.inverse_kinematics(poses) - HEXAPOD.parameters['geometry.zero_length']
+    seen = Pose(mirror * poses.position + rng.normal(0.0, noise, (40, 3)),
+                mirror[:, None] * poses.rotation * mirror)
+    both = ('the poses are of a mirrored (left-handed) frame: y has the opposite sign; or the '
+            'legs are in another order: leg_6, leg_5, leg_4, leg_3, leg_2, leg_1 ')
+    for given in ((lengths, seen), (lengths[:, ::-1], poses)):
+        with pytest.raises(StewartError) as caught:
+            calibrate(HEXAPOD, *given)
+        assert str(caught.value).startswith(both)
+
+
 def test_exact_poses_of_the_drawing_have_no_lack_of_fit() -> None:
     rng = np.random.default_rng(8)
     poses = random_poses(rng, 40)

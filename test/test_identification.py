@@ -326,6 +326,20 @@ def test_efforts_of_motors_need_the_drive(
         assert 'likely actuator.screw_lead, 0.04 m, is wrong: about 0.0' in err
 
 
+def test_forces_given_as_torques_of_motors_are_named(
+        identified: Callable[..., Any], tmp_path: Path) -> None:
+    """A few hundred times too large, they all are beyond limits.force_max, where it is given."""
+    driven = {'actuator.screw_lead': 0.01}
+    for limits in ({'limits.force_max': 6000.0}, {'limits.force_max': None}):
+        GIVEN.replaced(driven | limits).to_yaml(tmp_path / 'driven.yaml')
+        code, _, _, err = identified('fourier', '--no-report', '--motor-torque',
+                                     params=tmp_path / 'driven.yaml')
+        assert code == 2
+        assert 'likely mistake: the efforts are ' in err or limits['limits.force_max'] is None
+        assert 'likely forces at the legs in place of torques' in err
+        assert 'omit --motor-torque' in err
+
+
 def test_losses_of_drives_are_no_mass_and_no_friction(
         identified: Callable[..., Any], tmp_path: Path) -> None:
     p = GIVEN.replaced({

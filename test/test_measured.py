@@ -226,6 +226,22 @@ def test_torques_of_motors_are_compared_without_the_losses_of_the_drives(
     assert np.abs(torques * per_effort - computed).max() > 0.05 * np.abs(computed).max()
 
 
+@pytest.mark.parametrize('efficiency', [1.0, 0.75])
+def test_forces_given_as_torques_of_motors_are_named(efficiency: float) -> None:
+    case = case_of()
+    p = case.parameters.replaced({
+        'actuator.reflected_mass': None, 'actuator.screw_lead': 0.02,
+        'drive.torque_constant': 0.5, 'drive.efficiency': efficiency})
+    case = case._replace(parameters=p, outputs=Step(p).many(case.setpoints, None))
+    for currents in (False, True):
+        per_effort = force_per_effort(p, torques=not currents, currents=currents)
+        comparison = Comparison(p, of_motors=True)
+        compared(comparison, case, (case.setpoints.stamps, case.forces() * per_effort))
+        found = comparison.values()['likely_mistake']
+        assert found['what'] == 'force'
+        assert 'likely forces at the legs in place of torques or currents' in found['text']
+
+
 def test_torques_of_self_locking_screws_are_rejected() -> None:
     p = case_of().parameters.replaced({
         'actuator.reflected_mass': None, 'actuator.screw_lead': 0.02, 'drive.efficiency': 0.3})

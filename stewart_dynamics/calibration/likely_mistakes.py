@@ -43,6 +43,8 @@ from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # A mistake is likely if the misfit without it is smaller than this part.
 _BETTER = 0.25
+# Mistakes explain the poses alike if their misfits differ by this factor, or are below this value.
+_ALIKE, _EXACT = 2.0, 1e-3
 # A joint that moves by a larger part of the characteristic length is not of this hexapod.
 _FARTHEST = 0.3
 # Residuals above this part of it mean that the model does not describe the poses.
@@ -87,7 +89,9 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
             'other frames: --frames unknown calibrates them as well')))
     best, mistake = min(tried, key=lambda each: each[0])
     if best < _BETTER * given:
-        yield mistake._replace(text=f'{mistake.text} (misfit {best:.2g} of the motion'
+        # Symmetric hexapods: a mirrored frame is another order of the legs.
+        texts = [each.text for misfit, each in tried if misfit <= max(_ALIKE * best, _EXACT)]
+        yield mistake._replace(text=f'{"; or ".join(texts)} (misfit {best:.2g} of the motion'
                                + (f' instead of {given:.2g})' if given < math.inf else ')'))
     else:
         yield from _on_other_side(parameters, equations, unknown_frames)

@@ -353,6 +353,10 @@ class Identification:
         if self._first is None:
             self._first = extraction, window
 
+    def _of_efforts(self, sums: Sums) -> list[LikelyMistake]:
+        return list(of_efforts(
+            sums, self.unknowns, self.parameters, self._per_effort is not None))
+
     def result(self) -> Identified:
         """Fit all bags and return the result."""
         options, unknowns, extracts = self._options, self.unknowns, self.extracts
@@ -361,10 +365,13 @@ class Identification:
                            f'the filters: must be at least {_FEWEST}')
         sums = sums_of(extracts)
         if sums.counts.sum(axis=0).min() < _FEWEST:
+            whole = sums_of(extracts, lambda each: np.ones_like(each.used))
+            likely = [f'likely mistake: {each.text}' for each in self._of_efforts(whole)] or [
+                'is geometry.zero_length right, and are the efforts in N?']
             raise BagError(f'{self.bags[0].bag}: nothing to identify from: '
                            f'{sum(bag.samples_at_stops for bag in self.bags)} samples are at or '
-                           'beyond limits.length_min, length_max or force_max: is '
-                           'geometry.zero_length right, and are the efforts in N?')
+                           'beyond limits.length_min, length_max or force_max: '
+                           + '; '.join(likely))
         unsound = 6 * extracts.samples - int(sums.counts.sum())
         clean, noisy, grams, samples = zip(*self._noises, strict=True)
         noise = sum(grams) * (extracts.samples / sum(samples))
@@ -374,8 +381,7 @@ class Identification:
             sums = sums_of(extracts)
             found = fit(sums, unknowns, noise, self._cutoffs)
         # The sign first: a delay of half a period fits the moving part of opposite efforts.
-        likely = list(of_efforts(
-            sums, unknowns, self.parameters, self._per_effort is not None)) or list(of_delay(
+        likely = self._of_efforts(sums) or list(of_delay(
                 bag.delay_s + delay for bag, delay in zip(
                     self.bags, found.delays, strict=True)))
         errors = errors_of(extracts, sums, unknowns, found)

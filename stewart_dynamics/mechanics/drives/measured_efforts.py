@@ -32,8 +32,10 @@ _NEAR = 1.35
 FAR, _TORQUES = 2.0, 0.05
 _FACTORS = ((1e-3, 'kN in place of N'), (-1.0 / STANDARD_GRAVITY[2], 'kgf in place of N'),
             (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
-ZERO, SIGN, UNIT, TORQUE, SCALE, SWAPPED = (
-    'zero', 'sign', 'unit', 'torque', 'scale', 'swapped')
+ZERO, SIGN, UNIT, TORQUE, FORCE, SCALE, SWAPPED = (
+    'zero', 'sign', 'unit', 'torque', 'force', 'scale', 'swapped')
+# The same for forces that were converted as torques: the losses of the drives are taken off them.
+_LOSSES = 3.0
 
 # Cosine between measured and computed forces from which on they are alike but for a factor.
 _ALIKE = 0.9
@@ -225,7 +227,10 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> EffortMist
     lead, ratio = p['actuator.screw_lead'], p['drive.gear_ratio']
     torques = 'likely torques of the motors in place of forces: --motor-torque takes them'
     units = [unit for factor, unit in _FACTORS if _is_near(scale, factor)]
-    if of_motors:
+    if of_motors and any(_is_near(scale, each, _LOSSES) for each in _per_effort(p)):
+        what, likely = FORCE, ('likely forces at the legs in place of torques or currents of the '
+                               'motors: omit --motor-torque, --motor-current')
+    elif of_motors:
         what, likely = SCALE, (
             f'likely actuator.screw_lead, {lead[0]:g} m, is wrong: about {lead[0] * scale:.3g} m '
             f'would fit; or drive.gear_ratio, {ratio[0]:g}: about {ratio[0] / scale:.3g}')
@@ -242,5 +247,11 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> EffortMist
         what, f'the efforts are {scale:.3g} times what the model computes: {likely}')
 
 
-def _is_near(scale: float, factor: float) -> bool:
-    return 1.0 / _NEAR < scale / factor < _NEAR
+def _per_effort(p: Parameters) -> list[float]:
+    """Return the mean leg forces for torques, and for currents, of 1."""
+    ratio, constant = motor_ratio(p), p['drive.torque_constant']
+    return [float(np.mean(each * ratio)) for each in (1.0, constant) if each is not None]
+
+
+def _is_near(scale: float, factor: float, near: float = _NEAR) -> bool:
+    return 1.0 / near < scale / factor < near
