@@ -471,6 +471,11 @@ def test_the_page_fits_a_phone_and_two_sheets_of_paper(sheet: Path) -> None:
                 ' && each.offsetWidth > each.parentElement.clientWidth + 1).map(each => '
                 'each.innerText.slice(0, 40) + each.offsetWidth)')
             assert not overlaps
+            # what goes on behind an edge has a shadow there
+            assert set(page.evaluate(
+                '[...document.querySelectorAll(".scroll")].map('
+                'each => getComputedStyle(each).backgroundAttachment)')) == {
+                    'local, local, scroll, scroll'}
         pdf = page.pdf(prefer_css_page_size=True)
         assert b'/Count 2' in pdf
         browser.close()
