@@ -33,7 +33,7 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatfo
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.external_wrench.estimate import (
-    Estimate, external_wrenches, ExternalWrench, Measurement, Overload)
+    Estimate, external_wrenches, ExternalWrench, Measurement, Overload, Target)
 from stewart_dynamics.external_wrench.measured_legs import (
     MEASURED_LEGS, MeasuredLegs, NOT_CONVERGED, SINGULAR, UNSTAMPED)
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
@@ -55,6 +55,12 @@ BEGIN = 1_700_000_000_000_000_000
 MILLISECOND = 1_000_000
 # So high that nothing is left of the filter.
 UNFILTERED = {'external_wrench.cutoff': 1e9}
+
+
+def target_of(motion: Motion) -> Target:
+    """Return a motion of one sample as the last setpoint."""
+    found = StewartPlatform(HEXAPOD).inverse_dynamics(motion, singular='nan')
+    return Target(tuple(motion.rows.reshape(-1).tolist()), float(found.determinant))
 
 
 def six(values: Any) -> Six:
@@ -88,7 +94,7 @@ def estimates(step: ExternalWrench, measurements: Sequence[Measurement], target:
               known: Any = NO_WRENCH) -> list[Estimate]:
     """Return the estimates from measurements one after the other."""
     found: list[Estimate] = []
-    row = tuple(target.rows.reshape(-1).tolist())
+    row = target_of(target)
     for each in measurements:
         found.append(step(each, found[-1] if found else None, six(known), row))
     return found
@@ -116,7 +122,7 @@ def test_on_a_moving_base_its_motion_is_no_external_load() -> None:
     pose = random_motion(parameters, random, 1)
     still = Motion(pose.position[0], pose.rotation[0])
     load = random_wrench(parameters, random, 1)[0]
-    step, found, row = ExternalWrench(parameters), [], tuple(still.rows.tolist())
+    step, found, row = ExternalWrench(parameters), [], target_of(still)
     for n in range(200):
         base = BaseMotion.from_motion(of_base(n * 1e-3), parameters['gravity'])
         # The forces of a millisecond are those of its middle.
@@ -323,17 +329,17 @@ def test_the_search_begins_at_the_last_pose_and_then_at_the_setpoint() -> None:
     below = Motion([0.0, 0.0, -1.1], np.eye(3))
     step = ExternalWrench(HEXAPOD)
     at = resting(HEXAPOD, HOME, None, [BEGIN])[0]
-    found = step(at, None, NO_WRENCH, below.rows.tolist())
+    found = step(at, None, NO_WRENCH, target_of(below))
     assert relative(found.motion[:3], below.position) < 1e-9
-    again = step(at, found._replace(stamp=BEGIN + 10 ** 12), NO_WRENCH, HOME.rows.tolist())
+    again = step(at, found._replace(stamp=BEGIN + 10 ** 12), NO_WRENCH, target_of(HOME))
     assert relative(again.motion[:3], below.position) < 1e-9
     # It does not converge from the last pose: the setpoint is the guess.
     flat = found._replace(stamp=0, motion=tuple(Motion([0.0, 0.0, 0.0], np.eye(3)).rows.tolist()))
-    assert relative(step(at, flat, NO_WRENCH, HOME.rows.tolist()).motion[:3],
+    assert relative(step(at, flat, NO_WRENCH, target_of(HOME)).motion[:3],
                     HOME.position) < 1e-9
     # But not within a series.
     with pytest.raises(SingularityError, match=r'lengths \['):
-        step(at, flat._replace(stamp=BEGIN - 1), NO_WRENCH, HOME.rows.tolist())
+        step(at, flat._replace(stamp=BEGIN - 1), NO_WRENCH, target_of(HOME))
 
 
 # Singularities
@@ -360,7 +366,8 @@ def test_the_estimate_follows_the_setpoint_through_a_singularity(
         found.append(step(
             Measurement(BEGIN + n * 5 * MILLISECOND // 2, six(result.lengths[n]),
                         six(result.rates[n]), six(result.forces[n])),
-            found[-1] if found else None, NO_WRENCH, tuple(targets.rows[n].tolist())))
+            found[-1] if found else None, NO_WRENCH, Target(
+                tuple(targets.rows[n].tolist()), float(sides[n]))))
     poses = np.array([each.motion[:12] for each in found])
     off = np.abs(poses - true.rows[:, :12]).max(axis=1)
     # While the platform lags behind, near the singularity its mirror image may be taken.
@@ -379,9 +386,9 @@ def test_a_setpoint_beyond_a_singularity_that_is_not_followed_changes_nothing() 
     assert platform.inverse_dynamics(HOME).determinant * platform.inverse_dynamics(
         beyond).determinant < 0.0
     legs = resting(HEXAPOD, HOME, LOAD, [BEGIN + n * MILLISECOND for n in range(50)])
-    found = [step(legs[0], None, NO_WRENCH, tuple(HOME.rows.tolist()))]
+    found = [step(legs[0], None, NO_WRENCH, target_of(HOME))]
     for each in legs[1:]:
-        found.append(step(each, found[-1], NO_WRENCH, tuple(beyond.rows.tolist())))
+        found.append(step(each, found[-1], NO_WRENCH, target_of(beyond)))
     assert found == estimates(ExternalWrench(HEXAPOD), legs)
 
 
@@ -392,7 +399,7 @@ def test_lengths_of_no_pose_are_an_error() -> None:
     step = ExternalWrench(HEXAPOD)
     for lengths in ((0.1, *at.lengths[1:]), (-1.0,) * 6, (1e300,) * 6):
         with pytest.raises((PoseError, SingularityError), match=r'lengths \['):
-            step(at._replace(lengths=six(lengths)), None, NO_WRENCH, HOME.rows.tolist())
+            step(at._replace(lengths=six(lengths)), None, NO_WRENCH, target_of(HOME))
 
 
 @pytest.mark.parametrize('changed', [
@@ -567,7 +574,7 @@ def test_compiled_and_not_gives_the_same_bits() -> None:
 # Messages on ~/measured_legs: any layout, any order of names, and every reason of rejection
 
 JOINTS = list(HEXAPOD['joints'])
-TARGET = tuple(HOME.rows.tolist())
+TARGET = target_of(HOME)
 ZERO_LENGTHS = HEXAPOD['geometry.zero_length']
 
 

@@ -33,7 +33,7 @@ from stewart_dynamics.replay.index import row_of, write_fleet
 from stewart_dynamics.replay.motor_charts import Deliverable, motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import MARGIN, needed
 from stewart_dynamics.replay.statements import Card, cards, motion_statements
-from stewart_dynamics.replay.summary import Answered, Summary
+from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.motor_step import DEMANDED_TORQUES, MOTOR_ROW, SPEEDS
 from stewart_dynamics.setpoints.step import Batch, Step
@@ -67,7 +67,8 @@ def summary_of(p: Parameters, motion: Motion, times: Array, edges: list[int],
         block = setpoints(motion, times).chosen(slice(first, end))
         outputs = step.many(block, state)
         state = outputs.state
-        summary.add(Answered(times[first:end], block, outputs, base.many(block)))
+        summary.add(Answered(times[first:end], block, outputs, base.many(block),
+                             powers_of(StewartPlatform(p), block, outputs)))
     values = summary.values()
     to_json(values)
     return values

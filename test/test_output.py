@@ -79,7 +79,7 @@ def answered(outputs: Outputs, times: NDArray[np.int64], motions: Array) -> Answ
     n = len(outputs.stamps)
     return Answered(np.arange(n) / 7.0, Batch(
         outputs.stamps, motions, np.zeros((n, 6)), np.zeros(n, dtype=bool), times), outputs,
-        base_wrenches_of(outputs))
+        base_wrenches_of(outputs), np.zeros((n, 6)))
 
 
 def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]]) -> Path:

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from stewart_dynamics import Motion, Parameters, StewartError
+from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import BASE, NO_BASE
@@ -41,7 +41,7 @@ from stewart_dynamics.reference_motion.motion import motion_at, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.replay.bag_report import Report, share_plotly
 from stewart_dynamics.replay.residuals import Comparison
-from stewart_dynamics.replay.summary import Answered, Summary
+from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.replay.summary_text import measured_headline
 from stewart_dynamics.reporting.colors import LEG_COLORS, ROLES
 from stewart_dynamics.reporting.pages import (
@@ -73,6 +73,7 @@ class Given:
             stamps, motions, np.zeros((many, 6)), np.zeros(many, dtype=bool), stamps, bases)
         self.outputs: Outputs = Step(parameters).many(self.setpoints, None)
         self.base_wrenches = BaseWrench(parameters).many(self.setpoints)
+        self.powers = powers_of(StewartPlatform(parameters), self.setpoints, self.outputs)
         self.breakdown = ForceBreakdownRows(parameters)(motions, self.setpoints.wrenches, bases)
         if bases is not None:
             self.breakdown[np.isnan(bases[:, 0])] = np.nan
@@ -82,7 +83,7 @@ class Given:
         return Answered(
             self.seconds[part] + later, self.setpoints.chosen(part),
             Outputs(*(each[part] for each in self.outputs)), self.base_wrenches[part],
-            self.breakdown[part])
+            self.powers[part], self.breakdown[part])
 
     def summary(self, **changes: Any) -> dict[str, Any]:
         """Return what summary.json would hold."""

@@ -122,11 +122,14 @@ class Samples:
     def parts(self, edges: Sequence[int] = ()) -> Iterator[Answered]:
         """Return them as the replay gives them, in blocks with these edges."""
         outputs, setpoints = self.outputs(), self.setpoints()
+        with np.errstate(over='ignore'):
+            powers = self.demanded * self.rates
         for first, end in zip([0, *edges], [*edges, len(self.seconds)], strict=True):
             part = slice(first, end)
             yield Answered(
                 self.seconds[part], setpoints.chosen(part),
                 Outputs(*(each[part] for each in outputs)), self.base_wrenches[part],
+                powers[part],
                 None if self.breakdown is None else self.breakdown[part])
 
     def summary(self, parameters: Parameters, edges: Sequence[int] = (),
@@ -412,7 +415,7 @@ def test_it_keeps_no_samples() -> None:
             summary.add(Answered(
                 samples.seconds + n, setpoints.chosen(np.arange(2000)),
                 Outputs(*map(np.copy, outputs)), samples.base_wrenches.copy(),
-                samples.breakdown.copy()))
+                samples.demanded * samples.rates, samples.breakdown.copy()))
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()

@@ -372,8 +372,6 @@ def _gravity(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[
         if 'gravity' not in mechanism.carried:
             remarks.append(f'gravity: not in the file: {-STANDARD_GRAVITY[2]} m/s^2 along the '
                            "world's -z")
-    elif not gravity.any():
-        remarks.append('gravity: zero in the file: forces have no weight')
     turn = found.base.placement.rotation
     return {'gravity': gravity if np.array_equal(turn, np.eye(3)) else turn.T @ gravity}
 

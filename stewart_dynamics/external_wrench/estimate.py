@@ -66,7 +66,7 @@ from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import (
-    BASE, consecutive, FORCES, MOTION, NO_BASE, PARTS_OF_WRENCH, POSE, POSITION, RESULT,
+    BASE, consecutive, FORCES, MOTION, NO_BASE, PARTS_OF_WRENCH, POSITION, RESULT,
     ROTATION, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
@@ -84,11 +84,10 @@ _MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _ACROSS, _CODE = consecu
 # The motion given is the previous one, or the guess.
 (_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION, _BASE_BEFORE,
  _BASE, _TARGET, _WRITTEN, _RESULT, _TILE) = consecutive(
-    CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, BASE, BASE, POSE.stop, _CODE.stop, RESULT,
+    CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, BASE, BASE, 1, _CODE.stop, RESULT,
     inverse_dynamics.TILE)
 _GIVEN = Struct(f'{_WRITTEN.start - _LENGTHS.start}d')
 _GIVES = Struct(f'{_CODE.stop}d')
-_NO_TARGET = (math.nan,) * POSE.stop
 
 
 class Measurement(NamedTuple):
@@ -98,6 +97,13 @@ class Measurement(NamedTuple):
     lengths: Six  # [m]
     rates: Six  # [m/s]
     forces: Six  # of the actuators since the last measurement [N], + pushes
+
+
+class Target(NamedTuple):
+    """The last setpoint, where the platform should be."""
+
+    motion: Sequence[float]  # a row of motion
+    determinant: float  # det(J) there [m^3]
 
 
 class Overload(NamedTuple):
@@ -188,8 +194,7 @@ def _one(numbers: Array) -> None:
     for n in range(MOTION):
         motion[n] = before[n]
     # Whether the setpoint is on the other side of a singularity; nan: no setpoint.
-    sides = forward_kinematics.determinant(constants, before) * forward_kinematics.determinant(
-        constants, numbers[_TARGET])
+    sides = forward_kinematics.determinant(constants, before) * numbers[_TARGET.start]
     written[_ACROSS.start] = 1.0 if sides < 0.0 else 0.0
     code, written[_STEPS.start], written[_RESIDUAL.start] = forward_kinematics.pose(
         constants, numbers[_LENGTHS], motion)
@@ -245,12 +250,12 @@ class ExternalWrench:
                         if parameters[limit] is not None]
 
     def __call__(self, measurement: Measurement, before: Estimate | None, known: Six,
-                 target: Sequence[float] | None, base: tuple[float, ...] = NO_BASE) -> Estimate:
+                 target: Target | None, base: tuple[float, ...] = NO_BASE) -> Estimate:
         """
         Return the estimate for a measurement with finite numbers.
 
-        ``known`` is the load on ``~/wrench`` [N, N m], ``target`` the last setpoint as a row of
-        motion. If the stamp of the last estimate is later, or older by more than
+        ``known`` is the load on ``~/wrench`` [N, N m], ``target`` the last setpoint.
+        If the stamp of the last estimate is later, or older by more than
         ``setpoint.timeout``, only its pose is used, and the filter restarts. It restarts as well
         where the platform has followed the target through a singularity.
 
@@ -266,10 +271,10 @@ class ExternalWrench:
             result = self._solve(given, before.wrench or NO_WRENCH, seconds, before.motion,
                                  before.base, base, target)
             if target is not None and result[_ACROSS.start] == 1.0:
-                other = self._solve(given, NO_WRENCH, 0.0, target, base, base)
+                other = self._solve(given, NO_WRENCH, 0.0, target.motion, base, base)
                 if other[_CODE.start] == forward_kinematics.FOUND and (
                         result[_CODE.start] != forward_kinematics.FOUND
-                        or 2.0 * self._distance(other, target) < self._distance(other, result)):
+                        or 2.0 * self._distance(other, target.motion) < self._distance(other, result)):
                     result, interval = other, 0
         else:
             for guess in self._guesses(before, target):
@@ -290,13 +295,13 @@ class ExternalWrench:
 
     def _solve(self, given: tuple[float, ...], before: Six, interval: float,
                motion: Sequence[float], base_before: tuple[float, ...],
-               base: tuple[float, ...], target: Sequence[float] | None = None,
+               base: tuple[float, ...], target: Target | None = None,
                ) -> tuple[float, ...]:
         # Computed here: compiled code has an expm1 of its own.
         gain = -math.expm1(-self._rate * interval)
         _GIVEN.pack_into(
             self._memory, 8 * _LENGTHS.start, *given, *before, gain, interval, *motion,
-            *base_before, *base, *(_NO_TARGET if target is None else target[POSE]))
+            *base_before, *base, math.nan if target is None else target.determinant)
         self._bound()
         return _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
 
@@ -305,12 +310,12 @@ class ExternalWrench:
         turned = math.dist(one[ROTATION], other[ROTATION]) / math.sqrt(2.0)
         return math.hypot(math.dist(one[POSITION], other[POSITION]), self._size * turned)
 
-    def _guesses(self, before: Estimate | None, target: Sequence[float] | None,
+    def _guesses(self, before: Estimate | None, target: Target | None,
                  ) -> Iterator[Sequence[float]]:
         if before is not None:
             yield before.motion
         if target is not None:
-            yield target
+            yield target.motion
         yield from self._homes
 
     @cached_property

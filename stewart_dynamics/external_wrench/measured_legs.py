@@ -29,7 +29,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array, SECOND, Six, Stamps
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError, StewartError
 from stewart_dynamics.external_wrench.effort_check import EffortCheck
-from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench, Measurement
+from stewart_dynamics.external_wrench.estimate import (
+    Estimate, ExternalWrench, Measurement, Target)
 from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, NO_BASE, TWIST, WRENCH
 from stewart_dynamics.messages.cdr import MalformedError
@@ -147,7 +148,7 @@ class MeasuredLegs:
         if self._efforts.mistake is not None:
             self._efforts = EffortCheck(parameters)  # they may have been the mistake
 
-    def take(self, data: bytes, known: Six, target: tuple[float, ...] | None,
+    def take(self, data: bytes, known: Six, target: Target | None,
              base: BaseInput | None = None) -> Estimate | None:
         """
         Return the estimate from a sensor_msgs/JointState (CDR), or None where it is rejected.

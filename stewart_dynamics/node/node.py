@@ -35,7 +35,7 @@ from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.external_wrench import estimate as external_wrench, payload
 from stewart_dynamics.external_wrench.estimate import (
-    EXTERNAL_WRENCH, ExternalWrench, WRENCH_LIMITS)
+    EXTERNAL_WRENCH, ExternalWrench, Target, WRENCH_LIMITS)
 from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
@@ -160,7 +160,7 @@ class DynamicsNode(LifecycleNode):
         self._waiting: list[tuple[Setpoint, float]] = []  # joined setpoints, and times of arrival
         self._gathering = False  # a task answers them after the messages received
         self._last: Output | None = None
-        self._target: tuple[float, ...] | None = None  # motion of the last answered setpoint
+        self._target: Target | None = None  # the last answered setpoint
         self._restarting = False  # the last setpoint was a restart that could not be answered
         publishers, rate = self._topics.publishers, parameters['visualization_rate']
         self._markers = PublisherAtRate(publishers.get(MARKERS), rate, Markers(parameters).write)
@@ -284,7 +284,7 @@ class DynamicsNode(LifecycleNode):
         publishers = self._topics.publishers
         for topic, message in self._messages.of_output(output):
             publishers[topic].publish(message)
-        self._last, self._target = output, setpoint.motion
+        self._last, self._target = output, Target(setpoint.motion, output.determinant)
         self._note(setpoint, output, came)
 
     def _note(self, setpoint: Setpoint, output: Output, came: float) -> None:
@@ -364,7 +364,7 @@ class DynamicsNode(LifecycleNode):
         if estimate.published is not None:
             self._topics.publishers[EXTERNAL_WRENCH].publish(
                 self._messages.of_wrench(estimate.stamp, estimate.published))
-        diagnostics.estimated(estimate, self._target, now)
+        diagnostics.estimated(estimate, self._target and self._target.motion, now)
         if self._diagnostics.level_changed(now):
             self._report()
 

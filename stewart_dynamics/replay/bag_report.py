@@ -40,7 +40,6 @@ from stewart_dynamics.mechanics.limits import (
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, PARTS_OF_WRENCH,
     POSE, POSITION, ROTATION)
-from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import NEEDS
@@ -76,7 +75,7 @@ class Report:
 
     def __init__(self, parameters: Parameters, measured: bool = False,
                  folder: Path | None = None) -> None:
-        self._parameters, self._platform = parameters, StewartPlatform(parameters)
+        self._parameters = parameters
         self._legs: tuple[str, ...] = parameters['joints']
         self._sources = len(sources_of(parameters))
         timeout = parameters['setpoint.timeout']
@@ -92,11 +91,9 @@ class Report:
 
     def add(self, block: Answered) -> None:
         """Add setpoints, at least one, with their breakdown."""
-        seconds, setpoints, outputs, base_wrenches, breakdown = block
+        seconds, setpoints, outputs, base_wrenches, powers, breakdown = block
         assert breakdown is not None
         motions, forces = setpoints.motions, outputs.demanded_forces
-        with np.errstate(over='ignore'):
-            powers = forces * self._platform.drive_rates(motions, outputs.rates)
         if self._first is None:
             self._first = motions[0, POSITION].copy()
         angles = self._continued(np.degrees(to_euler(motions[:, ROTATION].reshape(-1, 3, 3))))

@@ -38,6 +38,7 @@ from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.program import SOFTWARE
@@ -47,7 +48,7 @@ from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison, Efforts
-from stewart_dynamics.replay.summary import Answered, Summary
+from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
 from stewart_dynamics.setpoints import base_wrench, inputs, step
@@ -162,6 +163,7 @@ class _Run:
         self._first_time: int | None = None
         self._setpoints = Setpoints(parameters, self._rejected, self._notice)
         self._step = Step(parameters)
+        self._platform = StewartPlatform(parameters)
         self._base_wrench = BaseWrench(parameters)
         self._state: State | None = None
         self._restarting = False
@@ -291,7 +293,8 @@ class _Run:
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
         block = Answered(self._seconds(setpoints.stamps), setpoints, outputs,
-                         self._base_wrench.many(setpoints))
+                         self._base_wrench.many(setpoints),
+                         powers_of(self._platform, setpoints, outputs))
         self._files.write(block)
         if self.report is not None:
             block = block._replace(breakdown=self._breakdown(

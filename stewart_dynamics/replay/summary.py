@@ -69,8 +69,17 @@ class Answered(NamedTuple):
     setpoints: Batch
     outputs: Outputs
     base_wrenches: Array  # wrench of the hexapod on its base (N, 6) [N, N m]; nan: not known
+    powers: Array  # mechanical powers of the drives (N, 6) [W]
     breakdown: Array | None = None
     """The demanded forces by source (N, 7, 6): sample, source, leg [N]."""
+
+
+def powers_of(platform: StewartPlatform, setpoints: Batch, outputs: Outputs) -> Array:
+    """Return the mechanical powers of the drives (N, 6) [W]."""
+    with np.errstate(over='ignore', invalid='ignore'):
+        powers: Array = outputs.demanded_forces * platform.drive_rates(
+            setpoints.motions, outputs.rates)
+    return powers
 
 
 class Summary:
@@ -101,7 +110,6 @@ class Summary:
         # of the quantity of each limit, the value nearest to it or farthest beyond it
         self._peaks = {
             name: Extreme(6, np.negative if name in MINIMA else np.abs) for name in LIMITS}
-        self._platform = StewartPlatform(parameters)
         self._published, self._power = Extreme(6, np.abs), Extreme(6, np.abs)
         # squares of the forces; driving power; braking power
         self._means = Integral(18)
@@ -141,7 +149,7 @@ class Summary:
             self._add(block)
 
     def _add(self, block: Answered) -> None:
-        seconds, setpoints, outputs, base_wrenches, breakdown = block
+        seconds, setpoints, outputs, base_wrenches, power, breakdown = block
         steps = self._steps(seconds, setpoints)
         lengths, rates, demanded = outputs.lengths, outputs.rates, outputs.demanded_forces
         without = with_nan(demanded)
@@ -160,7 +168,6 @@ class Summary:
         self._suppressed += int((with_nan(outputs.forces) & ~without).sum())
         self._base_wrench.add(seconds, steps, base_wrenches)
         with np.errstate(over='ignore', invalid='ignore'):
-            power = demanded * self._platform.drive_rates(setpoints.motions, rates)
             self._means.add(steps, np.concatenate(
                 (demanded ** 2, np.maximum(power, 0.0), np.maximum(-power, 0.0)), axis=1))
         self._published.add(seconds, outputs.forces)
