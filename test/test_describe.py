@@ -82,6 +82,17 @@ def test_likely_mistakes_are_warnings_and_exit_code_1_with_strict(tmp_path, caps
     assert run('--from', tmp_path / 'wrong.sdf', '--output', tmp_path / 'read', '--strict') == 1
 
 
+def test_zero_gravity_of_a_file_is_said_once(tmp_path, capsys):
+    pytest.importorskip('mujoco')
+    Parameters.from_yaml(PLATFORM).replaced({'gravity': [0.0, 0.0, 0.0]}).to_yaml(
+        tmp_path / 'orbit.yaml')
+    assert run('--params', tmp_path / 'orbit.yaml', '--output', tmp_path) == 0
+    capsys.readouterr()
+    assert run('--from', tmp_path / 'orbit.xml', '--output', tmp_path / 'read') == 0
+    (said,) = [line for line in capsys.readouterr().err.splitlines() if 'gravity' in line]
+    assert said.startswith('stewart_describe: warning: gravity: 0 m/s^2: none, as in orbit?')
+
+
 def test_the_block_of_ros2_control_is_written_by_option(tmp_path):
     run('--params', PLATFORM, '--output', tmp_path, '--ros2-control', 'position,effort',
         '--hardware', 'topic')

@@ -482,7 +482,7 @@ def judged(measurements: Sequence[Measurement], parameters: Parameters = HEXAPOD
 
 
 def with_noise(measurements: Sequence[Measurement], factor: float = 1.0, noise: float = 0.0,
-          ) -> list[Measurement]:
+               ) -> list[Measurement]:
     """Return measurements with efforts in another unit, and noise as the accuracy page has it."""
     random = rng(3)
     return [each._replace(

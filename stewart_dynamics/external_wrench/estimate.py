@@ -59,10 +59,10 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
 from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
+from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.bodies import drive_row
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
-from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import (
@@ -274,7 +274,8 @@ class ExternalWrench:
                 other = self._solve(given, NO_WRENCH, 0.0, target.motion, base, base)
                 if other[_CODE.start] == forward_kinematics.FOUND and (
                         result[_CODE.start] != forward_kinematics.FOUND
-                        or 2.0 * self._distance(other, target.motion) < self._distance(other, result)):
+                        or 2.0 * self._distance(other, target.motion)
+                        < self._distance(other, result)):
                     result, interval = other, 0
         else:
             for guess in self._guesses(before, target):

@@ -366,12 +366,12 @@ class Identification:
         sums = sums_of(extracts)
         if sums.counts.sum(axis=0).min() < _FEWEST:
             whole = sums_of(extracts, lambda each: np.ones_like(each.used))
-            likely = [f'likely mistake: {each.text}' for each in self._of_efforts(whole)] or [
+            reasons = [f'likely mistake: {each.text}' for each in self._of_efforts(whole)] or [
                 'is geometry.zero_length right, and are the efforts in N?']
             raise BagError(f'{self.bags[0].bag}: nothing to identify from: '
                            f'{sum(bag.samples_at_stops for bag in self.bags)} samples are at or '
                            'beyond limits.length_min, length_max or force_max: '
-                           + '; '.join(likely))
+                           + '; '.join(reasons))
         unsound = 6 * extracts.samples - int(sums.counts.sum())
         clean, noisy, grams, samples = zip(*self._noises, strict=True)
         noise = sum(grams) * (extracts.samples / sum(samples))

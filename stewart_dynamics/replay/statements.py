@@ -198,7 +198,7 @@ def _limits(summary: Summary) -> Iterator[Statement]:
 
 
 def _held(summary: Summary, topic: str, limits: str) -> Statement:
-    """Return that limits are held, by what, and whether measured efforts contradict that."""
+    """Return that limits are held by demands, and whether measured efforts contradict that."""
     measured = summary.get('measured')
     if not measured:
         return Statement(topic, 'good', f'{limits} held')

@@ -99,7 +99,7 @@ class Setpoints:
         mistake = (self._pose_mistake('first', self._first) if ever
                    else self._pose_mistake('last', self._last) if found else [])
         if mistake:
-            # Derivatives of wrong poses do not show what is wrong with twists.
+            # Derivatives of wrong poses do not show the mistake in twists.
             found = inconsistencies(self._consistency, ever, self._topic_of, reasons=False)
         return mistake + found + self.base.mistakes(ever)
 

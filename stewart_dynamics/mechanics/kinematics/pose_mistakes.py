@@ -69,7 +69,8 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
     Without a home pose only a position in mm is named.
     """
     pose = np.array(motion[POSE])
-    position, rotation = pose[POSITION], pose[ROTATION].reshape(3, 3)
+    position: Array = pose[POSITION]
+    rotation: Array = pose[ROTATION].reshape(3, 3)
     try:
         home = home_pose(parameters)
     except ParameterError:
