@@ -192,7 +192,6 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
             'fits all others: lengths and poses must be of the same instants, at rest')])
     found = fit(used, unknowns, None if noise is None else Noise(*noise))
     lack = lack_of_fit(platform, used, found, unknowns, held, found.whitened if noise else None)
-    because = f'; {lack[0].text}' if lack else ''
     what = found.identifiability
     what = what._replace(scales=what.scales[:GEOMETRY], shares=what.shares[:GEOMETRY],
                          directions=what.directions[:GEOMETRY])
@@ -205,7 +204,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     if IDENTIFIED not in states:
         refuse([LikelyMistake(
             'identifiable', 'no number is identifiable by itself, with residuals of '
-            f'{1e3 * after.max():.3g} mm: {missing}{because}')])
+            f'{1e3 * after.max():.3g} mm: {lack[0].text if lack else missing}')])
     validation = _validated(p, used, unknowns, found, hold_out)
     if validation is not None:
         errors_before, errors_after = (
@@ -214,7 +213,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
             refuse([LikelyMistake(
                 'worse', f'held-out poses are {_shown(validation.before)} off by the file, but '
                 f'{_shown(validation.after)} by a fit to the others: the poses do not support a '
-                f'better geometry{because}')])
+                'better geometry' + (f'; {lack[0].text}' if lack else ''))])
     covariance = found.covariance[:GEOMETRY, :GEOMETRY]
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + (what.shares * what.scales) ** 2)
     # Errors of neighbors are correlated: poses are known better than each number of the geometry.

@@ -65,6 +65,10 @@ def _arguments() -> argparse.ArgumentParser:
     data.add_argument('--mm', action='store_true',
                       help='x, y, z and the leg positions are in mm, not in m')
     data.add_argument('--degrees', action='store_true', help='angles are in degrees, not in rad')
+    data.add_argument('--drive-positions', action='store_true',
+                      help='leg positions are those of drives whose screws turn with their legs '
+                           '(drive.screw_rotation: universal): motor angles times lead / (2 pi '
+                           'gear_ratio)')
     data.add_argument('--frames', choices=('known', 'unknown'), default='known',
                       help='unknown: the device measures a target on the platform in a frame of '
                            'its own; both are calibrated as well (default: known)')
@@ -100,7 +104,7 @@ def _run(given: argparse.Namespace) -> int:
     interrupt_on_signals()
     options = CalibrationOptions(
         given.fixed, given.frames, given.noise and Noise(*given.noise), given.hold_out, given.mm,
-        given.degrees, given.accept_mistakes, given.report, given.force)
+        given.degrees, given.drive_positions, given.accept_mistakes, given.report, given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
     if given.design is not None:
         _PROGRAM.say(design_command.run(given, parameters, given.output or Path(DESIGNED)))

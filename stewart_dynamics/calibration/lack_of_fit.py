@@ -44,13 +44,12 @@ from stewart_dynamics.calibration.fit import Fit, Unknowns
 from stewart_dynamics.calibration.noise import covariances, whitening
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import to_euler
-from stewart_dynamics.mechanics.least_squares import normal
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
-# A cause is named if its Bayes factor against noise is larger, and with others whose Bayes factors
-# are not smaller by more than the second.
-_NAMED, _CLEARLY = math.log(1e3), math.log(20.0)
+# Something is named if its Bayes factor against noise is larger; its cause, if the Bayes factor
+# against every other cause is larger than the second.
+_NAMED, _CLEARLY = math.log(200.0), math.log(20.0)
 # Standard deviations tau by those of the residuals, as the effect of a term in the residuals.
 _SQUARES = np.geomspace(0.3, 10.0, 12) ** 2
 # Given noise is too small if noise has such residuals with a smaller probability.
@@ -59,17 +58,20 @@ _PROBABILITY = 1e-6
 _ROUNDING, _DEPENDENT = 1e-12, 1e-13
 # Numbers of poses on either side of a split at least, and of splits of one quantity at most.
 _FEWEST, _SPLITS = 2, 19
-_TURNS, _FIXED, _SCALE, _POSE, _DRIFT, _PLAY, _NOISE = (
-    'turns', 'fixed', 'scale', 'pose', 'drift', 'play', 'noise')
+_OF_A_LEG = 7  # unknowns
+_ALL = 'all legs'
+_FIXED, _SCALE, _TURNS, _DEFLECTION, _POSE, _DRIFT, _PLAY, _NOISE, _UNEXPLAINED = (
+    'fixed', 'scale', 'turns', 'deflection', 'pose', 'drift', 'play', 'noise', 'unexplained')
 _LACKS = {
-    _FIXED: 'the fixed values are not those of the hexapod: {}',
-    _SCALE: 'positions off by scale, from the lead of the screw or the encoder: {}',
-    _TURNS: 'positions of drives whose screws turn with their legs, or of the other hand or lead '
-            'than drive.* has: {}',
-    _POSE: 'residuals depend on the pose, from deflection or joints without a common center: {}',
-    _DRIFT: 'residuals drift from the first pose to the last: {}',
-    _PLAY: 'play, a loose joint or encoder: {}',
-    _NOISE: 'the residuals are {} the noise that was given'}
+    _FIXED: 'the fixed values are not those of the hexapod',
+    _SCALE: 'positions off by scale, from the lead of the screw or the encoder',
+    _TURNS: 'positions follow the turns of the legs about their axes, as those of drives whose '
+            'screws turn with the legs (--drive-positions, drive.*)',
+    _DEFLECTION: 'residuals follow the static forces of the legs, from deflection',
+    _POSE: 'residuals depend on the pose, from joints without a common center or deflection',
+    _DRIFT: 'residuals drift from the first pose to the last',
+    _PLAY: 'play, a loose joint or encoder',
+    _UNEXPLAINED: 'not explained'}
 _SIDES = ('its static force', *(f'the pose ({each})' for each in (
     'x', 'y', 'z', 'alpha', 'beta', 'gamma')), 'its position', 'its move to the pose')
 
@@ -115,19 +117,15 @@ class _Residuals(NamedTuple):
         squares, directions = np.linalg.eigh(free.T @ free)
         return float(self._evidence(np.maximum(squares, 0.0), directions.T @ (free.T @ self.left)))
 
-    def of_each(self, terms: Array) -> tuple[float, float, float]:
-        """Return the evidence of one of k terms, the best one's, and its amplitude [m]."""
+    def of_each(self, terms: Array) -> tuple[Array, Array]:
+        """Return the evidence of each of k terms, and its amplitude [m by the term's unit]."""
         free = self.free(terms)
         if not free.size:
-            return 0.0, 0.0, 0.0
-        sizes = np.linalg.norm(free, axis=0)
+            return np.zeros(1), np.zeros(1)
+        sizes, count = np.linalg.norm(free, axis=0), len(self.whiten)
         along = self.left @ free / sizes
-        count = len(self.whiten)
-        found = self._evidence(np.full((len(sizes), 1), float(count)),
-                               math.sqrt(count) * along[:, None])
-        best = int(np.argmax(found))
-        return _mean(found), float(found[best]), float(
-            self.deviation * abs(along[best]) / sizes[best])
+        return self._evidence(np.full((len(sizes), 1), float(count)),
+                              math.sqrt(count) * along[:, None]), self.deviation * along / sizes
 
     def of_noise(self, leg: int) -> float:
         """Return the evidence of one leg's own noise."""
@@ -185,29 +183,37 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
     if np.sqrt(np.mean(found.lin.residuals ** 2)) < _ROUNDING * unknowns.size:
         return ()
     terms, sides = _terms(platform, equations, found, fixed)
-    joints = platform.parameters['joints']
+    names = platform.parameters['joints']
+    rms = 1e6 * np.sqrt(np.mean(found.lin.residuals ** 2, axis=0))
+    scatter = [f'{name} (residuals of {each:.3g} um, {np.median(rms):.3g} um in the median leg)'
+               for name, each in zip(names, rms, strict=True)]
     legs, causes = [*range(6)], []
     while legs:
         residuals = _Residuals.of(found, unknowns, legs)
         if residuals.freedom < 1:
             break
-        tried = sorted(_causes(residuals, legs, terms, sides, joints), reverse=True)
+        tried = sorted(_causes(residuals, legs, terms, sides, names, scatter),
+                       reverse=True)
         best = tried[0]
         if best.evidence < _NAMED:
             break
-        causes += [each for n, each in enumerate(tried)
-                   if each.evidence > max(best.evidence - _CLEARLY, _NAMED)
-                   and each.what not in [other.what for other in tried[:n]]]
+        likely = {each.what: each for each in reversed(tried)
+                  if each.evidence > best.evidence - _CLEARLY}
+        if len(likely) > 1:
+            causes.append((_UNEXPLAINED, f'{best.text}, {" or ".join(likely)}'))
+        else:
+            causes.append((best.what, best.text))
         legs = [leg for leg in legs if leg not in best.legs]
-    lacks = [LikelyMistake(what, _LACKS[what].format(', '.join(
-        each.text for each in causes if each.what == what)))
-        for what in dict.fromkeys(each.what for each in causes)]
+    lacks = [LikelyMistake(what, f'{_LACKS[what]}: ' + ', '.join(
+        text for each, text in causes if each == what))
+        for what in dict.fromkeys(what for what, _ in causes)]
     if whitened is not None and not lacks:
         rest = max(whitened.size - found.identifiability.rank, 1)
         square = float(np.sum(whitened ** 2))
         if chi2.sf(square, rest) < _PROBABILITY:
-            lacks.append(LikelyMistake(_NOISE, _LACKS[_NOISE].format(
-                f'{math.sqrt(square / rest):.2g} times')))
+            lacks.append(LikelyMistake(_NOISE, 'the residuals are '
+                                       f'{math.sqrt(square / rest):.2g} times the noise that was '
+                                       'given'))
     return tuple(lacks)
 
 
@@ -222,43 +228,52 @@ def _terms(platform: StewartPlatform, equations: Equations, found: Fit, fixed: F
     # Lengths are nearly quadratic in the pose themselves: cubic terms, too.
     of_pose = np.concatenate([*(u[:, a:a + 1] * u[:, a:] for a in range(6)), u ** 3], axis=1)
     of_all = {_POSE: of_pose, _DRIFT: np.concatenate([time, time ** 2], axis=1)}
-    forces = platform.inverse_dynamics(Motion.from_pose(pose), singular='nan').forces
+    forces = np.nan_to_num(platform.inverse_dynamics(
+        Motion.from_pose(pose), singular='nan').forces)
     moves = np.diff(equations.lengths, axis=0, prepend=equations.lengths[:1])
     return {
         _FIXED: found.lin.derivatives[..., :GEOMETRY][..., fixed],
         _SCALE: equations.lengths[..., None],
         _TURNS: equations.turns(found.values)[..., None],
+        _DEFLECTION: forces[..., None],
         **{what: np.repeat(each[:, None], 6, axis=1) for what, each in of_all.items()}}, [
-            np.nan_to_num(forces), *(np.repeat(each[:, None], 6, axis=1) for each in u.T),
+            forces, *(np.repeat(each[:, None], 6, axis=1) for each in u.T),
             equations.lengths, moves]
 
 
 def _causes(residuals: _Residuals, legs: Sequence[int], terms: dict[str, Array],
-            sides: Sequence[Array], joints: Sequence[str]) -> Iterator[_Cause]:
+            sides: Sequence[Array], names: Sequence[str], scatter: Sequence[str],
+            ) -> Iterator[_Cause]:
     """Yield the causes of larger residuals of single legs, and of all."""
-    count = len(residuals.whiten)
+    count, place = len(residuals.whiten), {leg: n for n, leg in enumerate(legs)}
+
+    def of_legs(values: Array, which: Sequence[int]) -> Array:
+        """Return values (N, 6, k) as terms of their own for some legs (N, m, k legs)."""
+        found = np.zeros((count, len(legs), len(which), values.shape[2]))
+        for n, leg in enumerate(which):
+            found[:, place[leg], n] = values[:, leg]
+        return found.reshape(count, len(legs), -1)
+
     for what, each in terms.items():
-        whole = np.zeros((count, len(legs), len(legs), each.shape[2]))
-        for n, leg in enumerate(legs):
-            whole[:, n, n] = each[:, leg]
-        for n, leg in enumerate(legs):
-            yield _Cause(residuals.of_terms(whole[:, :, n]), what, (leg,), joints[leg])
-        yield _Cause(residuals.of_terms(whole.reshape(count, len(legs), -1)), what, tuple(legs),
-                     'all legs')
-    for n, leg in enumerate(legs):
-        evidences, best = [], (-math.inf, 0.0, '')
-        for name, values in zip(_SIDES, sides, strict=True):
-            of_leg = np.zeros((count, len(legs), 1))
-            splits = _splits(values[:, leg])
-            of_leg = np.zeros((count, len(legs), splits.shape[1]))
-            of_leg[:, n] = splits
-            evidence, largest, amplitude = residuals.of_each(of_leg)
-            evidences.append(evidence)
-            best = max(best, (largest, amplitude, name))
-        side, noise = _mean(np.array(evidences)), residuals.of_noise(n)
-        yield _Cause(_mean(np.array([side, noise])), _PLAY, (leg,), joints[leg] + (
-            f' (+-{1e6 * best[1]:.3g} um, the side changes with {best[2]})' if side > noise
-            else ' (scattered)'))
+        # As many terms as poses explain any scatter.
+        few = each.shape[2] + _OF_A_LEG > count
+        for leg in legs:
+            yield _Cause(residuals.of_noise(place[leg]) if what == _POSE and few else
+                         residuals.of_terms(of_legs(each, [leg])), what, (leg,), names[leg] + (
+                f' ({-residuals.of_each(of_legs(each, [leg]))[1][0]:+.2%})'
+                if what == _SCALE else ''))
+        if not (what == _POSE and few):
+            yield _Cause(residuals.of_terms(of_legs(each, legs)), what, tuple(legs), _ALL)
+    for leg in legs:
+        rules = [residuals.of_each(of_legs(_splits(values[:, leg])[:, None].repeat(6, axis=1), [
+            leg])) for values in sides]
+        side, noise = _mean(np.array([_mean(each) for each, _ in rules])), residuals.of_noise(
+            place[leg])
+        best = max(range(len(rules)), key=lambda n: float(rules[n][0].max()))
+        evidence, amplitudes = rules[best]
+        yield _Cause(_mean(np.array([side, noise])), _PLAY, (leg,), (
+            f'{names[leg]} (+-{1e6 * abs(amplitudes[int(np.argmax(evidence))]):.3g} um, the side '
+            f'changes with {_SIDES[best]})' if side > noise else scatter[leg]))
 
 
 def _splits(values: Array) -> Array:
@@ -268,5 +283,6 @@ def _splits(values: Array) -> Array:
     sides = np.where(values[:, None] > levels, 1.0, -1.0)
     few = np.minimum((sides > 0.0).sum(axis=0), (sides < 0.0).sum(axis=0)) < _FEWEST
     sides = sides[:, ~few]
-    return sides[:, np.unique(np.linspace(0, sides.shape[1] - 1, _SPLITS).round().astype(int))] \
-        if sides.shape[1] > _SPLITS else sides
+    last = sides.shape[1] - 1
+    return np.asarray(sides[:, np.unique(np.linspace(0, last, min(last + 1, _SPLITS)).round(
+        ).astype(int))])
