@@ -109,14 +109,12 @@ class Equations(NamedTuple):
         moment = np.zeros_like(s)  # by a turn of the platform, beside that of s
         if self.screws[:, PITCH].any():
             rotation = to_target @ turned
-            in_platform = platform @ np.swapaxes(rotation, 1, 2)
-            sizes = sizes + self.screws[:, PITCH] * lagrange.leg_twists(
-                s, rotation, self.screws)
+            arms_of_platform = platform @ np.swapaxes(rotation, 1, 2)
             of_drives = lagrange.drive_jacobian(
-                lagrange.Legs(np.linalg.norm(legs, axis=-1), s, in_platform), rotation,
-                self.screws)
+                lagrange.Legs(sizes, s, arms_of_platform), rotation, self.screws)
+            sizes = sizes + self.screws[:, PITCH] * self.turns(values)
             s = of_drives[..., :3]
-            moment = of_drives[..., 3:] - np.cross(in_platform, s)
+            moment = of_drives[..., 3:] - np.cross(arms_of_platform, s)
         s_target = s @ to_target
         found = np.zeros((*sizes.shape, ALL))
         for leg in range(6):
@@ -135,8 +133,8 @@ class Equations(NamedTuple):
     def turns(self, values: Array) -> Array:
         """Return the twists of the legs (N, 6) [rad], zero if their axes are not known."""
         pose = self.in_base(self.frames_at(values))
-        legs = pose.position[:, None] + values[PLATFORM].reshape(6, 3) @ np.swapaxes(
-            pose.rotation, 1, 2) - values[BASE].reshape(6, 3)
+        legs = pose.position[:, None] - values[BASE].reshape(6, 3) + (
+            pose.rotation[:, None] @ values[PLATFORM].reshape(6, 3, 1))[..., 0]
         return lagrange.leg_twists(
             legs / np.linalg.norm(legs, axis=-1, keepdims=True), pose.rotation, self.screws)
 

@@ -49,13 +49,16 @@ from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # Something is named if its Bayes factor against noise is larger; its cause, if the Bayes factor
 # against every other cause is larger than the second.
-_NAMED, _CLEARLY = math.log(200.0), math.log(20.0)
+_NAMED, _CLEARLY = math.log(1e3), math.log(20.0)
 # Standard deviations tau by those of the residuals, as the effect of a term in the residuals.
 _SQUARES = np.geomspace(0.3, 10.0, 12) ** 2
 # Given noise is too small if noise has such residuals with a smaller probability.
 _PROBABILITY = 1e-6
 # Smaller residuals, by the characteristic length, are rounding; relative squares that are zero.
 _ROUNDING, _DEPENDENT = 1e-12, 1e-13
+# Terms of which a smaller part is not explained by the unknowns are explained. Smaller moves of a
+# leg, by the residuals, can be noise.
+_SEEN, _MOVE = 1e-6, 10.0
 # Numbers of poses on either side of a split at least, and of splits of one quantity at most.
 _FEWEST, _SPLITS = 2, 19
 _OF_A_LEG = 7  # unknowns
@@ -105,7 +108,7 @@ class _Residuals(NamedTuple):
         """Return terms (N, m, k) whitened, and free of the unknowns' directions (N m, k)."""
         rows = (self.whiten @ terms).reshape(len(self.left), -1)
         free = rows - self.known @ (self.known.T @ rows)
-        seen = np.linalg.norm(free, axis=0) > 1e-6 * np.linalg.norm(rows, axis=0)
+        seen = np.linalg.norm(free, axis=0) > _SEEN * np.linalg.norm(rows, axis=0)
         return np.asarray(free[:, seen])
 
     def of_terms(self, terms: Array) -> float:
@@ -180,8 +183,10 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
     """
     from scipy.stats import chi2
 
-    if np.sqrt(np.mean(found.lin.residuals ** 2)) < _ROUNDING * unknowns.size:
-        return ()
+    deviation = math.sqrt(np.mean(found.lin.residuals ** 2))
+    if deviation < _ROUNDING * unknowns.size or (
+            equations.lengths.std(axis=0).max() < _MOVE * deviation):
+        return ()  # rounding errors, or one and the same pose
     terms, sides = _terms(platform, equations, found, fixed)
     names = platform.parameters['joints']
     rms = 1e6 * np.sqrt(np.mean(found.lin.residuals ** 2, axis=0))
@@ -231,6 +236,8 @@ def _terms(platform: StewartPlatform, equations: Equations, found: Fit, fixed: F
     forces = np.nan_to_num(platform.inverse_dynamics(
         Motion.from_pose(pose), singular='nan').forces)
     moves = np.diff(equations.lengths, axis=0, prepend=equations.lengths[:1])
+    moved = np.abs(moves) > _MOVE * np.sqrt(np.mean(found.lin.residuals ** 2))
+    last = np.maximum.accumulate(np.where(moved, np.arange(count)[:, None], 0), axis=0)
     return {
         _FIXED: found.lin.derivatives[..., :GEOMETRY][..., fixed],
         _SCALE: equations.lengths[..., None],
@@ -238,7 +245,7 @@ def _terms(platform: StewartPlatform, equations: Equations, found: Fit, fixed: F
         _DEFLECTION: forces[..., None],
         **{what: np.repeat(each[:, None], 6, axis=1) for what, each in of_all.items()}}, [
             forces, *(np.repeat(each[:, None], 6, axis=1) for each in u.T),
-            equations.lengths, moves]
+            equations.lengths, np.take_along_axis(moves, last, axis=0)]
 
 
 def _causes(residuals: _Residuals, legs: Sequence[int], terms: dict[str, Array],
