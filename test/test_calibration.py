@@ -21,7 +21,8 @@ from numpy.testing import assert_allclose
 import pytest
 from referees import PLATFORM
 from stewart_dynamics import (
-    calibrate, Motion, MotionError, ParameterError, Parameters, Pose, StewartError, StewartPlatform)
+    calibrate, Motion, MotionError, ParameterError, Parameters, Pose, StewartError,
+    StewartPlatform)
 from stewart_dynamics.calibration.equations import (
     ALL, Equations, Frames, GEOMETRY, inverse, product, values_of, with_geometry)
 from stewart_dynamics.calibration.fit import fit, Unknowns
@@ -412,7 +413,7 @@ def with_play(rng: np.random.Generator, count: int, play: float, side: str) -> t
 @pytest.mark.parametrize(('side', 'words'), [
     ('force', 'the side changes with its static force'), ('x', 'the side changes with'),
     ('tilt', 'the side changes with'), ('approach', 'the side changes with its move to the pose'),
-    ('nothing', 'not explained: leg_3, play or pose')])
+    ('nothing', 'not explained: leg_3, ')])
 def test_play_on_a_side_by_the_pose_is_noticed_with_few_poses(side: str, words: str) -> None:
     """20 poses, +-50 um, noise of 10 um: most of such play looks like another geometry."""
     texts = []

@@ -244,8 +244,8 @@ def _screws(p: Parameters, drive_positions: bool) -> Array:
     """Return the screws, with a pitch if positions are those of drives."""
     if drive_positions:
         if p['drive.screw_rotation'] != UNIVERSAL:
-            raise ParameterError('drive positions: with drive.screw_rotation: guided they are those '
-                                 'of the legs')
+            raise ParameterError('drive positions: with drive.screw_rotation: guided they are '
+                                 'those of the legs')
         return screw_constants(p)
     try:
         return np.column_stack([np.zeros(6), universal_axes(p)])

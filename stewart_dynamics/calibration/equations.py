@@ -81,7 +81,7 @@ class Equations(NamedTuple):
     lengths (N, 6): positions of the legs, which are zero at their zero length [m].
     pose: poses (N,) of the target in the device's frame.
     frames: frames that the unknown frames are relative to.
-    screws (6, SCREW): pitch, 0 where positions are those of legs, and axes of the universal joints.
+    screws (6, SCREW): pitch, 0 where positions are those of legs, and axes of universal joints.
     """
 
     lengths: Array

@@ -133,7 +133,6 @@ class _Residuals(NamedTuple):
     def of_noise(self, leg: int) -> float:
         """Return the evidence of one leg's own noise."""
         own = self.whiten[:, :, leg]
-        count = len(own)
         known = np.einsum('na,nak->nk', own, self.known.reshape(*own.shape, -1))
         along = np.sum(own * self.left.reshape(own.shape), axis=1)
         squares = np.sum(own ** 2, axis=1)
@@ -145,14 +144,14 @@ class _Residuals(NamedTuple):
             left = self.freedom - weights @ along ** 2 - vector @ np.linalg.solve(matrix, vector)
             found.append(self._log(
                 np.sum(np.log1p(square * squares)) + np.linalg.slogdet(matrix)[1], left))
-        return _mean(np.array(found))
+        return float(_mean(np.array(found)))
 
     def _evidence(self, squares: Array, along: Array) -> Array:
         """Return the evidence of terms (..., k) with A^T A and A^T z along its directions."""
         tau = _SQUARES.reshape(-1, *[1] * squares.ndim)
         ratios = 1.0 + tau * squares
-        return _mean(self._log(np.sum(np.log(ratios), axis=-1), self.freedom - np.sum(
-            tau * along ** 2 / ratios, axis=-1)))
+        return np.asarray(_mean(self._log(np.sum(np.log(ratios), axis=-1), self.freedom - np.sum(
+            tau * along ** 2 / ratios, axis=-1))))
 
     def _log(self, determinant: Array, left: Array) -> Array:
         return np.asarray(-0.5 * (determinant + self.freedom * np.log(
@@ -189,7 +188,7 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
         return ()  # rounding errors, or one and the same pose
     terms, sides = _terms(platform, equations, found, fixed)
     names = platform.parameters['joints']
-    rms = 1e6 * np.sqrt(np.mean(found.lin.residuals ** 2, axis=0))
+    rms = 1e6 * np.sqrt(np.mean(found.lin.residuals ** 2, axis=0))  # [um]
     scatter = [f'{name} (residuals of {each:.3g} um, {np.median(rms):.3g} um in the median leg)'
                for name, each in zip(names, rms, strict=True)]
     legs, causes = [*range(6)], []
@@ -197,17 +196,14 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
         residuals = _Residuals.of(found, unknowns, legs)
         if residuals.freedom < 1:
             break
-        tried = sorted(_causes(residuals, legs, terms, sides, names, scatter),
-                       reverse=True)
+        tried = sorted(_causes(residuals, legs, terms, sides, names, scatter), reverse=True)
         best = tried[0]
         if best.evidence < _NAMED:
             break
-        likely = {each.what: each for each in reversed(tried)
-                  if each.evidence > best.evidence - _CLEARLY}
-        if len(likely) > 1:
-            causes.append((_UNEXPLAINED, f'{best.text}, {" or ".join(likely)}'))
-        else:
-            causes.append((best.what, best.text))
+        likely = dict.fromkeys(
+            each.what for each in tried if each.evidence > best.evidence - _CLEARLY)
+        causes.append((best.what, best.text) if len(likely) == 1 else (
+            _UNEXPLAINED, f'{best.text}, {" or ".join(likely)}'))
         legs = [leg for leg in legs if leg not in best.legs]
     lacks = [LikelyMistake(what, f'{_LACKS[what]}: ' + ', '.join(
         text for each, text in causes if each == what))
@@ -224,7 +220,7 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
 
 def _terms(platform: StewartPlatform, equations: Equations, found: Fit, fixed: Flags,
            ) -> tuple[dict[str, Array], list[Array]]:
-    """Return the terms (N, 6, k) of each cause, and what gives the side of a play, (N, 6) each."""
+    """Return the terms (N, 6, k) of each cause, and quantities (N, 6) that give sides of play."""
     count = len(equations.lengths)
     pose = equations.in_base(equations.frames_at(found.values))
     seen = np.concatenate([pose.position, to_euler(pose.rotation)], axis=1)
@@ -285,11 +281,8 @@ def _causes(residuals: _Residuals, legs: Sequence[int], terms: dict[str, Array],
 
 def _splits(values: Array) -> Array:
     """Return the sides, +-1 (N, k), of values (N,) about levels between them."""
-    levels = np.unique(values)
-    levels = 0.5 * (levels[1:] + levels[:-1])
-    sides = np.where(values[:, None] > levels, 1.0, -1.0)
-    few = np.minimum((sides > 0.0).sum(axis=0), (sides < 0.0).sum(axis=0)) < _FEWEST
-    sides = sides[:, ~few]
-    last = sides.shape[1] - 1
-    return np.asarray(sides[:, np.unique(np.linspace(0, last, min(last + 1, _SPLITS)).round(
-        ).astype(int))])
+    ordered, count = np.sort(values), len(values)
+    ranks = np.linspace(_FEWEST, count - _FEWEST, min(count - 2 * _FEWEST + 1, _SPLITS)).round()
+    levels = np.unique(0.5 * sum(ordered[ranks.astype(int) - n] for n in range(2)))
+    levels = levels[(levels > ordered[0]) & (levels < ordered[-1])]
+    return np.where(values[:, None] > levels, 1.0, -1.0)
