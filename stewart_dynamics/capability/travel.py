@@ -56,7 +56,9 @@ def _travel(constants: Array, bounds: Array, bodies: Bodies, stop: float, legs: 
     # a platform that only turns is back at its pose after one turn
     end = 2.0 * math.pi / way.rate if norm(way.velocity) == 0.0 else math.inf
     limit, leg, decided = NOTHING, -1, True
-    for code in (LENGTH_MAX, LENGTH_MIN, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX):
+    for place in range(CLEARANCE_MIN):
+        # not of a tuple: to LLVM 15 its index could be too large, which would be an exception
+        code = LENGTH_MAX - place if place <= LENGTH_MAX else place  # LENGTH_MAX is the first
         for n in range(6):
             bound = bounds[code, n]
             limited = (bound > 0.0 if code == LENGTH_MIN else
