@@ -29,8 +29,8 @@ from stewart_dynamics.capability.box_cells import (
     ARM as LEG_ARM, BOUND, CENTER, DEPTH, EXCESS, HALF, halve, Place, place_of, prepare_legs,
     put_box, put_point, spin_of, TURN, turned, unit_of, UPPER)
 from stewart_dynamics.capability.clearance_bounds import (
-    ARM, BASE_JOINT, between_corners, Bodies, bodies_in, Body, corners_of, CYLINDER, follow, FOLLOWING,
-    is_given, OF_LEG, pair_of, pairs_with, PLACE, PLATES, PLATFORM_JOINT,
+    ARM, BASE_JOINT, between_corners, Bodies, bodies_in, Body, corners_of, CYLINDER, follow,
+    FOLLOWING, is_given, OF_LEG, pair_of, pairs_with, PLACE, PLATES, PLATFORM_JOINT,
     put_plates, RATES, relative_rate, ROTATING, shortest, slope_along, STAYING, STILL, TURNING)
 from stewart_dynamics.capability.singular_values import BEND
 from stewart_dynamics.compilation.functions import compiled, entry_point

@@ -684,7 +684,7 @@ class Capability:
     def _per_wrench(self, pose: Pose | Motion, wrenches: Array) -> Array:
         """Return the leg forces (..., 6) that balance wrenches (..., 6) alone."""
         transposed = np.swapaxes(self.platform.drive_jacobian(pose), -1, -2)
-        # Of one shape: numpy 1.26 takes an array of fewer dimensions for vectors.
+        # numpy 1.26 would take an array of fewer dimensions for vectors.
         whole = np.broadcast_to(wrenches, np.broadcast_shapes(
             wrenches.shape, transposed.shape[:-1]))[..., None]
         return np.asarray(np.linalg.solve(transposed, whole)[..., 0], dtype=float)

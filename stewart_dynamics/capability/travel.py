@@ -31,8 +31,7 @@ from stewart_dynamics.capability.clearance_bounds import (
 from stewart_dynamics.capability.travel_clearance import end_of_clearance
 from stewart_dynamics.capability.travel_condition import end_of_condition
 from stewart_dynamics.capability.travel_legs import (
-    BASE_ANGLE_MAX, end_of_leg, LEG, LENGTH_MAX, LENGTH_MIN, PLATFORM_ANGLE_MAX, prepare_legs,
-    Way, way_of)
+    end_of_leg, LEG, LENGTH_MAX, LENGTH_MIN, prepare_legs, Way, way_of)
 from stewart_dynamics.compilation.functions import compiled, entry_point
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.vectors import norm, put3

@@ -26,9 +26,9 @@ import math
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.clearance_bounds import (
-    ARM, BASE_JOINT, between_corners, Bodies, Body, corners_of, CYLINDER, follow, FOLLOWING, OF_LEG, pair_of,
-    pairs_with, PLACE, PLATES, PLATFORM_JOINT, RATES, relative_rate, ROTATING, shortest,
-    slope_along, STAYING, STILL, TURNING)
+    ARM, BASE_JOINT, between_corners, Bodies, Body, corners_of, CYLINDER, follow, FOLLOWING,
+    OF_LEG, pair_of, pairs_with, PLACE, PLATES, PLATFORM_JOINT, RATES, relative_rate, ROTATING,
+    shortest, slope_along, STAYING, STILL, TURNING)
 from stewart_dynamics.capability.singular_values import BEND
 from stewart_dynamics.capability.travel_legs import (
     CENTER, line_of, NARROW, REACH, ROUNDING, safe_step, SPEED, Way)
