@@ -138,8 +138,8 @@ def timed(times: ArrayLike, motion: Any, ask: Callable[[Motion, float], Answer],
     with np.errstate(all='ignore'):  # numbers that overflow need too many samples
         parts = Sampling(platform.parameters, 0.0).parts(
             durations / speed, Interpolation(durations / speed, rows), results,
-            platform.drive_rates(rows, results[:, RATES]), None if base is None else base.rows[None],
-            math.inf)
+            platform.drive_rates(rows, results[:, RATES]),
+            None if base is None else base.rows[None], math.inf)
     near = parts <= MOST_SAMPLES  # not where they are nan
     if not near.all():
         n = int(np.argmin(near))
