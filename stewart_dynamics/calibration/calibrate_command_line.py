@@ -23,7 +23,7 @@ from pathlib import Path
 from stewart_dynamics.calibration import design_command
 from stewart_dynamics.program import (
     add_accepted, add_node, add_parameters, add_report, between, DONE, names_of,
-    Program)
+    Program, share)
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 from stewart_dynamics.reporting.results_folder import CALIBRATED, DESIGNED
 from stewart_dynamics.signals import interrupt_on_signals
@@ -81,7 +81,7 @@ def _arguments() -> argparse.ArgumentParser:
     calibrated.add_argument('--fixed', type=names_of, default=(), metavar='NAME,...',
                             help="parts that keep the file's values, as zero_length, "
                                  'base_joints.leg_1, platform_joints.leg_3.z')
-    calibrated.add_argument('--hold-out', type=between(0.0, 0.5), default=HOLD_OUT,
+    calibrated.add_argument('--hold-out', type=share(0.5), default=HOLD_OUT,
                             metavar='PART',
                             help='share of the poses that validates a fit to the others; 0: none '
                                  f'(default: {HOLD_OUT:g})')
