@@ -131,7 +131,7 @@ class _Residuals(NamedTuple):
                               math.sqrt(count) * along[:, None]), self.deviation * along / sizes
 
     def of_noise(self, leg: int) -> float:
-        """Return the evidence of one leg's own noise."""
+        """Return the evidence of one leg's own noise, less where noise has heavy tails."""
         own = self.whiten[:, :, leg]
         known = np.einsum('na,nak->nk', own, self.known.reshape(*own.shape, -1))
         along = np.sum(own * self.left.reshape(own.shape), axis=1)
@@ -144,7 +144,10 @@ class _Residuals(NamedTuple):
             left = self.freedom - weights @ along ** 2 - vector @ np.linalg.solve(matrix, vector)
             found.append(self._log(
                 np.sum(np.log1p(square * squares)) + np.linalg.slogdet(matrix)[1], left))
-        return float(_mean(np.array(found)))
+        each = self.left.reshape(own.shape)
+        each = each / np.sqrt(np.mean(each ** 2, axis=0))
+        # The variance of a sample variance, by that of normal noise.
+        return float(_mean(np.array(found)) / max(0.5 * (np.mean(each ** 4) - 1.0), 1.0))
 
     def _evidence(self, squares: Array, along: Array) -> Array:
         """Return the evidence of terms (..., k) with A^T A and A^T z along its directions."""
