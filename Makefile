@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
-  bench-replay clean demo demo-calibrate demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment export-demo \
+  bench-replay clean demo demo-calibrate demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment export-demo installed \
   lint lint-flake8 lint-layers lint-mypy lint-ruff test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
@@ -34,8 +34,8 @@ REQUIREMENTS := requirements.txt requirements-ros.txt
 endif
 
 # DEPENDENCIES=newest, =oldest: the newest or the oldest versions that setup.py admits, without ROS, in
-# an environment of its own, and for each PYTHON=... Without it, the newest Python that is found, also
-# by pyenv, or the oldest: it has wheels of old versions.
+# an environment of its own, and for each PYTHON=... Without it, the newest or the oldest Python that
+# is found, also by pyenv; the oldest versions are those that have wheels for it.
 VERSIONS := $(if $(filter command,$(origin DEPENDENCIES)),$(DEPENDENCIES))
 ifneq ($(filter-out newest oldest,$(VERSIONS)),)
 $(error DEPENDENCIES=$(VERSIONS): must be newest or oldest, or not given)
@@ -45,7 +45,7 @@ ROS := none
 VENV_OPTIONS :=
 REQUIREMENTS := setup.py .ci/setup_requirements.py
 PYTHONS := $(or $(PYTHON),$(foreach version,$(if $(filter oldest,$(VERSIONS)),10 11 12 13,13 12 11 10), \
-  python3.$(version) $(wildcard $(HOME)/.pyenv/versions/3.$(version).*/bin/python3.$(version))))
+  python3.$(version) $(wildcard $(HOME)/.pyenv/versions/3.$(version).*/bin/python3.$(version))) python3)
 endif
 
 ifneq ($(filter pypi kilted none,$(ROS)),)
@@ -172,6 +172,8 @@ docs-site: $(INSTALLED)
 	  docs docs/_build/html
 	@echo 'file://$(CURDIR)/docs/_build/html/index.html'
 
+installed: $(INSTALLED)
+
 # With all machine code, which takes half a minute on two cores.
 environment: $(INSTALLED)
 	@$(VENV)/bin/stewart_dynamics --compile
@@ -190,7 +192,7 @@ $(PREPARED): $(REQUIREMENTS)
 ifeq ($(VERSIONS),)
 	@cat $(REQUIREMENTS) > $(VENV)/requirements.txt
 else
-	@$(PIP) install setuptools
+	@$(PIP) install --upgrade packaging pip setuptools
 	@$(VENV)/bin/python .ci/setup_requirements.py $(VERSIONS) > $(VENV)/requirements.txt
 	@echo lark >> $(VENV)/requirements.txt  # for FMPy: otherwise in the ROS wheels
 endif

@@ -54,9 +54,9 @@ extras_require = {
         'numpydoc>=1.6',
         'sphinx>=7.3.7',  # for this docutils; 7.3.0 warns of any type of a setting
     ],
-    'mujoco': ['mujoco>=3.2'],
+    'mujoco': ['mujoco>=3.2.3'],  # <connect> has site1 and site2
     'parquet': ['pyarrow>=14'],
-    'plot': ['matplotlib>=3.5'],
+    'plot': ['matplotlib>=3.7'],  # a legend outside of the axes
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',
         'ros-rclpy[fastrtps]~=7.1.6',

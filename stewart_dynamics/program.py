@@ -28,7 +28,7 @@ import sys
 from typing import Any, TextIO, TYPE_CHECKING
 
 from stewart_dynamics import __version__, signals
-from stewart_dynamics.errors import one_line, StewartError
+from stewart_dynamics.errors import one_line, shown_name, StewartError
 
 if TYPE_CHECKING:
     from stewart_dynamics.compilation.functions import EntryPoint
@@ -273,7 +273,7 @@ def number(text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f'{text or repr(text)}: must be a number')
+        raise argparse.ArgumentTypeError(f'{_shown(text)}: must be a number')
     return value
 
 
@@ -288,8 +288,18 @@ def between(least: float, most: float) -> Callable[[str], float]:
         value = number(text)
         if not least <= value <= most:
             raise argparse.ArgumentTypeError(
-                f'{text}: must be at least {least:g}, at most {most:g}')
+                f'{_shown(text)}: must be at least {least:g}, at most {most:g}')
         return value
+
+    return read
+
+
+def share(most: float) -> Callable[[str], float]:
+    """Return the type of an option that is a share: 0, or at least 0.001."""
+    some = between(1e-3, most)
+
+    def read(text: str) -> float:
+        return some(text) if number(text) else 0.0
 
     return read
 
@@ -301,12 +311,17 @@ def whole(least: int, most: int) -> Callable[[str], int]:
             value = int(plain_digits(text))
         except ValueError:
             raise argparse.ArgumentTypeError(
-                f'{text or repr(text)}: must be a whole number') from None
+                f'{_shown(text)}: must be a whole number') from None
         if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f'{text}: must be at least {least}, at most {most}')
+            raise argparse.ArgumentTypeError(
+                f'{_shown(text)}: must be at least {least}, at most {most}')
         return value
 
     return read
+
+
+def _shown(text: str) -> str:
+    return shown_name(text) if text.strip() else repr(text)
 
 
 def plain_digits(text: str) -> str:

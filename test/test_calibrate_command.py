@@ -47,7 +47,7 @@ from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.reporting.estimates import (
     estimate, page_values, rounded, table_lines)
-from test_calibration import HEXAPOD, measured, random_poses, true_values
+from test_calibration import HEXAPOD, measured, random_poses, true_values, UNIVERSAL
 
 NODE = '/stewart_dynamics'
 WITHOUT_CHECKSUMS = 'bag.mcap: has no checksums: damaged bytes cannot be detected'
@@ -237,6 +237,20 @@ def test_other_bad_input(table: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     assert 'leg_7: not a part of the geometry' in capsys.readouterr().err
     assert main([str(table), '--params', str(PLATFORM), '--mm']) == 2
     assert 'are in m, not in mm: without --mm' in capsys.readouterr().err
+
+
+def test_positions_of_drives_are_an_option(table: Path, tmp_path: Path,
+                                           capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'universal.yaml'
+    HEXAPOD.parameters.replaced(UNIVERSAL).to_yaml(file)
+    arguments = [str(table), '--drive-positions', '--output', str(tmp_path / 'out')]
+    assert main([*arguments, '--params', str(PLATFORM)]) == 2
+    assert 'drive positions: with drive.screw_rotation: guided' in capsys.readouterr().err
+    assert main([*arguments, '--params', str(file), '--strict']) == 1
+    assert 'LACK OF FIT: positions follow the turns of the legs' in capsys.readouterr().out
+    result = json.loads((tmp_path / 'out' / 'calibration.json').read_text())
+    assert result['options']['drive_positions'] and result['lack_of_fit']['cause'] == 'turns'
+    assert all(each['interval'] is None for each in result['parameters'])
 
 
 def test_degrees_read_as_radians_are_named(table: Path, tmp_path: Path) -> None:

@@ -21,12 +21,14 @@ from numpy.testing import assert_allclose
 import pytest
 from referees import PLATFORM
 from stewart_dynamics import (
-    calibrate, MotionError, ParameterError, Parameters, Pose, StewartError, StewartPlatform)
+    calibrate, Motion, MotionError, ParameterError, Parameters, Pose, StewartError,
+    StewartPlatform)
 from stewart_dynamics.calibration.equations import (
     ALL, Equations, Frames, GEOMETRY, inverse, product, values_of, with_geometry)
 from stewart_dynamics.calibration.fit import fit, Unknowns
 from stewart_dynamics.calibration.frames import find_frames
 from stewart_dynamics.calibration.noise import covariances, Noise
+from stewart_dynamics.mechanics.drives.screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 
 # M. J. Nategh, M. M. Agheli, "A total solution to kinematic calibration of hexapod machine tools
@@ -389,6 +391,8 @@ def test_all_poses_are_used_where_none_is_held_out_and_some_noise_is_needed() ->
 
 @pytest.mark.parametrize(('what', 'words'), [
     ('play', 'play, a loose joint or encoder: leg_3 (residuals of'),
+    ('deflection', 'residuals follow the static forces of the legs, from deflection: all legs'),
+    ('drift', 'residuals drift from the first pose to the last: leg_3'),
     ('scale', 'positions off by scale, from the lead of the screw or the encoder: leg_3 (+0.2'),
     ('fixed', 'the fixed values are not those of the hexapod: '),
     ('noise', 'times the noise that was given')])
@@ -400,9 +404,139 @@ def test_a_lack_of_fit_is_named(what: str, words: str) -> None:
         lengths[:, 2] += np.where(rng.random(60) < 0.5, 1e-4, -1e-4)
     if what == 'scale':
         lengths[:, 2] *= 1.002
+    if what == 'deflection':
+        lengths += HEXAPOD.inverse_dynamics(Motion.from_pose(seen)).forces / 4e6
+    if what == 'drift':
+        lengths[:, 2] += np.linspace(0.0, 1e-4, 60)
     found = calibrate(HEXAPOD, lengths, seen, fixed=['zero_length'] if what == 'fixed' else [],
                       noise=Noise(1e-6, 5e-6, 5e-6) if what == 'noise' else None)
     assert words in found.lack_of_fit[0].text
+
+
+def with_play(rng: np.random.Generator, count: int, play: float, side: str) -> tuple[
+        np.ndarray, Pose, np.ndarray]:
+    """Return lengths, poses and true values; leg 3 is off by +-play, on a side by the pose."""
+    values, poses = true_values(rng), random_poses(rng, count)
+    lengths, seen = measured(rng, values, poses, Noise(1e-5, 1e-5, 1e-5))
+    given = {'force': HEXAPOD.inverse_dynamics(Motion.from_pose(poses)).forces[:, 2],
+             'x': poses.position[:, 0], 'tilt': poses.rotation[:, 2, 1],
+             'approach': np.diff(lengths[:, 2], prepend=lengths[0, 2] - 1.0),
+             'nothing': rng.normal(size=count)}[side]
+    lengths[:, 2] += np.where(given > (
+        0.0 if side == 'approach' else np.median(given)), play, -play)
+    return lengths, seen, values
+
+
+@pytest.mark.parametrize(('side', 'words'), [
+    ('force', 'the side changes with its static force'), ('x', 'the side changes with'),
+    ('tilt', 'the side changes with'), ('approach', 'the side changes with its move to the pose'),
+    ('nothing', 'not explained: leg_3, ')])
+def test_play_on_a_side_by_the_pose_is_noticed_with_few_poses(side: str, words: str) -> None:
+    """20 poses, +-50 um, noise of 10 um: most of such play looks like another geometry."""
+    texts = []
+    for seed in range(6):
+        lengths, seen, values = with_play(np.random.default_rng(seed), 20, 5e-5, side)
+        found = calibrate(HEXAPOD, lengths, seen, hold_out=0.0)
+        texts += [found.lack_of_fit[0].text] if found.lack_of_fit else []
+        assert not found.outliers
+    assert len(texts) >= 4
+    assert all('leg_3' in each for each in texts)
+    assert sum(words in each for each in texts) >= 3
+
+
+@pytest.mark.parametrize('side', ['force', 'x', 'approach'])
+def test_large_play_is_no_outlier_and_no_lack_of_motion(side: str) -> None:
+    lengths, seen, _ = with_play(np.random.default_rng(1), 20, 1e-3, side)
+    found = calibrate(HEXAPOD, lengths, seen, accept_mistakes=True)
+    assert not found.outliers
+    assert found.lack_of_fit[0].text.startswith('play, a loose joint or encoder: leg_3 (+-')
+    for each in found.likely:
+        assert each.what in ('identifiable', 'worse') and found.lack_of_fit[0].text in each.text
+    # Less than half of the poses are on the other side: the others are exact by comparison.
+    lengths, seen = measured(np.random.default_rng(2), true_values(np.random.default_rng(2)),
+                             random_poses(np.random.default_rng(3), 40), Noise(2e-6, 2e-6, 2e-6))
+    lengths[::3, 2] += 1e-3
+    found = calibrate(HEXAPOD, lengths, seen)
+    assert not found.outliers and found.lack_of_fit[0].what == 'play'
+
+
+def test_noise_of_any_kind_is_no_lack_of_fit() -> None:
+    """Normal, heavy tails, a uniform distribution; single poses, and each measured three times."""
+    noticed = 0
+    for seed in range(48):
+        rng = np.random.default_rng(seed)
+        values = true_values(rng)
+        poses = random_poses(rng, (20, 40)[seed % 2])
+        if seed % 6 > 3:
+            poses = poses[np.repeat(np.arange(20), 3)]
+        lengths, seen = measured(rng, values, poses)
+        one, two = (1e-5 * (rng.normal(size=shape), rng.laplace(size=shape) / np.sqrt(2.0),
+                            rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), shape))[seed % 3]
+                    for shape in (lengths.shape, seen.position.shape))
+        found = calibrate(HEXAPOD, lengths + one, Pose(seen.position + two, seen.rotation),
+                          hold_out=0.0)
+        noticed += bool(found.lack_of_fit)
+    assert noticed <= 1
+
+
+AXES = universal_axes(HEXAPOD.parameters)
+UNIVERSAL = {'actuator.screw_lead': 0.01, 'drive.screw_rotation': 'universal',
+             'drive.base_universal_axes': AXES[:, :3].ravel().tolist(),
+             'drive.platform_universal_axes': AXES[:, 3:].ravel().tolist()}
+
+
+def turned_positions(rng: np.random.Generator, poses: Pose, values: np.ndarray) -> np.ndarray:
+    """Return the positions of drives by the angles of their motors."""
+    real = StewartPlatform(with_geometry(HEXAPOD.parameters.replaced(UNIVERSAL), values))
+    angles = real.motors(Motion.from_pose(poses)).angles
+    return angles * 0.01 / (2.0 * np.pi)
+
+
+def test_derivatives_of_drive_positions_are_those_of_finite_differences() -> None:
+    rng = np.random.default_rng(1)
+    p = HEXAPOD.parameters.replaced(UNIVERSAL)
+    values = true_values(rng)
+    values[GEOMETRY:] = rng.normal(0.0, 0.1, 12)
+    equations = Equations(rng.normal(0.0, 1.0, (5, 6)), random_poses(rng, 5), FRAMES,
+                          screw_constants(p))
+    steps = 1e-6 * np.eye(ALL)
+    lin = equations.at(values)
+    assert_allclose(lin.derivatives, np.stack([
+        (equations.at(values + step).residuals - equations.at(values - step).residuals) / 2e-6
+        for step in steps], axis=-1), atol=2e-9)
+    turn = 1e-7 * rng.normal(size=3)
+    device = equations.frames_at(values).device.rotation
+    other = equations._replace(pose=Pose(
+        equations.pose.position, from_euler(device.T @ turn) @ equations.pose.rotation))
+    assert_allclose(other.at(values).residuals - lin.residuals, lin.rotation @ turn, atol=1e-12)
+
+
+@pytest.mark.parametrize('frames', ['known', 'unknown'])
+def test_positions_of_drives_whose_screws_turn_with_their_legs(frames: str) -> None:
+    """By the motors' angles; taken for positions of the legs they are named."""
+    rng = np.random.default_rng(2)
+    platform = StewartPlatform(HEXAPOD.parameters.replaced(UNIVERSAL))
+    values, poses = true_values(rng), random_poses(rng, 40)
+    lengths, seen = measured(rng, values, poses)
+    drives = turned_positions(rng, poses, values)
+    assert np.abs(drives - lengths).max() > 1e-4
+    if frames == 'unknown':
+        seen = Equations(lengths, seen).as_measured(seen, FRAMES)
+    found = calibrate(platform, drives, seen, frames=frames, drive_positions=True)
+    assert found.validation is not None
+    if frames == 'known':
+        assert found.lack_of_fit == () and np.abs(found.values - values[:GEOMETRY]).max() < 1e-10
+        assert found.validation.after.largest[0] < 1e-9
+    else:  # the base frame, with the axes in it, is that of the file's joints
+        assert found.after.max() < 1e-7 and found.validation.after.largest[0] < 1e-6
+    for given, taken in ((drives, False), (lengths, True)):
+        wrong = calibrate(platform, given + rng.normal(0.0, 1e-5, (40, 6)), seen, frames=frames,
+                          drive_positions=taken)
+        assert [each.what for each in wrong.lack_of_fit] == ['turns']
+    # A file that does not say that the screws turn.
+    assert calibrate(HEXAPOD, drives, seen, frames=frames).lack_of_fit[0].what == 'turns'
+    with pytest.raises(ParameterError, match='drive.screw_rotation: guided'):
+        calibrate(HEXAPOD, drives, seen, drive_positions=True)
 
 
 def test_too_little_is_rejected() -> None:

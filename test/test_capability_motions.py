@@ -141,6 +141,35 @@ def test_with_times_the_motion_between_the_samples_counts(ask: str) -> None:
         assert accepted == (factor < 1.0)
 
 
+def test_a_motion_at_rest_is_one_with_times_as_well() -> None:
+    capability, rest = Capability(PLATFORM), motion(0, TIMES[:3], size=0.0)
+    for ask in (capability.speed_factor, capability.amplitude_factor):
+        assert ask(rest, times=TIMES[:3]) == ask(rest)
+    found = capability.payload(rest, [0.1, 0.2, 0.3], times=TIMES[:3])
+    assert found.value == pytest.approx(capability.payload(rest, [0.1, 0.2, 0.3]).value, 1e-12)
+
+
+@pytest.mark.parametrize('load', ['wrench', 'base'])
+def test_a_load_counts_between_the_samples(load: str) -> None:
+    """Forces reach their limit by the load alone, and only between samples."""
+    platform = StewartPlatform(PLATFORM.parameters.replaced({
+        'limits.velocity_max': None, 'limits.force_max': 3000.0,
+        'actuator.coulomb_friction': 0.0}))
+    capability, few = Capability(platform), TIMES[::20]
+    given = motion(3, few)
+    more: dict[str, Any] = {'base': BaseMotion([0.0, 0.0, -60.0])}
+    if load == 'wrench':
+        more = {'wrench': [0.0, 0.0, -9000.0, 0.0, 0.0, 0.0]}
+    whole = motions.Interpolation(np.diff(few), given.rows)
+    where = np.arange(0.0, len(few) - 1.0, 1.0 / 256.0)
+    which = where.astype(np.int64)
+    dense = Motion.of_rows(whole.at(which, where - which))
+    for ask in (capability.speed_factor, capability.amplitude_factor):
+        found = ask(given, times=few, **more)
+        assert found.value == pytest.approx(ask(dense, **more).value, rel=1e-4)
+        assert found.value <= ask(given, **more).value * (1.0 + 1e-12)
+
+
 def test_a_motion_through_a_singularity_is_possible_at_no_speed() -> None:
     """Turned past det(J) = 0 about z: near it, beyond it, and between two samples."""
     platform = StewartPlatform(PLATFORM.parameters.replaced({

@@ -520,7 +520,7 @@ def test_units_of_poses_and_points_in_options_are_judged(
 def test_a_likely_mistake_in_a_pose_comes_before_the_error_that_follows(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run('--params', PLATFORM, '--output', tmp_path / 'sheet', '--pose',
-               0, 0, 1180, 0, 0, 0, '--pivot', 0, 0, 800) == 2
+               0, 0, 1180, 0, 0, 0, '--pivot', 0, 0, 100) == 2
     pose, pivot, error = capsys.readouterr().err.splitlines()
     assert pose.startswith('stewart_capability: warning: --pose: ')
     assert pivot.startswith('stewart_capability: warning: --pivot: ')
@@ -531,6 +531,8 @@ BAD: list[tuple[list[str], str]] = [
     (['--pose', '0', '0', '2', '0', '0', '0'], 'above limits.length_max'),
     (['--pose', '0', '0', '1.18', '0', '0', '1.5707963'], 'pose: singular: the condition number'),
     (['--payload', '0', '0', '0', '0'], '--payload: mass 0 kg: must be above 0'),
+    (['--payload', '1', '0', '0', '1e6'], '--payload: 1e+06 m from the platform frame: must be'),
+    (['--pivot', '0', '-1000', '0'], '100 times the size of the hexapod: lengths are in m'),
     (['--payload', '9e4', '0', '0', '0'], 'above limits.force_max'),
     (['--leg-stiffness', '-1'], '--leg-stiffness: -1 N/m: must be above 0'),
     (['--motion', 'none'], 'none: not a bag that can be read'),
@@ -701,7 +703,8 @@ def test_help_needs_neither_numpy_nor_the_compiler() -> None:
 @pytest.mark.parametrize(('value', 'text'), [
     (0.0, '0'), (1.23456, '1.234'), (-1.23456, '−1.234'), (99999.0, '99\u202f990'),
     (0.1, '0.1000'), (2.3, '2.300'), (1234.0, '1\u202f234'), (math.inf, '–'), (None, '–'),
-    (1e-5, '0.00001000')])
+    (1e-5, '0.00001000'), (9999999999.0, '9\u202f999\u202f000\u202f000'), (1e10, '1.000e+10'),
+    (-1.79e308, '−1.790e+308'), (1e-299, '1.000e−299'), (5e-324, '4.940e−324')])
 def test_figures_are_rounded_toward_zero(value: float | None, text: str) -> None:
     assert down(value) == text
 

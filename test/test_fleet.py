@@ -22,6 +22,7 @@ middle of a bag.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import suppress
@@ -110,11 +111,13 @@ def bags(tmp_path: Path, long_bag: Path) -> Path:
 
 @pytest.fixture(scope='module')
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
-    with LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address='127.0.0.1:0',
-            silence_logs=logging.CRITICAL,
-            local_directory=f'{tmp_path_factory.mktemp("dask")}') as made:
-        yield made
+    made = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address='127.0.0.1:0',
+                        silence_logs=logging.CRITICAL,
+                        local_directory=f'{tmp_path_factory.mktemp("dask")}')
+    yield made
+    # Workers that tests have killed may end later than Dask waits; they are daemons.
+    with suppress(TimeoutError, asyncio.TimeoutError):
+        made.close()
 
 
 def until(condition: Callable[[], Any], what: str) -> Any:

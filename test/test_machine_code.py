@@ -35,6 +35,7 @@ from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.compilation.functions import (
     entry_point, EntryPoint, Preparation, prepare)
 from stewart_dynamics.compilation.machine_code import COMPILED
+from stewart_dynamics.compile_all import compile_all, modules
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
 
@@ -293,6 +294,22 @@ def test_a_program_that_is_no_python_compiles_nothing(
     with pytest.warns(RuntimeWarning, match='cannot be compiled: .*: the dynamics run uncompiled'):
         check(imported('scaled_sums'))
     assert not list(kept.glob('scaled_sums*'))
+
+
+def test_all_modules_of_the_package_are_compiled(capsys: pytest.CaptureFixture[str]) -> None:
+    """Whatever versions of numba and LLVM are installed."""
+    assert compile_all() == 0
+    assert f' {len(modules())} modules are compiled, ' in capsys.readouterr().out
+
+
+def test_modules_that_cannot_be_compiled_are_not_counted(tmp_path: Path) -> None:
+    failed = subprocess.run(
+        [sys.executable, '-c', "import sys; sys.executable = '/bin/false'\n"
+         'from stewart_dynamics.compile_all import compile_all; sys.exit(compile_all())'],
+        env=os.environ | {'STEWART_DYNAMICS_CACHE_DIR': str(tmp_path)}, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True)
+    assert failed.returncode == 1
+    assert ' 0 modules are compiled, 0 of them now ' in failed.stdout
 
 
 def test_the_compiler_reads_nothing_from_the_present_folder_and_may_print(

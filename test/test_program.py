@@ -16,7 +16,9 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
+from importlib import import_module
 import os
 from pathlib import Path
 import signal
@@ -28,7 +30,9 @@ import pytest
 
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.program import BAD_INPUT, between, frequency, number, Program, STRICT, whole
+from stewart_dynamics.program import (
+    BAD_INPUT, between, folder, frequency, names_of, node_name, number, Program, share, STRICT,
+    whole)
 from stewart_dynamics.signals import ending_signals, interrupt_on_signals
 
 PROGRAM = Program('some_program', 'parameters', 'something is found')
@@ -113,7 +117,7 @@ def test_signals_are_handled_before_anything_large_is_imported(module: str) -> N
         done.stdout.split())
 
 
-@pytest.mark.parametrize('kind', [number, frequency, between(-1.0, 1.0), whole(1, 9)])
+@pytest.mark.parametrize('kind', [number, frequency, between(-1.0, 1.0), share(0.5), whole(1, 9)])
 @pytest.mark.parametrize('text', ['nan', 'inf', '1e400', '', 'abc', '1_0', '\u0661'])
 def test_what_is_no_number_says_so_for_every_option(
         kind: Callable[[str], float], text: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -124,6 +128,33 @@ def test_what_is_no_number_says_so_for_every_option(
     assert end.value.code == BAD_INPUT
     last = capsys.readouterr().err.splitlines()[-1]
     assert last.startswith('program: error: argument --value: ') and 'must be a' in last
+
+
+@pytest.mark.parametrize('module', [
+    'calibration.calibrate', 'datasheet.datasheet', 'identification.identify', 'replay.replay'])
+def test_no_option_takes_a_number_of_any_size(module: str) -> None:
+    """An extreme value is rejected in a short line, or is of a size that can be computed with."""
+    parser = import_module(f'stewart_dynamics.{module}_command_line')._arguments()
+    options = [each for each in parser._actions if each.type is not None and getattr(
+        each.type, '__module__', '') == 'stewart_dynamics.program' and each.type not in (
+            folder, names_of, node_name)]
+    assert options
+    for option in options:
+        for text in ('1e-320', '1e-299', '1e15', '1e300', '-1e300', '1.7e308', '-0', '', 'inf',
+                     'nan', '9' * 400, '0x10', '1e', '- 1'):
+            try:
+                value = option.type(text)
+            except argparse.ArgumentTypeError as exc:
+                assert 'must be' in str(exc) and len(str(exc)) < 200
+            else:
+                assert abs(value) <= 1e15
+
+
+@pytest.mark.parametrize('text', ['1e-320', '1e-299', '0.0009', '0.6', '-0.1'])
+def test_a_share_of_something_is_none_or_enough_of_it(text: str) -> None:
+    assert [share(0.5)(each) for each in ('0', '-0', '0.001', '0.5')] == [0.0, 0.0, 0.001, 0.5]
+    with pytest.raises(argparse.ArgumentTypeError, match='must be at least 0.001, at most 0.5'):
+        share(0.5)(text)
 
 
 @pytest.mark.parametrize('text', ['-1e-3', '-1.e+3', '-.5E2', '-2'])

@@ -30,19 +30,21 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.equations import (
-    chosen, Equations, Frames, GEOMETRY, names_of, SAME, values_of, with_geometry)
+    chosen, Equations, Frames, GEOMETRY, GUIDED, names_of, SAME, values_of, with_geometry)
 from stewart_dynamics.calibration.fit import Fit, fit, minimum, outliers, Unknowns
 from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
+from stewart_dynamics.calibration.lack_of_fit import lack_of_fit
 from stewart_dynamics.calibration.likely_mistakes import (
-    lack_of_fit, mistakes_of_input, mistakes_of_result, not_identified)
+    mistakes_of_input, mistakes_of_result, not_identified)
 from stewart_dynamics.calibration.measured_poses import FEWEST
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
+from stewart_dynamics.mechanics.drives.screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.least_squares import Identifiability, LARGEST_SHARE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, UNIVERSAL
 from stewart_dynamics.reporting.estimates import (
     FIXED, HOLD_OUT, IDENTIFIED, justified, LikelyMistake, states_of)
 
@@ -50,6 +52,8 @@ from stewart_dynamics.reporting.estimates import (
 _FEWEST_OTHERS = 12
 # A larger part of the poses that are outliers is no accident.
 _MOST_OUTLIERS = 0.2
+# A leg that alone is off in a larger part of the poses has play: these are not outliers.
+_OFTEN_ALONE = 0.1
 # Errors of held-out poses may grow by this factor: a good file, and few poses.
 _WORSE = 1.2
 # Numbers of the file are rounded to a hundredth of this part of their standard errors [m].
@@ -111,7 +115,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
               fixed: Sequence[str] = (), frames: str = 'known',
               noise: tuple[float, float, float] | None = None,
               hold_out: float = HOLD_OUT,
-              angles: Array | None = None, degrees: bool = False,
+              angles: Array | None = None, degrees: bool = False, drive_positions: bool = False,
               accept_mistakes: bool = False) -> Calibration:
     """
     Return the geometry that explains measured poses.
@@ -139,6 +143,9 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         The angles of which the poses were made, to find angles in another unit.
     degrees : bool
         They were read as degrees.
+    drive_positions : bool
+        ``lengths`` are positions of drives whose screws turn with their legs: motor angles times
+        lead / (2 pi gear_ratio).
     accept_mistakes : bool
         Return a result although a mistake is likely or held-out poses are predicted worse.
 
@@ -149,7 +156,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
 
     """
     p = platform.parameters
-    measured = _checked(platform, lengths, poses)
+    measured = _checked(platform, lengths, poses)._replace(screws=_screws(p, drive_positions))
     if frames not in ('known', 'unknown'):
         raise ParameterError(f"frames: {frames!r}: must be 'known' or 'unknown'")
     if noise is not None and not any(noise):
@@ -174,7 +181,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     size = p['singularity.characteristic_length']
     unknowns = Unknowns.of(values_of(p, known), size, held, unknown)
     first = outliers(measured, unknowns)
-    sound: Flags = ~np.any(first.outlying, axis=1)
+    sound: Flags = ~np.any(first.outlying & ~_often_alone(first.outlying), axis=1)
     used = measured.part(sound)
     if len(used.lengths) * 6 <= unknowns.basis.shape[1]:
         raise StewartError(f'{len(used.lengths)} poses for {unknowns.basis.shape[1]} unknowns: '
@@ -184,6 +191,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
             'outliers', f'{np.sum(~sound)} of {len(sound)} poses do not fit the geometry that '
             'fits all others: lengths and poses must be of the same instants, at rest')])
     found = fit(used, unknowns, None if noise is None else Noise(*noise))
+    lack = lack_of_fit(platform, used, found, unknowns, held, found.whitened if noise else None)
     what = found.identifiability
     what = what._replace(scales=what.scales[:GEOMETRY], shares=what.shares[:GEOMETRY],
                          directions=what.directions[:GEOMETRY])
@@ -196,7 +204,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     if IDENTIFIED not in states:
         refuse([LikelyMistake(
             'identifiable', 'no number is identifiable by itself, with residuals of '
-            f'{1e3 * after.max():.3g} mm: {missing}')])
+            f'{1e3 * after.max():.3g} mm: {lack[0].text if lack else missing}')])
     validation = _validated(p, used, unknowns, found, hold_out)
     if validation is not None:
         errors_before, errors_after = (
@@ -205,7 +213,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
             refuse([LikelyMistake(
                 'worse', f'held-out poses are {_shown(validation.before)} off by the file, but '
                 f'{_shown(validation.after)} by a fit to the others: the poses do not support a '
-                'better geometry')])
+                'better geometry' + (f'; {lack[0].text}' if lack else ''))])
     covariance = found.covariance[:GEOMETRY, :GEOMETRY]
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + (what.shares * what.scales) ** 2)
     # Errors of neighbors are correlated: poses are known better than each number of the geometry.
@@ -218,9 +226,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         len(used.lengths), before, after,
         tuple(Outlier(int(n), tuple(map(int, np.flatnonzero(first.outlying[n]))),
                       float(np.abs(first.residuals[n]).max())) for n in np.flatnonzero(~sound)),
-        validation, lack_of_fit(
-            p, used, first, found.whitened if noise else None, what.rank, held),
-        tuple(likely))
+        validation, lack, tuple(likely))
 
 
 def _checked(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion) -> Equations:
@@ -232,6 +238,26 @@ def _checked(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion
         raise MotionError(f'lengths {given.shape}, poses {pose.shape}: must be (N, 6) and (N,)')
     check_number(len(given))
     return Equations(given, pose)
+
+
+def _screws(p: Parameters, drive_positions: bool) -> Array:
+    """Return the screws, with a pitch if positions are those of drives."""
+    if drive_positions:
+        if p['drive.screw_rotation'] != UNIVERSAL:
+            raise ParameterError('drive positions: with drive.screw_rotation: guided they are '
+                                 'those of the legs')
+        return screw_constants(p)
+    try:
+        return np.column_stack([np.zeros(6), universal_axes(p)])
+    except StewartError:  # no home pose
+        return GUIDED
+
+
+def _often_alone(outlying: Flags) -> Flags:
+    """Return the legs (6,) that are often off without the others: play, not outliers."""
+    alone = outlying & (np.sum(outlying, axis=1, keepdims=True) == 1)
+    often: Flags = np.mean(alone, axis=0) > _OFTEN_ALONE
+    return often
 
 
 def check_number(poses: int) -> None:
@@ -260,7 +286,8 @@ def _validated(parameters: Parameters, equations: Equations, unknowns: Unknowns,
     before = _with_frames(others, unknowns)
     after = fit(others, unknowns, found.noise).values
     return Validation(*(pose_errors(
-        with_geometry(parameters, each), equations.part(held), equations.frames_at(each))
+        with_geometry(parameters, each), equations.part(held).of_legs(each),
+        equations.frames_at(each))
         for each in (before, after)))
 
 

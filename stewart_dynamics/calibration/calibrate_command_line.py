@@ -23,7 +23,7 @@ from pathlib import Path
 from stewart_dynamics.calibration import design_command
 from stewart_dynamics.program import (
     add_accepted, add_node, add_parameters, add_report, between, DONE, names_of,
-    Program)
+    Program, share)
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 from stewart_dynamics.reporting.results_folder import CALIBRATED, DESIGNED
 from stewart_dynamics.signals import interrupt_on_signals
@@ -65,6 +65,10 @@ def _arguments() -> argparse.ArgumentParser:
     data.add_argument('--mm', action='store_true',
                       help='x, y, z and the leg positions are in mm, not in m')
     data.add_argument('--degrees', action='store_true', help='angles are in degrees, not in rad')
+    data.add_argument('--drive-positions', action='store_true',
+                      help='leg positions are those of drives whose screws turn with their legs '
+                           '(drive.screw_rotation: universal): motor angles times lead / (2 pi '
+                           'gear_ratio)')
     data.add_argument('--frames', choices=('known', 'unknown'), default='known',
                       help='unknown: the device measures a target on the platform in a frame of '
                            'its own; both are calibrated as well (default: known)')
@@ -77,7 +81,7 @@ def _arguments() -> argparse.ArgumentParser:
     calibrated.add_argument('--fixed', type=names_of, default=(), metavar='NAME,...',
                             help="parts that keep the file's values, as zero_length, "
                                  'base_joints.leg_1, platform_joints.leg_3.z')
-    calibrated.add_argument('--hold-out', type=between(0.0, 0.5), default=HOLD_OUT,
+    calibrated.add_argument('--hold-out', type=share(0.5), default=HOLD_OUT,
                             metavar='PART',
                             help='share of the poses that validates a fit to the others; 0: none '
                                  f'(default: {HOLD_OUT:g})')
@@ -100,7 +104,7 @@ def _run(given: argparse.Namespace) -> int:
     interrupt_on_signals()
     options = CalibrationOptions(
         given.fixed, given.frames, given.noise and Noise(*given.noise), given.hold_out, given.mm,
-        given.degrees, given.accept_mistakes, given.report, given.force)
+        given.degrees, given.drive_positions, given.accept_mistakes, given.report, given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
     if given.design is not None:
         _PROGRAM.say(design_command.run(given, parameters, given.output or Path(DESIGNED)))

@@ -20,6 +20,9 @@ to the frame of the target that the device measures (c), by the measured pose (M
 frame, and by the device's pose in the base frame (A), less its base joint b. The residual is that
 length less the zero length and the measured position. A and c are identities where the device
 measures the platform frame in the base frame.
+
+Positions of drives whose screws turn with their legs are ``L + pitch psi`` less the zero length,
+with the twist psi of the leg (``mechanics.drives.screws``): pitch psi is added to the length.
 """
 
 from __future__ import annotations
@@ -30,8 +33,10 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import euler_rate_matrix, from_euler
+from stewart_dynamics.mechanics.rows import PITCH, SCREW
 from stewart_dynamics.parameters.table import Parameters
 
 # Unknowns: base joints leg by leg, platform joints, zero lengths; device in base, platform in
@@ -55,6 +60,11 @@ SAME = Frames(*2 * [Pose(np.zeros(3), np.eye(3))])
 """The device measures the platform frame in the base frame."""
 
 
+# Positions of the legs themselves, with axes of universal joints that are not known.
+GUIDED = np.zeros((6, SCREW))
+_WITHOUT_PITCH = np.arange(SCREW) != PITCH
+
+
 class Linearization(NamedTuple):
     """N poses with the geometry of some values."""
 
@@ -71,11 +81,13 @@ class Equations(NamedTuple):
     lengths (N, 6): positions of the legs, which are zero at their zero length [m].
     pose: poses (N,) of the target in the device's frame.
     frames: frames that the unknown frames are relative to.
+    screws (6, SCREW): pitch, 0 where positions are those of legs, and axes of universal joints.
     """
 
     lengths: Array
     pose: Pose
     frames: Frames = SAME
+    screws: Array = GUIDED
 
     def part(self, which: Any) -> Equations:
         """Return some of the poses."""
@@ -94,6 +106,15 @@ class Equations(NamedTuple):
         sizes = np.linalg.norm(legs, axis=-1)
         s = legs / sizes[..., None]
         to_target = turn @ self.pose.rotation
+        moment = np.zeros_like(s)  # by a turn of the platform, beside that of s
+        if self.screws[:, PITCH].any():
+            rotation = to_target @ turned
+            arms_of_platform = platform @ np.swapaxes(rotation, 1, 2)
+            of_drives = lagrange.drive_jacobian(
+                lagrange.Legs(sizes, s, arms_of_platform), rotation, self.screws)
+            sizes = sizes + self.screws[:, PITCH] * self.turns(values)
+            s = of_drives[..., :3]
+            moment = of_drives[..., 3:] - np.cross(arms_of_platform, s)
         s_target = s @ to_target
         found = np.zeros((*sizes.shape, ALL))
         for leg in range(6):
@@ -102,12 +123,26 @@ class Equations(NamedTuple):
             found[:, leg, at:at + 3] = s_target[:, leg] @ turned
             found[:, leg, ZERO.start + leg] = -1.0
         found[..., DEVICE] = np.concatenate([
-            s, np.cross(of_device, s) @ euler_rate_matrix(values[DEVICE][3:])], axis=-1)
+            s, (np.cross(of_device, s) + moment) @ euler_rate_matrix(values[DEVICE][3:])], axis=-1)
         found[..., TARGET] = np.concatenate([
-            s_target, np.cross(in_target, s_target) @ euler_rate_matrix(values[TARGET][3:])],
-            axis=-1)
+            s_target, (np.cross(in_target, s_target) + moment @ to_target
+                       ) @ euler_rate_matrix(values[TARGET][3:])], axis=-1)
         return Linearization(sizes - values[ZERO] - self.lengths, found, s,
-                             np.cross(arms @ turn.T, s))
+                             np.cross(arms @ turn.T, s) + moment)
+
+    def turns(self, values: Array) -> Array:
+        """Return the twists of the legs (N, 6) [rad], zero if their axes are not known."""
+        pose = self.in_base(self.frames_at(values))
+        legs = pose.position[:, None] - values[BASE].reshape(6, 3) + (
+            pose.rotation[:, None] @ values[PLATFORM].reshape(6, 3, 1))[..., 0]
+        return lagrange.leg_twists(
+            legs / np.linalg.norm(legs, axis=-1, keepdims=True), pose.rotation, self.screws)
+
+    def of_legs(self, values: Array) -> Equations:
+        """Return the same with positions of the legs where these are of drives."""
+        return self._replace(
+            lengths=self.lengths - self.screws[:, PITCH] * self.turns(values),
+            screws=self.screws * _WITHOUT_PITCH)
 
     def frames_at(self, values: Array) -> Frames:
         """Return the frames of values of the unknowns."""

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Likely mistakes in measured poses, and a lack of fit of the model, each with its likeliest cause.
+Likely mistakes in measured poses, and numbers that these cannot distinguish.
 
 A mistake is likely if the poses fit the file's geometry, up to a constant of each leg, several
 times better without it: a real error of the geometry does not do that.
@@ -27,17 +27,15 @@ import math
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.equations import (
     BASE, Equations, GEOMETRY, inverse, PLATFORM, SAME, values_of, ZERO)
-from stewart_dynamics.calibration.fit import Outliers
 from stewart_dynamics.calibration.frames import find_frames
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.mechanics.frames.rotation import from_euler, to_euler, to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
-from stewart_dynamics.mechanics.least_squares import Information, normal, solve
 from stewart_dynamics.parameters.table import AUTO, Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
@@ -51,20 +49,6 @@ _FARTHEST = 0.3
 _UNEXPLAINED = 0.03
 # Zero lengths that become a smaller part of the file's are those of whole lengths.
 _WHOLE = 0.1
-# A lack of fit is significant if noise has it with a smaller probability; deviations of a leg
-# above this multiple of the others' are large.
-_PROBABILITY, _LARGE = 1e-6, 2.0
-# Smaller deviations, by the characteristic length, are rounding.
-_ROUNDING = 1e-12
-_FIXED, _SCALE, _POSE, _PLAY, _NOISE = 'fixed', 'scale', 'pose', 'play', 'noise'
-_LACKS = {
-    _FIXED: 'the fixed values are not those of the hexapod: {}',
-    _SCALE: 'positions off by scale, from the lead of the screw or the encoder: {}',
-    _POSE: 'residuals depend on the pose, from deflection or joints without a common center: {}',
-    _PLAY: 'play, a loose joint or encoder: {}',
-    _NOISE: 'the residuals are {} the noise that was given'}
-# Minimum number of poses for each term of a test.
-_FEWEST = 3
 
 
 def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_frames: bool,
@@ -200,81 +184,6 @@ def _misfit(parameters: Parameters, equations: Equations, unknown_frames: bool) 
     r = equations._replace(frames=frames).at(values_of(parameters, frames)).residuals
     whole = max(spread(equations.lengths), spread(r + equations.lengths))
     return spread(r) / whole if whole > 0.0 else math.inf
-
-
-def lack_of_fit(parameters: Parameters, equations: Equations, found: Outliers,
-                whitened: Array | None, unknowns: int, fixed: Flags,
-                ) -> tuple[LikelyMistake, ...]:
-    """
-    Return the causes of residuals that are more than noise, the likeliest first.
-
-    ``equations`` are N poses without outliers, ``found`` a fit to them with equal weights that
-    determined ``unknowns`` directions, ``whitened`` (N, 6) residuals by the noise that was given,
-    and ``fixed`` (42,) the numbers that keep the file's values.
-    """
-    from scipy.stats import chi2, f
-
-    lin, joints = equations.at(found.values), parameters['joints']
-    r, count = lin.residuals, len(lin.residuals)
-    pose = np.concatenate([equations.pose.position, to_euler(equations.pose.rotation)], axis=1)
-    pose = (pose - pose.mean(axis=0)) / np.maximum(pose.std(axis=0), 1e-12)
-    squares = np.stack([pose[:, a] * pose[:, b] for a in range(6) for b in range(a, 6)], axis=1)
-    # Lengths are nearly quadratic in the pose themselves: cubic terms, too.
-    of_pose = np.concatenate([squares, pose ** 3], axis=1)
-    causes: dict[str, list[tuple[float, str]]] = {}
-    for leg, joint in enumerate(joints):
-        own, held = (each[:, np.abs(each).max(axis=0, initial=0.0) > 0.0] for each in (
-            lin.derivatives[:, leg, :GEOMETRY][:, which] for which in (~fixed, fixed)))
-        for what, terms in ((_FIXED, held), (_SCALE, equations.lengths[:, leg:leg + 1]),
-                            (_POSE, of_pose)):
-            gain, slope = _explained(r[:, leg], own, terms)
-            if gain > 0.0:
-                name = f'{joint} ({-slope:+.2%})' if what == _SCALE else joint
-                causes.setdefault(what, []).append((gain, name))
-                break
-    free = max(count - unknowns / 6.0, 1.0)
-    deviations = np.sqrt(np.sum(r ** 2, axis=0) / free)
-    usual = float(np.median(deviations))
-    named = [name.split(' ')[0] for each in causes.values() for _, name in each]
-    rounding = _ROUNDING * parameters['singularity.characteristic_length']
-    for deviation, joint in zip(deviations, joints, strict=True):
-        ratio = deviation / max(usual, 1e-300)
-        if joint not in named and ratio > _LARGE and deviation > rounding and (
-                f.sf(ratio ** 2, free, free) < _PROBABILITY):
-            causes.setdefault(_PLAY, []).append((
-                float(free * deviation ** 2), f'{joint} (residuals of {1e6 * deviation:.3g} um, '
-                f'{1e6 * usual:.3g} um in the median leg)'))
-    if whitened is not None and not causes:
-        rest = max(whitened.size - unknowns, 1)
-        square = float(np.sum(whitened ** 2))
-        if chi2.sf(square, rest) < _PROBABILITY:
-            causes[_NOISE] = [(0.0, f'{math.sqrt(square / rest):.2g} times')]
-    order = sorted(causes, key=lambda what: -sum(gain for gain, _ in causes[what]))
-    return tuple(LikelyMistake(what, _LACKS[what].format(
-        ', '.join(name for _, name in sorted(causes[what], reverse=True)))) for what in order)
-
-
-def _explained(r: Array, own: Array, terms: Array) -> tuple[float, float]:
-    """Return the squared residual that terms explain if it is significant, and the last slope."""
-    from scipy.stats import f
-
-    if not terms.size or len(r) < own.shape[1] + _FEWEST * terms.shape[1]:
-        return 0.0, 0.0
-    both = np.concatenate([own, terms], axis=1)
-    sums = Information(normal(both, both), normal(both, r[:, None])[:, 0], float(r @ r), len(r))
-    scales = 1.0 / np.maximum(np.sqrt(np.diag(sums.matrix)), 1e-12)
-    lefts, ranks, slope = [sums.squares], [0], 0.0
-    for count in (own.shape[1], both.shape[1])[not own.shape[1]:]:
-        part = sums._replace(matrix=sums.matrix[:count, :count], vector=sums.vector[:count])
-        found = solve(part, np.zeros(count), scales[:count], largest_error=math.inf)
-        lefts.append(part.residual_squares(found.values))
-        ranks.append(found.identifiability.rank)
-        slope = float(found.values[-1])
-    more, rest = ranks[-1] - ranks[-2], len(r) - ranks[-1]
-    if more < 1 or rest < 1:
-        return 0.0, 0.0
-    ratio = (lefts[-2] - lefts[-1]) / more / max(lefts[-1] / rest, 1e-24)
-    return (lefts[-2] - lefts[-1] if f.sf(ratio, more, rest) < _PROBABILITY else 0.0), slope
 
 
 def not_identified(joints: Sequence[str], shares: Array, largest: float, equations: Equations,

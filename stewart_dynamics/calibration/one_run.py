@@ -45,6 +45,7 @@ class CalibrationOptions(NamedTuple):
     hold_out: float = HOLD_OUT
     millimeters: bool = False
     degrees: bool = False
+    drive_positions: bool = False
     accept_mistakes: bool = False
     report: bool = True
     force: bool = False
@@ -69,7 +70,8 @@ def run(measured: MeasuredPoses, source: str, parameters: Parameters, folder: Pa
     found = calibrate(
         StewartPlatform(parameters), measured.lengths, measured.poses, fixed=options.fixed,
         frames=options.frames, noise=options.noise, hold_out=options.hold_out,
-        angles=measured.angles, degrees=options.degrees, accept_mistakes=options.accept_mistakes)
+        angles=measured.angles, degrees=options.degrees,
+        drive_positions=options.drive_positions, accept_mistakes=options.accept_mistakes)
     result = document(found, measured, source, options.shown())
     with whole_folder(folder, options, CALIBRATION, before) as partial:
         found.parameters.to_yaml(partial / CALIBRATED_PARAMETERS, comments(result))

@@ -29,8 +29,8 @@ from stewart_dynamics.capability.box_cells import (
     ARM as LEG_ARM, BOUND, CENTER, DEPTH, EXCESS, HALF, halve, Place, place_of, prepare_legs,
     put_box, put_point, spin_of, TURN, turned, unit_of, UPPER)
 from stewart_dynamics.capability.clearance_bounds import (
-    ARM, BASE_JOINT, between_corners, Bodies, bodies_in, Body, CYLINDER, follow, FOLLOWING,
-    is_given, OF_LEG, pair_of, pairs_with, PLACE, PLATES, PLATFORM_JOINT,
+    ARM, BASE_JOINT, between_corners, Bodies, bodies_in, Body, corners_of, CYLINDER, follow,
+    FOLLOWING, is_given, OF_LEG, pair_of, pairs_with, PLACE, PLATES, PLATFORM_JOINT,
     put_plates, RATES, relative_rate, ROTATING, shortest, slope_along, STAYING, STILL, TURNING)
 from stewart_dynamics.capability.singular_values import BEND
 from stewart_dynamics.compilation.functions import compiled, entry_point
@@ -135,8 +135,8 @@ def _lowest(bodies: Bodies, a: Body, b: Body, n: Vector3, cell: Array, how: int,
     longer = math.sqrt(1.0 + swept * swept)
     corners, rest = bodies.corners, TURNING if how == ROTATING else STILL
     lowest, worst, other_worst = math.inf, a[0], b[0]
-    for p in range(a[0], a[2], a[1]):
-        for q in range(b[0], b[2], b[1]):
+    for p in corners_of(a):
+        for q in corners_of(b):
             distance = dot(n, between_corners(corners, p, q))
             distance -= longer * (corners[p, rest] + corners[q, rest])
             x = y = z = 0.0

@@ -28,8 +28,7 @@ from stewart_dynamics.capability import travel
 from stewart_dynamics.capability.force_intervals import (
     largest_multiple, quadratic_exit)
 from stewart_dynamics.capability.growth import Growth
-from stewart_dynamics.capability.motions import (
-    constant, Deviations, faster, timed)
+from stewart_dynamics.capability.motions import Deviations, faster, timed
 from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
 from stewart_dynamics.capability.travel import ENDS, LIMITS
@@ -40,7 +39,8 @@ from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, wrong_type)
 from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.dynamics import lagrange
-from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, PLATFORM
+from stewart_dynamics.mechanics.dynamics.linear_parameters import (
+    about_origin, PLATFORM, with_point_mass)
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, motion_rows, Pose
@@ -480,8 +480,9 @@ class Capability:
             raise MotionError('continuous: must be False for a motion: drive.torque_continuous '
                               'limits what is held at rest')
         if times is not None:
-            return timed(self.platform, times, motion, lambda each, _: self.payload(
-                each, center_of_mass), lambda rows, _: rows)
+            return timed(times, motion, lambda each, _: self.payload(each, center_of_mass),
+                         lambda mass: (StewartPlatform(with_point_mass(
+                             self.platform.parameters, mass, center_of_mass)), motion.rows, 1.0))
         center = as_array('center_of_mass', center_of_mass, (3,))
         moving = motion if isinstance(motion, Motion) else Motion.from_pose(motion)
         forces = self.platform.inverse_dynamics(moving).forces
@@ -514,15 +515,15 @@ class Capability:
             Motion of the base, likewise.
         times : (N,), optional
             Times of a motion (N,) [s]: the motion between the samples counts as well, by the rules
-            of planned trajectories (``planned.trajectory``): its extremes are found to 1 %, the
-            one that limits to rounding errors. Wrench and base must then be constant. By default
-            the samples alone count.
+            of planned trajectories (``planned.trajectory``). Where a limit may be exceeded between
+            two samples at the answer of the samples alone, at least 16 samples are put between
+            them; the extreme that limits is then found to rounding errors. Wrench and base must
+            be constant. By default the samples alone count.
 
         """
         if times is not None:
-            constant(wrench, base)
-            return timed(self.platform, times, motion, lambda each, _: self.speed_factor(
-                each, wrench, base), faster)
+            return timed(times, motion, lambda each, _: self.speed_factor(each, wrench, base),
+                         lambda k: (self.platform, faster(motion.rows, k), k), wrench, base)
         solved = self.platform.inverse_dynamics(motion, singular='nan')
         ended = self._of_path(motion, solved)
         if ended is not None:
@@ -567,9 +568,9 @@ class Capability:
         start = self._single(Pose(motion.position[0], motion.rotation[0]) if center is None
                              else center)
         if times is not None:
-            constant(wrench, base)
-            return timed(self.platform, times, motion, lambda each, most: self._amplitude(
-                each, start, wrench, base, most), lambda rows, k: Deviations(start, rows).at(k))
+            return timed(
+                times, motion, lambda each, most: self._amplitude(each, start, wrench, base, most),
+                lambda k: (self.platform, Deviations(start, motion.rows).at(k), 1.0), wrench, base)
         return self._amplitude(motion, start, wrench, base, math.inf)
 
     def _amplitude(self, motion: Motion, start: Motion, wrench: ArrayLike | None,
@@ -684,7 +685,10 @@ class Capability:
     def _per_wrench(self, pose: Pose | Motion, wrenches: Array) -> Array:
         """Return the leg forces (..., 6) that balance wrenches (..., 6) alone."""
         transposed = np.swapaxes(self.platform.drive_jacobian(pose), -1, -2)
-        return np.asarray(np.linalg.solve(transposed, wrenches[..., None])[..., 0], dtype=float)
+        # numpy 1.26 would take an array of fewer dimensions for vectors.
+        whole = np.broadcast_to(wrenches, np.broadcast_shapes(
+            wrenches.shape, transposed.shape[:-1]))[..., None]
+        return np.asarray(np.linalg.solve(transposed, whole)[..., 0], dtype=float)
 
     def _multiple(self, motion: Motion, forces: Array, change: Array, whole: bool = False,
                   directions: Array | None = None, continuous: bool = False) -> Extent:

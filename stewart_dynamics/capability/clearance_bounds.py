@@ -133,6 +133,12 @@ def pair_of(bodies: Bodies, leg: int, other: int, pair: int) -> tuple[Body, Body
 
 
 @inlined
+def corners_of(body: Body) -> range:
+    """Return the corners of a body."""
+    return range(body[0], body[2], max(body[1], 1))  # a step of 0 would be an exception
+
+
+@inlined
 def between_corners(corners: Array, p: int, q: int) -> Vector3:
     """Return the vector from corner q to corner p."""
     return subtract(read3(corners[p], PLACE), read3(corners[q], PLACE))
@@ -151,7 +157,7 @@ def shortest(corners: Array, a: Body, b: Body) -> Vector3:
 def _support(corners: Array, body: Body, n: Vector3) -> int:
     """Return the corner of a body that is farthest against n."""
     best, lowest = body[0], math.inf
-    for k in range(body[0], body[2], body[1]):
+    for k in corners_of(body):
         along = dot(n, read3(corners[k], PLACE))
         if along < lowest:
             best, lowest = k, along
@@ -178,7 +184,7 @@ def follow(bodies: Bodies, a: Body, b: Body, n: Vector3, how: int) -> None:
         put3(rates[k], 0, (0.0, 0.0, 0.0))
     for body, sign in ((a, 1.0), (b, -1.0)):
         nearest = _support(corners, body, scale(sign, n))
-        for other in range(body[0], body[2], body[1]):
+        for other in corners_of(body):
             q = between_corners(corners, other, nearest)
             length = norm(q)
             if other == nearest or not abs(dot(n, q)) < _NEAR * length:

@@ -96,8 +96,10 @@ class Growth:
         Raises MotionError: the intervals in which that is proven are too many or too narrow.
         """
         found, last = None, min(most, LARGEST)
+        # With the samples that limit first, the others need few intervals.
+        early = np.argsort(-self._largest_ratios(min(last, 1.0)))
         for first in range(0, self._count, _BLOCK):
-            which = np.arange(first, min(first + _BLOCK, self._count))
+            which = early[first:first + _BLOCK]
             low = 0.0
             while low < last:
                 high = last if most < LARGEST else min(max(2.0 * low, 1.0), last)
@@ -108,6 +110,15 @@ class Growth:
             if last == 0.0:
                 break
         return found
+
+    def _largest_ratios(self, factor: float) -> Array:
+        """Return the largest magnitude of each sample's ratios (N,); infinite where unknown."""
+        found = np.empty(self._count)
+        for first in range(0, self._count, _BLOCK):
+            which = np.arange(first, min(first + _BLOCK, self._count))
+            found[which] = np.abs(self.state(np.full(len(which), factor), which).ratios).max(
+                axis=1)
+        return np.nan_to_num(found, nan=np.inf)
 
     def _within(self, which: Integers, low: float, high: float,
                 ) -> tuple[float, int, int] | None:

@@ -88,7 +88,7 @@ def faster(rows: Array, factor: float) -> Array:
     return rows
 
 
-def constant(wrench: ArrayLike | None, base: BaseMotion | None) -> None:
+def _check_constant(wrench: ArrayLike | None, base: BaseMotion | None) -> None:
     """Raise MotionError for a wrench or base that is not constant."""
     for name, shape in (('wrench', np.shape(wrench)[:-1] if wrench is not None else ()),
                         ('base', base.shape if isinstance(base, BaseMotion) else ())):
@@ -97,18 +97,23 @@ def constant(wrench: ArrayLike | None, base: BaseMotion | None) -> None:
                               'times')
 
 
-def timed(platform: StewartPlatform, times: ArrayLike, motion: Any,
-          ask: Callable[[Motion, float], Answer], grown: Callable[[Array, float], Array],
-          ) -> Answer:
+def timed(times: ArrayLike, motion: Any, ask: Callable[[Motion, float], Answer],
+          at_limit: Callable[[float], tuple[StewartPlatform, Array, float]],
+          wrench: ArrayLike | None = None, base: BaseMotion | None = None) -> Answer:
     """
     Return the answer to a question about a motion, between its samples, too.
 
-    platform: its limits say which intervals need samples.
+    Where the motion at the limit of its samples may exceed a limit between them, it has the
+    samples of a planned trajectory.
+
     times (N,): times of the samples [s], strictly increasing.
     ask: takes samples and a factor that need not be exceeded; returns an Extent.
-    grown: takes rows of motion and a factor; returns those of the motion at its limit.
+    at_limit: takes the value of an answer; returns the hexapod, rows of the motion (N, MOTION),
+        and how much faster it is played.
+    wrench, base: external wrench and motion of the base, constant.
     """
     check_kind(motion, Motion)
+    _check_constant(wrench, base)
     seconds = as_array('times', times, motion.shape or (1,))
     if len(motion.shape) != 1 or len(motion) < 2 or seconds.shape != motion.shape:
         raise MotionError(f'times: shape {seconds.shape}, motion: shape {motion.shape}: must both '
@@ -124,16 +129,17 @@ def timed(platform: StewartPlatform, times: ArrayLike, motion: Any,
         return between.at(which, where - which)
 
     found: Any = ask(motion, math.inf)
-    # At its limit, the motion needs the samples that a planned trajectory needs.
     value = float(found.value)
-    factor = value if 0.0 < value < LARGEST else 1.0
-    rows = grown(motion.rows, factor)
-    scale = factor if grown is faster else 1.0
-    results = platform.solve(rows)
+    if value == 0.0:
+        return cast('Answer', found._replace(time=float(seconds[found.sample])))
+    platform, rows, speed = at_limit(value if value < LARGEST else 1.0)
+    results = platform.inverse_dynamics(
+        Motion.of_rows(rows), wrench, base, singular='nan').rows
     with np.errstate(all='ignore'):  # numbers that overflow need too many samples
-        parts = Sampling(platform.parameters).parts(
-            durations / scale, Interpolation(durations / scale, rows), results,
-            platform.drive_rates(rows, results[:, RATES]), None, 0.0)
+        parts = Sampling(platform.parameters, 0.0).parts(
+            durations / speed, Interpolation(durations / speed, rows), results,
+            platform.drive_rates(rows, results[:, RATES]),
+            None if base is None else base.rows[None], math.inf)
     near = parts <= MOST_SAMPLES  # not where they are nan
     if not near.all():
         n = int(np.argmin(near))
@@ -150,8 +156,9 @@ def timed(platform: StewartPlatform, times: ArrayLike, motion: Any,
         float(len(counts)))
     width, best, at = 1.0, found, float(found.sample or 0)
     for turn in range(_ZOOMS + 1):
-        for begin in range(0, len(where), _BLOCK):
-            block = where[begin:begin + _BLOCK]
+        new = where[where % 1.0 != 0.0]
+        for begin in range(0, len(new), _BLOCK):
+            block = new[begin:begin + _BLOCK]
             answer: Any = ask(Motion.of_rows(rows_at(block)), best.value)
             if answer.sample is not None and answer.value <= best.value:
                 best, at = answer, float(block[answer.sample])

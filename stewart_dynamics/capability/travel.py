@@ -31,8 +31,7 @@ from stewart_dynamics.capability.clearance_bounds import (
 from stewart_dynamics.capability.travel_clearance import end_of_clearance
 from stewart_dynamics.capability.travel_condition import end_of_condition
 from stewart_dynamics.capability.travel_legs import (
-    BASE_ANGLE_MAX, end_of_leg, LEG, LENGTH_MAX, LENGTH_MIN, PLATFORM_ANGLE_MAX, prepare_legs,
-    Way, way_of)
+    end_of_leg, LEG, LENGTH_MAX, LENGTH_MIN, prepare_legs, Way, way_of)
 from stewart_dynamics.compilation.functions import compiled, entry_point
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.vectors import norm, put3
@@ -56,7 +55,9 @@ def _travel(constants: Array, bounds: Array, bodies: Bodies, stop: float, legs: 
     # a platform that only turns is back at its pose after one turn
     end = 2.0 * math.pi / way.rate if norm(way.velocity) == 0.0 else math.inf
     limit, leg, decided = NOTHING, -1, True
-    for code in (LENGTH_MAX, LENGTH_MIN, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX):
+    for place in range(CLEARANCE_MIN):
+        # not of a tuple: to LLVM 15 its index could be too large, which would be an exception
+        code = LENGTH_MAX - place if place <= LENGTH_MAX else place  # LENGTH_MAX is the first
         for n in range(6):
             bound = bounds[code, n]
             limited = (bound > 0.0 if code == LENGTH_MIN else

@@ -26,9 +26,9 @@ import math
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.clearance_bounds import (
-    ARM, BASE_JOINT, between_corners, Bodies, Body, CYLINDER, follow, FOLLOWING, OF_LEG, pair_of,
-    pairs_with, PLACE, PLATES, PLATFORM_JOINT, RATES, relative_rate, ROTATING, shortest,
-    slope_along, STAYING, STILL, TURNING)
+    ARM, BASE_JOINT, between_corners, Bodies, Body, corners_of, CYLINDER, follow, FOLLOWING,
+    OF_LEG, pair_of, pairs_with, PLACE, PLATES, PLATFORM_JOINT, RATES, relative_rate, ROTATING,
+    shortest, slope_along, STAYING, STILL, TURNING)
 from stewart_dynamics.capability.singular_values import BEND
 from stewart_dynamics.capability.travel_legs import (
     CENTER, line_of, NARROW, REACH, ROUNDING, safe_step, SPEED, Way)
@@ -124,8 +124,8 @@ def _step_of_bodies(constants: Array, bodies: Bodies, way: Way, a: Body, b: Body
     else:
         step = 1.0 / turned if turned > 0.0 else math.inf
     corners, rest = bodies.corners, TURNING if how == ROTATING else STILL
-    for p in range(a[0], a[2], a[1]):
-        for q in range(b[0], b[2], b[1]):
+    for p in corners_of(a):
+        for q in corners_of(b):
             gap = dot(n, between_corners(corners, p, q)) - limit
             bend = corners[p, rest] + corners[q, rest]
             if how == FOLLOWING:

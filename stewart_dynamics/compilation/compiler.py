@@ -92,7 +92,7 @@ def _from_block(entry: EntryPoint) -> Callable[[Any], None]:
     for dtype, dimensions in entry.arguments:
         if dimensions:
             shape = ''.join(f'integers[{place + n}], ' for n in range(1, dimensions + 1))
-            arguments.append(f'carray(block[{place}], ({shape}), np.{dtype.name})')
+            arguments.append(f'carray(block[{place}], ({shape}), np.{dtype.type.__name__})')
         else:
             arguments.append({'f': f'floats[{place}]', 'i': f'integers[{place}]',
                               'b': f'integers[{place}] != 0'}[dtype.kind])

@@ -32,6 +32,9 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import LARGEST, read_value
 from stewart_dynamics.whole_file import read_text
 
+# Rule of the largest length, for errors.
+LARGEST_RULE = '100 times the size of the hexapod: lengths are in m'
+
 
 def read_box(path: Path, parameters: Parameters) -> Array:
     """
@@ -47,14 +50,13 @@ def read_box(path: Path, parameters: Parameters) -> Array:
     document = read_value(read_text(path, LARGEST, ParameterError), str(path))
     if not isinstance(document, dict) or not document:
         raise ParameterError(f"{path}: must have a range, such as 'x: 0.1'")
-    size = float(np.max([np.ptp(parameters[name], axis=0) for name in (
-        'geometry.base_joints', 'geometry.platform_joints')]))
+    largest = largest_length(parameters)
     ranges = np.zeros((6, 2))
     for name, value in document.items():
         if name not in AXES:
             raise ParameterError(f'{path}: {shown_name(name)}: must be one of {", ".join(AXES)}')
         most, rule = ((2.0 * math.pi, 'a turn: angles are in radians') if name.startswith('r')
-                      else (100.0 * size, '100 times the size of the hexapod: lengths are in m'))
+                      else (largest, LARGEST_RULE))
         bounds = _range(f'{path}: {name}', value)
         if max(map(abs, bounds)) > most:
             raise ParameterError(
@@ -78,6 +80,12 @@ def doubtful_ranges(ranges: Array, parameters: Parameters) -> Iterator[str]:
             yield f'--box: {axis}: {most:g} rad is more than a quarter of a turn: in degrees?'
         elif not axis.startswith('r') and most > far:
             yield f'--box: {axis}: {most:g} m is more than {than}, {far:.4g} m: in mm?'
+
+
+def largest_length(parameters: Parameters) -> float:
+    """Return the largest length that an option or file may give [m]."""
+    return 100.0 * float(np.max([np.ptp(parameters[name], axis=0) for name in (
+        'geometry.base_joints', 'geometry.platform_joints')]))
 
 
 def _range(where: str, value: Any) -> tuple[float, float]:

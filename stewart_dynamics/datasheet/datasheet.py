@@ -27,6 +27,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags import recording
 from stewart_dynamics.capability import box_condition, box_legs, travel
 from stewart_dynamics.datasheet import claimed_box, ratings, workspace
+from stewart_dynamics.datasheet.claimed_box import largest_length, LARGEST_RULE
 from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import answer, AXES
@@ -213,8 +214,14 @@ def is_possible(sheet: dict[str, Any]) -> bool:
                for name in ('box', 'motion'))
 
 
-def check_order(order: Order) -> None:
+def check_order(order: Order, parameters: Parameters) -> None:
     """Raise StewartError for values that no datasheet can be made for."""
+    most = largest_length(parameters)
+    for name, point in (('pivot', order.pivot),
+                        ('payload', order.payload and order.payload.center_of_mass)):
+        if point is not None and np.abs(point).max() > most:
+            raise StewartError(f'--{name}: {np.abs(point).max():g} m from the platform frame: '
+                               f'must be within {most:.4g}, {LARGEST_RULE}')
     if order.payload is not None and not order.payload.mass > 0.0:
         raise StewartError(f'--payload: mass {order.payload.mass:g} kg: must be above 0')
     if order.leg_stiffness is not None and not order.leg_stiffness > 0.0:

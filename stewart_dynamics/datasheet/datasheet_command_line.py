@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.program import (
-    add_node, add_parameters, frequency, NODE, number, Program)
+    add_node, add_parameters, between, frequency, NODE, Program)
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import DATASHEETS
 from stewart_dynamics.signals import interrupt_on_signals
@@ -43,16 +43,18 @@ def _arguments() -> argparse.ArgumentParser:
                     'what limits it.',
         files='DIR/ gets datasheet.html, datasheet.json and workspace.csv.')
     add_parameters(parser, '; with the limits that rate it')
-    parser.add_argument('--pose', nargs=6, type=number, metavar=(
+    # Wide enough for mm, whose mistake is named.
+    size = between(-1e6, 1e6)
+    parser.add_argument('--pose', nargs=6, type=size, metavar=(
         'X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA'),
         help='pose that is rated [m, rad] (default: home)')
-    parser.add_argument('--pivot', nargs=3, type=number, metavar=('X', 'Y', 'Z'),
+    parser.add_argument('--pivot', nargs=3, type=size, metavar=('X', 'Y', 'Z'),
                         help='point that the platform turns about and forces act on, platform '
                              'frame [m] (default: its origin)')
-    parser.add_argument('--payload', nargs=4, type=number, metavar=('KG', 'X', 'Y', 'Z'),
+    parser.add_argument('--payload', nargs=4, type=size, metavar=('KG', 'X', 'Y', 'Z'),
                         help='mass on the platform, and its center of mass in the platform frame '
                              '[m]')
-    parser.add_argument('--leg-stiffness', type=number, metavar='K',
+    parser.add_argument('--leg-stiffness', type=between(-1e15, 1e15), metavar='K',
                         help='stiffness of a leg along its axis [N/m]: adds stiffness and natural '
                              'frequencies')
     parser.add_argument('--box', type=Path, metavar='FILE',
@@ -101,7 +103,7 @@ def _run(given: argparse.Namespace) -> int:
             given.payload[0], np.array(given.payload[1:])),
         None if given.box is None else read_box(given.box, parameters), given.motion, options,
         given.leg_stiffness)
-    check_order(order)
+    check_order(order, parameters)
     check_free(given.output, options, DATASHEET)
     remove_abandoned([given.output])
     _PROGRAM.prepare(FUNCTIONS, (

@@ -21,6 +21,7 @@ Figures are in the units of vendors' sheets, rounded toward zero.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from decimal import Context, Decimal, ROUND_DOWN
 import math
 from typing import Any, NamedTuple
 
@@ -30,9 +31,12 @@ from stewart_dynamics.capability.travel import LIMITS
 from stewart_dynamics.datasheet.ratings import AXES
 from stewart_dynamics.mechanics.limits import QUANTITIES, short_name, SINGULARITY
 from stewart_dynamics.parameters.table import FIXED
-from stewart_dynamics.reporting.pages import typeset
+from stewart_dynamics.reporting.pages import MOST_PLAIN, typeset
 
 _DIGITS = 4
+# Smaller numbers are written with a power of ten.
+_LEAST_PLAIN = 1e-6
+_TOWARD_ZERO, _ROUNDING = Context(_DIGITS, ROUND_DOWN), 1 + Decimal('1e-12')
 
 
 class Unit(NamedTuple):
@@ -77,12 +81,10 @@ def down(value: float | None) -> str:
         return '–'
     if value == 0.0:
         return '0'
-    places = _DIGITS - 1 - math.floor(math.log10(abs(value)))
-    power = 10.0 ** places
     # a value that is exact in four digits is not to lose its last one by rounding errors
-    shortened = math.trunc(value * power * (1.0 + 1e-12)) / power
-    text = f'{shortened:,.{max(places, 0)}f}'
-    return typeset(text)
+    shortened = _TOWARD_ZERO.create_decimal(Decimal(value) * _ROUNDING)
+    plain = _LEAST_PLAIN <= abs(value) < MOST_PLAIN
+    return typeset(f'{shortened:,f}' if plain else f'{shortened:.{_DIGITS - 1}e}')
 
 
 def both_ways(values: Mapping[str, Any], axis: str, unit: Unit) -> str:

@@ -26,6 +26,7 @@ from stewart_dynamics.capability.capability import Capability, Extent
 from stewart_dynamics.capability.reachable import Reachable
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
+from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
 from stewart_dynamics.mechanics.limits import LIMITS
@@ -33,8 +34,7 @@ from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import HELD_MOTORS
-from stewart_dynamics.parameters.table import (
-    inertia_matrix, LEG_SHAPE, Parameters, PLATFORM_OUTLINE)
+from stewart_dynamics.parameters.table import LEG_SHAPE, Parameters, PLATFORM_OUTLINE
 from stewart_dynamics.planned.interpolation import rotation_vector
 
 
@@ -74,7 +74,8 @@ class RatedHexapod:
             raise ParameterError(f'parameters: {", ".join(LIMITS)}: none of them is set: without '
                                  'a limit there is no datasheet')
         self.pivot = np.zeros(3) if pivot is None else np.asarray(pivot, dtype=float)
-        self.given = parameters if payload is None else _loaded(parameters, payload)
+        self.given = parameters if payload is None else with_point_mass(
+            parameters, payload.mass, payload.center_of_mass)
         whole = StewartPlatform(self.given)
         self.origin = whole.home_pose() if pose is None else pose
         self._limits = Capability(whole)
@@ -164,16 +165,3 @@ def _moved(p: Parameters, pivot: Array) -> Parameters:
         PLATFORM_OUTLINE: None if p[PLATFORM_OUTLINE] is None else p[PLATFORM_OUTLINE] - pivot,
         'platform.center_of_mass': p['platform.center_of_mass'] - pivot,
         'singularity.characteristic_length': p['singularity.characteristic_length']})
-
-
-def _loaded(p: Parameters, payload: Payload) -> Parameters:
-    """Return the parameters with a point mass on the platform."""
-    masses = np.array([p['platform.mass'], payload.mass])
-    centers = np.array([p['platform.center_of_mass'], payload.center_of_mass])
-    center = masses @ centers / masses.sum()
-    inertia = inertia_matrix(p['platform.inertia'])
-    for mass, arm in zip(masses, centers - center, strict=True):
-        inertia = inertia + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return p.replaced({
-        'platform.mass': masses.sum(), 'platform.center_of_mass': center,
-        'platform.inertia': inertia[np.triu_indices(3)]})

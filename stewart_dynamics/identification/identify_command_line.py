@@ -28,7 +28,7 @@ from stewart_dynamics.identification.identification_options import (
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
 from stewart_dynamics.program import (
     add_accepted, add_motor_efforts, add_node, add_parameters, add_report, arguments_of, between,
-    DONE, names_of, Program, whole)
+    DONE, names_of, Program, share, whole)
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_MOTION, IDENTIFIED
 from stewart_dynamics.signals import interrupt_on_signals
@@ -81,7 +81,7 @@ def _arguments() -> argparse.ArgumentParser:
                            f'(default: {CUTOFF:g}): above the frequencies of the motion')
     what.add_argument('--prior', type=between(1e-6, 1e3), metavar='PART',
                       help="the file's values count, as if known to this part of their size")
-    what.add_argument('--hold-out', type=between(0.0, 0.9), default=HOLD_OUT, metavar='PART',
+    what.add_argument('--hold-out', type=share(0.9), default=HOLD_OUT, metavar='PART',
                       help='end of each bag that validates a fit to the rest; 0: none '
                            f'(default: {HOLD_OUT:g})')
     what.add_argument('--no-delay', dest='delay', action='store_false',

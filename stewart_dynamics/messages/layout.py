@@ -111,7 +111,7 @@ class Layout:
         """
         rows = at_any_byte(data, self.size)[starts].view(self._dtype)
         stamp, = (rows[name] for name in self._stamps)
-        stamps: Stamps = stamp['sec'] * np.int64(SECOND) + stamp['nanosec']
+        stamps: Stamps = stamp['sec'].astype(np.int64) * SECOND + stamp['nanosec']
         alike: Flags = stamp['nanosec'] < SECOND
         for name, fixed in self._fixed.items():
             alike &= rows[name] == fixed

@@ -35,6 +35,7 @@ from stewart_dynamics.parameters.tolerances import (
     HYSTERESIS, is_unit, REFLECTED_MASS_TOLERANCE, START_TOLERANCE, unit_rule)
 
 
+CENTER_UNCERTAINTY = 0.1  # default of uncertainty.center_of_mass, by the characteristic length
 # Corners of a plate are in a plane to this part of its size.
 _FLAT = 1e-6
 NO_MASS = 1e-15
@@ -105,6 +106,23 @@ def _drives() -> Iterator[Parameter]:
                         f'universal joint that is fixed to the {end}, {end} axes, for '
                         'drive.screw_rotation: universal; default: across the leg at the home '
                         'pose, in the plane of the base joints', '', (), sizes=(18,))
+
+
+def _uncertainties() -> Iterator[Parameter]:
+    for name, text, unit, default in (
+            ('platform_mass', 'platform.mass, relative to it', '', 0.5),
+            ('center_of_mass', 'each coordinate of platform.center_of_mass; default: '
+             f'{CENTER_UNCERTAINTY:g} of singularity.characteristic_length', 'm', None),
+            ('inertia', 'platform.inertia, relative to its mean principal moment', '', 1.0),
+            ('leg_mass', 'masses, centers of mass and inertias of cylinders and pistons, relative '
+             'to them: once of all legs together, and again of each leg', '', 0.05),
+            ('reflected_mass', 'actuator.reflected_mass of each leg, relative to it', '', 0.1),
+            ('effort_gain', 'the gain of measured efforts, of all legs together', '', 0.01),
+            ('tilt', 'the direction of gravity in the base frame, about each of two axes', 'rad',
+             0.005)):
+        yield Parameter(
+            f'uncertainty.{name}', 'double', f'standard deviation of {text}; a prior of '
+            'stewart_identify and ~/identify_payload', unit, default, minimum=0.0)
 
 
 GUIDED, UNIVERSAL = 'guided', 'universal'  # values of drive.screw_rotation
@@ -291,6 +309,7 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               above=True, while_active=True),
     Parameter('payload.window', 'double', 'time of the measurements that ~/identify_payload uses, '
               'the last ones', 's', 10.0, minimum=2.0, maximum=60.0),
+    *_uncertainties(),
     *_meshes(),
     Parameter('visualization_rate', 'double', 'maximum rate of ~/markers and ~/joint_states; 0: '
               'off', 'Hz', 30.0, minimum=0.0),
@@ -346,6 +365,9 @@ class Parameters(ParameterSet):
                 f'{source}: geometry.platform_joints: all six are at one point')
         if self['singularity.characteristic_length'] is None:
             self._values['singularity.characteristic_length'] = size
+        if self['uncertainty.center_of_mass'] is None:
+            self._values['uncertainty.center_of_mass'] = (
+                CENTER_UNCERTAINTY * self['singularity.characteristic_length'])
         for name in ('geometry.base_joint_axes', 'geometry.platform_joint_axes',
                      'drive.base_universal_axes', 'drive.platform_universal_axes'):
             axes = self[name]

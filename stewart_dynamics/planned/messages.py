@@ -160,7 +160,7 @@ def _read(message: PlatformTrajectory, parameters: Parameters,
             raise MalformedError(
                 f'points[{first + n}]: time_from_start of {points["nanosec"][n]} ns: must be '
                 'under 1000000000')
-        times[first:end] = points['sec'] * np.int64(SECOND) + points['nanosec']
+        times[first:end] = points['sec'].astype(np.int64) * SECOND + points['nanosec']
         stuck = first_not_increasing(times[first:end], times[first - 1] if first else -1)
         if stuck is not None:
             n = first + stuck

@@ -52,9 +52,14 @@ _FEWEST = 16
 
 
 class Sampling:
-    """The number of samples that the trajectories of a hexapod need."""
+    """
+    The number of samples that the trajectories of a hexapod need.
 
-    def __init__(self, parameters: Parameters) -> None:
+    tolerance: part of the largest force and of a limit by which a force may be missed.
+    """
+
+    def __init__(self, parameters: Parameters, tolerance: float = TOLERANCE) -> None:
+        self._tolerance = tolerance
         self._arm = arm = float(parameters['singularity.characteristic_length'])
         self._limits = Limits(parameters)
         self._viscous = parameters['actuator.viscous_friction']
@@ -145,12 +150,13 @@ class Sampling:
             of_motors = force_limits(self._parameters, _larger(np.abs(rates)) + rate_deviation)
             still = force_limits(self._parameters, np.zeros(6))
             strongest = np.minimum(strongest, np.maximum(of_motors, _LEAST * still))
-        allowed = TOLERANCE * np.minimum(largest, strongest)
+        allowed = self._tolerance * np.minimum(largest, strongest)
         relevant = _larger(magnitudes) + deviation + friction > np.minimum(
             largest, strongest) + allowed
         needed = relevant & (deviation + friction > allowed)
-        parts: Array = np.where(needed, np.ceil(np.sqrt(deviation / allowed)).clip(
-            _FEWEST, _ENOUGH), 1.0).max(axis=1)
+        ratio = np.where(deviation == 0.0, 0.0, deviation / allowed)
+        enough = np.ceil(np.sqrt(ratio)).clip(_FEWEST, _ENOUGH)
+        parts: Array = np.where(needed, enough, 1.0).max(axis=1)
         return parts
 
     def _inertia_deviation(self, durations: Array, bounds: Bounds, inverse_radius: Array,

@@ -62,6 +62,9 @@ def cluster(address: str, run: str, at: At) -> Iterator[Replayed]:
                     ended = future.result()
                 except dask.KilledWorker:
                     ended = finished(task)
+                except dask.CancelledError:  # by Dask; a cancelled run does not come back here
+                    ended = finished(task) or failed(
+                        task, 'the connection to the scheduler was lost')
                 except Exception as exc:  # the connection may be lost
                     ended = finished(task) or failed(task, f'{type(exc).__name__}: {exc}')
                 yield task, ended

@@ -32,6 +32,7 @@ from stewart_dynamics.mechanics.limits import (
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.summary import margin_key, unit_key
+from stewart_dynamics.reporting.pages import fixed
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, Rejection
 
 Summary = Mapping[str, Any]  # the content of summary.json
@@ -246,9 +247,10 @@ def _loads(found: Summary) -> Iterator[Statement]:
     for name, unit in PARTS_OF_WRENCH.items():
         each, key = found[name], unit_key(unit)
         if each[f'peak_{key}'] is not None:
-            rms = '-' if each[f'rms_{key}'] is None else f'{each[f"rms_{key}"]:.1f}'
-            yield Statement(LOADS, 'none', f'{name} on the base: {each[f"peak_{key}"]:.1f} {unit} '
-                            'at most', each['peak_at_s'], f'base_{name}', f' (RMS {rms})')
+            rms = '-' if each[f'rms_{key}'] is None else fixed(each[f'rms_{key}'], 1)
+            peak = fixed(each[f'peak_{key}'], 1)
+            yield Statement(LOADS, 'none', f'{name} on the base: {peak} {unit} at most',
+                            each['peak_at_s'], f'base_{name}', f' (RMS {rms})')
 
 
 def _motors(summary: Summary) -> Iterator[Statement]:

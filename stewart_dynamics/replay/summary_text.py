@@ -25,6 +25,7 @@ from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
     INPUTS, JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING, SINGULARITY)
+from stewart_dynamics.reporting.pages import fixed
 from stewart_dynamics.setpoints.rejections import Rejection
 
 _LISTED = 5
@@ -86,14 +87,14 @@ def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
     lines = [measured['headline']]
     if not measured['setpoints_compared']:
         return lines
-    rms = ', '.join(f'{leg} {found["residual_rms_n"]:.1f}' for leg, found in
+    rms = ', '.join(f'{leg} {fixed(found["residual_rms_n"], 1)}' for leg, found in
                     measured['legs'].items())
     lines += [f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
               f'force, RMS [N]: {rms}',
               'stewart_identify finds the payload and friction that fit the measured forces']
     contacts = measured['contacts']
     lines += [f'contact {_span(each["from_s"], each["to_s"])}: external force '
-              f'({", ".join(f"{part:.1f}" for part in each["force_n"])}) N'
+              f'({", ".join(fixed(part, 1) for part in each["force_n"])}) N'
               for each in contacts['strongest'][:_LISTED]]
     if contacts['count'] > _LISTED:
         lines.append(f'and {contacts["count"] - _LISTED} more contacts')

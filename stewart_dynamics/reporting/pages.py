@@ -45,6 +45,8 @@ _SHARED = Path(__file__).with_name('templates')
 
 # Between thousands: a narrow space that does not break, as SI recommends.
 _THIN_SPACE = '\u202f'
+# From here on, numbers are written with a power of ten.
+MOST_PLAIN = 1e10
 
 
 def number(value: float | None, decimals: int) -> str:
@@ -54,11 +56,16 @@ def number(value: float | None, decimals: int) -> str:
     return typeset(f'{value:,.{decimals}f}') if abs(value) < 1e5 else digits(value)
 
 
+def fixed(value: float, decimals: int) -> str:
+    """Return a number with a given number of decimals for a text, large ones in five digits."""
+    return f'{value:.{decimals}f}' if abs(value) < MOST_PLAIN else f'{value:.5g}'
+
+
 def digits(value: float | None) -> str:
     """Return a number with five digits, or all digits before the point."""
     if value is None or not math.isfinite(value):
         return '–'
-    if not 1e3 <= abs(value) < 1e10:
+    if not 1e3 <= abs(value) < MOST_PLAIN:
         return typeset(f'{value:.5g}')
     text = f'{value:.5g}' if abs(value) < 1e5 else f'{value:.0f}'
     decimals = len(text.partition('.')[2]) if 'e' not in text else 0

@@ -120,11 +120,11 @@ def screw_constants(p: Parameters) -> Array:
     if p['drive.screw_rotation'] == UNIVERSAL:
         screws[:, PITCH] = motor_turns(p) * p['actuator.screw_lead'] / (
             2.0 * math.pi * p['drive.gear_ratio'])
-        screws[:, 1:] = _universal_axes(p)
+        screws[:, 1:] = universal_axes(p)
     return screws
 
 
-def _universal_axes(p: Parameters) -> Array:
+def universal_axes(p: Parameters) -> Array:
     """Return the unit vectors (6, 6) of the axes fixed to base, base axes, and to platform."""
     rotation = homes(p)[1][0]
     base = p['drive.base_universal_axes']

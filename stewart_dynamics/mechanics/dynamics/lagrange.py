@@ -118,6 +118,13 @@ def drive_jacobian(at: Legs, rotation: Array, screws: Array | None = None) -> Ar
     return np.concatenate([h, np.cross(at.arms, h) + pitch * d], axis=-1)
 
 
+def leg_twists(directions: Array, rotation: Array, screws: Array) -> Array:
+    """Return the twists (..., 6) of legs between their universal joints [rad]."""
+    _, u, w = _screws(rotation, screws)
+    u_s, w_s = _dot(u, directions), _dot(w, directions)
+    return np.asarray(np.arctan2(_dot(directions, np.cross(u, w)), _dot(u, w) - u_s * w_s)[..., 0])
+
+
 def drive_jacobian_rate(at: Legs, rotation: Array, velocity: Array, omega: Array,
                         screws: Array | None = None) -> Array:
     """Return dJ_q/dt (..., 6, 6) under a twist."""

@@ -31,6 +31,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
@@ -130,3 +131,16 @@ def about_origin(mass: float, center: Array, inertia: Array) -> Array:
         np.dot(center, center) * np.eye(3) - np.outer(center, center))
     six: Array = whole[np.triu_indices(3)]
     return six
+
+
+def with_point_mass(p: Parameters, added: float, position: ArrayLike) -> Parameters:
+    """Return the parameters with a point mass [kg] on the platform, platform frame (3,) [m]."""
+    masses = np.array([p['platform.mass'], added])
+    centers = np.array([p['platform.center_of_mass'], position])
+    center = masses @ centers / masses.sum()
+    inertia = inertia_matrix(p['platform.inertia'])
+    for mass, arm in zip(masses, centers - center, strict=True):
+        inertia = inertia + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return p.replaced({
+        'platform.mass': masses.sum(), 'platform.center_of_mass': center,
+        'platform.inertia': inertia[np.triu_indices(3)]})

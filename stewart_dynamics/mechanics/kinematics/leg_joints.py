@@ -97,7 +97,8 @@ class TreeJoints:
         """
         at, r = np.asarray(position, dtype=float), np.asarray(rotation, dtype=float)
         legs = at[..., None, :] + self._platform @ r.swapaxes(-1, -2) - self._base
-        x, y, z = np.moveaxis(np.einsum('iba,...ib->...ia', self.mounts, legs), -1, 0)
+        # Copied: the bits of numpy 1.26's arctan2 of views change with where these are in memory.
+        x, y, z = np.moveaxis(np.einsum('iba,...ib->...ia', self.mounts, legs), -1, 0).copy()
         across = np.hypot(y, z)
         of_legs = np.stack([np.arctan2(-y, z), np.arctan2(x, across),
                             np.hypot(x, across) - self._zero_length], axis=-1)
