@@ -204,10 +204,11 @@ def _held(summary: Summary, topic: str, limits: str) -> Statement:
     if not measured:
         return Statement(topic, 'good', f'{limits} held')
     demands = f'{limits} held by the demands of the setpoints'
-    if measured['likely_mistake'] is None:
+    mistake = measured.get('likely_mistake')  # not in older summaries
+    if mistake is None:
         return Statement(topic, 'good', demands)
     return Statement(topic, 'warn', f'{demands}, which the measured efforts contradict (likely '
-                                    f'mistake: {measured["likely_mistake"]["what"]})')
+                                    f'mistake: {mistake["what"]})')
 
 
 def _contradicting(summary: Summary) -> bool:
@@ -347,7 +348,7 @@ def _measured(measured: Summary | None) -> Iterator[Statement]:
     if not measured:
         return
     compared, contacts = measured['setpoints_compared'], measured['contacts']
-    differs = (contacts['count'] or measured['likely_mistake']
+    differs = (contacts['count'] or measured.get('likely_mistake')
                or (measured['residual_share'] or 0.0) > _DIFFERENT)
     yield Statement(MEASURED, 'none' if not compared else 'warn' if differs else 'good',
                     measured['headline'])

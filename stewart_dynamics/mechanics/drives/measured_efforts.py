@@ -225,7 +225,8 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> EffortMist
     if 1.0 / FAR < scale < FAR:
         return None
     lead, ratio = p['actuator.screw_lead'], p['drive.gear_ratio']
-    torques = 'likely torques of the motors in place of forces: --motor-torque takes them'
+    torques = ('likely torques of the motors in place of forces: stewart_replay and '
+               'stewart_identify take them with --motor-torque')
     units = [unit for factor, unit in _FACTORS if _is_near(scale, factor)]
     if of_motors and any(_is_near(scale, each, _LOSSES) for each in _per_effort(p)):
         what, likely = FORCE, ('likely forces at the legs in place of torques or currents of the '
