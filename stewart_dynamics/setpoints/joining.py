@@ -95,7 +95,7 @@ class Setpoints:
         ever: all that were found; by default the present ones.
         """
         found = inconsistencies(self._consistency, ever, self._topic_of)
-        # The last pose is judged only where twists differ: it takes a millisecond.
+        # The last pose is judged only where twists differ.
         mistake = (self._pose_mistake('first', self._first) if ever
                    else self._pose_mistake('last', self._last) if found else [])
         if mistake:

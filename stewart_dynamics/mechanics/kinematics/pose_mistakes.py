@@ -23,6 +23,7 @@ that it has at home.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -30,6 +31,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose, other_side, shape_of
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, TOLERANCE
@@ -71,11 +73,10 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
     pose = np.array(motion[POSE])
     position: Array = pose[POSITION]
     rotation: Array = pose[ROTATION].reshape(3, 3)
-    try:
-        home = home_pose(parameters)
-    except ParameterError:
+    found = _at_home(parameters)
+    if found is None:
         return _far(parameters, position, rotation)
-    lengths_at_home, at_home = _legs(parameters, home.position, home.rotation)
+    home, lengths_at_home, at_home = found
     low, high = parameters[LENGTH_MIN], parameters[LENGTH_MAX]
     shortest = _SHORTEST * lengths_at_home if low is None else low * (1.0 - TOLERANCE)
     longest = _LONGEST * lengths_at_home if high is None else high * (1.0 + TOLERANCE)
@@ -110,6 +111,16 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
             if is_possible(at, turned):
                 return f'likely mistake: {" and ".join(each)}'
         return other_side(_legs(parameters, position, rotation)[1], at_home) if first else ''
+
+
+@lru_cache(maxsize=4)  # home takes a millisecond, the rest a tenth of it
+def _at_home(parameters: Parameters) -> tuple[Pose, Array, float] | None:
+    """Return the home pose, its lengths of the legs and det(J); None if it is not known."""
+    try:
+        home = home_pose(parameters)
+    except ParameterError:
+        return None
+    return home, *_legs(parameters, home.position, home.rotation)
 
 
 def _far(parameters: Parameters, position: Array, rotation: Array) -> str:

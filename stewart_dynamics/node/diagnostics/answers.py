@@ -268,7 +268,7 @@ class LimitsDiagnostics(StatusPart):
             self._answers.parameters['limits.action'] == SUPPRESS_FORCES)
         self._suppressed += suppressed
         if not any(self.held.of(name, now).level for name in _OF_POSE):
-            # At most once in a second: it takes a millisecond.
+            # At most once in a second: it may take a millisecond.
             self._mistake = pose_mistake(
                 self._answers.parameters, motion, first=self._answers.number == 1)
         for name in _LIMITS:
