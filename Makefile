@@ -146,6 +146,7 @@ bench-calibrate: $(INSTALLED)
 
 bench-coverage: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/interval_coverage.py --write
+	$(VENV)/bin/python benchmarks/interval_coverage.py --table --write
 
 bench-lack-of-fit: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/lack_of_fit.py --write

@@ -44,13 +44,15 @@ ROWS = ('platform.mass', 'platform.center_of_mass', 'platform.inertia',
 
 def compared(designed: Design, half_widths: dict[str, Array]) -> list[str]:
     """Return the table: the mean interval of each kind, and the least ratio of one parameter."""
-    names = designed.unknowns.names
+    unknowns = designed.unknowns
+    names, units = ([each[n] for n in unknowns.asked] for each in (
+        unknowns.names, unknowns.units))
     rows: list[tuple[str, ...]] = [('half of the 95 % interval', 'unit', 'designed', *(
         part for label in half_widths for part in (label, 'times wider', 'at least')))]
     for kind in ROWS:
         of_kind = [n for n, name in enumerate(names) if name.startswith(kind)]
         mine = designed.half_widths[of_kind]
-        row = [f'`{kind}`', designed.unknowns.units[of_kind[0]], f'{mine.mean():.2g}']
+        row = [f'`{kind}`', units[of_kind[0]], f'{mine.mean():.2g}']
         for values in half_widths.values():
             ratios = values[of_kind] / mine
             row += [f'{values[of_kind].mean():.2g}', f'{ratios.mean():.1f}',
@@ -79,7 +81,7 @@ def main() -> None:
         half_widths = {label: predicted_half_widths(
             platform_, designed.unknowns, sweep(platform_, asked, together), asked.duration, asked)
             for label, together in (('sweeps in turn', False), ('sweeps at once', True))}
-        scales = designed.unknowns.scales
+        scales = designed.unknowns.deviations[designed.unknowns.asked]
         ratios[kinds] = [float(np.sqrt(np.sum((each / scales) ** 2) / np.sum(
             (designed.half_widths / scales) ** 2))) for each in half_widths.values()]
     lines += [*compared(designed, half_widths), '']

@@ -39,8 +39,7 @@ import numpy as np
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.executables import executable
 from stewart_dynamics.identification.extraction import Extraction, Extracts
-from stewart_dynamics.identification.fit import errors_of, fit
-from stewart_dynamics.identification.sums import sums_of
+from stewart_dynamics.identification.fit import fit
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
@@ -79,7 +78,8 @@ def kind_of(name: str) -> str:
 
 def errors(names: Sequence[str], values: Array) -> dict[str, float]:
     """Return the largest error of each kind, in the units of TARGETS."""
-    truth = dict(zip(Unknowns(TRUE).names, Unknowns(TRUE).start, strict=True))
+    unknowns = Unknowns(TRUE)
+    truth = dict(zip(unknowns.names, unknowns.start, strict=True))
     largest: dict[str, float] = {}
     for name, value in zip(names, values, strict=True):
         kind = kind_of(name)
@@ -153,12 +153,10 @@ def one_seed(given: tuple[int, Array]) -> tuple[Array, Array]:
     read = Extraction(platform, unknowns, 1.0 / RATE, 10.0)(window, platform.home_pose())
     extracts = Extracts()
     extracts.add(0, 0.0, read.extract)
-    sums = sums_of(extracts)
-    found = fit(sums, unknowns, cutoffs=np.array([10.0]))
-    spread = errors_of(extracts, sums, unknowns, found)
+    found = fit(extracts, unknowns, None, np.array([10.0]))
     extracts.close()
-    return (np.append(found.values, found.delays[0]),
-            np.append(np.sqrt(np.diag(spread.covariance)), spread.delays[0]))
+    return (np.append(found.values[unknowns.asked], found.delays[0]),
+            np.append(np.sqrt(np.diag(found.covariance))[unknowns.asked], found.delay_errors[0]))
 
 
 def coverage(forces: Array, seeds: int) -> list[str]:
@@ -166,9 +164,10 @@ def coverage(forces: Array, seeds: int) -> list[str]:
     with ProcessPoolExecutor(2) as pool:
         found = list(pool.map(one_seed, ((seed, forces) for seed in range(seeds)), chunksize=5))
     values, deviations = (np.array(each) for each in zip(*found, strict=True))
-    truth = np.append(Unknowns(TRUE).start, NOISE.delay)
+    unknowns = Unknowns(TRUE)
+    truth = np.append(unknowns.start[unknowns.asked], NOISE.delay)
     held = 100.0 * np.mean(np.abs(values - truth) < TWO_SIDED * deviations, axis=0)
-    names = [kind_of(name) for name in Unknowns(TRUE).names] + ['delay']
+    names = [kind_of(unknowns.names[n]) for n in unknowns.asked] + ['delay']
     rows = [(f'95 % intervals that hold the truth, {seeds} seeds', 'least', 'most', 'standard '
              'error / spread')]
     for kind in dict.fromkeys(names):
