@@ -80,7 +80,7 @@ def test_equal_seeds_give_equal_motions(small: Design) -> None:
 
 def test_generations_make_the_intervals_smaller(small: Design) -> None:
     first = design(HEXAPOD, SMALL._replace(generations=1))
-    scales = small.unknowns.scales
+    scales = small.unknowns.deviations[small.unknowns.asked]
     assert np.sum((small.half_widths / scales) ** 2) < 0.8 * np.sum(
         (first.half_widths / scales) ** 2)
 
@@ -90,7 +90,7 @@ def test_its_intervals_are_three_times_narrower_than_those_of_sine_sweeps() -> N
     platform, options = StewartPlatform(HEXAPOD), DesignOptions(
         kinds=('platform',), generations=60, harmonics=6)
     designed = design(HEXAPOD, options)
-    scales = designed.unknowns.scales
+    scales = designed.unknowns.deviations[designed.unknowns.asked]
     for together in (False, True):
         swept = predicted_half_widths(platform, designed.unknowns, sweep(
             platform, options, together), options.duration, options)
@@ -107,10 +107,11 @@ def test_the_predicted_intervals_are_those_of_a_fit(small: Design) -> None:
     platform, unknowns = StewartPlatform(HEXAPOD), small.unknowns
     times = np.arange(0.0, 12.0, 1.0 / options.rate)
     motion = motion_at(small.trajectory, times)
-    columns = columns_of(platform, unknowns, motion.rows).reshape(-1, len(unknowns.names))
+    columns = columns_of(platform, unknowns, motion.rows).reshape(-1, len(unknowns.asked))
+    scales = unknowns.deviations[unknowns.asked]
     noise = options.noise * random.normal(size=(len(columns), 400))
-    found = np.linalg.lstsq(columns * unknowns.scales, noise, rcond=None)[0]
-    spread = 1.959964 * unknowns.scales * found.std(axis=1)
+    found = np.linalg.lstsq(columns * scales, noise, rcond=None)[0]
+    spread = 1.959964 * scales * found.std(axis=1)
     predicted = predicted_half_widths(platform, unknowns, motion, 12.0, options)
     np.testing.assert_allclose(spread / predicted, 1.0, atol=0.15)
 

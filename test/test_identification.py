@@ -45,7 +45,7 @@ TRUE = GIVEN.replaced({
 # The true hexapod on a base that is not level.
 TILTED = TRUE.replaced({'gravity': rotation_about(
     np.array([np.cos(0.7), np.sin(0.7), 0.0]), np.radians(1.5)) @ GIVEN['gravity']})
-VALUES = dict(zip(Unknowns(TRUE).names, Unknowns(TRUE).start, strict=True))
+VALUES = {Unknowns(TRUE).names[n]: Unknowns(TRUE).start[n] for n in Unknowns(TRUE).asked}
 RATE = 100.0
 SECONDS = 20.0
 # Noise at 100 samples per second, each the mean of ten at 1 kHz.
@@ -104,7 +104,6 @@ def test_the_true_hexapod_is_found_within_its_intervals(
                    'actuator.coulomb_friction': 1.5}[kind]
         assert value == pytest.approx(true, abs=allowed), name
     assert np.max(np.abs(off)) < 4.0
-    assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5
     (bag,) = result['bags']
     assert bag['delay_s'] == pytest.approx(3e-3, abs=2e-4)
     assert bag['noise_of_lengths_m'] == pytest.approx(3e-6, rel=0.1)
@@ -113,7 +112,8 @@ def test_the_true_hexapod_is_found_within_its_intervals(
 
     written = tmp_path / 'found' / 'identified.yaml'
     found = Parameters.from_yaml(written)
-    assert found['platform.mass'] == pytest.approx(values_of(result)['platform.mass'], abs=1e-3)
+    assert found['platform.mass'] == pytest.approx(
+        values_of(result, 'written')['platform.mass'], abs=0.01 * errors['platform.mass'])
     for name in GIVEN:
         if name not in ('platform.mass', 'platform.center_of_mass', 'platform.inertia',
                         'actuator.viscous_friction', 'actuator.coulomb_friction'):
@@ -172,12 +172,10 @@ def test_rotation_about_one_axis_identifies_the_inertia_about_it(
     # I n for n = (1, 1, 0) is identifiable: each of its components is a sum of two elements of I.
     _, result, out, _ = identified('diagonal')
     page = (tmp_path / 'found' / 'report.html').read_text()
-    assert page.count('>only in a combination</td>') == 5
-    assert page.count('>kept: not identifiable</td>') == 1
+    assert page.count('>not identifiable</td>') == 6
     states = values_of(result, 'state')
-    assert states['platform.inertia.zz'] == 'not_identifiable'
-    assert {name for name, state in states.items() if state == 'in_combination'} == {
-        f'platform.inertia.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz')}
+    assert {name for name, state in states.items() if state == 'not_identifiable'} == {
+        f'platform.inertia.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')}
     sums = {frozenset(each['parameters']): each for each in result['combinations']}
     for pair in (('xx', 'xy'), ('xz', 'yz'), ('yy', 'xy')):
         names = [f'platform.inertia.{axes}' for axes in pair]
@@ -190,6 +188,18 @@ def test_rotation_about_one_axis_identifies_the_inertia_about_it(
 
 
 WITH_TILT = ('--identify', 'platform,friction,tilt')
+# A base that may be tilted, all else known well: errors are those of the data.
+WELL_KNOWN = {f'uncertainty.{name}': 1e-4 for name in (
+    'leg_mass', 'effort_gain', 'reflected_mass', 'tilt')}
+UNSURE = WELL_KNOWN | {'uncertainty.tilt': 0.1}
+
+
+@pytest.fixture
+def unsure(tmp_path: Path) -> Path:
+    """Return the file of a hexapod on a base that may be tilted."""
+    path = tmp_path / 'unsure.yaml'
+    GIVEN.replaced(UNSURE).to_yaml(path)
+    return path
 
 
 def _turned(result: Any) -> Array:
@@ -205,8 +215,9 @@ def _degrees_between(one: Array, other: Array) -> float:
 
 
 def test_the_tilt_of_a_base_is_found_within_its_interval(
-        identified: Callable[..., Any], tmp_path: Path) -> None:
-    code, result, out, err = identified('tilted', *WITH_TILT, '--no-report', '--strict')
+        identified: Callable[..., Any], tmp_path: Path, unsure: Path) -> None:
+    code, result, out, err = identified(
+        'tilted', *WITH_TILT, '--no-report', '--strict', params=unsure)
     assert (code, err) == (0, '')
     assert _degrees_between(_turned(result), TILTED['gravity']) < 0.02
     assert _degrees_between(GIVEN['gravity'], TILTED['gravity']) > 1.4  # unlike the file's gravity
@@ -235,18 +246,21 @@ def test_the_tilt_of_a_base_is_found_within_its_interval(
     assert ' rad, turned about y by 0.016' in line
 
 
-def test_a_tilted_base_is_a_likely_mistake_unless_it_is_asked_for(
+def test_a_base_that_is_more_tilted_than_the_file_says_is_noticed(
         identified: Callable[..., Any]) -> None:
-    code, result, out, err = identified('tilted', '--no-report')
-    assert (code, result, out) == (2, None, '')
-    assert 'gravity of the parameters looks wrong: a base tilted by 1.5' in err
-    assert err.count('\n') == 1
+    code, result, out, _ = identified('tilted', '--no-report', '--strict')
+    assert code == 1
+    assert result['lack_of_fit']['cause'] == 'tilt'
+    assert 'likely a base tilted by 1.5' in ' '.join(out.split())
+    for axis, true in zip('xyz', TRUE['platform.center_of_mass'], strict=True):
+        low, high = values_of(result, 'interval')[f'platform.center_of_mass.{axis}']
+        assert low < true < high
 
 
 def test_at_rest_the_tilt_is_identifiable_unless_efforts_have_offsets(
-        identified: Callable[..., Any]) -> None:
+        identified: Callable[..., Any], unsure: Path) -> None:
     # Six forces at rest determine the weight's three components and its moment.
-    _, result, _, _ = identified('tilted at rest', *WITH_TILT, '--no-report')
+    _, result, _, _ = identified('tilted at rest', *WITH_TILT, '--no-report', params=unsure)
     assert _degrees_between(_turned(result), TILTED['gravity']) < 0.02
     states = values_of(result, 'state')
     assert states['platform.center_of_mass.z'] == 'not_identifiable'
@@ -255,16 +269,15 @@ def test_at_rest_the_tilt_is_identifiable_unless_efforts_have_offsets(
     np.testing.assert_allclose(*moments, atol=5e-3)
     # Offsets make tilt, weight and center of mass identifiable only in combination with them.
     _, result, out, _ = identified(
-        'tilted at rest', '--identify', 'platform,offset,tilt', '--no-report', '--force')
+        'tilted at rest', '--identify', 'platform,offset,tilt', '--no-report', '--force',
+        params=unsure)
     states = values_of(result, 'state')
     assert {states[name] for name in (
         'platform.mass', 'platform.center_of_mass.x', 'platform.center_of_mass.y',
-        'gravity.tilt_x', 'gravity.tilt_y')} == {'in_combination'}
-    sums = {each['parameters'][0]: each for each in result['combinations']}
+        'gravity.tilt_x', 'gravity.tilt_y')} == {'not_identifiable'}
     for axis in 'xy':
-        found = sums[f'gravity.tilt_{axis}']
-        assert all(name.startswith('effort_offset.') for name in found['parameters'][1:])
-        assert found['words'] in out
+        assert any(f'gravity.tilt_{axis}' in each['parameters'] and each['words'] in out
+                   for each in result['combinations'])
 
 
 def _swapped(given: Recorded) -> Recorded:
@@ -344,7 +357,7 @@ def test_losses_of_drives_are_no_mass_and_no_friction(
         identified: Callable[..., Any], tmp_path: Path) -> None:
     p = GIVEN.replaced({
         'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01,
-        'drive.motor_inertia': 7.6e-5, 'drive.efficiency': 0.8})
+        'drive.motor_inertia': 7.6e-5, 'drive.efficiency': 0.8, **WELL_KNOWN})
     p.to_yaml(tmp_path / 'driven.yaml')
     per_newton = 1.0 / motor_ratio(p)
 

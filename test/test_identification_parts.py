@@ -37,7 +37,7 @@ from stewart_dynamics.identification.fit import consistent
 from stewart_dynamics.identification.identify_command_line import main
 from stewart_dynamics.identification.kinematics import motions, pose_near, poses
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
-from stewart_dynamics.identification.unknowns import regression, Unknowns
+from stewart_dynamics.identification.unknowns import regressor_of, Unknowns
 from stewart_dynamics.identification.windows import interpolated, Signal, uniform
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import is_consistent
 
@@ -155,7 +155,8 @@ def assert_derivative(u: Unknowns, values: Array) -> None:
 def test_unknowns_are_in_the_terms_of_the_file() -> None:
     u = Unknowns(GIVEN, ['platform', 'friction', 'piston', 'offset'])
     assert u.names[0] == 'platform.mass'
-    assert len(u.names) == len(u.units) == len(u.start) == 10 + 12 + 18 + 6
+    assert len(u.asked) == 10 + 12 + 18 + 6
+    assert len(u.names) == len(u.units) == len(u.start) == len(u.root)
     values = u.start * 1.1 + 0.01
     assert_derivative(u, values)
     assert u.parameters(u.start) == GIVEN
@@ -163,26 +164,29 @@ def test_unknowns_are_in_the_terms_of_the_file() -> None:
 
 def test_forces_under_a_turned_gravity_are_those_of_the_hexapod_with_it() -> None:
     u = Unknowns(GIVEN, ['platform', 'friction', 'cylinder', 'piston', 'tilt'])
-    values = 1.1 * u.start
-    values[-2:] = 0.3, -0.5
+    values = u.start.copy()
+    values[u.asked] *= 1.1
+    values[-3:-1] = 0.3, -0.5
     assert_derivative(u, values)
     motion = fourier(3)(np.arange(50) * 0.1)
-    regressor, known = regression(StewartPlatform(GIVEN), u, motion.rows)
+    regressor = regressor_of(StewartPlatform(GIVEN), motion.rows)
     turned = u.parameters(values)
     assert turned['gravity'][2] > GIVEN['gravity'][2] + 1.0
     forces = StewartPlatform(turned).inverse_dynamics(motion).forces
-    np.testing.assert_allclose(regressor @ u.theta(values) + known, forces, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(regressor @ u.theta(values), forces, rtol=1e-9, atol=1e-9)
     # The library's columns are the first-order approximation.
     columns = regressor @ u.derivative(u.start)
     matrix = StewartPlatform(GIVEN).regressor(motion, tilt=True).matrix
-    np.testing.assert_allclose(columns[..., -2:], matrix[..., -2:], rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(columns[..., -3:-1], matrix[..., -2:], rtol=1e-9, atol=1e-7)
 
 
 def test_gravity_turns_about_the_axes_across_it() -> None:
     on_a_wall = GIVEN.replaced({'gravity': [0.1, -9.8, 0.3]})
     u = Unknowns(on_a_wall, ['tilt'])
-    assert u.names == ('gravity.tilt_x', 'gravity.tilt_z')
-    turned = u.parameters(np.array([0.02, -0.01]))['gravity']
+    assert u.tilt.names == ('gravity.tilt_x', 'gravity.tilt_z')
+    values = u.start.copy()
+    values[-3:-1] = 0.02, -0.01
+    turned = u.parameters(values)['gravity']
     np.testing.assert_allclose(
         turned - on_a_wall['gravity'], np.cross([0.02, 0.0, -0.01], on_a_wall['gravity']),
         atol=5e-3)
@@ -192,11 +196,12 @@ def test_an_impossible_body_becomes_the_nearest_possible_one() -> None:
     u = Unknowns(GIVEN)
     values = u.start.copy()
     values[4:10] = [1.0, 0.0, 0.0, 1.0, 0.0, 5.0]  # one moment larger than the sum of the others
-    values[12] = -3.0
-    found, beyond = consistent(u, values, np.diag(1e4 / u.scales ** 2))
+    friction = u.names.index('actuator.viscous_friction.leg_3')
+    values[friction] = -3.0
+    found, beyond = consistent(u, values, np.diag(1e-4 * u.deviations ** 2))
     assert is_consistent(u.inertial(found))
-    assert found[12] == 0.0
-    assert set(beyond) == {*u.names[:10], u.names[12]}
+    assert found[friction] == 0.0
+    assert set(beyond) == {*u.names[:10], u.names[friction]}
     np.testing.assert_allclose(found[[0, 1, 2, 3]], values[[0, 1, 2, 3]], rtol=1e-3, atol=1e-4)
     # all three moments are changed
     assert found[4] > 1.0 and found[7] > 1.0 and found[9] < 5.0

@@ -15,10 +15,9 @@
 """
 Possible causes of a lack of fit, and the forces that each of them adds, as columns.
 
-A cause changes the efforts by its columns times small amounts, to first order: an offset, a tilt
-of gravity, other masses of the legs, friction of another law, a joint or a zero length elsewhere,
-another gain or delay of one leg, saturation, a payload that changes. Columns are computed at the
-low rate from the filtered motion.
+A cause changes the efforts by its columns times small amounts, to first order: an offset, friction
+of another law, a joint or a zero length elsewhere, another gain or delay of one leg, saturation, a
+payload that changes. Columns are computed at the low rate from the filtered motion.
 """
 
 from __future__ import annotations
@@ -33,10 +32,7 @@ from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.identification.extraction import Extract, SLIP
 from stewart_dynamics.identification.fit import Fit
 from stewart_dynamics.identification.kinematics import motions
-from stewart_dynamics.identification.unknowns import Tilt, Unknowns
-from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_SECOND, linear_parameters, PISTON_FIRST,
-    PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, VISCOUS_FRICTION)
+from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
@@ -48,10 +44,10 @@ _MOST_BAGS = 6
 _SATURATED = 0.97
 # Finite-difference step of joint coordinates and zero lengths, relative to the platform's size.
 _STEP = 1e-4
-UNKNOWN = 'unknown'
+# Causes with the same forces: a joint that is displaced along its leg, and a zero length.
+SAME = {'zero_length': 'joint'}
 
-Factors = Callable[[Array], Array]
-_Part = tuple[Array, list['Cause'], Factors]
+_Part = tuple[Array, list['Cause']]
 
 
 class Cause(NamedTuple):
@@ -73,17 +69,15 @@ class Cause(NamedTuple):
 
 def _part(what: str, columns: Array, text: str, factor: float = 1.0,
           measure: Callable[[Array], Any] = np.asarray,
-          groups: Sequence[tuple[str, slice]] = (('', slice(None)),),
-          over_time: Factors = np.ones_like) -> _Part:
+          groups: Sequence[tuple[str, slice]] = (('', slice(None)),)) -> _Part:
     """
     Return columns (N, 6, m) with their causes; the indices are those among these columns.
 
     Each group has a word, for which ``@`` stands in the text, and some of the columns.
-    ``over_time`` returns factors of the columns at times (N, 1), as fractions of all samples.
     """
     places = np.arange(columns.shape[-1])
     return columns, [Cause(what, places[which], text.replace('@', word), factor, measure)
-                     for word, which in groups], over_time
+                     for word, which in groups]
 
 
 class Causes:
@@ -107,94 +101,55 @@ class Causes:
                 np.abs(extract.efforts[..., 0]).max(initial=0.0)))
         between = [begin / self.samples for begin in begins.values() if begin]
         self._changes = sorted({*_CHANGES, *(between if len(between) < _MOST_BAGS else ())})
-        self._tilt = Tilt(p['gravity'])
         self._size = float(p['singularity.characteristic_length'])
-        self._whole = linear_parameters(p)
-        self._whole[unknowns.linear] = self._theta[:len(unknowns.linear)]
+        self._whole = unknowns.linear(fit.values)
         self._each = [(f' of {leg}', slice(n, n + 1)) for n, leg in enumerate(p['joints'])]
         self._each_and_all = [*self._each, ('', slice(None))]
 
-    def columns(self, extract: Extract) -> tuple[Array, tuple[Cause, ...], Factors]:
-        """Return columns (N, 6, m) without their factors over time, the causes, these factors."""
+    def columns(self, extract: Extract, at: Array) -> tuple[Array, tuple[Cause, ...]]:
+        """Return columns (N, 6, m) at times ``at``, as fractions of all, and the causes."""
         poses = self._platform.forward_kinematics(
             extract.legs[..., 0], Pose.of_rows(extract.poses))
-        parts = [*self._of_forces(extract, poses),
+        parts = [*self._of_forces(extract, poses, at),
                  *(self._of_geometry(extract, poses) if self._geometry else ())]
         causes: list[Cause] = []
-        counts = [columns.shape[-1] for columns, _, _ in parts]
-        for first, (_, of_columns, _) in zip(np.cumsum([0, *counts[:-1]]), parts, strict=True):
+        first = 0
+        for columns, of_columns in parts:
             causes += [each._replace(places=first + each.places) for each in of_columns]
+            first += columns.shape[-1]
+        return np.concatenate([columns for columns, _ in parts], axis=-1), tuple(causes)
 
-        def factors(at: Array) -> Array:
-            return np.hstack([np.broadcast_to(over_time(at[:, None]), (len(at), count))
-                              for (_, _, over_time), count in zip(parts, counts, strict=True)])
-
-        return (np.concatenate([columns for columns, _, _ in parts], axis=-1), tuple(causes),
-                factors)
-
-    def _of_forces(self, extract: Extract, poses: Pose) -> Iterator[_Part]:
-        """Yield forces that depend on the motion, some of them on time as well."""
-        platform, whole = self._platform, self._whole
+    def _of_forces(self, extract: Extract, poses: Pose, at: Array) -> Iterator[_Part]:
+        """Yield forces that depend on the motion and, of a payload, on time."""
+        platform = self._platform
         lengths, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
         rows = motions(platform, poses, rates, accelerations)
         matrix = platform.regressors(rows)
-        predicted = extract.regressor @ self._theta + extract.known
+        predicted = extract.regressor @ self._theta
 
         yield _part('offset', _by_leg(np.ones((len(rows), 6, 1))),
                     'a constant offset of the efforts@, {} N', groups=self._each_and_all)
-        gravity = self._tilt.derivative(np.zeros(2))
-        yield _part('tilt', np.stack([
-            platform.regressors_at_rest(rows, axis[None]) @ whole for axis in gravity.T], axis=-1),
-            'a base tilted by {} degrees', np.degrees(1.0), np.linalg.norm)
-        yield _part('reflected_mass', matrix[..., REFLECTED_MASS],
-                    'another actuator.reflected_mass@, {} kg', groups=self._each_and_all)
-        yield _part('leg_mass', np.stack([
-            sum(matrix[..., part] @ whole[part] for part in parts)
-            for parts in ((CYLINDER_FIRST, CYLINDER_SECOND),
-                          (PISTON_MASS, PISTON_FIRST, PISTON_SECOND))], axis=-1),
-            'other leg masses, cylinders and pistons {} %', 100.0)
-        yield _part('viscous_friction', matrix[..., VISCOUS_FRICTION],
-                    'another actuator.viscous_friction, {} N s/m')
         coulomb, *stribeck = (_by_leg(extract.slip[..., n:n + 1]) for n in range(SLIP))
-        yield _part('coulomb_friction', coulomb, 'another actuator.coulomb_friction, {} N')
         for columns in stribeck:
             yield _part('stribeck_friction', columns, 'Stribeck friction, {} N at low rates',
                         measure=np.mean)
         yield _part('load_friction', coulomb * np.abs(predicted)[..., None],
                     'friction that depends on the load, {} % of it', 100.0, np.mean)
-        yield _part('quadratic_friction', _by_leg((rates * np.abs(rates))[..., None]),
-                    'friction that grows with the square of the rate, {} N s^2/m^2',
-                    measure=np.mean)
         yield _part('gain', _by_leg(predicted[..., None]),
                     'another gain of the efforts@, {} %', 100.0, groups=self._each)
-        yield _part('scale', predicted[..., None],
-                    'efforts that are by {} % larger than the forces', 100.0)
         yield _part('delay', _by_leg(extract.efforts[..., 1:2]),
                     'another delay of the efforts@, {} ms', -1e3, groups=self._each)
         beyond = np.maximum(np.abs(predicted) - _SATURATED * self._largest, 0.0)
         yield _part('saturation', (-np.sign(predicted) * beyond)[..., None],
                     f'saturation of the efforts at about {self._largest:.4g} N')
-        yield _part('platform', matrix[..., :10], 'platform parameters that are not identified')
-        x = (lengths - lengths.mean(axis=0)) / self._size
-        v = rates / (np.sqrt(np.mean(rates ** 2)) + 1e-300)
-        yield _part(UNKNOWN, _by_leg(np.stack([x, x ** 2, x ** 3], axis=-1)),
-                    'forces that depend on the pose')
-        yield _part(UNKNOWN, _by_leg(np.stack([np.abs(v), x * v, v ** 3], axis=-1)),
-                    'forces that depend on the rate')
-
         changes = self._changes
         words = [(f'at about {100.0 * change:.0f} %', slice(4 * n, 4 * n + 4))
                  for n, change in enumerate(changes)]
         words += [(f'between {100.0 * one:.0f} and {100.0 * other:.0f} %', slice(4 * n, 4 * n + 8))
                   for n, (one, other) in enumerate(pairwise(changes))]
-        yield _part('payload', np.tile(matrix[..., :4], len(changes)),
-                    'a payload that changes @ of the time, {} kg', measure=_mass, groups=words,
-                    over_time=lambda at: np.where(at >= np.repeat(changes, 4), 1.0, 0.0))
-        yield _part('friction_drift', np.stack([
-            matrix[..., part].sum(axis=-1) for part in (VISCOUS_FRICTION, COULOMB_FRICTION)],
-            axis=-1), 'friction that changes with time', over_time=_late)
-        yield _part('offset_drift', _by_leg(np.ones((len(rows), 6, 1))),
-                    'offsets of the efforts that change with time, {} N', over_time=_late)
+        after = np.where(at[:, None] >= np.repeat(changes, 4), 1.0, 0.0)
+        yield _part('payload', np.tile(matrix[..., :4], len(changes)) * after[:, None],
+                    'a payload that changes @ of the time, {} kg', measure=_mass, groups=words)
 
     def _of_geometry(self, extract: Extract, poses: Pose) -> Iterator[_Part]:
         """Yield derivatives of the forces by zero lengths and joint coordinates [N/m]."""
@@ -218,11 +173,6 @@ class Causes:
                 / step for change in step * np.eye(18).reshape(18, 6, 3)], axis=-1),
                 f'another {end} joint@, moved by {{}} mm', 1e3, groups=[
                     (word, slice(3 * n, 3 * n + 3)) for n, (word, _) in enumerate(self._each)])
-
-
-def _late(at: Array) -> Array:
-    """Return the time from the middle."""
-    return at - 0.5
 
 
 def _mass(amounts: Array) -> Array:

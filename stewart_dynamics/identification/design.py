@@ -36,7 +36,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.identification.identification_options import DesignOptions
-from stewart_dynamics.identification.unknowns import regression, Unknowns
+from stewart_dynamics.identification.unknowns import (
+    LINEAR_UNKNOWNS, regressor_of, Unknowns)
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
@@ -166,7 +167,7 @@ class Design(NamedTuple):
     trajectory: ReferenceMotionParameters
     unknowns: Unknowns
     half_widths: Array
-    """(k,) predicted 95 % intervals of the unknowns, for white noise in the efforts"""
+    """Predicted 95 % intervals of the asked unknowns, for white noise in the efforts"""
     use: dict[str, float]  # fraction of each limit that the motion uses
 
 
@@ -185,13 +186,13 @@ def design(parameters: Parameters, options: DesignOptions,
     motion = motion_at(trajectory, fine_times(options))
     half_widths = predicted_half_widths(
         search.platform, search.unknowns, motion, options.duration, options)
-    unknown = [name for name, half, scale in zip(
-        search.unknowns.names, half_widths, search.unknowns.scales, strict=True)
-        if not half < _NOT_IDENTIFIABLE * scale]
+    unknowns = search.unknowns
+    unknown = [unknowns.names[n] for n, half in zip(unknowns.asked, half_widths, strict=True)
+               if not half < _NOT_IDENTIFIABLE * unknowns.deviations[n]]
     if unknown:
         raise StewartError(f'no motion within the limits identifies {", ".join(options.kinds)}: '
                            f'{unknown[0]} is not identifiable; ask for less with --identify')
-    return Design(trajectory, search.unknowns, half_widths, search.limits.use(motion))
+    return Design(trajectory, unknowns, half_widths, search.limits.use(motion))
 
 
 def fine_times(options: DesignOptions) -> Array:
@@ -203,26 +204,28 @@ def fine_times(options: DesignOptions) -> Array:
 def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion: Motion,
                           seconds: float, options: DesignOptions) -> Array:
     """
-    Return the half widths (k,) of the 95 % intervals for a motion of the given duration [s].
+    Return half of the 95 % intervals of the asked unknowns, for a motion of a duration [s].
 
-    Assumes white noise in the efforts alone; unidentifiable parameters get very wide intervals.
+    Assumes white noise in the efforts alone: numbers that are not asked for are known.
+    Unidentifiable parameters get very wide intervals.
     """
     columns = columns_of(platform, unknowns, motion.rows.reshape(-1, 24))
-    per_sample = columns.reshape(-1, columns.shape[-1])
+    scales = unknowns.deviations[unknowns.asked]
+    per_sample = columns.reshape(-1, columns.shape[-1]) * scales
     information = per_sample.T @ per_sample * (
         seconds * options.rate / len(columns) / options.noise ** 2)
-    scaled = unknowns.scales[:, None] * information * unknowns.scales
-    values, vectors = np.linalg.eigh(scaled)
+    values, vectors = np.linalg.eigh(information)
     least = max(_NOT_IDENTIFIABLE ** -2, 1e-13 * float(values[-1]))
-    variances = (vectors ** 2) @ (1.0 / np.maximum(values, least))
-    errors: Array = np.sqrt(variances)
-    return TWO_SIDED * unknowns.scales * errors
+    errors: Array = np.sqrt((vectors ** 2) @ (1.0 / np.maximum(values, least)))
+    return TWO_SIDED * scales * errors
 
 
 def columns_of(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> Array:
-    """Return the derivative of the efforts with respect to the unknowns, (N, 6, k)."""
-    regressor, _ = regression(platform, unknowns, rows)
-    columns: Array = regressor @ unknowns.derivative(unknowns.start)
+    """Return the derivative of the efforts with respect to the asked unknowns, (N, 6, k)."""
+    tilt = bool(unknowns.asked[-1] >= LINEAR_UNKNOWNS)
+    regressor = regressor_of(platform, rows, tilt)
+    columns: Array = regressor @ unknowns.derivative(unknowns.start)[
+        :regressor.shape[-1], unknowns.asked]
     return columns
 
 
@@ -260,7 +263,8 @@ class _Search:
         rows = self._rows(coefficients)
         excess = self.limits.excess(rows)
         columns = columns_of(self.platform, self.unknowns, rows.reshape(-1, rows.shape[-1]))
-        columns = columns.reshape(len(proportions), -1, columns.shape[-1]) * self.unknowns.scales
+        columns = columns.reshape(len(proportions), -1, columns.shape[-1])
+        columns *= self.unknowns.deviations[self.unknowns.asked]
         information = columns.swapaxes(1, 2) @ columns * (
             self._options.duration * self._options.rate / rows.shape[1]
             / self._options.noise ** 2)

@@ -34,18 +34,21 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.estimation.noisy_rates import smoothed_law
 from stewart_dynamics.identification.filters import convolved, decimated, LowPass, white_deviation
 from stewart_dynamics.identification.kinematics import motions, poses
-from stewart_dynamics.identification.unknowns import regression, Unknowns
+from stewart_dynamics.identification.unknowns import (
+    COULOMB_COLUMNS, regressor_of, Unknowns)
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.drives.measured_efforts import has_losses, without_losses
-from stewart_dynamics.mechanics.dynamics.friction import friction
+from stewart_dynamics.mechanics.drives.measured_efforts import FAR, has_losses, without_losses
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Wide cut-off relative to the narrow one; samples per period of the narrow cut-off.
 WIDE, SAMPLES = 2.5, 4.0
+# Widest band of rates for the law of friction, by the rate of the samples.
+_WIDEST = 0.42
 # Transition width of both filters, relative to the narrow cut-off.
 _TRANSITION = 1.0
 ORDERS = 4  # number of columns of an effort: its value and its first ORDERS - 1 derivatives
@@ -58,6 +61,8 @@ _ROUNDING = 1e-12
 # Lags are tried in steps of this fraction of a cut-off period; a lag must reduce the squared
 # residuals to this fraction.
 _LAG_STEP, _LESS = 0.05, 0.8
+# Deviation of the efforts in this search, relative to them.
+_ROUGHLY = 0.01
 # Number of samples for which the regressor is computed at once.
 _TOGETHER = 4096
 # Rates at which Stribeck friction may have fallen to 1/e, relative to the RMS rate of the first
@@ -76,8 +81,8 @@ class Extract(NamedTuple):
     times: Array
     """(N,) since the start of the window, in ``Extracts`` since the start of the bag [s]"""
     columns: Array
-    """(N, 6, n + 1 + ORDERS): the regressor of ``Unknowns.theta``, the force of all other
-    parameters [N], and the effort with its time derivatives [N, N/s, ...]"""
+    """(N, 6, n + ORDERS): the regressor of ``Unknowns.theta``, and the effort with its time
+    derivatives [N, N/s, ...]"""
     used: Flags  # (N, 6) whether an effort is fitted: all samples that contribute to it are valid
     legs: Array  # (N, 6, 3) length, rate and acceleration [m, m/s, m/s^2]
     slip: Array  # (N, 6, SLIP) shapes of friction over the rate
@@ -85,12 +90,13 @@ class Extract(NamedTuple):
     bag: int = 0
 
     @property
-    def regressor(self) -> Array:
-        return self.columns[..., :-1 - ORDERS]
+    def step(self) -> float:
+        """Time between two samples [s]."""
+        return float(self.times[1] - self.times[0]) if len(self.times) > 1 else 1.0
 
     @property
-    def known(self) -> Array:
-        return self.columns[..., -1 - ORDERS]
+    def regressor(self) -> Array:
+        return self.columns[..., :-ORDERS]
 
     @property
     def efforts(self) -> Array:
@@ -141,6 +147,11 @@ class Extracts:
         """Return the number of extracts."""
         return len(self._bags)
 
+    def clear(self) -> None:
+        """Remove all extracts."""
+        self._file.seek(0)
+        self._bags, self.used, self.moves, self.samples = [], [], [], 0
+
     def close(self) -> None:
         """Remove the file."""
         self._file.close()
@@ -160,6 +171,7 @@ class Extraction:
                  of_motors: bool = False) -> None:
         self.platform, self._unknowns, self._period = platform, unknowns, period
         self._losses = of_motors and has_losses(platform.parameters)
+        self._coulomb_velocity = platform.parameters['actuator.coulomb_velocity']
         self._size = float(platform.parameters['singularity.characteristic_length'])
         self._wide = LowPass.of(period, WIDE * cutoff, _TRANSITION * cutoff)
         self._narrow = LowPass.of(period, cutoff, _TRANSITION * cutoff)
@@ -179,7 +191,8 @@ class Extraction:
         the noise that they contain.
         """
         deviations = self._deviations(window)
-        lengths, rates, accelerations = self._filtered(window, deviations, noise)
+        lengths, rates, accelerations, quick, deviation = self._filtered(
+            window, deviations, noise)
         found = poses(self.platform, lengths, guess)
         rows = motions(self.platform, found, rates, accelerations)
         drive_rates = self.platform.drive_rates(rows, rates)
@@ -189,7 +202,9 @@ class Extraction:
                 forces, drive_rates, accelerations, self.platform.parameters)
         efforts = np.stack([decimated(forces, self._narrow.taps(order), self.step)
                             for order in range(ORDERS)], axis=-1)
-        columns = np.concatenate([self._decimated(rows), efforts], axis=-1)
+        drive_rates = drive_rates + quick - rates
+        sliding = smoothed_law(drive_rates, self._coulomb_velocity, deviation)
+        columns = np.concatenate([self._decimated(rows, sliding), efforts], axis=-1)
         wrong, stops = self._wrong(window)
         count = len(columns)
         times = self._period * (self.margin + self.step * np.arange(count)).astype(float)
@@ -199,18 +214,22 @@ class Extraction:
         legs = np.stack([decimated(each, taps, self.step)
                          for each in (lengths, rates, accelerations)], axis=-1)
         at = self._narrow.half + self.step * np.arange(count)
-        slip = decimated(self._slip(drive_rates, speeds), taps, self.step)
+        slip = decimated(np.stack([sliding, *(
+            sliding * np.exp(-(drive_rates / speed) ** 2) for speed in speeds)], axis=-1),
+            taps, self.step)
         extract = Extract(times, columns, ~wrong[:count], legs, slip, found.rows[at][:, POSE])
         return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]), moves,
                           1.0 - _rms(legs[..., 1]) / _rms(rates[at]) if moves else 0.0)
 
-    def lag(self, window: Window, guess: Pose, longest: float) -> tuple[int, float]:
+    def lag(self, window: Window, guess: Pose, longest: float, of_any_scale: bool,
+            ) -> tuple[int, float, float]:
         """
-        Return a coarse lag of the efforts behind the positions, or before, and the squared misfit.
+        Return a coarse lag of the efforts behind the positions, or before, misfit, and scale.
 
-        It is the lag in samples with the smallest residual, in steps of a fraction of a cut-off
-        period; 0 unless the residual is much smaller than without a lag. The misfit is relative
-        to the efforts, whatever the values of the linear parameters.
+        It is the lag in samples with the smallest misfit, in steps of a fraction of a cut-off
+        period; 0 unless the misfit is much smaller than without a lag. The misfit is that of
+        efforts and prior, squared and relative to the efforts. The scale is that of the efforts by
+        the file; ``of_any_scale``: efforts are divided by it where it is another unit or sign.
         """
         extract = self(window, guess).extract
         efforts = convolved(window.efforts[self._wide.half:-self._wide.half], self._narrow.taps())
@@ -218,49 +237,43 @@ class Extraction:
         most = -(-round(longest / self._period) // steps) * steps
         lags: Integers = np.arange(-most, most + 1, steps)
         at: Integers = self.step * np.arange(len(extract.times))
-        used = (at + most < len(efforts)) & (at >= most)
-        at = at[used]
-        if len(at) < extract.regressor.shape[-1]:
-            return 0, 1.0
-        sound = extract.used[used].reshape(-1)
-        columns = extract.regressor[used].reshape(len(sound), -1)[sound]
-        sizes = np.linalg.norm(columns, axis=0)
-        basis = np.linalg.qr(columns[:, sizes > 0.0] / sizes[sizes > 0.0])[0]
+        inside = (at + most < len(efforts)) & (at >= most)
+        at, used = at[inside], extract.used[inside]
+        size = _rms(efforts)
+        if not used.any() or size == 0.0:
+            return 0, 1.0, 0.0
+        u = self._unknowns
+        regressor = extract.regressor[inside][used]
+        columns = regressor @ u.derivative(u.start) @ u.root
+        modelled = regressor @ u.theta(u.start)
+        scale = float(np.sum(efforts[at][used] * modelled) / (np.sum(modelled ** 2) + 1e-300))
+        if of_any_scale and not 1.0 / FAR < scale < FAR and scale != 0.0:
+            efforts, size = efforts / scale, size / abs(scale)
+        deviation = _ROUGHLY * size
+        inverse = np.linalg.inv(columns.T @ columns / deviation ** 2 + np.eye(len(u.start)))
         misfits = []
         for lag in lags:
-            forces = (efforts[at + lag] - extract.known[used]).reshape(-1)[sound]
-            squares = float(forces @ forces)
-            misfits.append(1.0 - float(np.sum((basis.T @ forces) ** 2)) / squares
-                           if squares > 0.0 else 1.0)
+            off = (efforts[at + lag][used] - modelled) / deviation
+            vector = columns.T @ off / deviation
+            misfits.append(float(off @ off - vector @ inverse @ vector) * _ROUGHLY ** 2 / off.size)
         best, none = int(np.argmin(misfits)), len(lags) // 2
         if misfits[best] > _LESS * misfits[none]:
             best = none
-        return int(lags[best]), misfits[best]
-
-    @property
-    def _band(self) -> float:
-        return float(np.mean(self.platform.parameters['actuator.coulomb_velocity']))
+        return int(lags[best]), misfits[best], scale
 
     def _moves(self, lengths: Array, rates: Array, deviation: float) -> bool:
         """Return whether legs move by more than noise: else nothing slips."""
-        return _rms(rates) > self._band and bool(
+        return _rms(rates) > float(np.mean(self._coulomb_velocity)) and bool(
             np.ptp(lengths, axis=0).max() > _MOVES * deviation)
 
     def _chosen_speeds(self, rates: Array, accelerations: Array, moves: bool,
                        ) -> tuple[float, ...]:
         """Return the rates of the friction shapes; later windows have those of one that moves."""
-        step = self._period * _rms(accelerations) + self._band
+        step = self._period * _rms(accelerations) + float(np.mean(self._coulomb_velocity))
         speeds = tuple(max(part * _rms(rates), _RESOLVED * step) for part in _STRIBECK)
         if moves:
             self.speeds = speeds
         return speeds
-
-    def _slip(self, rates: Array, speeds: tuple[float, ...]) -> Array:
-        sign = np.empty(rates.shape)
-        friction(np.ascontiguousarray(rates), np.zeros(6), np.ones(6),
-                 self.platform.parameters['actuator.coulomb_velocity'], sign)
-        return np.stack([sign, *(sign * np.exp(-(rates / speed) ** 2) for speed in speeds)],
-                        axis=-1)
 
     def _deviations(self, window: Window) -> tuple[float, float]:
         of_lengths = float(np.sqrt(np.mean(white_deviation(window.positions) ** 2)))
@@ -275,38 +288,60 @@ class Extraction:
                                _ROUNDING * self._size / self._period)
 
     def _filtered(self, window: Window, deviations: tuple[float, float],
-                  noise: np.random.Generator | None) -> tuple[Array, Array, Array]:
-        """Return lengths, rates and accelerations of the legs, without the margin."""
+                  noise: np.random.Generator | None,
+                  ) -> tuple[Array, Array, Array, Array, float]:
+        """
+        Return lengths, rates and accelerations of the legs, without the margin.
+
+        They are followed by rates of the widest band that noise allows, since friction makes
+        rates bend where they change their sign, and the deviation of the noise in them [m/s].
+        """
         positions, rates = window.positions, window.rates
         positions = positions + self.platform.parameters['geometry.zero_length']
         if noise is not None:
             positions = positions + deviations[0] * noise.normal(size=positions.shape)
             rates = None if rates is None else (
                 rates + deviations[1] * noise.normal(size=rates.shape))
-        derivatives, wide = [], self._wide._replace(later=self.later)
-        for order in range(3):
-            if rates is None:
-                derivatives.append(convolved(positions, wide.taps(order)))
-                continue
-            of_positions, of_rates = wide.fused(
-                order, max(deviations[0], _ROUNDING * self._size), deviations[1])
-            derivatives.append(convolved(positions, of_positions) + convolved(rates, of_rates))
-        return derivatives[0], derivatives[1], derivatives[2]
+        lengths, rates_wide, accelerations = (self._derivative(
+            self._wide, order, positions, rates, deviations)[0] for order in range(3))
+        quick, deviation = self._derivative(self._wide, 1, positions, rates, deviations)
+        band = 2.0 * self._wide.cutoff
+        while band * self._period < _WIDEST:
+            wider = LowPass.of(self._period, band, self._narrow.cutoff)
+            inner, of_inner = self._derivative(wider, 1, positions, rates, deviations)
+            if of_inner > float(np.min(self._coulomb_velocity)):
+                break
+            margin = self._wide.half - wider.half
+            quick, deviation = inner[margin:len(inner) - margin], of_inner
+            band *= 2.0
+        return lengths, rates_wide, accelerations, quick, deviation
 
-    def _decimated(self, rows: Array) -> Array:
-        """Return the decimated regressor and known forces (N, 6, n + 1) of rows of motion."""
-        taps = self._narrow.taps()
+    def _derivative(self, band: LowPass, order: int, positions: Array, rates: Array | None,
+                    deviations: tuple[float, float]) -> tuple[Array, float]:
+        """Return a derivative of the lengths in a band, and the deviation of its noise."""
+        band = band._replace(later=self.later)
+        if rates is None:
+            taps = band.taps(order)
+            return convolved(positions, taps), deviations[0] * float(np.linalg.norm(taps))
+        of_positions, of_rates = band.fused(
+            order, max(deviations[0], _ROUNDING * self._size), deviations[1])
+        return (convolved(positions, of_positions) + convolved(rates, of_rates), float(np.hypot(
+            deviations[0] * np.linalg.norm(of_positions),
+            deviations[1] * np.linalg.norm(of_rates))))
+
+    def _decimated(self, rows: Array, sliding: Array) -> Array:
+        """Return the decimated regressor (N, 6, n) of rows of motion; ``sliding``: of the law."""
+        taps, legs = self._narrow.taps(), np.arange(6)
         parts = []
         # Each part begins at the input of its first output.
         stride = max(1, _TOGETHER // self.step) * self.step
         last = len(rows) - len(taps)
         for first in range(0, last + 1, stride):
             end = min(first + stride - self.step, (last - first) // self.step * self.step + first)
-            regressor, known = regression(
-                self.platform, self._unknowns, rows[first:end + len(taps)])
-            parts.append(np.concatenate([
-                decimated(regressor, taps, self.step),
-                decimated(known[..., None], taps, self.step)], axis=-1))
+            part = slice(first, end + len(taps))
+            regressor = regressor_of(self.platform, rows[part])
+            regressor[:, legs, COULOMB_COLUMNS] = sliding[part]
+            parts.append(decimated(regressor, taps, self.step))
         return np.concatenate(parts)
 
     def _wrong(self, window: Window) -> tuple[Flags, int]:

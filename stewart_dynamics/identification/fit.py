@@ -13,264 +13,328 @@
 # limitations under the License.
 
 """
-Weighted least squares of the unknowns on the sums of the extracts, and standard errors.
+The posterior of all uncertain numbers, from the extracts of recordings.
 
-Gauss-Newton steps: forces are linear in theta, whose elements for the platform are products of
-its mass, center of mass and inertia. The delay of the efforts of each bag is estimated jointly
-and eliminated. The noise of each leg in each bag is estimated from its residuals. Unidentifiable
-parameters keep their values (``mechanics.least_squares``).
+The residuals of efforts, ``r = f(t + d) - (1 + gain) Y theta``, are noise that is correlated in
+time and between legs. Their spectrum is estimated from the residuals themselves, smoothed over
+frequencies, and the columns of regressor and efforts are divided by it, frequency by frequency:
+the quotients are white, and sums of their products, one Gram matrix for each bag, hold all that
+the recordings say (``estimation.whitening``). Prior and data then are two terms of one sum
+(``estimation.posterior``), found by Gauss-Newton steps: theta is nonlinear in mass and center of
+mass, and the delay d of each bag shifts its efforts by their Taylor series.
+
+Noise of lengths and rates in Y adds to the Gram matrix, but is no information. It is estimated by
+as much noise again, and subtracted (corrected scores: T. Nakamura 1990,
+doi:10.1093/biomet/77.1.127).
 
 Fitted values are projected onto physically consistent ones, in the metric of the information: mass
 and friction are not negative, and the platform's pseudo-inertia is positive definite
-(``mechanics.dynamics.pseudo_inertia``). If least squares violate this, the platform's ten
+(``mechanics.dynamics.pseudo_inertia``). If the posterior violates this, the platform's ten
 parameters are fitted again in log-Cholesky parameters, which always describe a physical body.
-
-Residuals are coloured: filtered noise of efforts, noise of lengths in the regressor, and modeling
-errors are correlated in time and between legs. Standard errors are those of a sandwich estimator.
-With N the normal matrix and e_t the weighted directions of the fit,
-``cov = N^-1 (sum_t sum_s e_t E[r_t r_s^T] e_s^T) N^-1``. The inner sum is estimated in two ways:
-
-- by frequency, from the smoothed cross spectra of the residuals of the six legs: little scatter,
-  for stationary noise;
-- by blocks of time (White 1980, doi:10.2307/1912934, clustered): more scatter, also for residuals
-  that depend on the motion.
-
-For each parameter the larger estimate is used.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.identification.extraction import Extracts
-from stewart_dynamics.identification.sums import delayed_by, residual_of, Sums
-from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.errors import BagError
+from stewart_dynamics.estimation.posterior import Posterior, posterior
+from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
+from stewart_dynamics.identification.extraction import Extract, Extracts, ORDERS, SAMPLES
+from stewart_dynamics.identification.unknowns import (
+    COULOMB_COLUMNS, inertial_derivative, ORIGINS, PLATFORM, Unknowns)
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
     from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue)
-from stewart_dynamics.mechanics.least_squares import (
-    Identifiability, Information, LEAST_SHARE, no_information, solve)
-
+from stewart_dynamics.parameters.table import Parameters
 
 _STEPS = 30
 _DONE = 1e-10
-# Longest delay for which the Taylor series of the efforts is valid, in cut-off periods.
-_LONGEST_DELAY = 0.2
-# A delay is identifiable if the squared derivative of the efforts exceeds that of noise by this
-# factor.
-_TIMES_NOISE = 10.0
-_HELD = 1e-6
+# Passes over the extracts, each with the spectra of the residuals of the one before.
+_PASSES = 4
+# Prior deviation of a delay, in cut-off periods: the Taylor series is valid for as much.
+_DELAY = 0.2
 # Lower bound of the residuals' deviation, reached with exact efforts, relative to the efforts.
 _SMALLEST_DEVIATION = 1e-8
+# Highest frequency used, relative to that of the samples.
+BAND = 0.9 / SAMPLES
 # Relative distance to the bound below which a body is a point or a rod within rounding.
 _SMALLEST_BODY = 1e-6
 _BODY_STEPS = 200
+# Part of the deviation before the data above which a value keeps that of the file.
+_HARDLY = 0.9
 
 
 class Fit(NamedTuple):
-    """Unknowns (k,) that fit the samples of B bags."""
+    """The posterior of k unknowns, and of the delays of B bags."""
 
-    values: Array
-    covariance: Array  # (k, k) for white noise
+    values: Array  # (k,)
+    covariance: Array  # (k, k)
     delays: Array  # (B,) of the efforts [s], + later than the positions
-    delay_errors: Array
-    """(B,) standard errors for white noise [s]; 0: the delay is not identifiable"""
-    variances: Array  # (B, 6) of the residuals [N^2]
-    identifiability: Identifiability
-    matrix: Array  # (k, k) information of the unknowns, delays eliminated
+    delay_errors: Array  # (B,) [s]; nan: the delay is not identifiable
     at_bound: tuple[str, ...]
     """Names of parameters that would be inconsistent or negative without the bounds."""
+    posterior: Posterior  # of z and the delays, all by the deviations of the prior
+    delay_deviations: Array  # (B,) of the prior [s]
+    weights: Sequence[Weights]  # of each extract
+
+    def ratios(self, unknowns: Unknowns) -> Array:
+        """Return the deviations (k,) of the unknowns after the data, by those before."""
+        before = unknowns.deviations
+        ratios: Array = np.divide(np.sqrt(np.diag(self.covariance)), before,
+                                  out=np.ones(len(before)), where=before > 0.0)
+        return ratios
+
+    def parts(self, unknowns: Unknowns) -> dict[str, Array]:
+        """Return the standard deviation (k,) of each unknown by origin, 'noise' among them."""
+        count = len(unknowns.start)
+        across = unknowns.root @ self.posterior.covariance[:count, :count]
+        parts = {name: np.sqrt(np.sum(across[:, unknowns.origins == n] ** 2, axis=1))
+                 for n, name in enumerate(ORIGINS)}
+        rest = np.diag(self.covariance) - sum(each ** 2 for each in parts.values())
+        return {'noise': np.sqrt(np.maximum(rest, 0.0)), **parts}
 
 
-def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None,
-        cutoffs: Array | None = None) -> Fit:
+class Noisy(NamedTuple):
+    """For each bag the number of an extract, and this extract again with more noise of legs."""
+
+    numbers: Sequence[int]
+    extracts: Extracts
+
+    def both(self, clean: Extracts) -> Iterator[tuple[int, Extract, Extract]]:
+        """Yield the number of each, the extract without more noise, and that with it."""
+        without = (each for n, each in enumerate(clean) if n in self.numbers)
+        for number, one, other in zip(self.numbers, without, self.extracts, strict=True):
+            yield number, one, other._replace(used=one.used)
+
+
+def least_deviation(extract: Extract) -> float:
+    """Return the least deviation of residuals, reached with exact efforts [N]."""
+    efforts = math.sqrt(float(np.mean(extract.efforts[..., 0] ** 2)))
+    return _SMALLEST_DEVIATION * efforts + np.finfo(float).tiny
+
+
+def shifted_by(delay: float) -> Array:
+    """Return the coefficients (ORDERS,) of an effort that is not delayed, by its derivatives."""
+    return np.array([delay ** order / math.factorial(order) for order in range(ORDERS)])
+
+
+def residual_of(unknowns: Unknowns, values: Array, delay: float) -> Array:
+    """Return the coefficients (q,) of a residual by columns."""
+    return np.concatenate([
+        -(1.0 + values[-1]) * unknowns.theta(values), shifted_by(delay)])
+
+
+def directions(unknowns: Unknowns, values: Array, delays: Array, bag: int, deviations: Array,
+               ) -> Array:
     """
-    Return the unknowns that fit the samples of B bags best.
+    Return the negative derivative of a residual of a bag by z and the delays, (q, k + B).
 
-    ``noise`` (6, n, n) are the sums of the noise in the regressor alone. Delays are estimated if
-    the cut-off frequencies of the bags (B,) [Hz] are given, else zero.
+    ``deviations`` (B,) are those of the delays in the prior [s].
     """
-    found = _fit(sums, unknowns, unknowns.scales, noise, cutoffs)
-    unknown = found.identifiability.known_shares < LEAST_SHARE
-    if not unknown.any():
-        return found
-    # Weakly identifiable parameters keep the value from the file.
-    found = _fit(sums, unknowns, np.where(unknown, _HELD, 1.0) * unknowns.scales, noise, cutoffs)
-    return found._replace(values=np.where(unknown, unknowns.start, found.values))
-
-
-def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None,
-         cutoffs: Array | None) -> Fit:
-    values = unknowns.start.copy()
-    bags = len(sums.counts)
-    delays: Array = np.zeros(bags)
-    longest: Array = np.zeros(bags) if cutoffs is None else _LONGEST_DELAY / cutoffs
-    errors: Array = np.zeros(bags)
-    variances = _variances(sums, unknowns, values, delays)
-    for _ in range(_STEPS):
-        information, steps, of_noise = _information(
-            sums, unknowns, values, delays, variances, noise, cutoffs)
-        information = information._replace(
-            matrix=information.matrix + unknowns.strength,
-            vector=information.vector + unknowns.strength @ unknowns.start)
-        solution = solve(information, unknowns.start, scales, of_noise)
-        change = solution.values - values
-        largest = float(np.max(np.abs(change) / unknowns.scales, initial=0.0))
-        # Limit the step if the mass is far from the file's: its products are nonlinear.
-        change *= min(1.0, 2.0 / largest) if largest > 0.0 else 1.0
-        if unknowns.many_of_platform and values[0] + change[0] <= 0.0 and unknowns.names[0] == (
-                'platform.mass'):
-            change *= 0.5 * values[0] / -change[0]
-        values = values + change
-        for bag, (step, along, error) in enumerate(steps):
-            delays[bag] += float(np.clip(step + along @ change, -longest[bag], longest[bag]))
-            delays[bag] *= error > 0.0
-            errors[bag] = error
-        delays = np.clip(delays, -longest, longest)
-        variances = _variances(sums, unknowns, values, delays)
-        if largest < _DONE:
-            break
-    information, _, of_noise = _information(
-        sums, unknowns, values, delays, variances, noise, cutoffs)
-    final = solve(information, unknowns.start, scales, of_noise)
-    bounded, at_bound = consistent(unknowns, values, information.matrix)
-    return Fit(bounded, final.covariance, delays, errors, variances, final.identifiability,
-               information.matrix, at_bound)
-
-
-def shift_of_noise(clean: Sums, noisy: Sums, unknowns: Unknowns, found: Fit,
-                   cutoffs: Array | None) -> Array:
-    """
-    Return the bias (k,) of the unknowns by noise of lengths and rates, to first order.
-
-    Noise in the regressor rounds the friction law where the rate changes its sign, and more noise
-    does so again: the bias is estimated by the change of the unknowns with as much noise added
-    (simulation extrapolation: Cook and Stefanski 1994, doi:10.1080/01621459.1994.10476871).
-    ``noisy`` are the sums of the same samples with noise added.
-    """
-    known, steps = found.identifiability.known, []
-    for sums in (clean, noisy):
-        information, _, _ = _information(
-            sums, unknowns, found.values, found.delays, found.variances, None, cutoffs)
-        inner = known.T @ (information.matrix + unknowns.strength) @ known
-        steps.append(known @ np.linalg.pinv(inner, hermitian=True) @ (
-            known.T @ (information.vector - information.matrix @ found.values)))
-    shift: Array = steps[1] - steps[0]
-    return shift
-
-
-def directions(unknowns: Unknowns, values: Array, delay: float, with_delay: bool = True) -> Array:
-    """Return the negative derivative of a residual by unknowns and delay, (q, k + 1)."""
-    theta = unknowns.theta(values)
-    by_delay = -delayed_by(theta, delay)
-    columns = np.zeros((len(by_delay), len(values) + 1))
-    columns[:len(theta), :-1] = unknowns.derivative(values)
-    columns[:, -1] = by_delay if with_delay else 0.0
+    theta, count = unknowns.theta(values), len(values)
+    columns = np.zeros((len(theta) + ORDERS, count + len(delays)))
+    by_values = (1.0 + values[-1]) * unknowns.derivative(values)
+    by_values[:, -1] = theta
+    columns[:len(theta), :count] = by_values @ unknowns.root
+    columns[len(theta) + 1:, count + bag] = -deviations[bag] * shifted_by(delays[bag])[:-1]
     return columns
 
 
-def without_delay(normal: Array) -> Array:
-    """Return the derivative of the delay by the unknowns, (k,), from a normal matrix."""
-    along: Array = -normal[-1, :-1] / normal[-1, -1] if normal[-1, -1] > 0.0 else (
-        np.zeros(len(normal) - 1))
-    return along
+class _Sums(NamedTuple):
+    """Gram matrices (B, q, q) of whitened columns, less that of the noise in them, and this."""
+
+    grams: Array
+    of_noise: Array
+
+    @classmethod
+    def corrected(cls, grams: Array, of_noise: Array) -> _Sums:
+        """
+        Return the sums without the noise.
+
+        The law of Coulomb friction accounts for it, and that of efforts is not correlated with
+        their derivative.
+        """
+        linear = np.ones(grams.shape[-1])
+        linear[[*COULOMB_COLUMNS, -ORDERS + 1]] = 0.0
+        return cls(grams - of_noise * np.outer(linear, linear), of_noise)
 
 
-def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, variances: Array,
-                 noise: Array | None, cutoffs: Array | None,
-                 ) -> tuple[Information, list[tuple[float, Array, float]], Array | None]:
-    """Return the information of the sums, each bag's delay step, and information due to noise."""
-    theta, derivative = unknowns.theta(values), unknowns.derivative(values)
-    total, steps = no_information(len(values)), []
-    for bag, delay in enumerate(delays):
-        c = residual_of(theta, delay)
-        gram = np.tensordot(1.0 / variances[bag], sums.grams[bag], axes=1)
-        by_delay = delayed_by(theta, delay)
-        # Compare with the derivative of white noise below the cut-off.
-        observable = cutoffs is not None and by_delay @ gram @ by_delay > (
-            _TIMES_NOISE * sums.counts[bag].sum() * (2.0 * np.pi * cutoffs[bag]) ** 2 / 3.0)
-        e = directions(unknowns, values, delay, observable)
-        normal, vector = e.T @ gram @ e, e.T @ gram @ c
-        along = without_delay(normal)
-        alone = float(vector[-1] / normal[-1, -1]) if normal[-1, -1] > 0.0 else 0.0
-        matrix = normal[:-1, :-1] + np.outer(normal[:-1, -1], along)
-        of_values = vector[:-1] - normal[:-1, -1] * alone
-        total = total.plus(Information(
-            matrix, of_values + matrix @ values, float(c @ gram @ c),
-            int(sums.counts[bag].sum())))
-        steps.append((alone, along, float(normal[-1, -1] ** -0.5) if observable else 0.0))
-    if noise is None:
-        return total, steps, None
-    mean = np.average(1.0 / variances, axis=0, weights=sums.counts)
-    of_noise = derivative.T @ np.tensordot(mean, noise, axes=1) @ derivative
-    return total, steps, of_noise
+def best_for_file(extracts: Extracts, parameters: Parameters, kinds: Sequence[str], cutoffs: Array,
+                  ratios: Array, chosen: Callable[[Extract], Flags] = lambda extract: extract.used,
+                  ) -> Array:
+    """
+    Return the values (k,) that fit best if all that is not asked for is as the file says.
+
+    Values that the data hardly change, by the ``Fit.ratios`` (k,), keep the file's value.
+    """
+    unknowns = Unknowns(parameters, kinds, others_known=True)
+    found = fit(extracts, unknowns, None, cutoffs, chosen, passes=1)
+    values: Array = np.where(ratios > _HARDLY, unknowns.start, found.values)
+    return values
 
 
-def _variances(sums: Sums, unknowns: Unknowns, values: Array, delays: Array) -> Array:
-    squares = sums.squares(unknowns.theta(values), delays)
-    used = np.maximum(sums.counts - len(values) / 6.0, 1.0)
-    least = _SMALLEST_DEVIATION ** 2 * float(np.mean(sums.effort_squares() / used))
-    variances: Array = np.maximum(squares / used, max(least, np.finfo(float).tiny))
-    return variances
+def fit(extracts: Extracts, unknowns: Unknowns, noisy: Noisy | None, cutoffs: Array,
+        chosen: Callable[[Extract], Flags] = lambda extract: extract.used,
+        passes: int = _PASSES) -> Fit:
+    """
+    Return the posterior from the chosen efforts (N, 6) of each extract.
+
+    ``cutoffs`` are the cut-off frequencies of the bags (B,) [Hz]; 0 where the delay is known to be
+    zero.
+    """
+    return _Fitting(extracts, unknowns, noisy, cutoffs, chosen).result(passes)
 
 
-def consistent(unknowns: Unknowns, values: Array, information: Array,
+class _Fitting:
+    def __init__(self, extracts: Extracts, unknowns: Unknowns, noisy: Noisy | None,
+                 cutoffs: Array, chosen: Callable[[Extract], Flags]) -> None:
+        self._extracts, self._unknowns, self._noisy = extracts, unknowns, noisy
+        self._chosen, self._cutoffs = chosen, cutoffs
+        self._values: Array = unknowns.start.copy()
+        self._delays: Array = np.zeros(len(cutoffs))
+        self._deviations = np.divide(_DELAY, cutoffs, out=np.zeros(len(cutoffs)),
+                                     where=cutoffs > 0.0)
+        self._weights: list[Weights] = []
+        self._z: Array = np.zeros(len(unknowns.start) + len(cutoffs))
+        self._posterior: Posterior | None = None
+
+    def result(self, passes: int) -> Fit:
+        for _ in range(passes):
+            sums = self._sums()
+            self._improve(sums)
+        found, unknowns = self._posterior, self._unknowns
+        assert found is not None
+        count = len(unknowns.start)
+        covariance = unknowns.root @ found.covariance[:count, :count] @ unknowns.root.T
+        errors = self._deviations * np.sqrt(np.diag(found.covariance)[count:])
+        bounded, at_bound = consistent(unknowns, self._values, covariance)
+        return Fit(bounded, covariance, self._delays,
+                   np.where(errors < 0.5 * self._deviations, errors, np.nan), at_bound, found,
+                   self._deviations, self._weights)
+
+    def _directions(self, bag: int) -> Array:
+        return directions(
+            self._unknowns, self._values, self._delays, bag, self._deviations)
+
+    def _sums(self) -> _Sums:
+        """Return the sums with the spectra of the present residuals."""
+        bags, before, weights = len(self._cutoffs), self._weights, []
+        grams: Array = np.zeros(())
+        of_noise: Array = np.zeros(())
+        samples: Array = np.zeros(bags)
+        for number, extract in enumerate(self._extracts):
+            spectra = spectra_of(extract.columns * self._chosen(extract)[..., None], BAND)
+            bag, count = extract.bag, len(extract.times)
+            left = spectra @ residual_of(self._unknowns, self._values, self._delays[bag])
+            least = least_deviation(extract)
+            if not before:
+                size = np.sqrt(np.mean(left ** 2, axis=(0, 1))) + least
+                each = Weights(np.broadcast_to(size, (len(left), 6)), np.eye(6))
+            else:
+                assert self._posterior is not None
+                e = before[number].whitened(spectra) @ self._directions(bag)
+                free = 1.0 - np.sum((e @ self._posterior.covariance) * e, axis=-1)
+                each = weights_of(left, free, count, least)
+            weights.append(each)
+            if not grams.ndim:
+                grams = np.zeros((bags, spectra.shape[-1], spectra.shape[-1]))
+                of_noise = np.zeros(grams.shape)
+            grams[bag] += gram_of(each.whitened(spectra))
+            samples[bag] += count
+            # Noise of the efforts is in their derivative: that at rest shows no delay.
+            w = 2.0 * np.pi / (count * extract.step) * np.arange(len(spectra) * bool(before))
+            of_noise[bag, -ORDERS + 1, -ORDERS + 1] += 12.0 * float(w @ w)
+        self._weights = weights
+        if self._noisy is not None:
+            for number, extract, more in self._noisy.both(self._extracts):
+                change = (more.columns - extract.columns) * extract.used[..., None]
+                white = weights[number].whitened(spectra_of(change, BAND))
+                of_noise[extract.bag] += samples[extract.bag] / len(change) * gram_of(white)
+        return _Sums.corrected(grams, of_noise)
+
+    def _improve(self, sums: _Sums) -> None:
+        """Find the values that fit the sums best."""
+        unknowns, count = self._unknowns, len(self._unknowns.start)
+        for _ in range(_STEPS):
+            matrix = np.zeros((len(self._z), len(self._z)))
+            noise, vector = np.zeros_like(matrix), np.zeros(len(self._z))
+            for bag, (gram, of_noise) in enumerate(zip(sums.grams, sums.of_noise, strict=True)):
+                e = self._directions(bag)
+                c = residual_of(unknowns, self._values, self._delays[bag])
+                matrix += e.T @ gram @ e
+                noise += e.T @ of_noise @ e
+                vector += e.T @ gram @ c
+            if not np.isfinite(matrix).all():
+                raise BagError('numbers overflow: are all units SI units?')
+            self._posterior = posterior(matrix, vector, self._z, noise)
+            change = self._posterior.values - self._z
+            largest = float(np.abs(change).max(initial=0.0))
+            # Limit the step where the mass is far from the file's: its products are nonlinear.
+            z = self._z + change * min(1.0, 2.0 / largest if largest > 0.0 else 1.0)
+            values = unknowns.start + unknowns.root @ z[:count]
+            if values[0] <= 0.0:
+                z = 0.5 * (self._z + z)
+                values = unknowns.start + unknowns.root @ z[:count]
+            self._z, self._values, self._delays = z, values, self._deviations * z[count:]
+            if largest < _DONE:
+                break
+
+
+def consistent(unknowns: Unknowns, values: Array, covariance: Array,
                ) -> tuple[Array, tuple[str, ...]]:
     """Return values (k,) within all bounds, and the names of those that violated one."""
-    # Unidentifiable parameters are held with a standard error of their scale.
-    matrix = information + np.diag(unknowns.scales ** -2.0)
-    beyond: list[str] = []
-    free: Flags = np.ones(len(values), dtype=bool)
-    found = values
-    for _ in range(len(values)):
-        negative = [n for n in unknowns.not_negative() if found[n] < 0.0 and free[n]]
-        if not negative:
-            break
-        beyond += [unknowns.names[n] for n in negative]
-        free[negative] = False
-        found = _held(matrix, values, free)
-    count = unknowns.many_of_platform
-    if count and smallest_eigenvalue(unknowns.inertial(found)) < _SMALLEST_BODY:
-        beyond += unknowns.names[:count]
-        found = _as_body(unknowns, found, matrix)
-    return found, tuple(beyond)
+    found, beyond = values, np.zeros(len(values), dtype=bool)
+    while np.any(more := [found[n] < 0.0 and not beyond[n] for n in unknowns.not_negative()]):
+        beyond[unknowns.not_negative()[more]] = True
+        found = _moved(values, covariance, beyond, np.zeros(np.count_nonzero(beyond)))
+    if smallest_eigenvalue(unknowns.inertial(found)) < _SMALLEST_BODY:
+        body = _body(unknowns, found, covariance[:PLATFORM, :PLATFORM])
+        platform = np.arange(len(values)) < PLATFORM
+        found = np.where(beyond, 0.0, _moved(found, covariance, platform, body))
+        beyond |= platform
+    return found, tuple(name for name, is_beyond in zip(unknowns.names, beyond, strict=True)
+                        if is_beyond)
 
 
-def _held(matrix: Array, values: Array, free: Flags) -> Array:
-    """Return the values with some at zero and the others at their conditional optimum."""
-    at_zero = np.where(free, values, 0.0)
-    change = at_zero - values
-    shift = np.linalg.solve(matrix[np.ix_(free, free)], matrix[np.ix_(free, ~free)]
-                            @ change[~free])
-    at_zero[free] = values[free] - shift
-    return at_zero
+def _moved(values: Array, covariance: Array, which: Flags, given: Array) -> Array:
+    """Return the conditional mean of values of which some have given values."""
+    free = which & (np.diag(covariance) > 0.0)
+    inner, across = covariance[np.ix_(free, free)], covariance[:, free]
+    sizes = np.sqrt(np.diag(inner))
+    change = np.linalg.pinv(inner / np.outer(sizes, sizes), hermitian=True) @ (
+        (given[free[which]] - values[free]) / sizes)
+    moved: Array = values + across @ (change / sizes)
+    moved[which] = given
+    return moved
 
 
-def _as_body(unknowns: Unknowns, values: Array, matrix: Array) -> Array:
-    """Return the nearest values with a physical platform, in the metric of information."""
-    units = unknowns.inertial_scales
+def _body(unknowns: Unknowns, values: Array, covariance: Array) -> Array:
+    """Return the nearest physical platform (10,), in the metric of the covariance."""
+    scales = np.sqrt(np.diag(covariance)) + 1e-12 * np.abs(values[:PLATFORM]).max()
+    metric = np.linalg.pinv(covariance / np.outer(scales, scales), hermitian=True)
+    units = unknowns.inertial_units
 
     def candidate(eta: Array) -> Array:
         return unknowns.with_inertial(values, units * from_log_cholesky(eta))
 
-    count = unknowns.many_of_platform
-    scales = unknowns.scales[:count]
-    metric = matrix[:count, :count]
     eta = log_cholesky(unknowns.inertial(unknowns.start) / units)
     found = candidate(eta)
     damping = 1e-3
     for _ in range(_BODY_STEPS):
-        off = (found - values)[:count]
-        scaled = unknowns.derivative(found)[:10, :count] * scales / units[:, None]
-        derivative = scales[:, None] * np.linalg.pinv(scaled) @ log_cholesky_derivative(eta)
+        off = ((found - values)[:PLATFORM]) / scales
+        scaled = inertial_derivative(found[:PLATFORM]) * scales / units[:, None]
+        derivative = np.linalg.pinv(scaled) @ log_cholesky_derivative(eta)
         normal = derivative.T @ metric @ derivative
         step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12),
                                -derivative.T @ metric @ off)
         eta_next = eta + np.clip(step, -1.0, 1.0)
         following = candidate(eta_next)
-        nearer = (following - values)[:count]
+        nearer = ((following - values)[:PLATFORM]) / scales
         cost, next_cost = off @ metric @ off, nearer @ metric @ nearer
         if next_cost > cost:
             damping *= 10.0
@@ -281,88 +345,4 @@ def _as_body(unknowns: Unknowns, values: Array, matrix: Array) -> Array:
         if cost - next_cost < 1e-12 * cost or smallest_eigenvalue(
                 unknowns.inertial(found)) < _SMALLEST_BODY:
             break
-    return found
-
-
-# Half width of the smoothing of spectra, relative to the sampling rate; number of samples in the
-# blocks of time, and their minimum number.
-_SMOOTHING = 0.01
-_BLOCK = 100
-_FEWEST_BLOCKS = 15
-
-
-class Errors(NamedTuple):
-    """Covariance (k, k) of the unknowns, and standard errors of the delays (B,) [s]."""
-
-    covariance: Array
-    delays: Array
-
-
-def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit) -> Errors:
-    """Return the standard errors of a fit to the sums of extracts."""
-    theta, count = unknowns.theta(fit.values), len(fit.values)
-    e_of_bags, alongs, alone = [], [], []
-    for bag, delay in enumerate(fit.delays):
-        e = directions(unknowns, fit.values, delay, bool(fit.delay_errors[bag]))
-        gram = np.tensordot(1.0 / fit.variances[bag], sums.grams[bag], axes=1)
-        normal = e.T @ gram @ e
-        alongs.append(without_delay(normal))
-        alone.append(normal[-1, -1])
-        e_of_bags.append(e)
-    by_frequency = np.zeros((count, count))
-    scores, own = [], np.zeros((len(fit.delays), count + 1))
-    for extract in extracts:
-        bag = extract.bag
-        columns = extract.columns * extract.used[..., None]
-        residuals = columns @ residual_of(theta, fit.delays[bag])
-        weighted = columns @ e_of_bags[bag] / fit.variances[bag][:, None]
-        # The delay depends on the unknowns; its own error comes from its own column.
-        follow = weighted[..., :-1] + weighted[..., -1:] * alongs[bag]
-        both = np.concatenate([follow, weighted[..., -1:]], axis=-1)
-        middle = _by_frequency(both, residuals)
-        by_frequency += middle[:-1, :-1]
-        own[bag] += middle[-1]
-        size = max(1, min(_BLOCK, len(residuals) // _FEWEST_BLOCKS))
-        products = np.einsum('nlk,nl->nk', follow, residuals)
-        scores.append(np.add.reduceat(products, np.arange(0, len(products), size), axis=0))
-    score = np.concatenate(scores) if scores else np.zeros((1, count))
-    by_blocks = score.T @ score * len(score) / max(len(score) - 1, 1)
-    known = fit.identifiability.known
-    inner = known.T @ (fit.matrix + unknowns.strength) @ known
-    bread = known @ np.linalg.pinv(inner, hermitian=True) @ known.T
-    candidates = [bread @ middle @ bread for middle in (by_frequency, by_blocks)]
-    larger = np.sqrt(np.maximum(*(np.maximum(np.diag(each), 0.0) for each in candidates)))
-    first = np.sqrt(np.maximum(np.diag(candidates[0]), 1e-300))
-    scale = np.maximum(larger / first, 1.0)
-    delays = np.zeros(len(fit.delays))
-    for bag, (along, each) in enumerate(zip(alongs, alone, strict=True)):
-        if each > 0.0:
-            through = along @ bread
-            delays[bag] = np.sqrt(max(0.0, through @ by_frequency @ through + (
-                2.0 * through @ own[bag, :-1] + own[bag, -1] / each) / each))
-    return Errors(scale[:, None] * candidates[0] * scale, delays)
-
-
-def _by_frequency(weighted: Array, residuals: Array) -> Array:
-    """Return the inner sum of a block from columns (N, 6, k) and residuals (N, 6)."""
-    count = len(residuals)
-    size = 1 << (2 * count - 1).bit_length()
-    r = np.fft.rfft(residuals, size, axis=0)
-    spectra = np.einsum('fi,fj->fij', r, r.conj()) / count
-    smooth = smoothed(spectra, max(1, round(_SMOOTHING * size)))
-    e = np.fft.rfft(weighted, size, axis=0)
-    # one-sided: all frequencies except the first and the last count twice
-    twice = np.full(len(e), 2.0)
-    twice[0] = twice[-1] = 1.0
-    first = np.einsum('fij,fjk->fik', smooth.conj(), e)
-    middle = np.einsum('f,fik,fil->kl', twice, e.conj(), first, optimize=True)
-    return np.asarray(middle.real / size)
-
-
-def smoothed(spectra: Array, width: int) -> Array:
-    """Return the running mean over 2 width + 1 frequencies, mirrored at both ends."""
-    width = min(width, len(spectra) - 1)
-    whole = np.concatenate([spectra[width:0:-1].conj(), spectra, spectra[-2:-width - 2:-1].conj()])
-    sums = np.cumsum(np.concatenate([np.zeros((1, *spectra.shape[1:])), whole]), axis=0)
-    mean: Array = (sums[2 * width + 1:] - sums[:-2 * width - 1]) / (2 * width + 1)
-    return mean
+    return found[:PLATFORM]

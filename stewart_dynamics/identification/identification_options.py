@@ -35,8 +35,6 @@ class IdentificationOptions(NamedTuple):
     motor_torque: bool = False  # efforts are motor torques [N m]
     motor_current: bool = False  # efforts are motor currents [A]
     cutoff: float = CUTOFF  # cut-off frequency of the filter on regressor and efforts [Hz]
-    prior: float | None = None
-    """Standard error of the file's values, relative to the scales; None: they do not count."""
     hold_out: float = HOLD_OUT  # fraction at the end of each bag that validates a fit to the rest
     delay: bool = True  # estimate the delay of the efforts
     accept_mistakes: bool = False  # write results although a mistake is likely

@@ -15,9 +15,9 @@
 """
 Identification of a hexapod from bags; computes the result and writes no files.
 
-Windows of each bag are converted into extracts (``extraction``), whose sums are fitted (``fit``)
-twice, the second time without outliers. Intervals and validation follow; the validation predicts
-the end of each bag by a fit to the rest.
+Windows of each bag are converted into extracts (``extraction``). Stretches in which the platform
+does not follow the model, as with brakes or in contact, are left out; the rest is fitted
+(``fit``), and the end of each bag is predicted by a fit to its begin, and by the file.
 """
 
 from __future__ import annotations
@@ -25,25 +25,28 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, NANOSECOND, SECOND
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, ParameterError, PoseError, SingularityError
-from stewart_dynamics.identification.extraction import Extraction, Extracts, WindowRead
+from stewart_dynamics.identification.extraction import (
+    Extract, Extraction, Extracts, WindowRead)
 from stewart_dynamics.identification.filters import LowPass
-from stewart_dynamics.identification.fit import Errors, errors_of, Fit, fit, shift_of_noise
+from stewart_dynamics.identification.fit import (
+    best_for_file, Fit, fit, Noisy, residual_of)
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import (
     lack_of_fit, LackOfFit, LEFT_BY_FILTERS, long_pieces)
 from stewart_dynamics.identification.likely_mistakes import (
-    LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose, scale_of_efforts)
+    Comparison, LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose, of_validation)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
-from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.measured_efforts import FAR, force_per_effort
@@ -55,14 +58,13 @@ from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
 _FEWEST_SAMPLES = 10.0
-# Residuals above this multiple of the leg's deviation are outliers: a contact, a collision.
-_OUTLIER = 8.0
-# If a larger fraction exceeds it, no residual counts as an outlier.
-_MOST_OUTLIERS = 0.2
 # Number of times that the delay of a bag is refined.
 _REFINED = 3
 # A notice is given if a larger share of the RMS rate is above the cut-off.
 _MOST_ABOVE = 0.03
+# Samples in a block that is left out where the platform does not follow the model, degrees of
+# freedom of the residuals where it does, largest part that is left out, and number of fits.
+_BLOCK, _FREEDOM, _MOST_HELD, _ROUNDS = 8, 4.0, 0.5, 10
 # Minimum number of filtered samples.
 _FEWEST = 20
 # Below this number of cut-off periods the correlations of the residuals are not well known.
@@ -73,6 +75,13 @@ _BETTER = 0.25
 _MOST_INSIDE = 0.5
 # Seed of the noise that is added to determine the information due to noise alone.
 _SEED = 20221
+
+
+_Chosen = Callable[[Extract], Flags]
+
+
+def _used(extract: Extract) -> Flags:
+    return extract.used
 
 
 class BagRead(NamedTuple):
@@ -99,7 +108,7 @@ class BagRead(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Residuals by the file's and by fitted parameters, and efforts: RMS per leg (6,) [N]."""
+    """Residuals by the file's and by written parameters, and efforts: RMS per leg (6,) [N]."""
 
     before: Array
     after: Array
@@ -107,31 +116,43 @@ class Residuals(NamedTuple):
     samples: int
 
     @classmethod
-    def of(cls, sums: Sums, unknowns: Unknowns, found: Fit) -> Residuals:
-        """Return the residuals of the efforts in some sums."""
-        counts = np.maximum(sums.counts.sum(axis=0), 1)
-        before, after, measured = (np.sqrt(squares.sum(axis=0) / counts) for squares in (
-            sums.squares(unknowns.theta(unknowns.start), found.delays),
-            sums.squares(unknowns.theta(found.values), found.delays), sums.effort_squares()))
-        return cls(before, after, measured, int(sums.counts.sum()) // 6)
+    def of(cls, extracts: Extracts, unknowns: Unknowns, written: Array, delays: Array,
+           chosen: _Chosen) -> Residuals:
+        """Return the residuals of the chosen efforts, with delays (B,) [s]."""
+        squares, counts = np.zeros((3, 6)), np.zeros(6)
+        for extract in extracts:
+            used, delay = chosen(extract), delays[extract.bag]
+            counts += np.count_nonzero(used, axis=0)
+            for n, each in enumerate((
+                    *(extract.columns @ residual_of(unknowns, values, delay)
+                      for values in (unknowns.start, written)),
+                    extract.efforts[..., 0])):
+                squares[n] += np.sum(used * each ** 2, axis=0)
+        before, after, measured = np.sqrt(squares / np.maximum(counts, 1.0))
+        return cls(before, after, measured, int(counts.sum()) // 6)
 
 
-class Identified(NamedTuple):
+@dataclass(frozen=True)
+class Identified:
     """Result of an identification."""
 
-    parameters: Parameters  # the file's parameters with the identified values
     unknowns: Unknowns
     fit: Fit
-    errors: Errors
+    written: Array  # values (k,) of ``parameters``
     bags: tuple[BagRead, ...]
     samples: int  # number of filtered samples of all bags
-    outliers: int  # number of filtered efforts left out after the first fit
+    outliers: int  # number of filtered efforts at which the platform does not follow the model
     unsound: int  # number left out before it: outliers in samples, end stops, force limits
     residuals: Residuals
     validation: Residuals | None  # residuals on held-out time, by a fit to the rest
     likely: tuple[LikelyMistake, ...]
     lack_of_fit: LackOfFit | None  # None if the residuals are noise, or not tested
     tested: bool  # for a lack of fit: the bags are long enough
+
+    @cached_property
+    def parameters(self) -> Parameters:
+        """The file's parameters with the identified values; ParameterError if invalid."""
+        return self.unknowns.parameters(self.written)
 
 
 class _Motion(NamedTuple):
@@ -155,14 +176,11 @@ class Identification:
             parameters, options.motor_torque, options.motor_current)
         self.parameters, self._options = parameters, options
         self.platform = StewartPlatform(parameters)
-        self.unknowns = Unknowns(parameters, options.kinds, options.prior)
+        self.unknowns = Unknowns(parameters, options.kinds)
         self.extracts, self._noisy = Extracts(), Extracts()
         self.bags: list[BagRead] = []
         self._first: tuple[Extraction, Window] | None = None
-        # For the window of each bag with the most motion: its number; sums without and with more
-        # noise, the Gram matrix of that noise in the regressor, and the number of samples.
-        self._moving: list[int] = []
-        self._noises: list[tuple[Sums, Sums, Array, int]] = []
+        self._moving: list[int] = []  # for each bag the number of the extract with most motion
 
     def read(self, path: Path, progress: Callable[[int], None] | None = None) -> None:
         """Read a bag; raise BagError if it cannot be read, or contains no usable data."""
@@ -209,14 +227,20 @@ class Identification:
                                f'the {NEGATIVE} side of its base')
                 extraction = self._extraction(window)
             if not lag_is_known:
-                lag, _ = self._lag(extraction, window)
+                lag, _, scale = self._lag(extraction, window)
                 if len(window.positions) < fewest + abs(lag):
                     lag = 0
             window = window.with_lag(lag)
             read = self._read_window(path, extraction, window, last)
             if read.moves and not lag_is_known:
                 lag_is_known = True
-                read = self._delayed(path, extraction, window, last, read)
+                if 1.0 / FAR < scale < FAR or scale == 0.0:
+                    read = self._delayed(path, extraction, window, last, read)
+                else:  # of another unit or sign
+                    of_model = window._replace(efforts=window.efforts / scale)
+                    self._delayed(path, extraction, of_model, last,
+                                  self._read_window(path, extraction, of_model, last))
+                    read = self._read_window(path, extraction, window, last)
             last = read
             speeds = np.abs(last.extract.legs[..., 1])
             squares = float(np.sum(speeds ** 2))
@@ -265,7 +289,7 @@ class Identification:
             yield (f'less than {short:.3g} s are left by the filters: intervals are too narrow '
                    'for so short a recording')
         if inside > _MOST_INSIDE and any(
-                'coulomb_friction' in name for name in self.unknowns.names):
+                'coulomb_friction' in self.unknowns.names[n] for n in self.unknowns.asked):
             yield (f'{100.0 * inside:.0f} % of the rates are below actuator.coulomb_velocity: '
                    'Coulomb friction is linear there, and its value depends on that parameter')
 
@@ -275,14 +299,15 @@ class Identification:
         return Extraction(self.platform, self.unknowns, window.period, cutoff, speeds,
                           self._per_effort is not None)
 
-    def _lag(self, extraction: Extraction, window: Window) -> tuple[int, float]:
-        """Return the lag of the efforts in samples, and the squared misfit."""
+    def _lag(self, extraction: Extraction, window: Window, of_any_scale: bool = True,
+             ) -> tuple[int, float, float]:
+        """Return the lag of the efforts in samples, the squared misfit, and their scale."""
         piece = most_motion(window, extraction)
         try:
             return extraction.lag(piece, first_pose(extraction.platform, piece),
-                                  LONGEST_LAG if self._options.delay else 0.0)
+                                  LONGEST_LAG if self._options.delay else 0.0, of_any_scale)
         except (PoseError, SingularityError):
-            return 0, 1.0
+            return 0, 1.0, 1.0
 
     def _is_on_other_side(self, window: Window) -> bool:
         """
@@ -294,14 +319,13 @@ class Identification:
         parameters, platform = self.parameters, self.platform
         if home_of(parameters).certain:
             return False
-        _, misfit = self._lag(self._extraction(window), window)
+        _, misfit, _ = self._lag(self._extraction(window), window, of_any_scale=False)
         self.parameters = parameters.replaced({'geometry.platform_side': NEGATIVE})
         self.platform = StewartPlatform(self.parameters)
         extraction = self._extraction(window)
-        _, below = self._lag(extraction, window)
+        _, below, _ = self._lag(extraction, window, of_any_scale=False)
         if below < _BETTER * misfit and self._of_this_model(extraction, window):
-            self.unknowns = Unknowns(
-                self.parameters, self._options.kinds, self._options.prior)
+            self.unknowns = Unknowns(self.parameters, self._options.kinds)
             return True
         self.parameters, self.platform = parameters, platform
         return False
@@ -310,8 +334,7 @@ class Identification:
         """Return whether the efforts are those of the file's model in any unit, or with -."""
         piece = most_motion(window, extraction)
         extract = extraction(piece, first_pose(extraction.platform, piece)).extract
-        scale, _ = scale_of_efforts(
-            Sums.of(extract.columns, extract.used), self.unknowns, platform_too=True)
+        scale = Comparison([extract], self.unknowns).best_scales()[0]
         return scale > 0.0 or 1.0 / FAR < -scale < FAR
 
     def _read_window(self, path: Path, extraction: Extraction, window: Window,
@@ -331,31 +354,23 @@ class Identification:
 
         Filters of the efforts cannot do that: friction that jumps between two samples aliases.
         """
-        for _ in range(_REFINED):
-            sums = Sums.of(read.extract.columns, read.extract.used)
-            extraction.later += float(fit(
-                sums, self.unknowns, None, np.array([extraction.cutoff])).delays[0])
-            read = self._read_window(path, extraction, window, last)
+        with closing(Extracts()) as one:
+            for _ in range(_REFINED):
+                one.clear()
+                one.add(0, 0.0, read)
+                extraction.later += float(fit(
+                    one, self.unknowns, None, np.array([extraction.cutoff]), passes=1).delays[0])
+                read = self._read_window(path, extraction, window, last)
         return read
 
     def _add_noise(self, extraction: Extraction, motion: _Motion) -> None:
-        """Determine the information due to noise alone in a window."""
-        window, extract = motion.window, motion.read.extract
-        read = extraction(window, first_pose(self.platform, window),
-                          np.random.default_rng(_SEED))
-        self._noisy.add(len(self.bags), 0.0, read)
-        noisy = read.extract
+        """Add the window with the most motion of a bag with more noise."""
+        window = motion.window
+        self._noisy.add(len(self.bags), 0.0, extraction(
+            window, first_pose(self.platform, window), np.random.default_rng(_SEED)))
         self._moving.append(motion.number)
-        change = noisy.regressor - extract.regressor
-        self._noises.append((
-            Sums.of(extract.columns, extract.used), Sums.of(noisy.columns, extract.used),
-            np.einsum('nla,nlb->lab', change, change), len(change)))
         if self._first is None:
             self._first = extraction, window
-
-    def _of_efforts(self, sums: Sums) -> list[LikelyMistake]:
-        return list(of_efforts(
-            sums, self.unknowns, self.parameters, self._per_effort is not None))
 
     def result(self) -> Identified:
         """Fit all bags and return the result."""
@@ -363,82 +378,110 @@ class Identification:
         if extracts.samples < _FEWEST:
             raise BagError(f'{self.bags[0].bag}: {extracts.samples} samples are left after '
                            f'the filters: must be at least {_FEWEST}')
-        sums = sums_of(extracts)
-        if sums.counts.sum(axis=0).min() < _FEWEST:
-            whole = sums_of(extracts, lambda each: np.ones_like(each.used))
-            reasons = [f'likely mistake: {each.text}' for each in self._of_efforts(whole)] or [
+        counts = sum(np.count_nonzero(used, axis=0) for used in extracts.used)
+        usable = np.min(counts) >= _FEWEST
+        # The sign first: a delay of half a period fits the moving part of opposite efforts.
+        likely = list(of_efforts(Comparison(extracts, unknowns, whole=not usable),
+                                 self.parameters, self._per_effort is not None))
+        if not usable:
+            reasons = [f'likely mistake: {each.text}' for each in likely] or [
                 'is geometry.zero_length right, and are the efforts in N?']
             raise BagError(f'{self.bags[0].bag}: nothing to identify from: '
                            f'{sum(bag.samples_at_stops for bag in self.bags)} samples are at or '
                            'beyond limits.length_min, length_max or force_max: '
                            + '; '.join(reasons))
-        unsound = 6 * extracts.samples - int(sums.counts.sum())
-        clean, noisy, grams, samples = zip(*self._noises, strict=True)
-        noise = sum(grams) * (extracts.samples / sum(samples))
-        found = fit(sums, unknowns, noise, self._cutoffs)
-        outliers = self._leave_out_outliers(found)
-        if outliers:
-            sums = sums_of(extracts)
-            found = fit(sums, unknowns, noise, self._cutoffs)
-        # The sign first: a delay of half a period fits the moving part of opposite efforts.
-        likely = self._of_efforts(sums) or list(of_delay(
-                bag.delay_s + delay for bag, delay in zip(
-                    self.bags, found.delays, strict=True)))
-        errors = errors_of(extracts, sums, unknowns, found)
-        shift = shift_of_noise(
-            Sums.stacked(clean), Sums.stacked(noisy), unknowns, found, self._cutoffs)
-        errors = errors._replace(covariance=errors.covariance + np.outer(shift, shift))
-        residuals = Residuals.of(sums, unknowns, found)
-        lack = lack_of_fit(
-            self.platform, extracts, self._moving, self._noisy, unknowns, found)
+        unsound = 6 * extracts.samples - int(np.sum(counts))
+        outliers = 0 if likely else self._leave_out()
+        noisy = Noisy(self._moving, self._noisy)
+        found = fit(extracts, unknowns, noisy, self._cutoffs)
+        likely = likely or list(of_delay(
+            bag.delay_s + delay for bag, delay in zip(self.bags, found.delays, strict=True)))
+        written = best_for_file(extracts, self.parameters, options.kinds, self._cutoffs,
+                                found.ratios(unknowns))
+        residuals = Residuals.of(extracts, unknowns, written, found.delays, _used)
+        lack = lack_of_fit(self.platform, extracts, noisy, unknowns, found)
         left = float(np.sqrt(
             np.mean(residuals.after ** 2) / (np.mean(residuals.measured ** 2) + 1e-300)))
+        validation = self._validation(found) if options.hold_out else None
         if not likely:
             assert self._first is not None
-            likely += of_fit(self.parameters, *self._first, found, lack, left)
+            likely += of_fit(self.parameters, unknowns, *self._first, found, lack, left)
+        if not likely and validation is not None:
+            likely += of_validation(validation.before, validation.after, validation.measured)
         tested = bool(long_pieces(extracts))
         return Identified(
-            unknowns.parameters(found.values), unknowns, found, errors, tuple(self.bags),
-            extracts.samples, outliers, unsound, residuals,
-            self._validation(noise) if options.hold_out else None, tuple(likely),
+            unknowns, found, written, tuple(self.bags),
+            extracts.samples, outliers, unsound, residuals, validation, tuple(likely),
             lack if tested and left > LEFT_BY_FILTERS else None, tested)
 
     @property
-    def _cutoffs(self) -> Array | None:
-        return np.array([bag.cutoff_hz for bag in self.bags]) if self._options.delay else None
+    def _cutoffs(self) -> Array:
+        return np.array([bag.cutoff_hz if self._options.delay else 0.0 for bag in self.bags])
 
-    def _leave_out_outliers(self, found: Fit) -> int:
-        """Deselect efforts with outlying residuals; return their number."""
-        theta = self.unknowns.theta(found.values)
-        residuals = [
-            np.where(each.used, each.columns @ residual_of(theta, found.delays[each.bag]), np.nan)
-            for each in self.extracts]
-        whole = np.concatenate(residuals)
-        if np.isnan(whole).all(axis=0).any():
-            return 0
-        deviation = BY_MEDIAN * np.nanmedian(np.abs(whole), axis=0)
-        far = [np.abs(each) > _OUTLIER * deviation for each in residuals]
-        number = sum(map(np.count_nonzero, far))
-        if number > _MOST_OUTLIERS * whole.size:
-            return 0
-        self.extracts.used = [
-            used & ~each for used, each in zip(self.extracts.used, far, strict=True)]
-        return number
+    def _leave_out(self) -> int:
+        """
+        Deselect blocks of efforts that are not those of the model; return the number of efforts.
 
-    def _validation(self, noise: Array) -> Residuals | None:
+        In each block the platform follows the model, with residuals that have Student's
+        distribution of few degrees of freedom, or it is held, by brakes or a contact, and efforts
+        are unrelated to the model, normally distributed with their own size. What is likelier
+        is taken, and the rest is fitted again.
+        """
+        extracts = self.extracts
+        used = list(extracts.used)
+        held: list[Flags] = [np.zeros(len(each), dtype=bool) for each in used]
+        for _ in range(_ROUNDS):
+            found = fit(extracts, self.unknowns, None, self._cutoffs, passes=2)
+            of_extracts = [np.where(whole, extract.columns @ residual_of(
+                self.unknowns, found.values, found.delays[extract.bag]), np.nan)
+                for extract, whole in zip(extracts, used, strict=True)]
+            before = held
+            held = self._held(of_extracts, before)
+            if sum(map(np.count_nonzero, held)) > _MOST_HELD * extracts.samples:
+                held = [np.zeros(len(each), dtype=bool) for each in used]
+            extracts.used = [
+                each & ~out[:, None] for each, out in zip(used, held, strict=True)]
+            if all(map(np.array_equal, before, held)):
+                break
+        return sum(np.count_nonzero(each & out[:, None])
+                   for each, out in zip(used, held, strict=True))
+
+    def _held(self, residuals: list[Array], before: list[Flags]) -> list[Flags]:
+        """Return which samples are in blocks in which the platform is held."""
+        free = np.concatenate(
+            [each[~out] for each, out in zip(residuals, before, strict=True)])
+        deviation = BY_MEDIAN * np.nanmedian(np.abs(free), axis=0) + 1e-300
+        sizes = np.sqrt(np.mean(np.concatenate(
+            [each.efforts[..., 0] for each in self.extracts]) ** 2, axis=0)) + 1e-300
+        sizes = np.maximum(sizes / deviation, 1.0)  # of forces, by the noise
+        found = []
+        for each in residuals:
+            squares = np.nan_to_num((each / deviation) ** 2)
+            edges = np.arange(0, len(each), _BLOCK)
+            mean = np.add.reduceat(squares, edges)
+            mean /= np.diff([*edges, len(each)])[:, None]  # of a block, of each leg
+            of_free = 0.5 * (_FREEDOM + 6.0) * np.log1p(mean.sum(axis=1) / _FREEDOM)
+            of_held = np.sum(np.log(sizes)) + 0.5 * np.sum(mean / sizes ** 2, axis=1)
+            found.append(np.repeat(of_free > of_held, _BLOCK)[:len(each)])
+        return found
+
+    def _validation(self, found: Fit) -> Residuals | None:
         """Return the residuals at the end of each bag with a fit to the rest."""
-        part = self._options.hold_out
-        ends = [bag.seconds * (1.0 - part) for bag in self.bags]
+        ends = [bag.seconds * (1.0 - self._options.hold_out) for bag in self.bags]
 
-        def part_of(held_out: bool) -> Sums:
-            return sums_of(self.extracts, lambda each: each.used & (
-                (each.times >= ends[each.bag]) == held_out)[:, None])
+        def rest(extract: Extract) -> Flags:
+            return extract.used & (extract.times < ends[extract.bag])[:, None]
 
-        test, train = part_of(True), part_of(False)
-        if min(test.counts.sum(axis=0)) < _FEWEST or min(train.counts.sum(axis=0)) < _FEWEST:
+        def held_out(extract: Extract) -> Flags:
+            return extract.used & (extract.times >= ends[extract.bag])[:, None]
+
+        counts = [sum(np.count_nonzero(chosen(each), axis=0) for each in self.extracts)
+                  for chosen in (rest, held_out)]
+        if np.min(counts) < _FEWEST:
             return None
-        found = fit(train, self.unknowns, noise * (1.0 - part), self._cutoffs)
-        return Residuals.of(test, self.unknowns, found)
+        of_rest = best_for_file(self.extracts, self.parameters, self._options.kinds,
+                                self._cutoffs, found.ratios(self.unknowns), rest)
+        return Residuals.of(self.extracts, self.unknowns, of_rest, found.delays, held_out)
 
     def close(self) -> None:
         """Remove the temporary file."""

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification.identification_options import (
     CUTOFF, DesignOptions, IdentificationOptions)
-from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
+from stewart_dynamics.identification.unknowns import DEFAULT, KINDS, LINEAR_UNKNOWNS, PLATFORM
 from stewart_dynamics.program import (
     add_accepted, add_motor_efforts, add_node, add_parameters, add_report, arguments_of, between,
     DONE, names_of, Program, share, whole)
@@ -79,8 +79,6 @@ def _arguments() -> argparse.ArgumentParser:
     what.add_argument('--cutoff', type=between(0.1, 1000.0), default=CUTOFF, metavar='HZ',
                       help='cut-off frequency of the filter on both sides of the regression '
                            f'(default: {CUTOFF:g}): above the frequencies of the motion')
-    what.add_argument('--prior', type=between(1e-6, 1e3), metavar='PART',
-                      help="the file's values count, as if known to this part of their size")
     what.add_argument('--hold-out', type=share(0.9), default=HOLD_OUT, metavar='PART',
                       help='end of each bag that validates a fit to the rest; 0: none '
                            f'(default: {HOLD_OUT:g})')
@@ -207,9 +205,8 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
 def _design_head(designed: Design, asked: DesignOptions) -> Iterator[str]:
     yield f'Designed to identify {", ".join(asked.kinds)}, seed {asked.seed}. Predicted 95 %'
     yield f'intervals for white noise of {asked.noise:g} N in efforts at {asked.rate:g} Hz:'
-    for name, unit, half in zip(designed.unknowns.names, designed.unknowns.units,
-                                designed.half_widths, strict=True):
-        yield f'  {name}: +- {half:.2g} {unit}'
+    for n, half in zip(designed.unknowns.asked, designed.half_widths, strict=True):
+        yield f'  {designed.unknowns.names[n]}: +- {half:.2g} {designed.unknowns.units[n]}'
     yield 'Of what is free between home and the limits, less their margins, it uses:'
     yield from (f'  {part:.0%} of {name}' for name, part in designed.use.items())
 
@@ -220,9 +217,9 @@ def _design_lines(designed: Design, asked: DesignOptions) -> Iterator[str]:
            f'efforts at {asked.rate:g} Hz')
     unknowns = designed.unknowns
     of_legs: dict[str, tuple[float, str]] = {}
-    for n, (name, unit, half) in enumerate(zip(
-            unknowns.names, unknowns.units, designed.half_widths, strict=True)):
-        if n in unknowns.legs:  # the name of a leg parameter ends with the name of the leg
+    for n, half in zip(unknowns.asked, designed.half_widths, strict=True):
+        name, unit = unknowns.names[n], unknowns.units[n]
+        if PLATFORM <= n < LINEAR_UNKNOWNS:  # the name of a leg's ends with the name of the leg
             name = name.rpartition('.')[0]
         of_legs[name] = max(of_legs.get(name, (0.0, unit)), (float(half), unit))
     for name, (half, unit) in of_legs.items():

@@ -13,15 +13,15 @@
 # limitations under the License.
 
 """
-Lack of fit: whether the residuals are more than noise, and the likeliest cause.
+Lack of fit: whether the residuals are more than noise, and the cause if one is clearly likeliest.
 
 The columns C of each possible cause (``causes``) are compared with the residuals r by frequency,
 weighted by the inverse of the noise spectrum S, the spectrum of the residuals when all causes
-are fitted at once. With the columns of the fit projected out, the scores s = C^H S^-1 r have zero
-mean and the covariance N = C^H S^-1 C if the model is right; so s^T N^-1 s is chi-squared
-distributed with as many degrees of freedom as columns (a score test: Rao 1948,
-doi:10.1017/S0305004100023987). The cause that explains most is selected first; further causes are
-added to it until nothing significant is left.
+are fitted at once. With everything that is uncertain in the model projected out as far as the
+prior allows, the scores s = C^H S^-1 r have zero mean and the covariance N if the model is right;
+so s^T N^-1 s is chi-squared distributed with as many degrees of freedom as columns (a score test:
+Rao 1948, doi:10.1017/S0305004100023987). Half of it is the logarithm of a likelihood ratio: a
+cause is named only if it is a thousand times likelier than each other, and if it explains most.
 
 Noise of lengths and rates is in the columns and, through those of the fit, in the residuals: both
 agree in it. What it adds to scores and covariance is estimated by adding as much noise again, and
@@ -33,18 +33,19 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
 import math
-import tempfile
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
-from stewart_dynamics.identification.causes import Cause, Causes, Factors, UNKNOWN
+from stewart_dynamics.estimation.posterior import posterior
+from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
+from stewart_dynamics.identification.causes import Cause, Causes, SAME
 from stewart_dynamics.identification.extraction import Extract, Extracts, SAMPLES
-from stewart_dynamics.identification.fit import directions, Fit, smoothed
-from stewart_dynamics.identification.sums import residual_of
-from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.fit import (
+    BAND, directions, Fit, least_deviation, Noisy, residual_of)
+from stewart_dynamics.identification.unknowns import ORIGINS, Unknowns
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Maximum number of extracts that are tested.
@@ -56,27 +57,30 @@ WHOLE, PIECE = 80, 28
 # Smaller residuals, relative to the efforts, are no lack of fit: without any noise the filters
 # leave 2e-5 to 5e-4 in motions below an eighth of the cut-off frequency.
 LEFT_BY_FILTERS = 5e-4
-# Significance for a notice, in standard deviations of a normal distribution.
-_NOTICE = 7.0
-# Maximum number of causes that are named.
-_CAUSES = 3
+# Significance for a notice, in standard deviations of a normal distribution: of a force that the
+# model lacks, and of a number that is more uncertain than the file says.
+_NOTICE, _UNCERTAIN = 7.0, 4.0
+# Part of the variance before the data that must be gone after it, in a direction that is judged.
+_TOLD = 0.05
+# Twice the logarithm of the likelihood ratio from which a cause is named before another.
+_CLEARLY = 2.0 * math.log(1000.0)
+# Largest statistic that a named cause leaves, relative to its own.
+_LEAVES = 0.3
 # Directions with a smaller fraction of their squares left after projection are not tested.
 _IN_THE_FIT = 1e-3
 # Nor are those with a larger fraction of their squares due to noise of lengths and rates.
 _NOISE = 0.5
 # Standard deviations above which the slower causes are tested as well.
 _SUSPICIOUS = 4.0
-# Highest frequency used, relative to the cut-off; half width of the smoothing of spectra, relative
-# to the sampling rate, and its minimum in frequencies.
-_BAND, _SMOOTHING, _FEWEST = 0.9, 0.0125, 8
-# Least variance of a residual that the fit of all causes leaves, of 2 in each frequency.
-_LEAST_FREE = 2e-3
 # The form of a cause, as that of Stribeck's curve, is known less well than its amount: intervals
 # are widened by this multiple of the change of each unknown.
 _WIDENING = 1.5
-# Penalty on the statistic for each column of a cause; a cause with this part of the likeliest
-# one's gain is named beside it.
-_PENALTY, _AS_LIKELY = 4.0, 0.9
+# Penalty on the statistic for each column of a cause.
+_PENALTY = 4.0
+# Rates, relative to their RMS, below which a leg reverses, and above which it is fast; ratio of
+# residuals there to all that is worth a word.
+_REVERSES, _FAST, _WORTH = 0.2, 1.3, 1.3
+UNKNOWN = 'unknown'
 
 
 class Found(NamedTuple):
@@ -96,35 +100,35 @@ class Found(NamedTuple):
 
 
 class LackOfFit(NamedTuple):
-    """A lack of fit and its likeliest causes."""
+    """A lack of fit, with its cause or where it is largest."""
 
-    causes: tuple[Found, ...]  # causes in the order in which they were found, the likeliest first
-    others: tuple[Found, ...]  # causes that explain the residuals nearly as well as the first
+    cause: str  # keyword of the cause; UNKNOWN: none is clearly likeliest
+    text: str  # what it is, or where the residuals are largest
+    ranked: tuple[Found, ...]  # significant causes, the likeliest first
     shifts: Array  # (k,) amount by which the interval of each unknown is widened on both sides
-    left: float  # fraction of the residual RMS that remains with the first cause
-    unexplained: bool  # whether something significant remains, or the cause is unknown
+    left: float  # fraction of the residual RMS that remains with the cause
 
     @property
-    def text(self) -> str:
+    def unexplained(self) -> bool:
+        """Return whether no cause is named."""
+        return self.cause == UNKNOWN
+
+    @property
+    def notice(self) -> str:
         """Return the notice in one line."""
-        first, *others = self.causes
-        also = '; or '.join(dict.fromkeys(each.text for each in self.others))
-        kinds = IDENTIFY.get(first.what)
-        return (
-            'the residuals are more than noise'
-            + (': the cause is not found' if first.what == UNKNOWN else
-               f': likely {first.text}')
-            + (f'; or {also}' if also else '')
-            + (f'; and {"; and ".join(each.text for each in others)}' if others else '')
-            + (f'; {kinds} in --identify takes it into account' if kinds else '')
-            + ('; no intervals are given' if self.unexplained else
-               '; the intervals are widened by what it changes'))
+        if self.unexplained:
+            return ('the residuals are more than noise: not explained; the largest part is '
+                    f'{self.text}; no intervals are given')
+        kinds = 'offset in --identify' if self.cause == 'offset' else TAKEN_BY.get(self.cause)
+        return (f'the residuals are more than noise: likely {self.text}'
+                + (f'; {kinds} takes it into account' if kinds else '')
+                + '; the intervals are widened by what it changes')
 
 
-# Values of --identify that take a likely cause into account.
-IDENTIFY = {'offset': 'offset', 'tilt': 'tilt', 'reflected_mass': 'reflected_mass',
-            'leg_mass': 'cylinder,piston', 'platform': 'platform',
-            'viscous_friction': 'viscous_friction', 'coulomb_friction': 'coulomb_friction'}
+# Parameters that take into account what the recordings contradict.
+TAKEN_BY = {'tilt': 'a larger uncertainty.tilt',
+            'reflected_mass': 'a larger uncertainty.reflected_mass',
+            'leg_mass': 'a larger uncertainty.leg_mass'}
 
 
 class _Explained(NamedTuple):
@@ -136,26 +140,31 @@ class _Explained(NamedTuple):
 
 
 class _Scores(NamedTuple):
-    """Sums of m columns, divided by their sizes, with the fit's columns projected out."""
+    """Sums of m columns, divided by their sizes, with the model's uncertainty projected out."""
 
     normal: Array
     """(m, m), the covariance of the scores; the projection leaves this of 1 on the diagonal"""
     of_noise: Array  # (m, m), the part of it that is noise of lengths and rates
     scores: Array  # (m,), without what this noise adds to them
     sizes: Array  # (m,)
+    follow: Array  # (n, m) change of the model by the columns
     squares: float  # sum of squared residuals
 
     @classmethod
-    def of(cls, sums: Array, of_noise: Array, inner: int) -> _Scores:
-        """Return them from sums of the fit's inner columns, m columns and the residuals."""
-        projection = np.hstack([
-            -(_inverse(sums[:inner, :inner]) @ sums[:inner, inner:]).T,
-            np.eye(len(sums) - inner)])
-        left, noise = (projection @ each @ projection.T for each in (sums, of_noise))
-        sizes = np.sqrt(np.diag(sums)[inner:-1])
+    def of(cls, sums: Array, of_noise: Array, at: Array) -> _Scores:
+        """Return them from sums of the model's n directions, m columns and the residuals."""
+        n = len(at)
+        model = posterior((sums - of_noise)[:n, :n], (sums - of_noise)[:n, -1], at,
+                          of_noise[:n, :n])
+        follow = -model.covariance @ (sums - of_noise)[:n, n:-1]
+        projection = np.hstack([follow.T, np.eye(follow.shape[1])])
+        noise = projection @ of_noise[:-1, :-1] @ projection.T
+        left = sums[n:-1, n:-1] + sums[n:-1, :n] @ follow
+        scores = (sums - of_noise)[n:-1, -1] - (sums - of_noise)[n:-1, :n] @ (model.values - at)
+        sizes = np.sqrt(np.diag(sums)[n:-1])
         scale = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
-        normal, of_noise = (scale[:, None] * each[:-1, :-1] * scale for each in (left, noise))
-        return cls(normal, of_noise, scale * (left - noise)[:-1, -1], scale, float(sums[-1, -1]))
+        normal, of_noise = (scale[:, None] * each * scale for each in (left, noise))
+        return cls(normal, of_noise, scale * scores, scale, follow, float(sums[-1, -1]))
 
     def explained(self, places: Integers) -> _Explained:
         """Return the part of the residuals that some columns explain."""
@@ -183,43 +192,80 @@ class _Scores(NamedTuple):
         return inverse, white.shape[1]
 
 
-def lack_of_fit(platform: StewartPlatform, extracts: Extracts, moving: Sequence[int],
-                noisy: Extracts, unknowns: Unknowns, fit: Fit) -> LackOfFit | None:
+def lack_of_fit(platform: StewartPlatform, extracts: Extracts, noisy: Noisy, unknowns: Unknowns,
+                fit: Fit) -> LackOfFit | None:
     """
-    Return the lack of fit with its likeliest causes; None if nothing significant is left.
+    Return the lack of fit; None if nothing significant is left.
 
-    ``noisy`` has one extract of each bag again, of the number in ``moving``, with more noise of
-    lengths and rates. The statistics are valid only if there are ``long_pieces``.
+    ``noisy`` has one extract of each bag again, with more noise of lengths and rates. The
+    statistics are valid only if there are ``long_pieces``.
     """
     numbers = long_pieces(extracts) or range(len(extracts))
     chosen = list(_selected(numbers, len(numbers)))
-
-    def tested(geometry: bool) -> tuple[Sequence[Cause], _Scores, Array, _Scores]:
-        causes = Causes(platform, unknowns, fit, _of(extracts, chosen), geometry)
-        return _scores(causes, extracts, chosen, moving, noisy, unknowns, fit)
-
+    contradicted = list(_contradicted(unknowns, fit))
+    ranked: list[Found] = []
     try:
-        causes, scores, _, _ = tested(geometry=False)
-        if not _ranked(causes, scores, _SUSPICIOUS):
-            return None
-        causes, scores, follow, plain = tested(geometry=True)
+        for geometry in False, True:
+            causes = Causes(platform, unknowns, fit, _of(extracts, chosen), geometry)
+            of_all, scores = _scores(causes, extracts, chosen, noisy, unknowns, fit)
+            ranked = _ranked(of_all, scores, _NOTICE if geometry else _SUSPICIOUS)
+            if not ranked:
+                break
     except (PoseError, SingularityError):
         return None
-    likely = ranked = _ranked(causes, scores, _NOTICE)
-    if not likely:
+    ranked = sorted([*ranked, *(each for each, _ in contradicted)], key=lambda each: -each.gain)
+    if not ranked:
         return None
-    found: list[Found] = []
-    while ranked and len(found) < _CAUSES:
-        found.append(ranked[0])
-        taken: Integers = np.unique(np.concatenate([each.places for each in found]))
-        ranked = _ranked(causes, scores.without(taken), _NOTICE)
-    best = found[0]
-    others = tuple(each for each in likely if each.what != best.what
-                   and each.gain > _AS_LIKELY * best.gain)
-    of_best = plain.explained(best.places).statistic / plain.squares
-    shifts = np.abs(follow[:, taken] @ scores.explained(taken).amounts)
-    return LackOfFit(tuple(found), others, _WIDENING * shifts,
-                     math.sqrt(max(0.0, 1.0 - of_best)), bool(ranked) or best.what == UNKNOWN)
+    best, *others = ranked
+    for each, shifts in contradicted:
+        if each is best and all(best.gain - other.gain > _CLEARLY for other in others):
+            return LackOfFit(best.what, best.text, tuple(ranked), shifts, 1.0)
+    rest = _ranked(of_all, scores.without(best.places), _NOTICE)
+    rivals = [each for each in others if SAME.get(each.what, each.what) != SAME.get(
+        best.what, best.what) and best.gain - each.gain < _CLEARLY]
+    if rivals or any(each.statistic > _LEAVES * best.statistic for each in rest):
+        return LackOfFit(UNKNOWN, _largest_part(platform, _of(extracts, chosen), unknowns, fit),
+                         tuple(ranked), np.zeros(len(unknowns.start)), 1.0)
+    explained = scores.explained(best.places)
+    shifts = np.abs(unknowns.root @ scores.follow[:len(unknowns.start), best.places]
+                    @ explained.amounts)
+    return LackOfFit(best.what, best.text, tuple(ranked), _WIDENING * shifts,
+                     math.sqrt(max(0.0, 1.0 - explained.statistic / scores.squares)))
+
+
+def _contradicted(unknowns: Unknowns, fit: Fit) -> Iterator[tuple[Found, Array]]:
+    """
+    Yield kinds of numbers that are farther from the file than their uncertainty allows.
+
+    If the model is right, their means after the data have the covariance 1 - C, with C the
+    covariance after the data. The second is what their prior shifts each unknown by (k,).
+    """
+    count = len(unknowns.start)
+    z, covariance = fit.posterior.values[:count], fit.posterior.covariance[:count, :count]
+    for what in TAKEN_BY:
+        of = np.flatnonzero(unknowns.origins == ORIGINS.index(what))
+        values, vectors = np.linalg.eigh(np.eye(len(of)) - covariance[np.ix_(of, of)])
+        known = values > _TOLD
+        along = (vectors.T @ z[of])[known]
+        statistic, freedom = float(np.sum(along ** 2 / values[known])), int(known.sum())
+        if freedom and deviations(statistic, freedom) > _UNCERTAIN:
+            true = vectors[:, known] @ (along / values[known])
+            yield Found(what, _in_words(unknowns, what, unknowns.root[:, of] @ true), statistic,
+                        freedom, deviations(statistic, freedom), np.zeros(0, dtype=np.int64)), (
+                            np.abs(unknowns.root @ covariance[:, of] @ true))
+
+
+def _in_words(unknowns: Unknowns, what: str, change: Array) -> str:
+    """Return a change (k,) of the file's values in words."""
+    if what == 'tilt':
+        return f'a base tilted by {math.degrees(math.hypot(*change[-3:-1])):.3g} degrees'
+    if what == 'reflected_mass':
+        of_rotors = [f'{each:+.3g}' for each, name in zip(change, unknowns.names, strict=True)
+                     if what in name]
+        return f'another actuator.reflected_mass, {" ".join(of_rotors)} kg'
+    parts = [100.0 * each / start for each, start, name in zip(
+        change, unknowns.start, unknowns.names, strict=True) if 'second_moment' in name and start]
+    return f'other masses of the legs, by about {np.mean(parts):+.3g} %'
 
 
 def _ranked(causes: Sequence[Cause], scores: _Scores, significance: float) -> list[Found]:
@@ -231,6 +277,23 @@ def _ranked(causes: Sequence[Cause], scores: _Scores, significance: float) -> li
             found.append(Found(cause.what, cause.described(amounts), statistic, freedom,
                                deviations(statistic, freedom), cause.places))
     return sorted(found, key=lambda each: -each.gain)
+
+
+def _largest_part(platform: StewartPlatform, extracts: Iterable[Extract], unknowns: Unknowns,
+                  fit: Fit) -> str:
+    """Return in which leg the residuals are largest, and in which part of its motion."""
+    residuals, rates = (np.concatenate(each) for each in zip(*(
+        ((each.columns @ residual_of(unknowns, fit.values, fit.delays[each.bag])) * each.used,
+         each.legs[..., 1]) for each in extracts), strict=True))
+    leg = int(np.argmax(np.sum(residuals ** 2, axis=0)))
+    squares = residuals[:, leg] ** 2
+    speeds = np.abs(rates[:, leg]) / (np.sqrt(np.mean(rates[:, leg] ** 2)) + 1e-300)
+    parts = {word: float(np.mean(squares[which])) / float(np.mean(squares))
+             for word, which in (('at reversals', speeds < _REVERSES),
+                                 ('at high rates', speeds > _FAST)) if which.any()}
+    word = max(parts, key=lambda each: parts[each], default='')
+    return f'in {platform.parameters["joints"][leg]}' + (
+        f' {word}' if parts.get(word, 0.0) > _WORTH else '')
 
 
 def deviations(statistic: float, freedom: int) -> float:
@@ -265,117 +328,69 @@ def _of(extracts: Extracts, numbers: Container[int]) -> Iterator[Extract]:
     return (each for n, each in enumerate(extracts) if n in numbers)
 
 
-def _scores(causes: Causes, extracts: Extracts, chosen: Container[int], moving: Sequence[int],
-            noisy: Extracts, unknowns: Unknowns, fit: Fit,
-            ) -> tuple[Sequence[Cause], _Scores, Array, _Scores]:
+def _scores(causes: Causes, extracts: Extracts, chosen: Sequence[int], noisy: Noisy,
+            unknowns: Unknowns, fit: Fit) -> tuple[Sequence[Cause], _Scores]:
     """
-    Return the causes, weighted sums, derivatives of unknowns by columns (k, m), and plain sums.
+    Return the causes and the scores of their columns.
 
-    The spectra of the chosen extracts are weighted by leg, as in the fit, and kept in a file. The
-    residuals that are left when all causes are fitted to them give the weights of each frequency.
+    The residuals that are left when all causes are fitted to them give the weights.
     """
-    known = fit.identifiability.known
+    at = fit.posterior.values
     of_causes: Sequence[Cause] = ()
-    factors: Factors = np.ones_like
-    inner = known.shape[1] + len(fit.delays)  # known directions, then the delays
 
-    def spectra_of(extract: Extract, at: Array) -> Array:
-        """Return the spectra of an extract at times, as fractions of all."""
-        nonlocal of_causes, factors
+    def spectra(extract: Extract, times: Array) -> Array:
+        """Return spectra of model, causes and residuals at times, as fractions of all."""
+        nonlocal of_causes
         bag, used = extract.bag, extract.used[..., None]
+        added, of_causes = causes.columns(extract, times)
         columns = extract.columns * used
-        e = columns @ directions(
-            unknowns, fit.values, fit.delays[bag], bool(fit.delay_errors[bag]))
-        delays = np.zeros((*e.shape[:2], len(fit.delays)))
-        delays[..., bag] = e[..., -1]
-        added, of_causes, factors = causes.columns(extract)
-        added *= factors(at)[:, None]
-        residuals = columns @ residual_of(unknowns.theta(fit.values), fit.delays[bag])
-        return _spectra(np.concatenate([
-            e[..., :-1] @ known, delays, added * used, residuals[..., None]],
-            axis=-1) / np.sqrt(fit.variances[bag])[:, None])
+        return spectra_of(np.concatenate([
+            columns @ directions(
+                unknowns, fit.values, fit.delays, bag, fit.delay_deviations),
+            added * used,
+            (columns @ residual_of(unknowns, fit.values, fit.delays[bag]))[..., None],
+            ], axis=-1), BAND)
 
-    lengths: list[int] = []
     spans: dict[int, tuple[float, float]] = {}  # of each bag, as fractions of all times
+    of_extracts: list[tuple[int, Array, int, float]] = []
     gram: Array = np.zeros(())
-    plain: Array = np.zeros(())
-    weighted: Array = np.zeros(())
-    of_noise: Array = np.zeros(())
-    with tempfile.TemporaryFile() as file:
-        for extract in _of(extracts, chosen):
-            first, count = sum(lengths), len(extract.times)
-            ends = first / causes.samples, (first + count) / causes.samples
-            spans[extract.bag] = spans.get(extract.bag, ends)[0], ends[1]
-            spectra = spectra_of(extract, _between(*ends, count))
-            gram = gram + _gram(spectra)
-            plain = plain + _gram(np.sqrt(fit.variances[extract.bag])[:, None] * spectra)
-            np.save(file, spectra)
-            lengths.append(count)
-        file.seek(0)
-        inverse = _inverse(gram[:-1, :-1])
-        rest = inverse @ gram[:-1, -1]
-        for samples in lengths:
-            spectra = np.load(file)
-            weighted = weighted + _gram(_whitened(spectra, spectra, rest, inverse, samples))
-    share = 0.0
-    clean_ones = zip(_of(extracts, moving), noisy, strict=True)
-    for clean, more in _selected(clean_ones, len(noisy)):
-        # Over the time of the whole bag: at rest friction is noise, in motion it is not.
+    samples = 0
+    for number, extract in zip(chosen, _of(extracts, chosen), strict=True):
+        count = len(extract.times)
+        ends = samples / causes.samples, (samples + count) / causes.samples
+        spans[extract.bag] = spans.get(extract.bag, ends)[0], ends[1]
+        each = spectra(extract, _between(*ends, count))
+        gram = gram + gram_of(fit.weights[number].whitened(each))
+        of_extracts.append((number, each, count, least_deviation(extract)))
+        samples += count
+    # a fit with all causes, which the prior of the model and pseudo-inverses keep finite
+    gram[range(len(at)), range(len(at))] += 1.0
+    inverse = _inverse(gram[:-1, :-1])
+    rest = inverse @ gram[:-1, -1]
+    weights: dict[int, Weights] = {}
+    sums: Array = np.zeros_like(gram)
+    for number, each, count, least in of_extracts:
+        white = fit.weights[number].whitened(each)[..., :-1]
+        free = 1.0 - np.sum((white @ inverse) * white, axis=-1)
+        left = each[..., -1] - each[..., :-1] @ rest
+        weights[number] = weights_of(left, free, count, least)
+        sums = sums + gram_of(weights[number].whitened(each))
+    of_noise, share = np.zeros_like(sums), 0.0
+    for number, clean, more in noisy.both(extracts):
         begin, end = spans.get(clean.bag, (0.0, 1.0))
-        at = _between(begin, end, len(clean.times))
-        spectra = spectra_of(clean, at)
-        of_noise = of_noise + (end - begin) * causes.samples / len(clean.times) * _gram(_whitened(
-            spectra_of(more._replace(used=clean.used), at) - spectra, spectra, rest, inverse,
-            len(clean.times)))
-        share += end - begin
-    of_noise /= share
-    follow = -_inverse(gram[:inner, :inner]) @ gram[:inner, inner:-1]
-    return (of_causes, _Scores.of(weighted, of_noise, inner), known @ follow[:known.shape[1]],
-            _Scores.of(plain, np.zeros_like(plain), inner))
+        times = _between(begin, end, len(clean.times))
+        change = spectra(more, times) - spectra(clean, times)
+        part = end - begin
+        of_noise = of_noise + part * causes.samples / len(times) * gram_of(
+            weights.get(number, fit.weights[number]).whitened(change))
+        share += part
+    return of_causes, _Scores.of(sums, of_noise / share, at)
 
 
 def _between(begin: float, end: float, count: int) -> Array:
     """Return evenly spaced numbers, without the end."""
     numbers: Array = np.linspace(begin, end, count, endpoint=False, dtype=float)
     return numbers
-
-
-def _spectra(columns: Array) -> Array:
-    """Return real and imaginary parts (F, 2, 6, m) at frequencies below the cut-off."""
-    count = len(columns)
-    spectra = np.fft.rfft(columns, axis=0)[:int(count * _BAND / SAMPLES) + 1]
-    # one-sided: all frequencies except the first count twice
-    spectra *= np.sqrt(2.0 / count)
-    spectra[0] *= np.sqrt(0.5)
-    parts: Array = np.stack([spectra.real, spectra.imag], axis=1)
-    return parts
-
-
-def _gram(spectra: Array) -> Array:
-    flat = spectra.reshape(-1, spectra.shape[-1])
-    gram: Array = flat.T @ flat
-    return gram
-
-
-def _whitened(columns: Array, spectra: Array, rest: Array, inverse: Array, samples: int) -> Array:
-    """Return columns (F, 2, 6, m), whitened by the residuals of a fit with all causes."""
-    left = spectra[..., -1] - spectra[..., :-1] @ rest
-    # The fit of the columns reduces the variance of a residual below the noise variance.
-    flat = spectra[..., :-1].reshape(-1, len(rest))
-    free = 1.0 - np.sum((flat @ inverse) * flat, axis=1).reshape(left.shape)
-    width = max(_FEWEST, round(_SMOOTHING * samples))
-    power, share = (smoothed(each.sum(axis=1), width) for each in (left ** 2, free))
-    deviations = np.sqrt(power / np.maximum(share, _LEAST_FREE) + 1e-30)
-    white = left / deviations[:, None]
-    along = white.reshape(-1, 6)
-    correlation = along.T @ along
-    sizes = np.sqrt(np.outer(np.diag(correlation), np.diag(correlation)))
-    # A leg of which nothing is used has no residuals.
-    correlation = np.divide(correlation, sizes, out=np.eye(6), where=sizes > 0.0)
-    values, vectors = np.linalg.eigh(correlation)
-    root = vectors / np.sqrt(np.maximum(values, 0.05)) @ vectors.T
-    result: Array = root @ (columns / deviations[:, None, :, None])
-    return result
 
 
 def _inverse(matrix: Array) -> Array:

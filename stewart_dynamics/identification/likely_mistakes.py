@@ -13,32 +13,29 @@
 # limitations under the License.
 
 """
-Likely mistakes in a recording or a parameter file, detected by their effect on the fit.
+Likely mistakes in a recording or a parameter file, as other hypotheses about the same data.
 
-Efforts of the wrong sign or unit scale all forces, including the weight and inertia that the file
-gives for legs and actuators. Swapped legs, a wrong zero length and a tilted base correspond to
-another hexapod, which fits worse than the right one.
+Efforts of another sign or unit, and swapped legs, are compared with the recording by the
+squared misfit of data and prior together, twice the logarithm of the likelihood.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import combinations
+import math
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
-from stewart_dynamics.identification.extraction import Extraction
-from stewart_dynamics.identification.fit import Fit
+from stewart_dynamics.identification.extraction import Extract, Extraction, ORDERS
+from stewart_dynamics.identification.fit import Fit, residual_of, shifted_by
 from stewart_dynamics.identification.kinematics import first_pose
-from stewart_dynamics.identification.lack_of_fit import LackOfFit
-from stewart_dynamics.identification.sums import shifted_by, Sums
+from stewart_dynamics.identification.lack_of_fit import LackOfFit, LEFT_BY_FILTERS
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.drives.measured_efforts import FAR, mistake_of_scale
-from stewart_dynamics.mechanics.least_squares import (
-    Information, information, solve)
+from stewart_dynamics.mechanics.drives.measured_efforts import mistake_of_scale
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
@@ -48,8 +45,14 @@ _SUSPICIOUS = 0.03
 _UNEXPLAINED = 0.3
 # A cause must reduce the residual to this fraction.
 _BETTER = 0.5
-# Largest standard error of a known direction, with columns of the regressor scaled to length 1.
-_LARGEST_ERROR = 1e4
+# Deviation of the efforts, relative to them, where hypotheses are compared; largest misfit of one
+# that is taken.
+_ROUGHLY, _WELL = 0.01, 0.1
+# Twice the logarithm of the likelihood ratio from which another hypothesis is taken.
+_CLEARLY = 2.0 * math.log(1000.0)
+_LEAST_MASS = 1e-9  # relative to the file's, where the prior judges it
+# Ratio of residuals on held-out time from which the file is better than the fit.
+_WORSE = 1.05
 # Minimum fraction of valid samples for a comparison.
 _FEWEST = 0.5
 # Length of the part that is searched, in cut-off periods, longer if the filters need it.
@@ -59,6 +62,69 @@ _PIECE = 50.0
 LONGEST_LAG = 0.1
 # Tolerance of limits of length, relative to them.
 _TOLERANCE = 1e-3
+
+
+class Comparison:
+    """
+    Compares hypotheses about efforts by their sums of products (q, q) with the regressor.
+
+    ``whole``: with all efforts, not only those that are used.
+    """
+
+    def __init__(self, extracts: Iterable[Extract], unknowns: Unknowns, whole: bool = False,
+                 ) -> None:
+        self._unknowns, self._rows = unknowns, 0
+        self._gram: Array = np.zeros(())
+        for extract in extracts:
+            used = extract.columns[extract.used | whole]
+            self._gram, self._rows = self._gram + used.T @ used, self._rows + len(used)
+        columns = unknowns.derivative(unknowns.start) @ unknowns.root
+        self._columns = np.concatenate([columns, np.zeros((ORDERS, columns.shape[1]))])
+        self._of_file = residual_of(unknowns, unknowns.start, 0.0)
+        self._of_file[-ORDERS:] = 0.0
+        self._efforts = self._gram[-ORDERS]
+
+    def best_scales(self) -> list[float]:
+        """Return scales of the efforts: the best by the file, and with its uncertainty."""
+        along, total = -float(self._efforts @ self._of_file), float(self._efforts[-ORDERS])
+        modelled = float(self._of_file @ self._gram @ self._of_file)
+        scale = along / modelled if modelled > 0.0 else 0.0
+        if scale == 0.0:
+            return [0.0]
+        weight, inverse = self._solved(scale)
+        across = self._columns.T @ self._efforts
+        # the inverse of the scale is one more unknown
+        follow = weight * inverse @ across
+        along += float(follow @ (self._columns.T @ self._gram @ self._of_file))
+        total -= float(follow @ across)
+        return [scale, *([total / along] if along else [])]
+
+    def misfit(self, scale: float = 1.0, delay: float = 0.0) -> float:
+        """Return the squared misfit of data and prior with efforts divided by a scale."""
+        c = self._of_file.copy()
+        c[-ORDERS:] = shifted_by(delay) / scale
+        weight, inverse = self._solved(scale)
+        z = inverse @ (weight * self._columns.T @ self._gram @ c)
+        left = c - self._columns @ z
+        misfit = weight * float(left @ self._gram @ left) + float(z @ z)
+        # A mass is positive: the prior judges the logarithm of its ratio to the file's.
+        part = self._unknowns.root[0, 0] / self._unknowns.start[0]
+        if part > 0.0:
+            mass = max(1.0 + part * float(z[0]), _LEAST_MASS)
+            misfit += (math.log(mass) / part) ** 2 - float(z[0]) ** 2
+        return misfit
+
+    def relative(self, scale: float = 1.0, delay: float = 0.0) -> float:
+        """Return the RMS misfit, relative to the efforts."""
+        return _ROUGHLY * math.sqrt(self.misfit(scale, delay) / max(self._rows, 1))
+
+    def _solved(self, scale: float) -> tuple[float, Array]:
+        """Return the weight of the efforts, and the covariance of the unknowns."""
+        efforts = float(self._efforts[-ORDERS]) / max(self._rows, 1)
+        weight = scale ** 2 / (_ROUGHLY ** 2 * efforts) if efforts > 0.0 else 0.0
+        return weight, np.linalg.inv(
+            weight * self._columns.T @ self._gram @ self._columns
+            + np.eye(self._columns.shape[1]))
 
 
 def of_no_pose(p: Parameters, positions: Array) -> str:
@@ -86,29 +152,21 @@ def of_delay(delays: Iterable[float]) -> Iterator[LikelyMistake]:
             'stamps of both must be of one clock')
 
 
-def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, of_motors: bool,
-               ) -> Iterator[LikelyMistake]:
-    """
-    Yield likely mistakes in sign and unit of the efforts.
-
-    The scale of the efforts is estimated jointly with the platform from the file's leg parameters;
-    without leg masses, from the forces of the file's platform.
-    """
-    scale, error = scale_of_efforts(sums, unknowns, platform_too=False)
-    by_file, _ = scale_of_efforts(sums, unknowns, platform_too=True)
-    if not np.isfinite(by_file) or by_file == 0.0:
-        scale = 0.0
-    elif not (np.isfinite(scale) and error < 0.1 * abs(scale)) or (
-            # the file's legs may be wrong, but not by this ratio
-            not 0.1 < scale / by_file < 10.0):
-        scale = by_file
-    elif (scale > 0.0) == (by_file > 0.0) and 1.0 / FAR < abs(by_file) < FAR:
-        scale = by_file  # the platform's weight shows that the unit is right
-    if mistake := mistake_of_scale(scale, p, of_motors):
+def of_efforts(comparison: Comparison, p: Parameters, of_motors: bool) -> Iterator[LikelyMistake]:
+    """Yield a likely mistake in sign or unit of the efforts."""
+    scales = comparison.best_scales()
+    if scales[0] == 0.0:
+        likeliest = 0.0
+    else:
+        likeliest = min((1.0, *scales), key=comparison.misfit)
+        if (comparison.misfit() - comparison.misfit(likeliest) < _CLEARLY
+                or comparison.relative(likeliest) > _WELL):
+            return
+    if mistake := mistake_of_scale(likeliest, p, of_motors):
         yield LikelyMistake(*mistake)
 
 
-def of_fit(p: Parameters, extraction: Extraction, window: Window, fit: Fit,
+def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit,
            lack: LackOfFit | None, residual: float) -> Iterator[LikelyMistake]:
     """
     Yield a likely mistake if the residual is a large fraction of the efforts.
@@ -116,23 +174,17 @@ def of_fit(p: Parameters, extraction: Extraction, window: Window, fit: Fit,
     Legs are swapped in the first window. ``residual`` is the RMS of the residuals divided by that
     of the efforts.
     """
-    left, cause, text = (1.0, '', '') if lack is None else (
-        lack.left, lack.causes[0].what, lack.causes[0].text)
-    if cause == 'zero_length' and left < _BETTER:
-        yield LikelyMistake(cause, f'geometry.zero_length looks wrong: {text}: the residual '
-                            f'becomes {left:.2f} times as large')
+    left = 1.0 if lack is None else lack.left
+    if lack is not None and lack.cause == 'zero_length' and lack.ranked[0].columns == 6:
+        yield LikelyMistake(lack.cause, f'geometry.zero_length looks wrong: {lack.text}')
         return
     if residual < _SUSPICIOUS:
         return
     piece, joints = most_motion(window, extraction), p['joints']
-    now = _tried(extraction, piece, fit)
+    now = _tried(extraction, piece, unknowns, fit)
     found = [(now, 'misfit', (
         f'the residual is {100.0 * residual:.0f} % of the efforts whatever the parameters: '
         'positions and efforts may not belong together, or the geometry is wrong'))]
-    if cause == 'tilt':
-        found.append((left * now, cause, (
-            f'gravity of the parameters looks wrong: {text}: tilt in --identify takes that into '
-            'account')))
     best = min(_BETTER, left)
     for a, b in combinations(range(6), 2):
         order = [{a: b, b: a}.get(leg, leg) for leg in range(6)]
@@ -142,7 +194,7 @@ def of_fit(p: Parameters, extraction: Extraction, window: Window, fit: Fit,
         for which, swapped in (('positions and efforts', legs._replace(efforts=efforts)),
                                ('efforts', piece._replace(efforts=efforts)),
                                ('positions', legs)):
-            misfit = _tried(extraction, swapped, fit)
+            misfit = _tried(extraction, swapped, unknowns, fit)
             if misfit < best * now:
                 found.append((misfit, 'swapped', f'the {which} of {joints[a]} and {joints[b]} '
                                                  'look swapped'))
@@ -154,34 +206,15 @@ def of_fit(p: Parameters, extraction: Extraction, window: Window, fit: Fit,
         yield LikelyMistake(*found[0][1:])
 
 
-def scale_of_efforts(sums: Sums, unknowns: Unknowns, platform_too: bool,
-                     ) -> tuple[float, float]:
-    """Return the scale of the efforts by least squares, and its standard error."""
-    many = len(unknowns.linear)  # a tilt does not change the scale
-    theta = unknowns.theta(unknowns.start)
-    known = len(theta)
-    gram = sums.grams.sum(axis=(0, 1))
-    # efforts = scale known + Y theta'
-    columns = np.zeros((len(gram), many + 1))
-    columns[:many, :many] = np.diag(unknowns.linear_scales)
-    columns[known, many] = 1.0
-    if platform_too:
-        columns[:known, many] = theta
-    total = Information(
-        columns.T @ gram @ columns, columns.T @ gram[known + 1],
-        float(gram[known + 1, known + 1]), int(sums.counts.sum()))
-    if not total.rows or total.squares <= 0.0:
-        return float('nan'), float('inf')
-    if platform_too:
-        weight = total.matrix[-1, -1]
-        return (float(total.vector[-1] / weight) if weight > 0.0 else float('nan')), float('inf')
-    sizes = np.sqrt(np.diag(total.matrix))
-    scales = np.where(sizes > 1e-6 * sizes.max(), 1.0 / np.maximum(sizes, 1e-300), 0.0)
-    found = solve(total, np.zeros(many + 1), scales, largest_error=_LARGEST_ERROR)
-    if not scales[-1] or not found.identifiability.identifiable[-1]:
-        return float('nan'), float('inf')
-    variance = total.residual_squares(found.values) / total.rows
-    return float(found.values[-1]), float(np.sqrt(variance * found.covariance[-1, -1]))
+def of_validation(before: Array, after: Array, measured: Array) -> Iterator[LikelyMistake]:
+    """Yield a likely mistake if the file predicts held-out efforts better than the fit."""
+    file, fitted, size = (math.sqrt(float(np.mean(each ** 2))) for each in (
+        before, after, measured))
+    if fitted > _WORSE * file + LEFT_BY_FILTERS * size:
+        yield LikelyMistake(
+            'validation', f'on held-out time the residual is {file:.3g} N by the file and '
+            f'{fitted:.3g} N by a fit to the rest: the file is better; the model does not hold in '
+            'a part of the recording')
 
 
 def most_motion(window: Window, extraction: Extraction) -> Window:
@@ -198,16 +231,12 @@ def most_motion(window: Window, extraction: Extraction) -> Window:
         outliers=window.outliers[part])
 
 
-def _tried(extraction: Extraction, window: Window, fit: Fit) -> float:
-    """Return the RMS residual of a fit to a window [N]; infinite if no pose is found."""
+def _tried(extraction: Extraction, window: Window, unknowns: Unknowns, fit: Fit) -> float:
+    """Return the RMS misfit of a window, relative to its efforts; infinite without a pose."""
     try:
         extract = extraction(window, first_pose(extraction.platform, window)).extract
     except (PoseError, SingularityError):
         return float('inf')
-    efforts = extract.efforts @ shifted_by(fit.delays[0]) - extract.known
-    samples = information(extract.regressor, efforts, extract.used.astype(float))
-    if samples.rows < _FEWEST * extract.used.size:
+    if np.count_nonzero(extract.used) < _FEWEST * extract.used.size:
         return float('inf')
-    scales = 1.0 / np.sqrt(np.maximum(np.diag(samples.matrix), 1e-300))
-    found = solve(samples, np.zeros(len(scales)), scales, largest_error=_LARGEST_ERROR)
-    return float(np.sqrt(samples.residual_squares(found.values) / samples.rows))
+    return Comparison([extract], unknowns).relative(delay=fit.delays[0])

@@ -33,22 +33,24 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags import recording
 from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.estimation.posterior import IDENTIFIABLE
 from stewart_dynamics.identification.extraction import Extracts
+from stewart_dynamics.identification.fit import residual_of, shifted_by
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import (
     Identification, Identified, Residuals)
-from stewart_dynamics.identification.lack_of_fit import Found, PIECE, WHOLE
-from stewart_dynamics.identification.sums import residual_of, shifted_by
+from stewart_dynamics.identification.lack_of_fit import PIECE, WHOLE
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics, regressor
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
-from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+from stewart_dynamics.mechanics.least_squares import (
+    Identifiability, identifiability, TWO_SIDED)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.estimates import (
     combined, estimate, IDENTIFIED, justified, NOT_IDENTIFIABLE, not_identifiable_lines,
-    page_values, states_of, table_lines, WITHOUT_VALUE)
+    page_values, table_lines, WITHOUT_VALUE)
 from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
 from stewart_dynamics.reporting.results_folder import (
     check_free, IDENTIFICATION, IDENTIFIED_PARAMETERS, remove_abandoned, REPORT_PAGE, whole_folder)
@@ -104,68 +106,79 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
 
 def _rounded(found: Identified) -> Parameters:
     """Return the parameters rounded to the digits that the intervals justify."""
-    errors = np.sqrt(np.maximum(np.diag(found.errors.covariance), 0.0))
+    errors = np.sqrt(np.diag(found.fit.covariance))
     try:
-        return found.unknowns.parameters(justified(found.fit.values, errors))
+        return found.unknowns.parameters(justified(found.written, errors))
     except StewartError:  # a body at its bound may not be rounded
         return found.parameters
 
 
 def document(found: Identified, options: IdentificationOptions) -> dict[str, Any]:
     """Return the content of identification.json, see docs/identification.md."""
-    what, joints = found.fit.identifiability, found.parameters['joints']
-    u, lack = found.unknowns, found.lack_of_fit
+    joints, u, asked = found.parameters['joints'], found.unknowns, found.unknowns.asked
+    lack, what, states = found.lack_of_fit, *_identifiability(found)
     sure = lack is None or not lack.unexplained
-    parameters = [
-        estimate(name, unit, start, value, state, error, share, name in found.fit.at_bound, sure)
-        for name, unit, start, value, state, error, share in zip(
-            u.names, u.units, u.start, found.fit.values, states_of(what), _errors(found),
-            what.shares, strict=True)]
+    errors, parts = _errors(found), found.fit.parts(u)
+    parameters = [{**estimate(
+        u.names[n], u.units[n], u.start[n], found.fit.values[n], state, errors[n], share,
+        u.names[n] in found.fit.at_bound, sure, prior=True),
+        'written': found.written[n], 'file_deviation': u.deviations[n],
+        'parts': {name: each[n] for name, each in parts.items() if each[n] > 0.0}}
+        for n, state, share in zip(asked, states, what.shares, strict=True)]
+    unclear = np.flatnonzero([state != IDENTIFIED for state in states])
     return {
         'version': VERSION, 'software': SOFTWARE,
         'date': now(),
         'bags': [{
             **bag._asdict(), 'bag': str(bag.bag),
-            'delay_s': delay + bag.delay_s if error else None,
-            'delay_standard_error_s': error if error else None,
+            'delay_s': delay + bag.delay_s if error > 0.0 else None,
+            'delay_standard_error_s': error if error > 0.0 else None,
         } for bag, delay, error in zip(
-            found.bags, found.fit.delays, found.errors.delays, strict=True)],
+            found.bags, found.fit.delays, found.fit.delay_errors, strict=True)],
         'options': {
             'identify': list(options.kinds), 'motor_torque': options.motor_torque,
             'motor_current': options.motor_current,
-            'cutoff_hz': options.cutoff, 'prior': options.prior, 'hold_out': options.hold_out,
+            'cutoff_hz': options.cutoff, 'hold_out': options.hold_out,
             'delay': options.delay, 'accept_mistakes': options.accept_mistakes},
         'samples': found.samples, 'efforts_left_out': found.unsound,
         'efforts_outliers': found.outliers,
         'parameters': parameters,
         'combinations': combined(
-            what, u.names, u.units, found.fit.values, found.errors.covariance),
-        'rank': what.rank, 'unknowns': len(u.names),
-        'singular_values': what.singular_values,
+            what, [u.names[n] for n in asked], [u.units[n] for n in asked],
+            found.fit.values[asked], found.fit.covariance[np.ix_(asked, asked)], unclear),
+        'rank': what.rank, 'unknowns': len(asked), 'singular_values': what.singular_values,
         'residuals': _residuals(joints, found.residuals),
         'validation': None if found.validation is None else {
             'samples': found.validation.samples, **_residuals(joints, found.validation)},
         'tested_for_lack_of_fit': found.tested,
         'lack_of_fit': None if lack is None else {
-            'cause': lack.causes[0].what, 'text': lack.text,
+            'cause': lack.cause, 'text': lack.notice,
             'intervals': 'widened' if sure else 'none', 'residual_left': lack.left,
-            'causes': [_cause(each) for each in lack.causes],
-            'other_causes': [_cause(each) for each in lack.others]},
+            'causes': [{'what': each.what, 'text': each.text, 'statistic': each.statistic,
+                        'columns': each.columns, 'deviations': each.deviations}
+                       for each in lack.ranked]},
         'likely_mistakes': [each._asdict() for each in found.likely],
         'identified': found.parameters.plain(),
     }
 
 
-def _cause(each: Found) -> dict[str, Any]:
-    return {'what': each.what, 'text': each.text, 'statistic': each.statistic,
-            'columns': each.columns, 'deviations': each.deviations}
+def _identifiability(found: Identified) -> tuple[Identifiability, list[str]]:
+    """Return what the data say of the asked parameters without the prior, and their states."""
+    u, block = found.unknowns, np.ix_(found.unknowns.asked, found.unknowns.asked)
+    scales = u.deviations[u.asked]
+    scales[scales == 0.0] = 1.0  # what the file knows exactly
+    before, after = (each[block] / np.outer(scales, scales)
+                     for each in (u.root @ u.root.T, found.fit.covariance))
+    data = np.linalg.pinv(after, hermitian=True) - np.linalg.pinv(before, hermitian=True)
+    largest = (IDENTIFIABLE ** -2 - 1.0) ** -0.5
+    what = identifiability(data / np.outer(scales, scales), scales, largest_error=largest)
+    return what, [IDENTIFIED if known else NOT_IDENTIFIABLE
+                  for known in found.fit.ratios(u)[u.asked] < IDENTIFIABLE]
 
 
 def _errors(found: Identified) -> Array:
-    """Return standard errors (k,), including unidentifiable directions and lack of fit."""
-    what = found.fit.identifiability
-    own = np.maximum(np.diag(found.errors.covariance), 0.0)
-    errors: Array = np.sqrt(own + (what.shares * what.scales) ** 2)
+    """Return standard errors (k,), wider where there is a lack of fit."""
+    errors: Array = np.sqrt(np.diag(found.fit.covariance))
     return errors if found.lack_of_fit is None else (
         errors + found.lack_of_fit.shifts / TWO_SIDED)
 
@@ -277,7 +290,6 @@ def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapp
 def _curves(extracts: Extracts, found: Identified) -> tuple[Array, list[dict[str, str]]]:
     """Return times, efforts and forces before and after (M, 19), and spectra of residuals."""
     u = found.unknowns
-    before, after = u.theta(u.start), u.theta(found.fit.values)
     timeout = found.parameters['setpoint.timeout']
     spectrum = Spectrum(12, timeout)
     curves: list[Array] = []
@@ -285,7 +297,8 @@ def _curves(extracts: Extracts, found: Identified) -> tuple[Array, list[dict[str
     for extract in extracts:
         delay = found.fit.delays[extract.bag]
         effort = extract.efforts @ shifted_by(delay)
-        residuals = [extract.columns @ residual_of(theta, delay) for theta in (before, after)]
+        residuals = [extract.columns @ residual_of(u, values, delay)
+                     for values in (u.start, found.written)]
         times = elapsed + extract.times - extract.times[0]
         spectrum.add(times, np.concatenate(residuals, axis=1).T)
         elapsed = float(times[-1]) + 10.0 * timeout  # no step between bags

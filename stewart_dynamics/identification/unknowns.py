@@ -13,26 +13,32 @@
 # limitations under the License.
 
 """
-Parameters to be identified, with the names and definitions of the parameter file.
+Everything that is uncertain in a recording, as random numbers with the file's values as means.
 
-The platform is described by mass, center of mass and inertia about it, so that unidentifiable
-parameters keep the values of the file. Forces are linear in ten inertial parameters that are
-functions of these. Leg parameters are linear themselves: mass, first and second moment of each
-part. The tilt of gravity comes last: forces are linear in gravity,
-``f = Y theta + sum_i d_i G_i theta`` with d the change of gravity and G_i the part of Y due to one
-unit of gravity along axis i, so products of the change with the gravity-dependent parameters are
-further linear parameters, exact for a tilt of any size.
+These are all parameters of the hexapod, whether they are to be written or not, the tilt of gravity
+and a gain of the efforts. Their standard deviations are those of ``uncertainty.*``; friction may
+have any value up to a share of the weight, and so have numbers that are asked for and that the
+file gives as 0.
+
+The platform is described by mass, center of mass and inertia about it. Forces are linear in ten
+inertial parameters that are functions of these, and in first and second moments and masses of the
+parts of the legs. They are linear in gravity, too, ``f = Y theta + sum_i d_i G_i theta`` with the
+change d of gravity and G_i the part of Y due to one unit of gravity along axis i, so products of
+the change with the gravity-dependent parameters are further linear parameters, exact for a tilt
+of any size.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, BODY_UNITS, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND,
     FIRST_MOMENT, LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST,
@@ -59,12 +65,23 @@ TILT = 'tilt'
 KINDS = (*_OF_PLATFORM, *_OF_LEGS, TILT)  # values that --identify accepts
 DEFAULT = ('platform', 'viscous_friction', 'coulomb_friction')
 
-# Indices of the linear parameters whose forces depend on gravity.
-_WEIGHING = np.concatenate([[0], *(np.arange(LINEAR)[part] for part in (
-    FIRST_MOMENT, CYLINDER_FIRST, PISTON_MASS, PISTON_FIRST))])
+# The linear parameters that are uncertain; the mass of a cylinder alone changes no force.
+_LINEAR = np.delete(np.arange(LINEAR), CYLINDER_MASS)
+# Among them those whose forces depend on gravity.
+_WEIGHING = np.flatnonzero(np.isin(_LINEAR, np.concatenate([[0], *(
+    np.arange(LINEAR)[part] for part in (
+        FIRST_MOMENT, CYLINDER_FIRST, PISTON_MASS, PISTON_FIRST))])))
+LINEAR_UNKNOWNS = len(_LINEAR)
+COULOMB_COLUMNS = np.searchsorted(_LINEAR, np.arange(LINEAR)[COULOMB_FRICTION])
+"""Indices (6,) of the columns of Coulomb friction in the regressor."""
+# Origins of the uncertainty: ``uncertainty.*``, friction, and offsets of the efforts.
+ORIGINS = ('platform_mass', 'center_of_mass', 'inertia', 'leg_mass', 'reflected_mass', 'friction',
+           'offset', 'tilt', 'effort_gain')
+_ORIGIN_OF = np.full(LINEAR, 3)
+for _origin, _part in ((0, MASS), (1, CENTER), (2, INERTIA), (4, REFLECTED_MASS),
+                       (5, VISCOUS_FRICTION), (5, COULOMB_FRICTION), (6, OFFSET)):
+    _ORIGIN_OF[_part] = _origin
 
-# Scale of a tilt [rad].
-_TILT = 0.1
 # Acceleration at which the scale of inertial effects equals a leg's share of the weight [m/s^2].
 _ACCELERATION = 10.0
 # Rate at which the scale of friction equals that share, relative to sqrt(acceleration size).
@@ -111,143 +128,123 @@ class Tilt:
 
 class Unknowns:
     """
-    The k parameters to be identified: those of KINDS in ``kinds``.
+    The k uncertain numbers and their prior distribution; those of ``kinds`` are asked for.
 
-    The file's parameters give the scales, and the values of all other parameters. ``prior`` is
-    the standard error of the file's values by the scales; without it they do not count.
-
-    names, units: name and unit of each parameter.
-    start (k,): values from the file.
-    scales (k,): relevant change of each parameter.
-    linear (m,): indices of the LINEAR parameters that depend on them; the platform's ten come
-        first.
-    inertial_scales, linear_scales (10,), (m,): mass of the platform with powers of its size;
-        scales of ``linear``.
-    weighing (w,): elements of ``linear`` whose forces depend on gravity.
-    legs: indices of the leg parameters: after the platform's, before the tilt.
-    tilt: rotation of gravity; None: not to be identified.
-    strength (k, k): information of the file's values; zero without a prior.
+    names, units: name and unit of each.
+    start (k,): their means.
+    root (k, k): they are ``start + root z`` with the k numbers z independent, of deviation 1.
+    asked: indices of those that are identified; the others are uncertain as well, unless
+        ``others_known``.
+    origins (k,): for each z the index of its origin in ORIGINS.
     """
 
     def __init__(self, parameters: Parameters, kinds: Sequence[str] = DEFAULT,
-                 prior: float | None = None) -> None:
+                 others_known: bool = False) -> None:
         self._parameters = p = parameters
         self._theta = linear_parameters(p)
-        of_platform = np.zeros(PLATFORM, dtype=bool)
-        of_legs: Flags = np.zeros(LINEAR, dtype=bool)
-        for kind in kinds:
-            for part in _OF_PLATFORM.get(kind, ()):
-                of_platform[part] = True
-            for part in _OF_LEGS.get(kind, ()):
-                of_legs[part] = True
-        self._platform: Integers = np.flatnonzero(of_platform)
-        legs: Integers = np.flatnonzero(of_legs)
-        self.linear: Integers = np.concatenate([np.arange(PLATFORM), legs])
-        self.weighing: Integers = self.linear[np.isin(self.linear, _WEIGHING)]
-        self.legs = range(len(self._platform), len(self._platform) + len(legs))
-        self.tilt = Tilt(p['gravity']) if TILT in kinds else None
-        of_tilt = () if self.tilt is None else self.tilt.names
+        self.tilt = Tilt(p['gravity'])
         names = names_of(p)
-        self.names = (
-            *(_PLATFORM[n] for n in self._platform), *(names[n] for n in legs), *of_tilt)
-        self.units = (*(BODY_UNITS[n] for n in self._platform), *(UNITS[n] for n in legs),
-                      *len(of_tilt) * ['rad'])
-        self._of_file: Array = np.concatenate([
-            [p['platform.mass']], p['platform.center_of_mass'], p['platform.inertia']])
-        self.start: Array = np.concatenate(
-            [self._of_file[self._platform], self._theta[legs], np.zeros(len(of_tilt))])
-        self.scales: Array = np.concatenate([
-            _platform_scales(p)[self._platform], _leg_scales(p)[legs],
-            np.full(len(of_tilt), _TILT)])
-        self.strength: Array = np.diag(
-            np.zeros(len(self.scales)) if prior is None else (prior * self.scales) ** -2.0)
-        mass, size = p['platform.mass'], _size(p)
-        self.inertial_scales: Array = mass * np.repeat([1.0, size, size ** 2], [1, 3, 6])
-        self.linear_scales: Array = np.concatenate([self.inertial_scales, _leg_scales(p)[legs]])
+        self.names = (*_PLATFORM, *(names[n] for n in _LINEAR[PLATFORM:]), *self.tilt.names,
+                      'effort_gain')
+        self.units = (*BODY_UNITS, *(UNITS[n] for n in _LINEAR[PLATFORM:]), 'rad', 'rad', '')
+        self.start: Array = np.concatenate([
+            [p['platform.mass']], p['platform.center_of_mass'], p['platform.inertia'],
+            self._theta[_LINEAR[PLATFORM:]], np.zeros(3)])
+        asked = np.zeros(LINEAR, dtype=bool)
+        for kind in kinds:
+            for part in (*_OF_PLATFORM.get(kind, ()), *_OF_LEGS.get(kind, ())):
+                asked[part] = True
+        self.asked: Integers = np.flatnonzero(np.concatenate([
+            asked[_LINEAR], [TILT in kinds] * 2, [False]]))
+        scales = _leg_scales(p)
+        of_friction = np.isin(np.arange(LINEAR), np.r_[VISCOUS_FRICTION, COULOMB_FRICTION])
+        # Numbers that the file does not know at all count if they are asked for.
+        level = root_of_covariance(p, np.where(asked | of_friction, scales, 0.0))
+        more = [p['uncertainty.tilt'], p['uncertainty.tilt'], p['uncertainty.effort_gain']]
+        self.root: Array = np.diag(np.concatenate([np.zeros(LINEAR_UNKNOWNS), more]))
+        self.root[:LINEAR_UNKNOWNS, :LINEAR_UNKNOWNS] = level[np.ix_(_LINEAR, _LINEAR)]
+        if others_known:
+            others = ~np.isin(np.arange(len(self.start)), self.asked)
+            self.root[others] = self.root[:, others] = 0.0
+        self.origins: Integers = np.concatenate([_ORIGIN_OF[_LINEAR], [7, 7, 8]])
 
     @property
-    def many_of_platform(self) -> int:
-        """Return the number of platform parameters; they come first."""
-        return len(self._platform)
+    def inertial_units(self) -> Array:
+        """Return units of the ten inertial parameters (10,), by the file's mass and size."""
+        size = float(self._parameters['singularity.characteristic_length'])
+        units: Array = self.start[0] * np.repeat([1.0, size, size ** 2], [1, 3, 6])
+        return units
 
     @property
-    def fixed(self) -> Array:
-        """Return the linear parameters (LINEAR,) with zeros where they depend on the unknowns."""
+    def deviations(self) -> Array:
+        """Return the prior standard deviations (k,)."""
+        deviations: Array = np.sqrt(np.sum(self.root ** 2, axis=1))
+        return deviations
+
+    def linear(self, values: Array) -> Array:
+        """Return the parameters (LINEAR,) of the regressor, under level gravity."""
         theta = self._theta.copy()
-        theta[self.linear] = 0.0
+        theta[_LINEAR] = self._level(values)
         return theta
 
     def theta(self, values: Array) -> Array:
         """
-        Return the linear parameters (n,) for values (k,): the m parameters ``linear``.
+        Return the linear parameters (n,) for values (k,).
 
-        With the tilt, the change of gravity along each axis times ``weighing``, and times 1 for
-        the fixed parameters, is appended: n = m + 3 (w + 1).
+        They are followed by the change of gravity along each axis times those that depend on it.
         """
-        theta = self._level(values)
-        if self.tilt is None:
-            return theta
-        change = self.tilt.change(values[self.legs.stop:])
-        return np.concatenate([theta, np.outer(change, self._carried(theta)).ravel()])
+        level = self._level(values)
+        change = self.tilt.change(values[-3:-1])
+        return np.concatenate([level, np.outer(change, level[_WEIGHING]).ravel()])
 
     def derivative(self, values: Array) -> Array:
         """Return the derivative of ``theta`` with respect to the values, (n, k)."""
-        d: Array = np.zeros((len(self.linear), len(values)))
-        d[:PLATFORM, :self.many_of_platform] = _inertial_derivative(
-            self._whole(values))[:, self._platform]
-        d[PLATFORM:, self.legs] = np.eye(len(self.legs))
-        if self.tilt is None:
-            return d
-        angles = values[self.legs.stop:]
-        weighs = np.isin(self.linear, self.weighing)
-        of_carried = np.concatenate([d[weighs], np.zeros((1, len(values)))])
-        products = self.tilt.change(angles)[:, None, None] * of_carried
-        products[..., self.legs.stop:] += (
-            self._carried(self._level(values))[:, None] * self.tilt.derivative(angles)[:, None])
+        d: Array = np.zeros((LINEAR_UNKNOWNS, len(values)))
+        d[:PLATFORM, :PLATFORM] = inertial_derivative(values[:PLATFORM])
+        d[PLATFORM:, PLATFORM:LINEAR_UNKNOWNS] = np.eye(LINEAR_UNKNOWNS - PLATFORM)
+        angles = values[-3:-1]
+        products = self.tilt.change(angles)[:, None, None] * d[_WEIGHING]
+        products[..., -3:-1] += (self._level(values)[_WEIGHING, None]
+                                 * self.tilt.derivative(angles)[:, None])
         return np.concatenate([d, products.reshape(-1, len(values))])
 
     def _level(self, values: Array) -> Array:
-        """Return the parameters ``linear`` (m,)."""
-        theta: Array = np.concatenate([_inertial(self._whole(values)), values[self.legs]])
-        return theta
-
-    def _carried(self, theta: Array) -> Array:
-        """Return the factors (w + 1,) of the change of gravity."""
-        return np.append(theta[np.isin(self.linear, self.weighing)], 1.0)
+        """Return the linear parameters without those of the tilt."""
+        level: Array = np.concatenate([
+            _inertial(values[:PLATFORM]), values[PLATFORM:LINEAR_UNKNOWNS]])
+        return level
 
     def with_inertial(self, values: Array, ten: Array) -> Array:
-        """Return values with these inertial parameters (10,), as far as they are unknowns."""
+        """Return values with these inertial parameters (10,) of the platform."""
         mass, center = ten[0], ten[1:4] / ten[0]
-        inertia = ten[4:] - about_origin(mass, center, np.zeros(6))
         changed = values.copy()
-        changed[:self.many_of_platform] = np.concatenate(
-            [[mass], center, inertia])[self._platform]
+        changed[:PLATFORM] = mass, *center, *(ten[4:] - about_origin(mass, center, np.zeros(6)))
         return changed
 
     def inertial(self, values: Array) -> Array:
         """Return the platform's ten inertial parameters for values (k,)."""
-        return _inertial(self._whole(values))
+        return _inertial(values[:PLATFORM])
 
     def not_negative(self) -> Integers:
         """Return the indices of leg parameters that cannot be negative."""
         ends = ('.mass.', '.second_moment.', 'reflected_mass.', '_friction.')
-        return np.array([n for n, name in enumerate(self.names) if n >= self.many_of_platform
+        return np.array([n for n, name in enumerate(self.names) if n >= PLATFORM
                          and any(end in f'{name}.' for end in ends)], dtype=np.int64)
 
     def parameters(self, values: Array) -> Parameters:
-        """Return the parameters with these values (k,); raise ParameterError if invalid."""
+        """Return the parameters with the asked ones of values (k,); ParameterError if invalid."""
+        written = self.start.copy()
+        written[self.asked] = values[self.asked]
         theta = self._theta.copy()
-        theta[self.linear] = self._level(values)
+        theta[_LINEAR] = self._level(written)
         theta[CYLINDER_MASS] = self._masses_of_cylinders(theta)
         try:
             found = parameter_values(theta, self._parameters)
         except ParameterError as exc:
             raise ParameterError(f'what fits best is no machine: {exc}: identify less') from exc
-        platform = self._whole(values)
-        found |= {'platform.mass': platform[0], 'platform.center_of_mass': platform[CENTER],
-                  'platform.inertia': platform[INERTIA]}
-        if self.tilt is not None:
-            found['gravity'] = self.tilt.gravity(values[self.legs.stop:])
+        found |= {'platform.mass': written[0], 'platform.center_of_mass': written[CENTER],
+                  'platform.inertia': written[INERTIA],
+                  'gravity': self.tilt.gravity(written[-3:-1])}
         changed: dict[str, Any] = {name: value for name, value in found.items()
                                    if not _alike(value, self._parameters[name])}
         if 'actuator.reflected_mass' in changed:
@@ -261,28 +258,17 @@ class Unknowns:
         return np.where(theta[CYLINDER_MASS] * second < first ** 2, 1.0001 * least,
                         theta[CYLINDER_MASS])
 
-    def _whole(self, values: Array) -> Array:
-        whole = self._of_file.copy()
-        whole[self._platform] = values[:self.many_of_platform]
-        return whole
 
-
-def regression(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> tuple[Array, Array]:
+def regressor_of(platform: StewartPlatform, rows: Array, tilt: bool = True) -> Array:
     """
-    Return the regressor (N, 6, n) of ``unknowns.theta`` and the known forces (N, 6) [N].
+    Return the regressor (N, 6, n) of ``Unknowns.theta`` in motions (N, MOTION).
 
-    They are those of a platform with the parameters of the file, in motions (N, MOTION).
+    Without the tilt it is that of the first LINEAR_UNKNOWNS of them.
     """
-    matrix, fixed = platform.regressors(rows), unknowns.fixed
-    regressor: Array = matrix[..., unknowns.linear]
-    known: Array = matrix @ fixed
-    if unknowns.tilt is not None:
-        parts = [regressor]
-        for axis in np.eye(3):
-            matrix = platform.regressors_at_rest(rows, axis[None])
-            parts += [matrix[..., unknowns.weighing], (matrix @ fixed)[..., None]]
-        regressor = np.concatenate(parts, axis=-1)
-    return regressor, known
+    regressor: Array = platform.regressors(rows)[..., _LINEAR]
+    return regressor if not tilt else np.concatenate([regressor, *(
+        platform.regressors_at_rest(rows, axis[None])[..., _LINEAR[_WEIGHING]]
+        for axis in np.eye(3))], axis=-1)
 
 
 def _alike(value: Any, other: Any) -> bool:
@@ -296,7 +282,8 @@ def _inertial(platform: Array) -> Array:
     return ten
 
 
-def _inertial_derivative(platform: Array) -> Array:
+def inertial_derivative(platform: Array) -> Array:
+    """Return the derivative (10, 10) of the inertial parameters by mass, center and inertia."""
     mass, center = platform[0], platform[CENTER]
     d = np.zeros((10, 10))
     d[0, 0] = 1.0
@@ -312,20 +299,12 @@ def _inertial_derivative(platform: Array) -> Array:
     return d
 
 
-def _size(p: Parameters) -> float:
-    return float(p['singularity.characteristic_length'])
-
-
-def _platform_scales(p: Parameters) -> Array:
-    mass, size = p['platform.mass'], _size(p)
-    return np.array([mass, *3 * [0.5 * size], *6 * [0.25 * mass * size ** 2]])
-
-
 def _leg_scales(p: Parameters) -> Array:
-    """Return scales of the linear parameters; only the leg parameters are set."""
-    mass, length = p['platform.mass'] / 6.0, 2.0 * _size(p)
-    weight, rate = _ACCELERATION * mass, _RATE * np.sqrt(_ACCELERATION * _size(p))
-    scales: Array = np.empty(LINEAR)
+    """Return sizes of the linear parameters at which they matter; only those of legs are set."""
+    mass, size = p['platform.mass'] / 6.0, float(p['singularity.characteristic_length'])
+    weight, rate = _ACCELERATION * mass, _RATE * math.sqrt(_ACCELERATION * size)
+    length = 2.0 * size
+    scales: Array = np.zeros(LINEAR)
     scales[PISTON_MASS] = scales[REFLECTED_MASS] = mass
     scales[CYLINDER_FIRST] = scales[PISTON_FIRST] = mass * length
     scales[CYLINDER_SECOND] = scales[PISTON_SECOND] = mass * length ** 2

@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.arrays import Array, Flags, Integers
 
 # Standard deviations on either side of the mean that include 95 % of a normal distribution.
 TWO_SIDED = 1.959964
@@ -215,15 +215,18 @@ def solve(samples: Information, start: Array, scales: Array, noise: Array | None
     return Solution(start + known @ step, known @ inverse @ known.T, what)
 
 
-def combinations(what: Identifiability) -> tuple[Combination, ...]:
+def combinations(what: Identifiability, unclear: Integers | None = None,
+                 ) -> tuple[Combination, ...]:
     """
     Return the identifiable combinations of parameters that are not identifiable individually.
+
+    unclear: indices of these parameters, as far as they are not ``what.identifiable``.
 
     They are the rows of the known subspace, reduced: each begins with a parameter that is in no
     other combination (base parameters: Gautier, Khalil, "Direct calculation of minimum set of
     inertial parameters of serial robots", IEEE T-RA 6(3), 1990, doi:10.1109/70.56655).
     """
-    unclear = np.flatnonzero(~what.identifiable)
+    unclear = np.flatnonzero(~what.identifiable) if unclear is None else unclear
     if not len(unclear) or not what.rank:
         return ()
     # Known directions that lie within these parameters have a singular value of 1, others 0.

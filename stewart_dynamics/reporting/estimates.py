@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.mechanics.least_squares import (
     combinations, Identifiability, LEAST_SHARE, TWO_SIDED)
 
@@ -35,7 +35,7 @@ FIXED = 'fixed'  # held at the file's value by an option
 
 HOLD_OUT = 0.2  # share of the data that validates a fit to the rest, by default
 WITHOUT_VALUE = {IN_COMBINATION: 'only in a combination', FIXED: 'fixed',
-                 NOT_IDENTIFIABLE: 'kept: not identifiable'}
+                 NOT_IDENTIFIABLE: 'not identifiable'}
 # Numbers below _SMALL with more decimals have an exponent.
 _MOST_DECIMALS, _SMALL = 9, 1e-4
 
@@ -54,7 +54,7 @@ def states_of(what: Identifiability) -> list[str]:
 
 
 def estimate(name: str, unit: str, start: float, value: float, state: str, error: float,
-             share: float, at_bound: bool, sure: bool) -> dict[str, Any]:
+             share: float, at_bound: bool, sure: bool, prior: bool = False) -> dict[str, Any]:
     """
     Return an estimated parameter for JSON.
 
@@ -63,21 +63,22 @@ def estimate(name: str, unit: str, start: float, value: float, state: str, error
     error, share: standard error; share of the unknown directions.
     at_bound, sure: whether the value is at a bound; whether it has an interval, if it is
         identified.
+    prior: whether the interval holds without that, because the file's uncertainty is in it.
     """
     return {
         'name': name, 'unit': unit, 'file': start, 'value': value,
         'state': state, 'standard_error': (
-            error if state != NOT_IDENTIFIABLE and math.isfinite(error) else None),
+            error if (prior or state != NOT_IDENTIFIABLE) and math.isfinite(error) else None),
         'interval': ([value - TWO_SIDED * error, value + TWO_SIDED * error]
-                     if state == IDENTIFIED and sure else None),
+                     if (prior or state == IDENTIFIED) and sure else None),
         'unknown_share': share, 'at_bound': at_bound}
 
 
 def combined(what: Identifiability, names: Sequence[str], units: Sequence[str], values: Array,
-             covariance: Array) -> list[dict[str, Any]]:
+             covariance: Array, unclear: Integers | None = None) -> list[dict[str, Any]]:
     """Return the combinations of parameters that are identifiable, for JSON."""
     result = []
-    for each in combinations(what):
+    for each in combinations(what, unclear):
         places = list(each.parameters)
         c = each.coefficients
         variance = float(c @ covariance[np.ix_(places, places)] @ c)
@@ -132,7 +133,7 @@ def not_identifiable_lines(result: Mapping[str, Any], source: str) -> list[str]:
     unknown = [each['name'] for each in result['parameters'] if each['state'] == NOT_IDENTIFIABLE]
     lines = []
     if unknown:
-        lines += ['', f"not identifiable from the {source} (the file's values are kept):",
+        lines += ['', f'not identifiable from the {source}:',
                   *(f'  {name}' for name in grouped(unknown))]
     if result['combinations']:
         lines += ['', 'identifiable only in combinations:']

@@ -1,0 +1,76 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How well a parameter file knows the parameters in which forces are linear: ``uncertainty.*``."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.dynamics.linear_parameters import (
+    CYLINDER_FIRST, CYLINDER_SECOND, FIRST_MOMENT, INERTIA, LINEAR, linear_parameters, MASS,
+    PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS)
+from stewart_dynamics.parameters.table import Parameters
+
+_PARTS = {'cylinder': (None, CYLINDER_FIRST, CYLINDER_SECOND),
+          'piston': (PISTON_MASS, PISTON_FIRST, PISTON_SECOND)}
+
+
+def root_of_covariance(p: Parameters, others: Array) -> Array:
+    """
+    Return R (LINEAR, LINEAR): the linear parameters are the file's plus R z.
+
+    z are independent and of deviation 1. The platform's ten are its mass, the coordinates of its
+    center of mass, and its inertia about that. The numbers of all legs are uncertain together and
+    each by itself.
+
+    others (LINEAR,): deviations of friction and offsets, which ``uncertainty.*`` does not contain;
+        of a parameter of the legs it counts where that has the deviation 0.
+    """
+    deviations = others.copy()
+    deviations[MASS] = p['uncertainty.platform_mass'] * p['platform.mass']
+    deviations[FIRST_MOMENT] = p['uncertainty.center_of_mass']
+    deviations[INERTIA] = p['uncertainty.inertia'] * np.mean(p['platform.inertia'][[0, 3, 5]])
+    covariance = _of_legs(p)
+    known = np.diag(covariance) > 0.0
+    covariance += np.diag(np.where(known, 0.0, deviations ** 2))
+    sizes = np.sqrt(np.diag(covariance))
+    scale = np.divide(1.0, sizes, out=np.zeros(LINEAR), where=sizes > 0.0)
+    values, vectors = np.linalg.eigh(scale[:, None] * covariance * scale)
+    root: Array = sizes[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+    return root
+
+
+def _of_legs(p: Parameters) -> Array:
+    """Return the covariance (LINEAR, LINEAR) of masses and moments of legs and rotors."""
+    theta, covariance = linear_parameters(p), np.zeros((LINEAR, LINEAR))
+    rotors = (p['uncertainty.reflected_mass'] * theta[REFLECTED_MASS]) ** 2
+    covariance[REFLECTED_MASS, REFLECTED_MASS] = np.diag(rotors)
+    legs, relative = np.arange(6), p['uncertainty.leg_mass']
+    for part, (of_mass, first, second) in _PARTS.items():
+        inertia = p[f'legs.{part}.inertia']
+        turning = theta[second] - inertia  # m S^2
+        masses, none = p[f'legs.{part}.mass'], np.zeros(6)
+        # by a relative change of mass, center of mass and inertia
+        changes = [(first, (theta[first], theta[first], none)),
+                   (second, (turning, 2.0 * turning, inertia)),
+                   *([] if of_mass is None else [(of_mass, (masses, none, none))])]
+        for n in range(3):
+            of_all, of_each = np.zeros((LINEAR, 1)), np.zeros((LINEAR, 6))
+            for where, of in changes:
+                at = np.arange(LINEAR)[where]
+                of_all[at, 0] = of_each[at, legs] = relative * of[n]
+            covariance += of_all @ of_all.T + of_each @ of_each.T
+    return covariance
