@@ -40,7 +40,10 @@ from stewart_dynamics.reference_motion.parameters import ReferenceMotionParamete
 
 Array = NDArray[np.float64]
 
-HEXAPOD = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+FILE = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+# All but the payload is known well: errors are those of the measurements.
+HEXAPOD = FILE.replaced({f'uncertainty.{name}': 1e-4 for name in (
+    'leg_mass', 'reflected_mass', 'effort_gain', 'tilt')})
 LOADED = HEXAPOD.replaced({
     'platform.mass': 172.0, 'platform.center_of_mass': [0.05, 0.02, 0.16],
     'platform.inertia': [15.0, 0.1, -0.6, 15.5, 0.3, 23.0]})
@@ -176,10 +179,21 @@ def test_the_intervals_hold() -> None:
     assert np.mean(np.abs(parts) < 1.0) > 0.9
 
 
+def test_wrong_masses_of_the_legs_are_within_the_intervals() -> None:
+    """As far as the file says that they may be wrong."""
+    light = LOADED.replaced({f'legs.{part}.mass': FILE[f'legs.{part}.mass'] / 1.05
+                             for part in ('cylinder', 'piston')})
+    sure = payload_of(recorded(excited, true=light))
+    assert np.abs(errors(sure)).max() > 3.0
+    unsure = payload_of(recorded(excited, true=light), FILE)
+    assert np.abs(errors(unsure)).max() < 1.0
+    assert unsure.fitted.half_widths[0] > 10.0 * sure.fitted.half_widths[0]
+
+
 def test_noise_in_the_rates_makes_no_inertia_smaller() -> None:
     """As it would be without the correction: then the largest of these is 1.4."""
     rough = Noise(rate=2e-3, force=0.1)
-    parts = [payload_of(recorded(excited, noise=rough, seed=seed)) for seed in range(3)]
+    parts = [payload_of(recorded(excited, noise=rough, seed=seed)) for seed in range(8)]
     assert all(known(each) == list(NAMES) for each in parts)
     assert np.abs(np.mean([errors(each) for each in parts], axis=0)).max() < 0.9
 
@@ -211,7 +225,7 @@ def test_at_rest_the_interval_has_what_coulomb_friction_can_hold() -> None:
         assert abs(errors(payload)[0]) < 2.0
     without = HEXAPOD.replaced({'actuator.coulomb_friction': 0.0})
     of_none = payload_of(recorded(at_rest, noise=Noise()), without)
-    assert of_none.fitted.half_widths[0] < 0.01
+    assert of_none.fitted.half_widths[0] < 0.05  # by the gain of the efforts
 
 
 def test_legs_above_the_velocity_of_coulomb_friction_do_not_stick() -> None:
@@ -261,9 +275,10 @@ def test_a_known_load_and_a_moving_base_are_no_payload() -> None:
 
     payload = payload_of(recorded(excited, base=base, wrench=load, known=load))
     assert np.abs(errors(payload)).max() < 2.0
-    # It is 200 N, where nobody knows it.
-    heavier = payload_of(recorded(excited, wrench=load))
-    assert heavier.fitted.body.mass - TRUE[0] == pytest.approx(200.0 / 9.80665, abs=2.0)
+    # It is 200 N, where nobody knows it; no mass pushes sideways.
+    heavier = payload_of(recorded(excited, wrench=(0.0, 0.0, -200.0, 0.0, 0.0, 0.0)), FILE)
+    assert heavier.fitted.body.mass - TRUE[0] == pytest.approx(200.0 / 9.80665, abs=4.0)
+    assert outcome_of(recorded(excited, wrench=load)).message.startswith('the model does not')
 
 
 def test_the_message_is_valid_in_a_parameter_file(tmp_path: Any) -> None:
@@ -302,7 +317,7 @@ def test_too_few_measurements_are_rejected_with_the_reason() -> None:
     (-1.0, 'the measured forces are -1.', 'likely they have another sign'),
     (1e-3, 'the measured forces are 0.001', ''), (1e200, 'the measured forces are 1.', ''),
     (1e304, 'numbers overflow', ''),
-    (5.0, 'the mass is not identifiable from the measured forces: residual ', '')])
+    (5.0, 'the model does not explain the measured forces: residual ', '')])
 def test_forces_of_another_size_are_named(factor: float, said: str, cause: str) -> None:
     outcome = outcome_of(add_again(
         LegHistory(10.0), recorded(excited, seconds=4.0, rate=200.0), factor))

@@ -13,55 +13,38 @@
 # limitations under the License.
 
 """
-Mass, center of mass and inertia of the platform from efforts, where friction is uncertain.
+Mass, center of mass and inertia of the platform from efforts, where all else is uncertain, too.
 
-The efforts differ from those of the model by ``y = P x + Z e + noise``: P are the ten columns of
-the regressor for a change x of mass, first moment and inertia, all about the given center of
-mass, so that parameters that are not identifiable keep the given values. Z are for each leg
-Coulomb friction, viscous friction and the limit of static friction, each for one standard
-deviation: the given friction is uncertain by its own size. e has unit variance and is eliminated
-leg by leg (a ridge regression, Hoerl, Kennard, "Ridge regression: biased estimation for
-nonorthogonal problems", Technometrics 12(1), 1970, doi:10.1080/00401706.1970.10488634).
+The efforts differ from those of the model by ``y = E z + noise``: z are independent and of unit
+deviation, and E are the columns of the regressor for one deviation of each number in
+``uncertainty.*``: of the platform (all about the given center of mass, so that numbers that are
+not identifiable keep the given values), of legs and rotors, of the tilt of gravity and the gain
+of the efforts. Friction is uncertain by its own size. The posterior of z is that of
+``estimation``, with noise that is correlated in time and between the legs.
 
-Accelerations from measured rates have noise, and with it the regressor: P^T W P is too large by
-``noise`` and the estimate too small. Both sums are corrected by their known expectation
-(W. A. Fuller, "Measurement Error Models", 1987, doi:10.1002/9780470316665, section 3.1).
-
-All legs weigh alike: an external load would make the weight of some legs smaller, and with it
-shift the estimate. The intervals hold for residuals that are correlated in time and between the
-legs: with their correlations over LAGS samples, weighted by Bartlett's window so that the
-covariance is positive semidefinite (Newey, West, "A simple, positive semi-definite,
-heteroskedasticity and autocorrelation consistent covariance matrix", Econometrica 55(3), 1987,
-doi:10.2307/1913610).
+Accelerations from measured rates have noise, and with it the columns: sums of their products are
+corrected by its known expectation (W. A. Fuller, "Measurement Error Models", 1987,
+doi:10.1002/9780470316665, section 3.1).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.estimation.posterior import IDENTIFIABLE, Posterior, posterior
+from stewart_dynamics.estimation.whitening import (
+    covariance_of_scores, gram_of, spectra_of, Weights, weights_of)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import FIRST_MOMENT, INERTIA, MASS
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import is_consistent
-from stewart_dynamics.mechanics.least_squares import Information, Solution, solve, TWO_SIDED
+from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 
 TEN = 10
-FRICTION = 3  # columns of each leg: Coulomb, viscous, static
-
-# A change that matters, of the mass, of the center by the size of the platform, of the inertia by
-# the mean of the given one. A direction is known if its standard error is at most a quarter of it.
-_MASS, _CENTER, _INERTIA = 0.2, 0.1, 0.4
-
-# ``solve`` rejects directions below TIMES_NOISE times the noise. Here the noise is
-# subtracted: a fifth of that is enough.
-_NOISE = 0.2
-
-# Iterations of the noise.
-ROUNDS = 4
-LAGS = 8
-# Student's t of n degrees of freedom, by n, above the normal distribution's: the first term.
-_STUDENT_95 = 2.372
+# Passes over the samples, each with the spectrum of the residuals of the one before.
+ROUNDS = 3
 # The noise is at least this part of the largest effort: no sensor is better.
 _LEAST_NOISE = 1e-5
 
@@ -85,16 +68,15 @@ class FittedBody(NamedTuple):
 
 
 class LegSamples(NamedTuple):
-    """N consecutive measurements, and how a wrong acceleration changes them."""
+    """Means over W windows at equal distances, and how a wrong acceleration changes them."""
 
-    columns: Array  # (N, 6, 10) of the regressor, of ``about(center)``
-    friction: Array
-    """(N, 6, FRICTION) effort for one standard deviation of each kind of friction [N]"""
-    differences: Array  # (N, 6) efforts less those of the model [N]
-    acceleration_noise: Array  # (6, 6) covariance of the noise in the accelerations of one sample
-    columns_by_acceleration: Array
-    """(6, 6, 10) derivative of the columns by each of the six accelerations"""
-    model_by_acceleration: Array  # (6, 6) derivative of the model's efforts, likewise
+    columns: Array
+    """(W, 6, n + 1): efforts for one deviation of each of n numbers, the platform's ten first,
+    then efforts less those of the model [N]; zeros where a window is not used"""
+    change: Array  # (10, 10) of mass, first moment, inertia about the center by the first ten z
+    acceleration_noise: Array  # (6, 6) covariance of the noise in the accelerations of one window
+    by_acceleration: Array  # (6, 6, n + 1) derivative of the columns by each of the six
+    measured: float  # RMS of the efforts [N]
 
 
 def about(center: Array) -> Array:
@@ -114,90 +96,76 @@ def _coupling(a: Array) -> Array:
 
 
 class BodyFit:
-    """
-    The fit, step by step: ``improve`` ROUNDS times, ``correlate`` all lags, then ``result``.
+    """The fit, ``improve`` ROUNDS times, then ``result``; ``given`` is the body of the model."""
 
-    ``samples`` are at least as many as LAGS; ``given`` is the body of the model, ``size`` the
-    distance of the platform joints from their center [m].
-    """
+    def __init__(self, samples: LegSamples, given: Body) -> None:
+        self._given, self._samples = given, samples
+        self._spectra = spectra_of(samples.columns, 0.5)
+        self._least = _LEAST_NOISE * float(np.abs(samples.columns).max())
+        size = np.sqrt(np.mean(self._spectra[..., -1] ** 2, axis=(0, 1))) + self._least
+        self._weights = Weights(
+            np.broadcast_to(size, (len(self._spectra), 6)), np.eye(6))
+        self._posterior: Posterior | None = None
 
-    def __init__(self, samples: LegSamples, given: Body, size: float) -> None:
-        self._given = given
-        moment = float(given.inertia[[0, 3, 5]].mean())
-        self._scales = np.array([_MASS * given.mass, *3 * [_CENTER * size * given.mass],
-                                 *6 * [_INERTIA * moment]])
-        # leg by leg: (6, N, ...)
-        self._p, self._z = samples.columns.swapaxes(0, 1), samples.friction.swapaxes(0, 1)
-        self._y = samples.differences.T[..., None]
-        self._samples = samples
-        strongest = np.abs(self._y).max() + np.abs(self._p[..., 0]).max() * given.mass
-        self._least = (_LEAST_NOISE * strongest) ** 2
-        self._variance = max(float(np.mean(self._y ** 2)), self._least)
-        # Share of the degrees of freedom of the correlations that Bartlett's window leaves.
-        self._freedom = 1.5 * len(samples.differences) / LAGS
-        self._solution: Solution | None = None
+    def improve(self) -> Iterator[None]:
+        """Fit with the present noise, and estimate the noise anew; yield after each piece."""
+        many = len(self._samples.columns)
+        white = self._weights.whitened(self._spectra)
+        yield
+        noise = self._noise()
+        yield
+        gram = gram_of(white)
+        sums = gram - noise
+        found = posterior(sums[:-1, :-1], sums[:-1, -1], np.zeros(len(sums) - 1), noise[:-1, :-1])
+        yield
+        e = white[..., :-1]
+        free = 1.0 - np.sum((e @ found.covariance) * e, axis=-1)
+        yield
+        scores = covariance_of_scores(e, white[..., -1] - e @ found.values, free, many)
+        self._posterior = found.with_scores(gram[:-1, :-1], scores)
+        yield
+        residuals = self._spectra[..., -1] - self._spectra[..., :-1] @ found.values
+        self._weights = weights_of(residuals, free, many, self._least)
+        rest = self._samples.columns[np.any(self._samples.columns[..., -1], axis=1)]
+        self._residual = float(np.sqrt(np.mean(
+            (rest[..., -1] - rest[..., :-1] @ found.values) ** 2)))
+        yield
 
-    def improve(self) -> None:
-        """Fit with the present noise, and estimate the noise anew."""
-        p, z, y, variance = self._p, self._z, self._y, self._variance
-        z_back = z.swapaxes(1, 2)
-        self._eliminate = np.linalg.solve(z_back @ z + variance * np.eye(FRICTION), z_back)
-        self._left = (p - z @ (self._eliminate @ p)) / variance
-        weighted = self._left.swapaxes(1, 2)
-        noise, shift = self._noise()
-        matrix = np.sum(weighted @ p, axis=0) - noise
-        vector = np.sum(weighted @ y, axis=0)[:, 0] + shift
-        self._solution = solve(Information(matrix, vector, 0.0, y.size), np.zeros(TEN),
-                               self._scales, _NOISE * noise)
-        rest = y - p @ self._solution.values[:, None]
-        self._residuals = rest - z @ (self._eliminate @ rest)
-        self._variance = max(float(np.mean(self._residuals ** 2)), self._least)
-
-    def _noise(self) -> tuple[Array, Array]:
-        """Return what noise in the accelerations adds to P^T W P, and takes from P^T W y."""
+    def _noise(self) -> Array:
+        """Return what noise in the accelerations adds to the sums of products."""
         of = self._samples
-        weight = len(of.differences) / self._variance
-        columns = weight * np.einsum(
-            'kl,lip->kip', of.acceleration_noise, of.columns_by_acceleration)
-        return (np.einsum('kip,kiq->pq', columns, of.columns_by_acceleration),
-                np.einsum('kip,ki->p', columns, of.model_by_acceleration))
-
-    def correlate(self, lag: int) -> None:
-        """Take the correlation of the residuals over a lag, 0 to LAGS, into account."""
-        many = len(self._samples.differences)
-        if lag == 0:
-            self._columns = np.ascontiguousarray(self._left.swapaxes(0, 1)).reshape(many, -1)
-            self._meat = np.zeros((TEN, TEN))
-        residuals = self._residuals[..., 0].T
-        later, earlier = slice(lag, None), slice(None, many - lag)
-        correlation = residuals[later].T @ residuals[earlier] / many
-        products = (self._columns[later].T @ self._columns[earlier]).reshape(6, TEN, 6, TEN)
-        product = np.einsum('ipjq,ij->pq', products, correlation)
-        weight = 1.0 - lag / (LAGS + 1)
-        self._meat += weight * (product + product.T) if lag else product
+        values, vectors = np.linalg.eigh(of.acceleration_noise)
+        independent = np.einsum('kl,kip->lip', vectors * np.sqrt(np.maximum(values, 0.0)),
+                                of.by_acceleration)
+        # Differences of one another's windows: at neighbours half of it, of the opposite sign.
+        many = len(of.columns)
+        power = 1.0 - np.cos(2.0 * np.pi / many * np.arange(len(self._spectra)))
+        power *= 2.0 * np.count_nonzero(np.any(of.columns[..., -1], axis=1)) / many
+        spectra = np.sqrt(power)[:, None, None, None] * independent
+        return sum((gram_of(self._weights.whitened(spectra[:, n:n + 1])) for n in range(6)),
+                   np.zeros(2 * (of.columns.shape[-1],)))
 
     def result(self) -> FittedBody:
         """Return the body."""
-        solution = self._solution
-        assert solution is not None
-        change = solution.values
-        known = solution.identifiability.identifiable.copy()
+        found, by = self._posterior, self._samples.change
+        assert found is not None
+        change = by @ found.values[:TEN]
+        before = by @ by.T
+        after = by @ found.covariance[:TEN, :TEN] @ by.T
+        derivative, at_start = self._derivative(change), self._derivative(np.zeros(TEN))
+        half_widths, of_file = (TWO_SIDED * np.sqrt(np.maximum(np.diag(d @ c @ d.T), 0.0))
+                                for d, c in ((derivative, after), (at_start, before)))
+        known = half_widths < IDENTIFIABLE * of_file
         body = self._body(change)
-        keep = ~known[INERTIA]
-        inertia = np.where(keep, self._given.inertia, body.inertia)
+        inertia = np.where(known[INERTIA], body.inertia, self._given.inertia)
         consistent = body.mass > 0.0 and is_consistent(
             np.array([body.mass, 0.0, 0.0, 0.0, *inertia]))
         if not consistent:
             known[INERTIA] = False
             inertia = self._given.inertia
         center = np.where(known[FIRST_MOMENT], body.center, self._given.center)
-        derivative = self._derivative(change)
-        covariance = derivative @ self._covariance(solution) @ derivative.T
-        quantile = TWO_SIDED + _STUDENT_95 / self._freedom
-        half_widths = quantile * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        residual = float(np.sqrt(np.mean(self._residuals ** 2)))
-        return FittedBody(Body(body.mass, center, inertia),
-                          half_widths, known, consistent, residual)
+        return FittedBody(
+            Body(body.mass, center, inertia), half_widths, known, consistent, self._residual)
 
     def _body(self, change: Array) -> Body:
         """Return the body for a change of the ten parameters about the given center."""
@@ -218,13 +186,3 @@ class BodyFit:
         matrix[INERTIA, MASS] = 0.5 * coupling @ offset
         matrix[INERTIA, FIRST_MOMENT] = -coupling
         return matrix
-
-    def _covariance(self, solution: Solution) -> Array:
-        """Return the covariance of the change, for residuals that are correlated in time."""
-        # The fit takes these degrees of freedom.
-        meat = self._meat * (self._freedom / (self._freedom - FRICTION - TEN / 6))
-        # Shift that the uncertain friction may cause.
-        by_friction = self._eliminate @ self._p
-        meat += np.einsum('ikp,ikq->pq', by_friction, by_friction)
-        covariance: Array = solution.covariance @ meat @ solution.covariance
-        return covariance

@@ -16,11 +16,11 @@
 The mass, center of mass and inertia of platform and payload, from the last seconds of motion.
 
 Measured forces less those of the model, with the parameters as they are, are what a change of the
-platform's ten inertial parameters has to explain: ``body_fit``. Both sides, the forces and the
-regressor, pass through the same filter, so that motion above its band costs information but makes
-no error: means over windows cos^2(pi t / 2 h), -h < t < h, at every h. With them the
-noise of the accelerations, differences of measured twists, is that of their slow part (summation
-by parts moves the difference to the window).
+platform's ten inertial parameters has to explain, beside all else that is uncertain: ``body_fit``.
+Both sides, the forces and the regressor, pass through the same filter, so that motion above its
+band costs information but makes no error: means over windows cos^2(pi t / 2 h), -h < t < h, at
+every h. With them the noise of the accelerations, differences of measured twists, is that of their
+slow part (summation by parts moves the difference to the window).
 
 The work is done in pieces, because setpoints are answered in between.
 """
@@ -28,6 +28,7 @@ The work is done in pieces, because setpoints are answered in between.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 import math
 from typing import NamedTuple
 
@@ -35,21 +36,24 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.compilation.machine_code import COMPILED
+from stewart_dynamics.estimation.noisy_rates import smoothed_law
+from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.external_wrench.body_fit import (
-    about, Body, BodyFit, FittedBody, FRICTION, LAGS, LegSamples, ROUNDS, TEN)
+    about, Body, BodyFit, FittedBody, LegSamples, ROUNDS, TEN)
 from stewart_dynamics.external_wrench.measured_legs import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, TURNED)
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    BODY_UNITS, COULOMB_FRICTION, PLATFORM, VISCOUS_FRICTION)
-from stewart_dynamics.mechanics.rows import ACCELERATION, FORCES, LENGTHS
+    BODY_UNITS, COULOMB_FRICTION, FIRST_MOMENT, LINEAR, linear_parameters, PLATFORM,
+    VISCOUS_FRICTION)
+from stewart_dynamics.mechanics.rows import ACCELERATION, BASE, FORCES, GRAVITY, LENGTHS, MOTION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
 
 FUNCTIONS = inverse_dynamics.solve, regressor.regressors
 
 # Measurements between two yields.
-PIECE = 64 if COMPILED else 1
+PIECE = 128 if COMPILED else 1
 
 # Half the width of a window: minimum [s], and minimum in measurements.
 _HALF_WIDTH = 0.05
@@ -74,8 +78,9 @@ _SATURATED = 0.99, 1.02
 _QUIET = np.errstate(over='ignore', invalid='ignore')
 
 _LEGS = np.arange(6)
-_COLUMNS = TEN + FRICTION  # of a leg; then its force less that of the model, and that
 
+# A larger residual, by the measured forces, means that the model does not hold.
+_UNEXPLAINED = 0.05
 # Forces by those of the model: outside, they are of another unit.
 _LEAST_SCALE, _MOST_SCALE = 0.1, 10.0
 
@@ -114,6 +119,9 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     stamps = history.stamps(begin, end)
     yield None
     work = _Windows(platform, stamps)
+    for first in range(begin, end, 4 * PIECE):
+        work.add_noise(history, begin, first, min(first + 4 * PIECE, end))
+        yield None
     for first in range(begin, end, PIECE):
         work.add(history, begin, first, min(first + PIECE, end))
         yield None
@@ -136,17 +144,17 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
                              f'likely they have another {what}')
         return
     given = Body(p['platform.mass'], p['platform.center_of_mass'], p['platform.inertia'])
-    fit = BodyFit(samples, given, p['singularity.characteristic_length'])
+    fit = BodyFit(samples, given)
     try:
         for _ in range(ROUNDS):
-            fit.improve()
-            yield None
-        for lag in range(LAGS + 1):
-            fit.correlate(lag)
-            yield None
+            yield from fit.improve()
         fitted = fit.result()
     except np.linalg.LinAlgError as exc:
         yield PayloadOutcome(f'the fit failed: {exc}')
+        return
+    if fitted.residual > _UNEXPLAINED * samples.measured:
+        yield PayloadOutcome(f'the model does not explain the measured forces: residual '
+                             f'{fitted.residual:.3g} N of {samples.measured:.4g} N (RMS)')
         return
     yield _outcome(Payload(int(stamps[-1]), seconds, work.excluded, fitted, given))
 
@@ -180,30 +188,49 @@ class _Windows:
         interval = float(np.median(intervals)) if len(intervals) else 0.0
         self.half_width = max(_HALF_WIDTH, _MEASUREMENTS * interval)
         many = int((stamps[-1] - stamps[0]) * NANOSECOND / self.half_width) + 2
-        self._sums = np.zeros((many, 6, _COLUMNS + 2))
+        # The regressor of each leg, its force less that of the model, and that.
+        self._sums = np.zeros((many, 6, LINEAR + 2))
+        self._motions, self._bases = np.zeros((many, MOTION)), np.full((many, BASE), np.nan)
         self._covered = np.zeros(many)
-        self._about = about(p['platform.center_of_mass'])
-        self._friction = np.column_stack([
-            p['actuator.coulomb_friction'], p['actuator.viscous_friction'],
-            _STATIC * p['actuator.coulomb_friction']])
+        self._coulomb = p['actuator.coulomb_friction']
         self._coulomb_velocity = p['actuator.coulomb_velocity']
         self._noise, self._noises = np.zeros((6, 6)), 0
-        self._middle: tuple[Array, Array] | None = None
         # Noise of an acceleration divided by the noise of a twist: the window's slope.
         self._noise_gain = math.pi ** 2 * interval / (4.0 * self.half_width ** 3)
+
+    def _rows(self, history: LegHistory, begin: int, first: int, end: int,
+              ) -> tuple[Array, Array, int] | None:
+        """Return rows around some measurements, their times, and the number of the first row."""
+        low, high = max(begin, first - 2), min(begin + len(self._stamps), end + 2)
+        if low < history.first:  # overwritten meanwhile
+            return None
+        seconds = (self._stamps[low - begin:high - begin] - self._stamps[0]) * NANOSECOND
+        return history.rows(low, high), seconds, low
+
+    @_QUIET
+    def add_noise(self, history: LegHistory, begin: int, first: int, end: int) -> None:
+        """Add the noise of the twists of measurements from one to another."""
+        found = self._rows(history, begin, first, end)
+        if found is None:
+            return
+        rows, seconds, low = found
+        twists, sound = rows[:, TURNED], np.diff(seconds) <= self._longest_gap
+        every = np.arange(max(first - low, 2), min(end - low, len(twists) - 2))
+        centers: Integers = every[np.all([sound[every + n] for n in (-2, -1, 0, 1)], axis=0)]
+        rough: Array = np.tensordot(_FOURTH, twists[centers + np.arange(-2, 3)[:, None]], 1)
+        self._noise += rough.T @ rough
+        self._noises += len(centers)
 
     @_QUIET
     def add(self, history: LegHistory, begin: int, first: int, end: int) -> None:
         """Add measurements from one to another; the first of all is ``begin``."""
-        low, high = max(begin, first - 2), min(begin + len(self._stamps), end + 2)
-        if low < history.first:  # overwritten meanwhile
+        found = self._rows(history, begin, first, end)
+        if found is None:
             return
-        rows = history.rows(low, high)
-        seconds = (self._stamps[low - begin:high - begin] - self._stamps[0]) * NANOSECOND
+        rows, seconds, low = found
         steps = np.diff(seconds)
         sound = steps <= self._longest_gap
         twists = rows[:, TURNED]
-        self._add_noise(twists, sound, first - low, end - low)
         # Those between two measurements.
         every = np.arange(max(first - low, 1), min(end - low, len(rows) - 1))
         inner: Integers = every[sound[every - 1] & sound[every]]
@@ -217,37 +244,38 @@ class _Windows:
         motions[:, ACCELERATION] = (twists[inner + 1] - twists[inner - 1]) / both
         forces = (rows[inner][:, ACTED] * before + rows[inner + 1][:, ACTED] * after) / both
         forces[saturated[inner] | saturated[inner + 1]] = np.nan
-        values = self._values(motions, rows[inner], forces)
-        self._add_windows(seconds[inner], 0.5 * both[:, 0], values)
+        bases = rows[inner][:, OF_BASE]
+        values = self._values(motions, rows[inner][:, LOADED], bases, forces)
+        self._add_windows(seconds[inner], 0.5 * both[:, 0], values, motions, bases)
 
-    def _add_noise(self, twists: Array, sound: Flags, first: int, end: int) -> None:
-        every = np.arange(max(first, 2), min(end, len(twists) - 2))
-        centers: Integers = every[np.all([sound[every + n] for n in (-2, -1, 0, 1)], axis=0)]
-        rough: Array = np.tensordot(_FOURTH, twists[centers + np.arange(-2, 3)[:, None]], 1)
-        self._noise += rough.T @ rough
-        self._noises += len(centers)
-
-    def _values(self, motions: Array, rows: Array, forces: Array) -> Array:
-        """Return the columns of each sample and leg, and its force less that of the model."""
-        wrenches, bases = rows[:, LOADED], rows[:, OF_BASE]
+    def _values(self, motions: Array, wrenches: Array, bases: Array, forces: Array) -> Array:
+        """Return regressor, force less that of the model, and that, of each sample and leg."""
         results = self._platform.solve(motions, wrenches, bases)
         model, lengths = results[:, FORCES], results[:, LENGTHS]
         # Efforts have no part of the force of an end stop.
         free = (lengths > self._shortest) & (lengths < self._longest)
         forces[~free.all(axis=1)] = np.nan
         self.excluded += int(np.isnan(forces[:, 0]).sum())
-        matrix = self._platform.regressors(motions, bases)
-        if self._middle is None:
-            self._middle = motions[:1].copy(), bases[:1].copy()
-        values = np.empty((len(motions), 6, _COLUMNS + 2))
-        values[..., :TEN] = matrix[..., PLATFORM] @ self._about
-        for n, kind in enumerate((COULOMB_FRICTION, VISCOUS_FRICTION)):
-            values[..., TEN + n] = matrix[:, _LEGS, kind.start + _LEGS]
-        values[..., TEN + 2] = 0.0
-        values[..., _COLUMNS], values[..., _COLUMNS + 1] = forces - model, model
+        values = np.empty((len(motions), 6, LINEAR + 2))
+        values[..., :LINEAR] = self._platform.regressors(motions, bases)
+        rates, sliding = (values[:, _LEGS, kind.start + _LEGS] for kind in (
+            VISCOUS_FRICTION, COULOMB_FRICTION))
+        of_noise = smoothed_law(rates, self._coulomb_velocity, self._rate_deviations)
+        values[:, _LEGS, COULOMB_FRICTION.start + _LEGS] = of_noise
+        model = model + self._coulomb * (of_noise - sliding)
+        values[..., LINEAR], values[..., LINEAR + 1] = forces - model, model
         return values
 
-    def _add_windows(self, seconds: Array, weights: Array, values: Array) -> None:
+    @cached_property
+    def _rate_deviations(self) -> Array:
+        """The deviation of the noise in the rates of the legs (6,), at the home pose."""
+        j_inv = self._platform.inverse_jacobian(self._platform.home_pose())
+        noise = self._noise / (max(self._noises, 1) * _FOURTH_VARIANCE)
+        deviations: Array = np.sqrt(np.diag(j_inv @ noise @ j_inv.T))
+        return deviations
+
+    def _add_windows(self, seconds: Array, weights: Array, values: Array, motions: Array,
+                     bases: Array) -> None:
         finite = np.isfinite(values).all(axis=(1, 2))  # not where J_inv cannot be solved
         seconds, weights, values = seconds[finite], weights[finite], values[finite]
         if not len(seconds):
@@ -257,6 +285,8 @@ class _Windows:
         low, high = int(whole[0]), int(whole[-1]) + 2
         part = np.sin(0.5 * np.pi * (turns - whole)) ** 2
         many = np.arange(len(seconds))
+        of_window, at = np.unique(whole, return_index=True)
+        self._motions[of_window], self._bases[of_window] = motions[finite][at], bases[finite][at]
         share = np.zeros((high - low, len(seconds)))
         share[whole - low, many] = (1.0 - part) * weights
         share[whole - low + 1, many] = part * weights
@@ -267,26 +297,55 @@ class _Windows:
     def samples(self) -> LegSamples | None:
         """Return the means over the windows, None where they are too few."""
         sound = self._covered > _COVERED * self.half_width
-        if np.count_nonzero(sound) < LEAST_WINDOWS or self._middle is None or not self._noises:
+        if np.count_nonzero(sound) < LEAST_WINDOWS or not self._noises:
             return None
+        motions, bases = self._motions[sound], self._bases[sound]
         means = self._sums[sound] / self._covered[sound, None, None]
-        differences, modelled = means[..., _COLUMNS], means[..., _COLUMNS + 1]
+        differences, modelled = means[..., LINEAR], means[..., LINEAR + 1]
         self.scale = 1.0 + float(np.sum(differences * modelled) / np.sum(modelled ** 2))
-        friction = means[..., TEN:_COLUMNS]
-        # Not a part of it: noise in the rates would vary it, and it would seem identifiable.
-        friction[..., 2] = np.abs(friction[..., 1]) < self._coulomb_velocity
-        columns, model = self._by_acceleration(*self._middle)
+        p = self._platform.parameters
+        of_friction = np.zeros(LINEAR)
+        for name, part in (('viscous', VISCOUS_FRICTION), ('coulomb', COULOMB_FRICTION)):
+            of_friction[part] = p[f'actuator.{name}_friction']
+        root = root_of_covariance(p, of_friction)
+        root[FIRST_MOMENT] *= p['platform.mass']
+        change = root[PLATFORM, PLATFORM].copy()
+        root[PLATFORM] = about(p['platform.center_of_mass']) @ root[PLATFORM]
+        root = root[:, np.any(root != 0.0, axis=0) | (np.arange(LINEAR) < TEN)]
+        standing = np.abs(means[:, _LEGS, VISCOUS_FRICTION.start + _LEGS]) < self._coulomb_velocity
+        columns = np.zeros((len(sound), 6, root.shape[1] + 6 + 3 + 1))
+        columns[sound] = np.concatenate([
+            means[..., :LINEAR] @ root,
+            np.einsum('nl,lm->nlm', standing * _STATIC * self._coulomb, np.eye(6)),
+            p['uncertainty.tilt'] * self._by_tilt(motions, bases),
+            p['uncertainty.effort_gain'] * modelled[..., None], differences[..., None]], axis=-1)
+        middle = len(motions) // 2
+        by_acceleration = self._by_acceleration(motions[middle], bases[middle:middle + 1], root)
         noise = self._noise_gain / (self._noises * _FOURTH_VARIANCE) * self._noise
-        return LegSamples(means[..., :TEN], friction * self._friction, differences, noise, columns,
-                          model)
+        measured = float(np.sqrt(np.mean((differences + modelled) ** 2)))
+        return LegSamples(columns, change, noise, by_acceleration, measured)
 
-    def _by_acceleration(self, motion: Array, base: Array) -> tuple[Array, Array]:
-        """Return the derivatives of columns and model by the accelerations, in one motion."""
+    def _by_tilt(self, motions: Array, bases: Array) -> Array:
+        """Return the forces (N, 6, 2) by turns of gravity about two base axes [N/rad]."""
+        p = self._platform.parameters
+        gravity = np.where(np.isnan(bases[:, GRAVITY]), p['gravity'], bases[:, GRAVITY])
+        across = np.argsort(np.abs(gravity.mean(axis=0)))[:2]
+        theta = linear_parameters(p)
+        by_tilt: Array = np.stack([self._platform.regressors_at_rest(
+            motions, np.cross(axis, gravity)) @ theta for axis in np.eye(3)[across]], axis=-1)
+        return by_tilt
+
+    def _by_acceleration(self, motion: Array, base: Array, root: Array) -> Array:
+        """Return the derivative (6, 6, n + 1) of the columns by accelerations, in one motion."""
         motions = np.tile(motion, (7, 1))
         motions[1:, ACCELERATION] += np.eye(6)
-        columns = self._platform.regressors(motions, base)[..., PLATFORM] @ self._about
         model = self._platform.solve(motions, None, base)[:, FORCES]
-        return columns[1:] - columns[0], model[1:] - model[0]
+        many = root.shape[1]
+        columns = np.zeros((7, 6, many + 6 + 3 + 1))
+        columns[..., :many] = self._platform.regressors(motions, base) @ root
+        columns[..., -1] = -model
+        by_acceleration: Array = columns[1:] - columns[0]
+        return by_acceleration
 
 
 def _outcome(payload: Payload) -> PayloadOutcome:
