@@ -82,11 +82,17 @@ class Fit(NamedTuple):
     delay_deviations: Array  # (B,) of the prior [s]
     weights: Sequence[Weights]  # of each extract
 
+    @property
+    def deviations(self) -> Array:
+        """Return the standard deviations (k,) of the values."""
+        deviations: Array = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return deviations
+
     def ratios(self, unknowns: Unknowns) -> Array:
         """Return the deviations (k,) of the unknowns after the data, by those before."""
         before = unknowns.deviations
-        ratios: Array = np.divide(np.sqrt(np.diag(self.covariance)), before,
-                                  out=np.ones(len(before)), where=before > 0.0)
+        ratios: Array = np.divide(
+            self.deviations, before, out=np.ones(len(before)), where=before > 0.0)
         return ratios
 
     def parts(self, unknowns: Unknowns) -> dict[str, Array]:
@@ -211,7 +217,7 @@ class _Fitting:
         assert found is not None
         count = len(unknowns.start)
         covariance = unknowns.root @ found.covariance[:count, :count] @ unknowns.root.T
-        errors = self._deviations * np.sqrt(np.diag(found.covariance)[count:])
+        errors = self._deviations * np.sqrt(np.maximum(np.diag(found.covariance)[count:], 0.0))
         bounded, at_bound = consistent(unknowns, self._values, covariance)
         return Fit(bounded, covariance, self._delays,
                    np.where(errors < 0.5 * self._deviations, errors, np.nan), at_bound, found,
@@ -296,6 +302,9 @@ def consistent(unknowns: Unknowns, values: Array, covariance: Array,
         body = _body(unknowns, found, covariance[:PLATFORM, :PLATFORM])
         platform = np.arange(len(values)) < PLATFORM
         found = np.where(beyond, 0.0, _moved(found, covariance, platform, body))
+        # What follows the platform must not become negative by that.
+        beyond[unknowns.not_negative()] |= found[unknowns.not_negative()] < 0.0
+        found = np.where(beyond & ~platform, 0.0, found)
         beyond |= platform
     return found, tuple(name for name, is_beyond in zip(unknowns.names, beyond, strict=True)
                         if is_beyond)
@@ -315,7 +324,8 @@ def _moved(values: Array, covariance: Array, which: Flags, given: Array) -> Arra
 
 def _body(unknowns: Unknowns, values: Array, covariance: Array) -> Array:
     """Return the nearest physical platform (10,), in the metric of the covariance."""
-    scales = np.sqrt(np.diag(covariance)) + 1e-12 * np.abs(values[:PLATFORM]).max()
+    rounding = 1e-12 * float(np.abs(values[:PLATFORM]).max())
+    scales = np.sqrt(np.maximum(np.diag(covariance), 0.0)) + rounding
     metric = np.linalg.pinv(covariance / np.outer(scales, scales), hermitian=True)
     units = unknowns.inertial_units
 

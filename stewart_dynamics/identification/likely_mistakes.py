@@ -97,7 +97,9 @@ class Comparison:
         follow = weight * inverse @ across
         along += float(follow @ (self._columns.T @ self._gram @ self._of_file))
         total -= float(follow @ across)
-        return [scale, *([total / along] if along else [])]
+        # the file's legs may be wrong, but not by such a ratio
+        joint = [total / along] if along else []
+        return [scale, *(each for each in joint if 0.1 < each / scale < 10.0)]
 
     def misfit(self, scale: float = 1.0, delay: float = 0.0) -> float:
         """Return the squared misfit of data and prior with efforts divided by a scale."""

@@ -106,7 +106,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
 
 def _rounded(found: Identified) -> Parameters:
     """Return the parameters rounded to the digits that the intervals justify."""
-    errors = np.sqrt(np.diag(found.fit.covariance))
+    errors = found.fit.deviations
     try:
         return found.unknowns.parameters(justified(found.written, errors))
     except StewartError:  # a body at its bound may not be rounded
@@ -178,9 +178,8 @@ def _identifiability(found: Identified) -> tuple[Identifiability, list[str]]:
 
 def _errors(found: Identified) -> Array:
     """Return standard errors (k,), wider where there is a lack of fit."""
-    errors: Array = np.sqrt(np.diag(found.fit.covariance))
-    return errors if found.lack_of_fit is None else (
-        errors + found.lack_of_fit.shifts / TWO_SIDED)
+    return found.fit.deviations if found.lack_of_fit is None else (
+        found.fit.deviations + found.lack_of_fit.shifts / TWO_SIDED)
 
 
 def _residuals(joints: Sequence[str], residuals: Residuals) -> dict[str, Any]:
