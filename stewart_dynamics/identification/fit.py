@@ -178,10 +178,10 @@ def best_for_file(extracts: Extracts, parameters: Parameters, kinds: Sequence[st
 
     Values that the data hardly change, by the ``Fit.ratios`` (k,), keep the file's value.
     """
-    unknowns = Unknowns(parameters, kinds, others_known=True)
-    found = fit(extracts, unknowns, None, cutoffs, chosen, passes=1)
-    values: Array = np.where(ratios > _HARDLY, unknowns.start, found.values)
-    return values
+    kept = ratios > _HARDLY
+    kept |= ~np.isin(np.arange(len(kept)), Unknowns(parameters, kinds).asked)
+    unknowns = Unknowns(parameters, kinds, kept)
+    return _Fitting(extracts, unknowns, None, cutoffs, chosen, white=True).result(_PASSES).values
 
 
 def fit(extracts: Extracts, unknowns: Unknowns, noisy: Noisy | None, cutoffs: Array,
@@ -198,7 +198,8 @@ def fit(extracts: Extracts, unknowns: Unknowns, noisy: Noisy | None, cutoffs: Ar
 
 class _Fitting:
     def __init__(self, extracts: Extracts, unknowns: Unknowns, noisy: Noisy | None,
-                 cutoffs: Array, chosen: Callable[[Extract], Flags]) -> None:
+                 cutoffs: Array, chosen: Callable[[Extract], Flags], white: bool = False) -> None:
+        self._white = white  # whether the residuals of each leg count as white noise
         self._extracts, self._unknowns, self._noisy = extracts, unknowns, noisy
         self._chosen, self._cutoffs = chosen, cutoffs
         self._values: Array = unknowns.start.copy()
@@ -238,7 +239,7 @@ class _Fitting:
             bag, count = extract.bag, len(extract.times)
             left = spectra @ residual_of(self._unknowns, self._values, self._delays[bag])
             least = least_deviation(extract)
-            if not before:
+            if self._white or not before:
                 size = np.sqrt(np.mean(left ** 2, axis=(0, 1))) + least
                 each = Weights(np.broadcast_to(size, (len(left), 6)), np.eye(6))
             else:

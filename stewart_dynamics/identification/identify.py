@@ -400,8 +400,9 @@ class Identification:
                                 found.ratios(unknowns))
         residuals = Residuals.of(extracts, unknowns, written, found.delays, _used)
         lack = lack_of_fit(self.platform, extracts, noisy, unknowns, found)
+        fitted = Residuals.of(extracts, unknowns, found.values, found.delays, _used)
         left = float(np.sqrt(
-            np.mean(residuals.after ** 2) / (np.mean(residuals.measured ** 2) + 1e-300)))
+            np.mean(fitted.after ** 2) / (np.mean(fitted.measured ** 2) + 1e-300)))
         validation = self._validation(found) if options.hold_out else None
         if not likely:
             assert self._first is not None

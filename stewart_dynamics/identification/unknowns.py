@@ -36,7 +36,7 @@ from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
@@ -133,13 +133,13 @@ class Unknowns:
     names, units: name and unit of each.
     start (k,): their means.
     root (k, k): they are ``start + root z`` with the k numbers z independent, of deviation 1.
-    asked: indices of those that are identified; the others are uncertain as well, unless
-        ``others_known``.
+    asked: indices of those that are identified; the others are uncertain as well, unless they
+        are ``known`` (k,).
     origins (k,): for each z the index of its origin in ORIGINS.
     """
 
     def __init__(self, parameters: Parameters, kinds: Sequence[str] = DEFAULT,
-                 others_known: bool = False) -> None:
+                 known: Flags | None = None) -> None:
         self._parameters = p = parameters
         self._theta = linear_parameters(p)
         self.tilt = Tilt(p['gravity'])
@@ -163,9 +163,8 @@ class Unknowns:
         more = [p['uncertainty.tilt'], p['uncertainty.tilt'], p['uncertainty.effort_gain']]
         self.root: Array = np.diag(np.concatenate([np.zeros(LINEAR_UNKNOWNS), more]))
         self.root[:LINEAR_UNKNOWNS, :LINEAR_UNKNOWNS] = level[np.ix_(_LINEAR, _LINEAR)]
-        if others_known:
-            others = ~np.isin(np.arange(len(self.start)), self.asked)
-            self.root[others] = self.root[:, others] = 0.0
+        if known is not None:
+            self.root[known] = self.root[:, known] = 0.0
         self.origins: Integers = np.concatenate([_ORIGIN_OF[_LINEAR], [7, 7, 8]])
 
     @property
