@@ -46,6 +46,12 @@ class Weights(NamedTuple):
     deviations: Array  # (F, 6) of residuals at each frequency [N]
     mixing: Array  # (6, 6) of the legs
 
+    @classmethod
+    def of_white(cls, residuals: Array, least: float) -> Weights:
+        """Return the weights of white noise of each leg, as large as residuals (F, 2, 6)."""
+        sizes = np.sqrt(np.mean(residuals ** 2, axis=(0, 1))) + least
+        return cls(np.broadcast_to(sizes, (len(residuals), 6)), np.eye(6))
+
     def whitened(self, spectra: Array) -> Array:
         """Return the spectra (F, 2, 6, q) of columns, whitened."""
         white: Array = self.mixing @ (spectra / self.deviations[:, None, :, None])

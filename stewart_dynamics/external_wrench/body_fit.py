@@ -102,9 +102,7 @@ class BodyFit:
         self._given, self._samples = given, samples
         self._spectra = spectra_of(samples.columns, 0.5)
         self._least = _LEAST_NOISE * float(np.abs(samples.columns).max())
-        size = np.sqrt(np.mean(self._spectra[..., -1] ** 2, axis=(0, 1))) + self._least
-        self._weights = Weights(
-            np.broadcast_to(size, (len(self._spectra), 6)), np.eye(6))
+        self._weights = Weights.of_white(self._spectra[..., -1], self._least)
         self._posterior: Posterior | None = None
 
     def improve(self) -> Iterator[None]:

@@ -240,8 +240,7 @@ class _Fitting:
             left = spectra @ residual_of(self._unknowns, self._values, self._delays[bag])
             least = least_deviation(extract)
             if self._white or not before:
-                size = np.sqrt(np.mean(left ** 2, axis=(0, 1))) + least
-                each = Weights(np.broadcast_to(size, (len(left), 6)), np.eye(6))
+                each = Weights.of_white(left, least)
             else:
                 assert self._posterior is not None
                 e = before[number].whitened(spectra) @ self._directions(bag)
@@ -303,7 +302,7 @@ def consistent(unknowns: Unknowns, values: Array, covariance: Array,
         body = _body(unknowns, found, covariance[:PLATFORM, :PLATFORM])
         platform = np.arange(len(values)) < PLATFORM
         found = np.where(beyond, 0.0, _moved(found, covariance, platform, body))
-        # What follows the platform must not become negative by that.
+        # Numbers that follow the platform must not become negative by that.
         beyond[unknowns.not_negative()] |= found[unknowns.not_negative()] < 0.0
         found = np.where(beyond & ~platform, 0.0, found)
         beyond |= platform

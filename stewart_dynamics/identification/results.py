@@ -41,7 +41,7 @@ from stewart_dynamics.identification.identify import (
     Identification, Identified, Residuals)
 from stewart_dynamics.identification.lack_of_fit import PIECE, WHOLE
 from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics, regressor
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.least_squares import (
     Identifiability, identifiability, TWO_SIDED)
@@ -70,7 +70,7 @@ _MOST = 12_000
 
 # Functions that every identification needs as machine code.
 FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,
-             friction.friction, *recording.FUNCTIONS)
+             *recording.FUNCTIONS)
 
 
 def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: IdentificationOptions,
