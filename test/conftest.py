@@ -25,6 +25,7 @@ import os
 from pathlib import Path
 import re
 import shutil
+import signal
 import subprocess
 from subprocess import DEVNULL
 import sys
@@ -42,6 +43,11 @@ if TYPE_CHECKING:
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 COMPILE_ALL = 'from stewart_dynamics.compile_all import compile_all; compile_all()'
+
+# Whoever runs the tests may ignore signals (nohup; a shell's background job), and processes
+# inherit it. The tests send them, and ask what a program does that heeds them.
+HANDLERS = {signal.SIGHUP: signal.SIG_DFL, signal.SIGINT: signal.default_int_handler,
+            signal.SIGTERM: signal.SIG_DFL}
 
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 FLAGS = ('--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
@@ -116,6 +122,24 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         places[path] = quick, numbers[quick, alone], alone
         numbers[quick, alone] += 1
     items.sort(key=lambda item: places[item.path])
+
+
+@pytest.fixture(scope='session', autouse=True)
+def heeded_signals() -> None:
+    """Heed signals before the first process is started."""
+    heed_signals()
+
+
+@pytest.fixture(autouse=True)
+def signals() -> None:
+    """Heed them again, whatever a program has done with them that ran in this process before."""
+    heed_signals()
+
+
+def heed_signals() -> None:
+    for number, handler in HANDLERS.items():
+        if signal.getsignal(number) != handler:
+            signal.signal(number, handler)
 
 
 @pytest.fixture(scope='module')
