@@ -54,7 +54,7 @@ extras_require = {
         'numpydoc>=1.6',
         'sphinx>=7.3.7',  # for this docutils; 7.3.0 warns of any type of a setting
     ],
-    'mujoco': ['mujoco>=3.2.3'],  # <connect> has site1 and site2
+    'mujoco': ['mujoco>=3.14'],  # before, inertias have errors of 1e-5
     'parquet': ['pyarrow>=14'],
     'plot': ['matplotlib>=3.7'],  # a legend outside of the axes
     'ros': [
