@@ -139,9 +139,11 @@ class BodyFit:
         many = len(of.columns)
         power = 1.0 - np.cos(2.0 * np.pi / many * np.arange(len(self._spectra)))
         power *= 2.0 * np.count_nonzero(np.any(of.columns[..., -1], axis=1)) / many
-        spectra = np.sqrt(power)[:, None, None, None] * independent
-        return sum((gram_of(self._weights.whitened(spectra[:, n:n + 1])) for n in range(6)),
-                   np.zeros(2 * (of.columns.shape[-1],)))
+        white = self._weights.mixing / self._weights.deviations[:, None]
+        of_legs = np.einsum('f,fai,faj->ij', power, white, white)
+        noise: Array = np.einsum('lip,ij,ljq->pq', independent, of_legs, independent,
+                                 optimize=True)
+        return noise
 
     def result(self) -> FittedBody:
         """Return the body."""
