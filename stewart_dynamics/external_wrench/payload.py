@@ -36,7 +36,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, SECOND
 from stewart_dynamics.compilation.machine_code import COMPILED
-from stewart_dynamics.estimation.noisy_rates import smoothed_law
+from stewart_dynamics.estimation.noisy_rates import rates_in_noise, smoothed_law
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.external_wrench.body_fit import (
     about, Body, BodyFit, FittedBody, LegSamples, ROUNDS, TEN)
@@ -59,6 +59,8 @@ _COPIED = 1024
 # Half the width of a window: minimum [s], and minimum in measurements.
 _HALF_WIDTH = 0.05
 _MEASUREMENTS = 5
+# Time over which rates are lines, as far as their noise hides [s].
+_BLOCK = 0.2
 # With fewer windows the correlation of their noise is too uncertain.
 LEAST_WINDOWS = 40
 # A window counts if measurements cover this part of it.
@@ -123,10 +125,14 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     rows = rows[max(0, history.first - begin):]  # those before were overwritten meanwhile
     work = _Windows(platform, rows)
     yield None
-    for add in (work.add, work.add_friction):
-        for some in _pieces(len(rows), PIECE):
-            add(some)
-            yield None
+    for some in _pieces(len(rows), PIECE):
+        work.add(some)
+        yield None
+    work.end()
+    yield None
+    for some in _pieces(len(work.used), work.block):
+        work.add_friction(some)
+        yield None
     seconds = float(work.seconds[-1])
     samples = work.samples()
     if samples is None:
@@ -204,20 +210,8 @@ class _Windows:
         self._sums = np.zeros((many, 6, LINEAR + 2))
         self._motions, self._bases = np.zeros((many, MOTION)), np.full((many, BASE), np.nan)
         self._covered = np.zeros(many)
-        self._used = np.zeros(len(rows), dtype=bool)
-        self._rates = np.zeros((len(rows), 6))  # of the drives
-
-    @cached_property
-    @_QUIET
-    def _noise(self) -> Array | None:
-        """The covariance (6, 6) of the noise of twists; None for too few measurements."""
-        sound = self._sound
-        if len(sound) < 4:
-            return None
-        rough = np.diff(self._rows[:, TURNED], n=4, axis=0)[
-            sound[:-3] & sound[1:-2] & sound[2:-1] & sound[3:]]
-        noise: Array = rough.T @ rough / (_FOURTH_VARIANCE * max(len(rough), 1))
-        return noise if len(rough) else None
+        self._added: list[tuple[Integers, Array]] = []  # measurements and rates of the drives
+        self.block = max(_MEASUREMENTS, round(_BLOCK / interval) if interval > 0.0 else 0)
 
     @_QUIET
     def add(self, some: slice) -> None:
@@ -250,7 +244,7 @@ class _Windows:
         used = at[right]
         if not len(used):
             return
-        self._used[used], self._rates[at] = True, rates
+        self._added.append((used, rates[right]))
         windows, share = self._share(used)
         self._sums[windows] += np.tensordot(share, values[right], 1)
         self._covered[windows] += share.sum(axis=1)
@@ -264,24 +258,29 @@ class _Windows:
         return saturated
 
     @_QUIET
+    def end(self) -> None:
+        """End the adding; friction follows."""
+        self.used = np.concatenate([np.zeros(0, int), *(used for used, _ in self._added)])
+        self._rates = np.concatenate([np.zeros((0, 6)), *(rates for _, rates in self._added)])
+        self._noise = self._noise_of(self._rows[self.used, TURNED])
+        self._rate_deviations = np.sqrt(np.diag(self._noise_of(self._rates)))
+
+    def _noise_of(self, values: Array) -> Array:
+        """Return the covariance of white noise in values (N, 6) of the used measurements."""
+        rough = np.diff(values, n=4, axis=0)[self.used[4:] - self.used[:-4] == 4]
+        noise: Array = rough.T @ rough / (_FOURTH_VARIANCE * max(len(rough), 1))
+        return noise
+
+    @_QUIET
     def add_friction(self, some: slice) -> None:
-        """Add the Coulomb friction of measurements that were added."""
-        used = some.start + np.flatnonzero(self._used[some])
-        if not len(used):
-            return
-        law = smoothed_law(self._rates[used], self._coulomb_velocity, self._rate_deviations)
-        windows, share = self._share(used)
+        """Add the Coulomb friction of used measurements."""
+        rates, deviations = rates_in_noise(self._rates[some], self._rate_deviations)
+        law = smoothed_law(rates, self._coulomb_velocity, deviations)
+        windows, share = self._share(self.used[some])
         means = share @ law
         self._sums[windows, _LEGS, COULOMB_FRICTION.start + _LEGS] += means
         self._sums[windows, :, LINEAR] -= self._coulomb * means
         self._sums[windows, :, LINEAR + 1] += self._coulomb * means
-
-    @cached_property
-    def _rate_deviations(self) -> Array:
-        """The deviation of the noise in the rates of the legs (6,), at the home pose."""
-        j_inv = self._platform.inverse_jacobian(self._platform.home_pose())
-        deviations: Array = np.sqrt(np.diag(j_inv @ self._noise @ j_inv.T))
-        return deviations
 
     def _turns(self, at: Integers) -> Integers:
         """Return the windows in the first half of which measurements are, less one."""
@@ -303,7 +302,7 @@ class _Windows:
     def samples(self) -> LegSamples | None:
         """Return the means over the windows, None where they are too few."""
         sound = self._covered > _COVERED * self.half_width
-        if np.count_nonzero(sound) < LEAST_WINDOWS or self._noise is None:
+        if np.count_nonzero(sound) < LEAST_WINDOWS:
             return None
         motions, bases = self._motions[sound], self._bases[sound]
         means = self._sums[sound] / self._covered[sound, None, None]
@@ -324,7 +323,7 @@ class _Windows:
             means[..., :LINEAR] @ root,
             np.einsum('nl,lm->nlm', standing * _STATIC * self._coulomb, np.eye(6)),
             p['uncertainty.tilt'] * self._by_tilt(motions, bases),
-            p['uncertainty.effort_gain'] * modelled[..., None], differences[..., None]], axis=-1)
+            p['uncertainty.effort_gain'] * self.scale * modelled[..., None], differences[..., None]], axis=-1)
         middle = len(motions) // 2
         by_acceleration = self._by_acceleration(motions[middle], bases[middle:middle + 1], root)
         measured = float(np.sqrt(np.mean((differences + modelled) ** 2)))
@@ -335,7 +334,7 @@ class _Windows:
         p = self._platform.parameters
         gravity = np.where(np.isnan(bases[:, GRAVITY]), p['gravity'], bases[:, GRAVITY])
         across = np.argsort(np.abs(gravity.mean(axis=0)))[:2]
-        theta = linear_parameters(p)
+        theta = self.scale * linear_parameters(p)  # as heavy as the forces
         by_tilt: Array = np.stack([self._platform.regressors_at_rest(
             motions, np.cross(axis, gravity)) @ theta for axis in np.eye(3)[across]], axis=-1)
         return by_tilt
