@@ -27,7 +27,7 @@ The work is done in pieces, because setpoints are answered in between.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from functools import cached_property
 import math
 from typing import NamedTuple
@@ -59,7 +59,7 @@ _COPIED = 1024
 # Half the width of a window: minimum [s], and minimum in measurements.
 _HALF_WIDTH = 0.05
 _MEASUREMENTS = 5
-# Time over which rates are lines, as far as their noise hides [s].
+# Time over which rates are parabolas, as far as their noise hides [s].
 _BLOCK = 0.2
 # With fewer windows the correlation of their noise is too uncertain.
 LEAST_WINDOWS = 40
@@ -115,14 +115,14 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     """
     p = platform.parameters
     begin, end = _range(history, p['payload.window'])
-    if end == begin:
-        yield PayloadOutcome('no measured legs')
-        return
     rows = np.empty((end - begin, OF_BASE.stop))
     for some in _pieces(len(rows), _COPIED):
         rows[some] = history.rows(begin + some.start, begin + some.stop)
         yield None
     rows = rows[max(0, history.first - begin):]  # those before were overwritten meanwhile
+    if not len(rows):
+        yield PayloadOutcome('no measured legs')
+        return
     work = _Windows(platform, rows)
     yield None
     for some in _pieces(len(rows), PIECE):
@@ -134,15 +134,13 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         work.add_friction(some)
         yield None
     seconds = float(work.seconds[-1])
-    samples = work.samples()
-    if samples is None:
+    if not work.found_means():
         needed = LEAST_WINDOWS * work.half_width
         more = '' if needed < p['payload.window'] else ', more than payload.window'
         yield PayloadOutcome(
             f'too short: {seconds:.1f} s of measured legs, {needed:.1f} s without gaps are needed'
             f'{more}{_excluded(work.excluded)}')
         return
-    yield None
     if not math.isfinite(work.scale):
         yield PayloadOutcome('numbers overflow')
         return
@@ -151,6 +149,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         yield PayloadOutcome(f'the measured forces are {work.scale:.3g} times those of the model: '
                              f'likely they have another {what}')
         return
+    samples = yield from work.samples()
     given = Body(p['platform.mass'], p['platform.center_of_mass'], p['platform.inertia'])
     fit = BodyFit(samples, given)
     try:
@@ -299,35 +298,48 @@ class _Windows:
         return slice(low, low + len(share)), share
 
     @_QUIET
-    def samples(self) -> LegSamples | None:
-        """Return the means over the windows, None where they are too few."""
-        sound = self._covered > _COVERED * self.half_width
-        if np.count_nonzero(sound) < LEAST_WINDOWS:
-            return None
-        motions, bases = self._motions[sound], self._bases[sound]
-        means = self._sums[sound] / self._covered[sound, None, None]
+    def found_means(self) -> bool:
+        """Return whether there are enough windows, of which the means and the scale are found."""
+        self._are_full = self._covered > _COVERED * self.half_width
+        self._means = self._sums[self._are_full] / self._covered[self._are_full, None, None]
+        modelled = self._means[..., LINEAR + 1]
+        self.scale = 1.0 + float(
+            np.sum(self._means[..., LINEAR] * modelled) / np.sum(modelled ** 2))
+        return len(self._means) >= LEAST_WINDOWS
+
+    def samples(self) -> Generator[None, None, LegSamples]:
+        """Return the means over the windows; yield after each piece."""
+        full, means = self._are_full, self._means
+        motions, bases = self._motions[full], self._bases[full]
         differences, modelled = means[..., LINEAR], means[..., LINEAR + 1]
-        self.scale = 1.0 + float(np.sum(differences * modelled) / np.sum(modelled ** 2))
         p = self._platform.parameters
         of_friction = np.zeros(LINEAR)
         for name, part in (('viscous', VISCOUS_FRICTION), ('coulomb', COULOMB_FRICTION)):
             of_friction[part] = p[f'actuator.{name}_friction']
         root = root_of_covariance(p, of_friction)
+        yield
         root[FIRST_MOMENT] *= p['platform.mass']
         change = root[PLATFORM, PLATFORM].copy()
         root[PLATFORM] = about(p['platform.center_of_mass']) @ root[PLATFORM]
         root = root[:, np.any(root != 0.0, axis=0) | (np.arange(LINEAR) < TEN)]
+        by_tilt = self._by_tilt(motions, bases)
+        yield
         standing = np.abs(means[:, _LEGS, VISCOUS_FRICTION.start + _LEGS]) < self._coulomb_velocity
-        columns = np.zeros((len(sound), 6, root.shape[1] + 6 + 3 + 1))
-        columns[sound] = np.concatenate([
-            means[..., :LINEAR] @ root,
-            np.einsum('nl,lm->nlm', standing * _STATIC * self._coulomb, np.eye(6)),
-            p['uncertainty.tilt'] * self._by_tilt(motions, bases),
-            p['uncertainty.effort_gain'] * self.scale * modelled[..., None], differences[..., None]], axis=-1)
+        weight = self.scale * modelled
+        parts = (means[..., :LINEAR] @ root,
+                 (standing * _STATIC * self._coulomb)[..., None] * np.eye(6),
+                 p['uncertainty.tilt'] * by_tilt,
+                 p['uncertainty.effort_gain'] * weight[..., None], differences[..., None])
+        columns = np.zeros((len(full), 6, sum(part.shape[-1] for part in parts)))
+        columns[full] = np.concatenate(parts, axis=-1)
+        yield
         middle = len(motions) // 2
-        by_acceleration = self._by_acceleration(motions[middle], bases[middle:middle + 1], root)
+        by_acceleration = np.zeros((6, *columns.shape[1:]))
+        by_acceleration[..., :root.shape[1]], by_acceleration[..., -1] = self._by_acceleration(
+            motions[middle], bases[middle:middle + 1], root)
         measured = float(np.sqrt(np.mean((differences + modelled) ** 2)))
-        return LegSamples(columns, change, self._noise_gain * self._noise, by_acceleration, measured)
+        return LegSamples(
+            columns, change, self._noise_gain * self._noise, by_acceleration, measured)
 
     def _by_tilt(self, motions: Array, bases: Array) -> Array:
         """Return the forces (N, 6, 2) by turns of gravity about two base axes [N/rad]."""
@@ -339,17 +351,13 @@ class _Windows:
             motions, np.cross(axis, gravity)) @ theta for axis in np.eye(3)[across]], axis=-1)
         return by_tilt
 
-    def _by_acceleration(self, motion: Array, base: Array, root: Array) -> Array:
-        """Return the derivative (6, 6, n + 1) of the columns by accelerations, in one motion."""
+    def _by_acceleration(self, motion: Array, base: Array, root: Array) -> tuple[Array, Array]:
+        """Return the derivatives of columns (6, 6, n) and differences by accelerations."""
         motions = np.tile(motion, (7, 1))
         motions[1:, ACCELERATION] += np.eye(6)
+        columns = self._platform.regressors(motions, base) @ root
         model = self._platform.solve(motions, None, base)[:, FORCES]
-        many = root.shape[1]
-        columns = np.zeros((7, 6, many + 6 + 3 + 1))
-        columns[..., :many] = self._platform.regressors(motions, base) @ root
-        columns[..., -1] = -model
-        by_acceleration: Array = columns[1:] - columns[0]
-        return by_acceleration
+        return columns[1:] - columns[0], model[0] - model[1:]
 
 
 def _outcome(payload: Payload) -> PayloadOutcome:
