@@ -28,7 +28,6 @@ The work is done in pieces, because setpoints are answered in between.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from functools import cached_property
 import math
 from typing import NamedTuple
 
@@ -128,8 +127,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     for some in _pieces(len(rows), PIECE):
         work.add(some)
         yield None
-    work.end()
-    yield None
+    yield from work.end()
     for some in _pieces(len(work.used), work.block):
         work.add_friction(some)
         yield None
@@ -153,6 +151,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     given = Body(p['platform.mass'], p['platform.center_of_mass'], p['platform.inertia'])
     fit = BodyFit(samples, given)
     try:
+        yield from fit.prepare()
         for _ in range(ROUNDS):
             yield from fit.improve()
         fitted = fit.result()
@@ -256,14 +255,17 @@ class _Windows:
         saturated: Flags = np.any((parts > _SATURATED[0]) & (parts < _SATURATED[1]), axis=1)
         return saturated
 
-    @_QUIET
-    def end(self) -> None:
-        """End the adding; friction follows."""
+    def end(self) -> Iterator[None]:
+        """End the adding, yield after each piece of the work; friction follows."""
         self.used = np.concatenate([np.zeros(0, int), *(used for used, _ in self._added)])
         self._rates = np.concatenate([np.zeros((0, 6)), *(rates for _, rates in self._added)])
+        yield
         self._noise = self._noise_of(self._rows[self.used, TURNED])
+        yield
         self._rate_deviations = np.sqrt(np.diag(self._noise_of(self._rates)))
+        yield
 
+    @_QUIET
     def _noise_of(self, values: Array) -> Array:
         """Return the covariance of white noise in values (N, 6) of the used measurements."""
         rough = np.diff(values, n=4, axis=0)[self.used[4:] - self.used[:-4] == 4]
