@@ -59,7 +59,7 @@ _COPIED = 1024
 _HALF_WIDTH = 0.05
 _MEASUREMENTS = 5
 # Time over which rates are parabolas, as far as their noise hides [s].
-_BLOCK = 0.2
+_BLOCK = 0.4
 # With fewer windows the correlation of their noise is too uncertain.
 LEAST_WINDOWS = 40
 # A window counts if measurements cover this part of it.
