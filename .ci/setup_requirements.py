@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from distutils.core import run_setup  # from Python 3.12 on it is in setuptools
 import json
 import subprocess
@@ -50,7 +51,8 @@ def main() -> None:
     extras = [requirement for name, listed in package.extras_require.items()
               if not name.startswith('ros') for requirement in listed]
     required = dict.fromkeys([*package.install_requires, *extras])
-    print(*sorted(map(chosen, required)), sep='\n')
+    with ThreadPoolExecutor(16) as pool:  # waits for the package index
+        print(*sorted(pool.map(chosen, required)), sep='\n')
 
 
 if __name__ == '__main__':
