@@ -406,7 +406,7 @@ def uneven_base() -> Array:
     """Return base joints off their plane, which stays level: the sides differ in their lengths."""
     plane = np.column_stack([np.ones(6), BASE[:, :2]])
     heights = np.array([0.4, -0.2, 0.3, 0.0, -0.4, 0.1])
-    heights -= plane @ np.linalg.lstsq(plane, heights)[0]
+    heights -= plane @ np.linalg.lstsq(plane, heights, rcond=None)[0]
     return np.column_stack([BASE[:, :2], heights])
 
 

@@ -25,6 +25,7 @@ import numpy as np
 import pytest
 from recorded import fourier
 from referees import Array, rng, ROOT
+from scipy.integrate import trapezoid
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
@@ -83,7 +84,7 @@ def test_loads_are_those_of_the_motors_of_the_library() -> None:
     for leg, load in enumerate(found['motors']['legs'].values()):
         torque, speed = motors.torques[:, leg], motors.speeds[:, leg]
         peak = int(np.abs(motors.breakaway_torques[:, leg]).argmax())
-        rms = np.sqrt(np.trapezoid(torque ** 2, TIMES) / TIMES[-1])
+        rms = np.sqrt(trapezoid(torque ** 2, TIMES) / TIMES[-1])
         assert load == pytest.approx({
             'torque_peak_n_m': motors.breakaway_torques[peak, leg],
             'torque_peak_at_s': TIMES[peak], 'torque_rms_n_m': rms,
@@ -92,20 +93,20 @@ def test_loads_are_those_of_the_motors_of_the_library() -> None:
             'torque_continuous_margin_n_m': 0.9 - rms,
             'speed_peak_rad_s': speed[np.abs(speed).argmax()],
             'speed_peak_at_s': TIMES[np.abs(speed).argmax()],
-            'speed_mean_rad_s': np.trapezoid(np.abs(speed), TIMES) / TIMES[-1],
+            'speed_mean_rad_s': trapezoid(np.abs(speed), TIMES) / TIMES[-1],
             'speed_margin_rad_s': 450.0 - np.abs(speed).max(),
             'current_peak_a': motors.currents[np.abs(torque).argmax(), leg],
             'current_rms_a': rms / 0.35,
             'temperature_rise_max_k': rises[:, leg].max(),
             'temperature_rise_max_at_s': TIMES[rises[:, leg].argmax()],
             'temperature_rise_steady_k':
-                0.9 * np.trapezoid(motors.copper_heat[:, leg], TIMES) / TIMES[-1],
+                0.9 * trapezoid(motors.copper_heat[:, leg], TIMES) / TIMES[-1],
             'temperature_rise_margin_k': 1.0 - rises[:, leg].max()}, rel=1e-9)
-    drawn, back = (np.trapezoid(np.maximum(sign * power, 0.0), TIMES) for sign in (1.0, -1.0))
+    drawn, back = (trapezoid(np.maximum(sign * power, 0.0), TIMES) for sign in (1.0, -1.0))
     assert found['motors']['bus'] == pytest.approx({
         'power_peak_w': power.max(), 'power_peak_at_s': TIMES[power.argmax()],
         'regenerated_peak_w': -power.min(), 'regenerated_peak_at_s': TIMES[power.argmin()],
-        'power_mean_w': np.trapezoid(power, TIMES) / TIMES[-1], 'energy_drawn_j': drawn,
+        'power_mean_w': trapezoid(power, TIMES) / TIMES[-1], 'energy_drawn_j': drawn,
         'energy_regenerated_j': back, 'cycles': 1, 'energy_per_cycle_j': drawn - back}, rel=1e-9)
     assert back > 0.0
     documented = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')

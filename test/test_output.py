@@ -33,10 +33,10 @@ from numpy.typing import NDArray
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
-from scipy.spatial.transform import Rotation
 from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.replay.output import OutputBag, RecordedModel
 from stewart_dynamics.replay.summary import Answered
@@ -57,7 +57,7 @@ def turning(number: int, first: int = 0) -> Outputs:
     n = np.arange(first, first + number)
     motions = np.zeros((number, 24))
     motions[:, 2] = 1.1
-    motions[:, 3:12] = Rotation.from_euler('z', 0.01 * n[:, None]).as_matrix().reshape(-1, 9)
+    motions[:, 3:12] = from_euler(0.01 * n[:, None] * [0.0, 0.0, 1.0]).reshape(-1, 9)
     motions[:, 17] = 1.0
     return STEP.many(Batch(1_000_000 * (n + 1), motions, np.zeros((number, 6)),
                            np.zeros(number, dtype=bool), times_of(number, first)), None)
@@ -189,7 +189,7 @@ def test_the_index_finds_every_message(turned: tuple[Path, Outputs]) -> None:
             with file_of(bag).open('rb') as file:
                 found = [(channel.topic, message.log_time, message.data)
                          for _, channel, message in make_reader(file, validate_crcs=True)
-                         .iter_messages(topics, starting_at=begin, ending_before=until)]
+                         .iter_messages(topics, begin, until)]
             assert found == [each for each in every if begin <= each[1] < until
                              and (topics is None or each[0] in topics)]
 

@@ -122,17 +122,19 @@ def test_numbers_of_joints_that_are_not_asked_for_may_be_anything() -> None:
 
 def test_padding_bytes_are_ignored() -> None:
     names = [f'{joint}x' for joint in JOINTS]
-    good = joint_state(7, names, range(6))
-    # rclpy leaves in gaps what the memory held: every byte that no field takes may be anything
+    good = joint_state(7, names, range(6), 'base')
+    # rclpy leaves in gaps what the memory held: every byte that no field takes may be anything.
+    # The zero at the end of a text is part of it, which not every version of rosbags looks at.
+    ends = {at for at in range(len(good)) if good[:at].endswith((b'base', b'x'))}
     efforts = Efforts(names)
     efforts.read(*joined([good]))
     gaps = 0
-    for at in range(2, len(good)):
+    for at in sorted({*range(2, len(good))} - ends):
         damaged = good[:at] + bytes([good[at] ^ 0xff]) + good[at + 1:]
         try:
             read = STORE.deserialize_cdr(damaged, 'sensor_msgs/msg/JointState')
             same = (list(read.name) == names and list(read.effort) == list(range(6))
-                    and read.header.stamp.nanosec == 7 and read.header.frame_id == ''
+                    and read.header.stamp.nanosec == 7 and read.header.frame_id == 'base'
                     and not len(read.position) and not len(read.velocity))
         except Exception:  # rosbags lets bare errors through
             continue
