@@ -20,6 +20,7 @@ from collections.abc import Sequence
 import re
 from typing import Any, NamedTuple
 
+from estimate_cases import drawn, payload as judged_payload
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -27,6 +28,7 @@ from referees import PinocchioReferee, random_base_motion, relative, rng, ROOT
 
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.external_wrench.body_fit import about
 from stewart_dynamics.external_wrench.estimate import Estimate
 from stewart_dynamics.external_wrench.measured_legs import HIGHEST_RATE, LegHistory
@@ -171,9 +173,10 @@ def test_about_moves_a_body() -> None:
 
 def test_the_intervals_hold() -> None:
     """The errors of all ten are as large as the intervals say."""
-    quiet = Noise(rate=3e-4, force=2.0)
+    quiet, given = Noise(rate=3e-4, force=2.0), HEXAPOD.replaced({
+        f'uncertainty.{name}': 1e-6 for name in ('effort_gain', 'tilt')})
     parts = np.array([errors(payload_of(recorded(
-        excited, rate=200.0, noise=quiet, seed=seed))) for seed in range(12)])
+        excited, rate=200.0, noise=quiet, seed=seed), given)) for seed in range(12)])
     spread = np.sqrt(np.mean(parts ** 2, axis=0)) * 1.96
     assert np.all(spread > 0.5) and np.all(spread < 1.6), spread
     assert np.mean(np.abs(parts) < 1.0) > 0.9
@@ -362,3 +365,33 @@ def test_measurements_overwritten_during_the_work_are_left_out() -> None:
     *_, outcome = work
     assert outcome is not None and outcome.payload is not None
     assert abs(outcome.payload.fitted.body.mass - TRUE[0]) < 0.2
+
+
+def test_the_payload_needs_no_home_pose() -> None:
+    """Without limits of length and zero length: poses are those of the measurements."""
+    given = HEXAPOD.replaced({
+        'limits.length_min': None, 'limits.length_max': None,
+        'geometry.zero_length': np.zeros(6)})
+    with pytest.raises(ParameterError):
+        StewartPlatform(given).home_pose()
+    payload = payload_of(recorded(excited), given)
+    assert abs(errors(payload)[0]) < 2.0
+
+
+def test_the_gain_of_efforts_counts_for_the_weight_that_is_there() -> None:
+    """A mass of 300 kg is known as well, by its own size, as one of 172 kg."""
+    unsure = HEXAPOD.replaced({'uncertainty.effort_gain': 0.02})
+    parts = []
+    for mass in (TRUE[0], 300.0):
+        true = LOADED.replaced({'platform.mass': mass})
+        fitted = payload_of(recorded(excited, true=true), unsure).fitted
+        parts.append(fitted.half_widths[0] / mass)
+    assert parts[1] > 0.85 * parts[0]
+
+
+def test_right_forces_of_creeping_legs_are_explained() -> None:
+    """Rates near their noise: friction is that of the rates that neighbours support."""
+    for seed in (9, 10, 15):
+        found = judged_payload(drawn(seed), 'creeping', seed)
+        assert found.judged, found.notices
+        assert found.of('platform.mass').miss < 1.5

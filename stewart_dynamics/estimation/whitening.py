@@ -105,8 +105,9 @@ def covariance_of_scores(columns: Array, residuals: Array, free: Array, samples:
     """
     width = max(_FEWEST, round(_SMOOTHING * samples))
     scaled = residuals / np.sqrt(np.maximum(free, _LEAST_FREE))
-    of_legs = 0.5 * smoothed(np.einsum('fpi,fpj->fij', scaled, scaled), width)
-    scores: Array = np.einsum('fpin,fij,fpjm->nm', columns, of_legs, columns, optimize=True)
+    of_legs = 0.5 * smoothed(np.swapaxes(scaled, 1, 2) @ scaled, width)
+    many = columns.shape[-1]
+    scores: Array = columns.reshape(-1, many).T @ (of_legs[:, None] @ columns).reshape(-1, many)
     return scores
 
 

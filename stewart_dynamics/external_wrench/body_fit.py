@@ -96,14 +96,22 @@ def _coupling(a: Array) -> Array:
 
 
 class BodyFit:
-    """The fit, ``improve`` ROUNDS times, then ``result``; ``given`` is the body of the model."""
+    """``prepare``, ``improve`` ROUNDS times, then ``result``; ``given`` is the file's body."""
 
     def __init__(self, samples: LegSamples, given: Body) -> None:
         self._given, self._samples = given, samples
-        self._spectra = spectra_of(samples.columns, 0.5)
-        self._least = _LEAST_NOISE * float(np.abs(samples.columns).max())
-        self._weights = Weights.of_white(self._spectra[..., -1], self._least)
         self._posterior: Posterior | None = None
+
+    def prepare(self) -> Iterator[None]:
+        """Make the spectra; yield after each leg."""
+        columns, legs = self._samples.columns, []
+        for leg in range(6):
+            legs.append(spectra_of(columns[:, leg:leg + 1], 0.5))
+            yield
+        self._spectra = np.concatenate(legs, axis=2)
+        self._least = _LEAST_NOISE * float(np.abs(columns).max())
+        self._weights = Weights.of_white(self._spectra[..., -1], self._least)
+        yield
 
     def improve(self) -> Iterator[None]:
         """Fit with the present noise, and estimate the noise anew; yield after each piece."""
@@ -139,9 +147,11 @@ class BodyFit:
         many = len(of.columns)
         power = 1.0 - np.cos(2.0 * np.pi / many * np.arange(len(self._spectra)))
         power *= 2.0 * np.count_nonzero(np.any(of.columns[..., -1], axis=1)) / many
-        spectra = np.sqrt(power)[:, None, None, None] * independent
-        return sum((gram_of(self._weights.whitened(spectra[:, n:n + 1])) for n in range(6)),
-                   np.zeros(2 * (of.columns.shape[-1],)))
+        white = self._weights.mixing / self._weights.deviations[:, None]
+        of_legs = np.einsum('f,fai,faj->ij', power, white, white)
+        noise: Array = np.einsum('lip,ij,ljq->pq', independent, of_legs, independent,
+                                 optimize=True)
+        return noise
 
     def result(self) -> FittedBody:
         """Return the body."""

@@ -78,7 +78,7 @@ class LegHistory:
 
     def stamps(self, begin: int, end: int) -> Stamps:
         """Return the stamps of measurements from one to another [ns]."""
-        column: Stamps = self._rows.view(np.int64)[:, _STAMP.start]
+        column = stamps_of(self._rows)
         low, high = begin % self.capacity, (end - 1) % self.capacity + 1
         if end <= begin:
             return column[:0]
@@ -89,6 +89,12 @@ class LegHistory:
         """Return a copy of the rows of measurements from one to another."""
         rows: Array = self._rows[np.arange(begin, end) % self.capacity]
         return rows
+
+
+def stamps_of(rows: Array) -> Stamps:
+    """Return the stamps of rows [ns]."""
+    stamps: Stamps = rows.view(np.int64)[:, _STAMP.start]
+    return stamps
 
 
 def motions_of(rows: Array) -> Array:

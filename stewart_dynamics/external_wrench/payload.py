@@ -27,21 +27,20 @@ The work is done in pieces, because setpoints are answered in between.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cached_property
+from collections.abc import Generator, Iterator
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, SECOND, Stamps
+from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, SECOND
 from stewart_dynamics.compilation.machine_code import COMPILED
-from stewart_dynamics.estimation.noisy_rates import smoothed_law
+from stewart_dynamics.estimation.noisy_rates import rates_in_noise, smoothed_law
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.external_wrench.body_fit import (
     about, Body, BodyFit, FittedBody, LegSamples, ROUNDS, TEN)
 from stewart_dynamics.external_wrench.measured_legs import (
-    ACTED, LegHistory, LOADED, motions_of, OF_BASE, TURNED)
+    ACTED, LegHistory, LOADED, motions_of, OF_BASE, stamps_of, TURNED)
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     BODY_UNITS, COULOMB_FRICTION, FIRST_MOMENT, LINEAR, linear_parameters, PLATFORM,
@@ -54,18 +53,20 @@ FUNCTIONS = inverse_dynamics.solve, regressor.regressors
 
 # Measurements between two yields.
 PIECE = 128 if COMPILED else 1
+_COPIED = 1024
 
 # Half the width of a window: minimum [s], and minimum in measurements.
 _HALF_WIDTH = 0.05
 _MEASUREMENTS = 5
+# Time over which rates are parabolas, as far as their noise hides [s].
+_BLOCK = 0.4
 # With fewer windows the correlation of their noise is too uncertain.
 LEAST_WINDOWS = 40
 # A window counts if measurements cover this part of it.
 _COVERED = 0.9
 
 # The fourth difference of white noise has this times its variance. Motion adds next to nothing.
-_FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-_FOURTH_VARIANCE = float(_FOURTH @ _FOURTH)
+_FOURTH_VARIANCE = 70.0
 
 # Friction is uncertain by its own size; what holds a leg at rest is anything up to Coulomb's.
 _STATIC = 1.0 / math.sqrt(3.0)
@@ -113,28 +114,31 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     """
     p = platform.parameters
     begin, end = _range(history, p['payload.window'])
-    if end == begin:
+    rows = np.empty((end - begin, OF_BASE.stop))
+    for some in _pieces(len(rows), _COPIED):
+        rows[some] = history.rows(begin + some.start, begin + some.stop)
+        yield None
+    rows = rows[max(0, history.first - begin):]  # those before were overwritten meanwhile
+    if not len(rows):
         yield PayloadOutcome('no measured legs')
         return
-    stamps = history.stamps(begin, end)
+    work = _Windows(platform, rows)
     yield None
-    work = _Windows(platform, stamps)
-    for first in range(begin, end, 4 * PIECE):
-        work.add_noise(history, begin, first, min(first + 4 * PIECE, end))
+    for some in _pieces(len(rows), PIECE):
+        work.add(some)
         yield None
-    for first in range(begin, end, PIECE):
-        work.add(history, begin, first, min(first + PIECE, end))
+    yield from work.end()
+    for some in _pieces(len(work.used), work.block):
+        work.add_friction(some)
         yield None
-    seconds = float(stamps[-1] - stamps[0]) * NANOSECOND
-    samples = work.samples()
-    if samples is None:
+    seconds = float(work.seconds[-1])
+    if not work.found_means():
         needed = LEAST_WINDOWS * work.half_width
         more = '' if needed < p['payload.window'] else ', more than payload.window'
         yield PayloadOutcome(
             f'too short: {seconds:.1f} s of measured legs, {needed:.1f} s without gaps are needed'
             f'{more}{_excluded(work.excluded)}')
         return
-    yield None
     if not math.isfinite(work.scale):
         yield PayloadOutcome('numbers overflow')
         return
@@ -143,9 +147,11 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         yield PayloadOutcome(f'the measured forces are {work.scale:.3g} times those of the model: '
                              f'likely they have another {what}')
         return
+    samples = yield from work.samples()
     given = Body(p['platform.mass'], p['platform.center_of_mass'], p['platform.inertia'])
     fit = BodyFit(samples, given)
     try:
+        yield from fit.prepare()
         for _ in range(ROUNDS):
             yield from fit.improve()
         fitted = fit.result()
@@ -156,7 +162,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         yield PayloadOutcome(f'the model does not explain the measured forces: residual '
                              f'{fitted.residual:.3g} N of {samples.measured:.4g} N (RMS)')
         return
-    yield _outcome(Payload(int(stamps[-1]), seconds, work.excluded, fitted, given))
+    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, given))
 
 
 def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
@@ -171,181 +177,189 @@ def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
     return history.first + restart + int(late), end
 
 
+def _pieces(count: int, size: int) -> Iterator[slice]:
+    return (slice(first, min(first + size, count)) for first in range(0, count, size))
+
+
 class _Windows:
     """Means of the inputs of the fit over windows."""
 
     scale: float  # of the forces, by those of the model
 
-    def __init__(self, platform: StewartPlatform, stamps: Stamps) -> None:
+    def __init__(self, platform: StewartPlatform, rows: Array) -> None:
         p = platform.parameters
-        self._platform, self._stamps = platform, stamps
+        self._platform, self._rows = platform, rows
+        stamps = stamps_of(rows)
+        self.stamp, self.seconds = int(stamps[-1]), (stamps - stamps[0]) * NANOSECOND
         self._force_max, self._shortest, self._longest = (
             default if p[f'limits.{name}'] is None else p[f'limits.{name}'] for name, default in (
                 ('force_max', math.inf), ('length_min', 0.0), ('length_max', math.inf)))
+        self._coulomb = p['actuator.coulomb_friction']
+        self._coulomb_velocity = p['actuator.coulomb_velocity']
         self.excluded = 0
-        self._longest_gap = p['setpoint.timeout']
-        intervals = np.diff(stamps) * NANOSECOND
-        interval = float(np.median(intervals)) if len(intervals) else 0.0
+        self._steps = np.diff(self.seconds)
+        self._sound = self._steps <= p['setpoint.timeout']
+        interval = float(np.median(self._steps)) if len(self._steps) else 0.0
         self.half_width = max(_HALF_WIDTH, _MEASUREMENTS * interval)
-        many = int((stamps[-1] - stamps[0]) * NANOSECOND / self.half_width) + 2
+        # Noise of an acceleration divided by the noise of a twist: the window's slope.
+        self._noise_gain = math.pi ** 2 * interval / (4.0 * self.half_width ** 3)
+        many = int(self.seconds[-1] / self.half_width) + 2
         # The regressor of each leg, its force less that of the model, and that.
         self._sums = np.zeros((many, 6, LINEAR + 2))
         self._motions, self._bases = np.zeros((many, MOTION)), np.full((many, BASE), np.nan)
         self._covered = np.zeros(many)
-        self._coulomb = p['actuator.coulomb_friction']
-        self._coulomb_velocity = p['actuator.coulomb_velocity']
-        self._noise, self._noises = np.zeros((6, 6)), 0
-        # Noise of an acceleration divided by the noise of a twist: the window's slope.
-        self._noise_gain = math.pi ** 2 * interval / (4.0 * self.half_width ** 3)
-
-    def _rows(self, history: LegHistory, begin: int, first: int, end: int,
-              ) -> tuple[Array, Array, int] | None:
-        """Return rows around some measurements, their times, and the number of the first row."""
-        low, high = max(begin, first - 2), min(begin + len(self._stamps), end + 2)
-        if low < history.first:  # overwritten meanwhile
-            return None
-        seconds = (self._stamps[low - begin:high - begin] - self._stamps[0]) * NANOSECOND
-        return history.rows(low, high), seconds, low
+        self._added: list[tuple[Integers, Array]] = []  # measurements and rates of the drives
+        self.block = max(_MEASUREMENTS, round(_BLOCK / interval) if interval > 0.0 else 0)
 
     @_QUIET
-    def add_noise(self, history: LegHistory, begin: int, first: int, end: int) -> None:
-        """Add the noise of the twists of measurements from one to another."""
-        found = self._rows(history, begin, first, end)
-        if found is None:
-            return
-        rows, seconds, low = found
-        twists, sound = rows[:, TURNED], np.diff(seconds) <= self._longest_gap
-        every = np.arange(max(first - low, 2), min(end - low, len(twists) - 2))
-        centers: Integers = every[np.all([sound[every + n] for n in (-2, -1, 0, 1)], axis=0)]
-        rough: Array = np.tensordot(_FOURTH, twists[centers + np.arange(-2, 3)[:, None]], 1)
-        self._noise += rough.T @ rough
-        self._noises += len(centers)
-
-    @_QUIET
-    def add(self, history: LegHistory, begin: int, first: int, end: int) -> None:
-        """Add measurements from one to another; the first of all is ``begin``."""
-        found = self._rows(history, begin, first, end)
-        if found is None:
-            return
-        rows, seconds, low = found
-        steps = np.diff(seconds)
-        sound = steps <= self._longest_gap
-        twists = rows[:, TURNED]
+    def add(self, some: slice) -> None:
+        """Add measurements, all but Coulomb friction, of which the rates are noted."""
         # Those between two measurements.
-        every = np.arange(max(first - low, 1), min(end - low, len(rows) - 1))
-        inner: Integers = every[sound[every - 1] & sound[every]]
-        if not len(inner):
+        at = np.arange(max(some.start, 1), min(some.stop, len(self._rows) - 1))
+        at = at[self._sound[at - 1] & self._sound[at]]
+        if not len(at):
             return
-        parts = np.abs(rows[:, ACTED]) / self._force_max
-        saturated: Flags = np.any((parts > _SATURATED[0]) & (parts < _SATURATED[1]), axis=1)
-        before, after = steps[inner - 1, None], steps[inner, None]
-        both = before + after
-        motions = motions_of(rows[inner])
-        motions[:, ACCELERATION] = (twists[inner + 1] - twists[inner - 1]) / both
-        forces = (rows[inner][:, ACTED] * before + rows[inner + 1][:, ACTED] * after) / both
-        forces[saturated[inner] | saturated[inner + 1]] = np.nan
-        bases = rows[inner][:, OF_BASE]
-        values = self._values(motions, rows[inner][:, LOADED], bases, forces)
-        self._add_windows(seconds[inner], 0.5 * both[:, 0], values, motions, bases)
-
-    def _values(self, motions: Array, wrenches: Array, bases: Array, forces: Array) -> Array:
-        """Return regressor, force less that of the model, and that, of each sample and leg."""
-        results = self._platform.solve(motions, wrenches, bases)
-        model, lengths = results[:, FORCES], results[:, LENGTHS]
+        rows, following = self._rows[at], self._rows[at + 1]
+        before, after = self._steps[at - 1, None], self._steps[at, None]
+        motions, bases = motions_of(rows), rows[:, OF_BASE]
+        motions[:, ACCELERATION] = (
+            following[:, TURNED] - self._rows[at - 1, TURNED]) / (before + after)
+        forces = (rows[:, ACTED] * before + following[:, ACTED] * after) / (before + after)
+        results = self._platform.solve(motions, rows[:, LOADED], bases)
+        lengths = results[:, LENGTHS]
         # Efforts have no part of the force of an end stop.
-        free = (lengths > self._shortest) & (lengths < self._longest)
-        forces[~free.all(axis=1)] = np.nan
-        self.excluded += int(np.isnan(forces[:, 0]).sum())
-        values = np.empty((len(motions), 6, LINEAR + 2))
+        right = ~(self._saturated(rows) | self._saturated(following)) & np.all(
+            (lengths > self._shortest) & (lengths < self._longest), axis=1)
+        self.excluded += int(np.count_nonzero(~right))
+        values = np.empty((len(at), 6, LINEAR + 2))
         values[..., :LINEAR] = self._platform.regressors(motions, bases)
         rates, sliding = (values[:, _LEGS, kind.start + _LEGS] for kind in (
             VISCOUS_FRICTION, COULOMB_FRICTION))
-        of_noise = smoothed_law(rates, self._coulomb_velocity, self._rate_deviations)
-        values[:, _LEGS, COULOMB_FRICTION.start + _LEGS] = of_noise
-        model = model + self._coulomb * (of_noise - sliding)
+        values[:, _LEGS, COULOMB_FRICTION.start + _LEGS] = 0.0
+        model = results[:, FORCES] - self._coulomb * sliding
         values[..., LINEAR], values[..., LINEAR + 1] = forces - model, model
-        return values
-
-    @cached_property
-    def _rate_deviations(self) -> Array:
-        """The deviation of the noise in the rates of the legs (6,), at the home pose."""
-        j_inv = self._platform.inverse_jacobian(self._platform.home_pose())
-        noise = self._noise / (max(self._noises, 1) * _FOURTH_VARIANCE)
-        deviations: Array = np.sqrt(np.diag(j_inv @ noise @ j_inv.T))
-        return deviations
-
-    def _add_windows(self, seconds: Array, weights: Array, values: Array, motions: Array,
-                     bases: Array) -> None:
-        finite = np.isfinite(values).all(axis=(1, 2))  # not where J_inv cannot be solved
-        seconds, weights, values = seconds[finite], weights[finite], values[finite]
-        if not len(seconds):
+        right &= np.isfinite(values).all(axis=(1, 2))  # not where J_inv cannot be solved
+        used = at[right]
+        if not len(used):
             return
-        turns = seconds / self.half_width
-        whole = turns.astype(np.int64)
-        low, high = int(whole[0]), int(whole[-1]) + 2
-        part = np.sin(0.5 * np.pi * (turns - whole)) ** 2
-        many = np.arange(len(seconds))
-        of_window, at = np.unique(whole, return_index=True)
-        self._motions[of_window], self._bases[of_window] = motions[finite][at], bases[finite][at]
-        share = np.zeros((high - low, len(seconds)))
-        share[whole - low, many] = (1.0 - part) * weights
-        share[whole - low + 1, many] = part * weights
-        self._sums[low:high] += np.tensordot(share, values, 1)
-        self._covered[low:high] += share.sum(axis=1)
+        self._added.append((used, rates[right]))
+        windows, share = self._share(used)
+        self._sums[windows] += np.tensordot(share, values[right], 1)
+        self._covered[windows] += share.sum(axis=1)
+        of_window, first = np.unique(self._turns(used), return_index=True)
+        self._motions[of_window], self._bases[of_window] = (
+            motions[right][first], bases[right][first])
+
+    def _saturated(self, rows: Array) -> Flags:
+        parts = np.abs(rows[:, ACTED]) / self._force_max
+        saturated: Flags = np.any((parts > _SATURATED[0]) & (parts < _SATURATED[1]), axis=1)
+        return saturated
+
+    def end(self) -> Iterator[None]:
+        """End the adding, yield after each piece of the work; friction follows."""
+        self.used = np.concatenate([np.zeros(0, int), *(used for used, _ in self._added)])
+        self._rates = np.concatenate([np.zeros((0, 6)), *(rates for _, rates in self._added)])
+        yield
+        self._noise = self._noise_of(self._rows[self.used, TURNED])
+        yield
+        self._rate_deviations = np.sqrt(np.diag(self._noise_of(self._rates)))
+        yield
 
     @_QUIET
-    def samples(self) -> LegSamples | None:
-        """Return the means over the windows, None where they are too few."""
-        sound = self._covered > _COVERED * self.half_width
-        if np.count_nonzero(sound) < LEAST_WINDOWS or not self._noises:
-            return None
-        motions, bases = self._motions[sound], self._bases[sound]
-        means = self._sums[sound] / self._covered[sound, None, None]
+    def _noise_of(self, values: Array) -> Array:
+        """Return the covariance of white noise in values (N, 6) of the used measurements."""
+        rough = np.diff(values, n=4, axis=0)[self.used[4:] - self.used[:-4] == 4]
+        noise: Array = rough.T @ rough / (_FOURTH_VARIANCE * max(len(rough), 1))
+        return noise
+
+    @_QUIET
+    def add_friction(self, some: slice) -> None:
+        """Add the Coulomb friction of used measurements."""
+        rates, deviations = rates_in_noise(self._rates[some], self._rate_deviations)
+        law = smoothed_law(rates, self._coulomb_velocity, deviations)
+        windows, share = self._share(self.used[some])
+        means = share @ law
+        self._sums[windows, _LEGS, COULOMB_FRICTION.start + _LEGS] += means
+        self._sums[windows, :, LINEAR] -= self._coulomb * means
+        self._sums[windows, :, LINEAR + 1] += self._coulomb * means
+
+    def _turns(self, at: Integers) -> Integers:
+        """Return the windows in the first half of which measurements are, less one."""
+        turns: Integers = (self.seconds[at] / self.half_width).astype(np.int64)
+        return turns
+
+    def _share(self, at: Integers) -> tuple[slice, Array]:
+        """Return windows, and how long (windows, measurements) each measurement counts there."""
+        whole = self._turns(at)
+        part = np.sin(0.5 * np.pi * (self.seconds[at] / self.half_width - whole)) ** 2
+        low, many = int(whole[0]), np.arange(len(at))
+        share = np.zeros((int(whole[-1]) + 2 - low, len(at)))
+        weights = 0.5 * (self._steps[at - 1] + self._steps[at])
+        share[whole - low, many] = (1.0 - part) * weights
+        share[whole - low + 1, many] = part * weights
+        return slice(low, low + len(share)), share
+
+    @_QUIET
+    def found_means(self) -> bool:
+        """Return whether there are enough windows, of which the means and the scale are found."""
+        self._are_full = self._covered > _COVERED * self.half_width
+        self._means = self._sums[self._are_full] / self._covered[self._are_full, None, None]
+        modelled = self._means[..., LINEAR + 1]
+        self.scale = 1.0 + float(
+            np.sum(self._means[..., LINEAR] * modelled) / np.sum(modelled ** 2))
+        return len(self._means) >= LEAST_WINDOWS
+
+    def samples(self) -> Generator[None, None, LegSamples]:
+        """Return the means over the windows; yield after each piece."""
+        full, means = self._are_full, self._means
+        motions, bases = self._motions[full], self._bases[full]
         differences, modelled = means[..., LINEAR], means[..., LINEAR + 1]
-        self.scale = 1.0 + float(np.sum(differences * modelled) / np.sum(modelled ** 2))
         p = self._platform.parameters
         of_friction = np.zeros(LINEAR)
         for name, part in (('viscous', VISCOUS_FRICTION), ('coulomb', COULOMB_FRICTION)):
             of_friction[part] = p[f'actuator.{name}_friction']
         root = root_of_covariance(p, of_friction)
+        yield
         root[FIRST_MOMENT] *= p['platform.mass']
         change = root[PLATFORM, PLATFORM].copy()
         root[PLATFORM] = about(p['platform.center_of_mass']) @ root[PLATFORM]
         root = root[:, np.any(root != 0.0, axis=0) | (np.arange(LINEAR) < TEN)]
+        by_tilt = self._by_tilt(motions, bases)
+        yield
         standing = np.abs(means[:, _LEGS, VISCOUS_FRICTION.start + _LEGS]) < self._coulomb_velocity
-        columns = np.zeros((len(sound), 6, root.shape[1] + 6 + 3 + 1))
-        columns[sound] = np.concatenate([
-            means[..., :LINEAR] @ root,
-            np.einsum('nl,lm->nlm', standing * _STATIC * self._coulomb, np.eye(6)),
-            p['uncertainty.tilt'] * self._by_tilt(motions, bases),
-            p['uncertainty.effort_gain'] * modelled[..., None], differences[..., None]], axis=-1)
+        weight = self.scale * modelled
+        parts = (means[..., :LINEAR] @ root,
+                 (standing * _STATIC * self._coulomb)[..., None] * np.eye(6),
+                 p['uncertainty.tilt'] * by_tilt,
+                 p['uncertainty.effort_gain'] * weight[..., None], differences[..., None])
+        columns = np.zeros((len(full), 6, sum(part.shape[-1] for part in parts)))
+        columns[full] = np.concatenate(parts, axis=-1)
+        yield
         middle = len(motions) // 2
-        by_acceleration = self._by_acceleration(motions[middle], bases[middle:middle + 1], root)
-        noise = self._noise_gain / (self._noises * _FOURTH_VARIANCE) * self._noise
+        by_acceleration = np.zeros((6, *columns.shape[1:]))
+        by_acceleration[..., :root.shape[1]], by_acceleration[..., -1] = self._by_acceleration(
+            motions[middle], bases[middle:middle + 1], root)
         measured = float(np.sqrt(np.mean((differences + modelled) ** 2)))
-        return LegSamples(columns, change, noise, by_acceleration, measured)
+        return LegSamples(
+            columns, change, self._noise_gain * self._noise, by_acceleration, measured)
 
     def _by_tilt(self, motions: Array, bases: Array) -> Array:
         """Return the forces (N, 6, 2) by turns of gravity about two base axes [N/rad]."""
         p = self._platform.parameters
         gravity = np.where(np.isnan(bases[:, GRAVITY]), p['gravity'], bases[:, GRAVITY])
         across = np.argsort(np.abs(gravity.mean(axis=0)))[:2]
-        theta = linear_parameters(p)
+        theta = self.scale * linear_parameters(p)  # as heavy as the forces
         by_tilt: Array = np.stack([self._platform.regressors_at_rest(
             motions, np.cross(axis, gravity)) @ theta for axis in np.eye(3)[across]], axis=-1)
         return by_tilt
 
-    def _by_acceleration(self, motion: Array, base: Array, root: Array) -> Array:
-        """Return the derivative (6, 6, n + 1) of the columns by accelerations, in one motion."""
+    def _by_acceleration(self, motion: Array, base: Array, root: Array) -> tuple[Array, Array]:
+        """Return the derivatives of columns (6, 6, n) and differences by accelerations."""
         motions = np.tile(motion, (7, 1))
         motions[1:, ACCELERATION] += np.eye(6)
+        columns = self._platform.regressors(motions, base) @ root
         model = self._platform.solve(motions, None, base)[:, FORCES]
-        many = root.shape[1]
-        columns = np.zeros((7, 6, many + 6 + 3 + 1))
-        columns[..., :many] = self._platform.regressors(motions, base) @ root
-        columns[..., -1] = -model
-        by_acceleration: Array = columns[1:] - columns[0]
-        return by_acceleration
+        return columns[1:] - columns[0], model[0] - model[1:]
 
 
 def _outcome(payload: Payload) -> PayloadOutcome:

@@ -28,6 +28,7 @@ Extracts are kept in a temporary file, so that memory does not grow with the bag
 from __future__ import annotations
 
 from collections.abc import Iterator
+import math
 import tempfile
 from typing import NamedTuple
 
@@ -49,6 +50,8 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 WIDE, SAMPLES = 2.5, 4.0
 # Widest band of rates for the law of friction, by the rate of the samples.
 _WIDEST = 0.42
+# Largest variance of fast noise in them, by the square of the rate below which friction is linear.
+_WIDTH = 0.3
 # Transition width of both filters, relative to the narrow cut-off.
 _TRANSITION = 1.0
 ORDERS = 4  # number of columns of an effort: its value and its first ORDERS - 1 derivatives
@@ -69,7 +72,7 @@ _TOGETHER = 4096
 # window that moves, and at least this multiple of the change of the rate between two samples at a
 # reversal.
 _STRIBECK, _RESOLVED = (0.1, 0.3), 4.0
-# A leg moves if its length changes by more than this multiple of its noise.
+# A leg slides if its length changes by more than this multiple of its noise.
 _MOVES = 10.0
 SLIP = 1 + len(_STRIBECK)
 """Number of friction shapes over the rate: Coulomb friction, Stribeck friction."""
@@ -191,7 +194,7 @@ class Extraction:
         the noise that they contain.
         """
         deviations = self._deviations(window)
-        lengths, rates, accelerations, quick, deviation = self._filtered(
+        lengths, rates, accelerations, quick, variance = self._filtered(
             window, deviations, noise)
         found = poses(self.platform, lengths, guess)
         rows = motions(self.platform, found, rates, accelerations)
@@ -203,12 +206,15 @@ class Extraction:
         efforts = np.stack([decimated(forces, self._narrow.taps(order), self.step)
                             for order in range(ORDERS)], axis=-1)
         drive_rates = drive_rates + quick - rates
-        sliding = smoothed_law(drive_rates, self._coulomb_velocity, deviation)
+        squares = self._coulomb_velocity ** 2
+        narrower = np.sqrt(squares - 3.0 * np.clip(-variance, 0.0, _WIDTH * squares))
+        slides = bool(np.ptp(lengths, axis=0).max() > _MOVES * deviations[0])
+        sliding = slides * smoothed_law(drive_rates, narrower, math.sqrt(max(variance, 0.0)))
         columns = np.concatenate([self._decimated(rows, sliding), efforts], axis=-1)
         wrong, stops = self._wrong(window)
         count = len(columns)
         times = self._period * (self.margin + self.step * np.arange(count)).astype(float)
-        moves = self._moves(lengths, rates, deviations[0])
+        moves = slides and _rms(rates) > float(np.mean(self._coulomb_velocity))
         speeds = self.speeds or self._chosen_speeds(rates, accelerations, moves)
         taps = self._narrow.taps()
         legs = np.stack([decimated(each, taps, self.step)
@@ -261,11 +267,6 @@ class Extraction:
             best = none
         return int(lags[best]), misfits[best], scale
 
-    def _moves(self, lengths: Array, rates: Array, deviation: float) -> bool:
-        """Return whether legs move by more than noise: else nothing slips."""
-        return _rms(rates) > float(np.mean(self._coulomb_velocity)) and bool(
-            np.ptp(lengths, axis=0).max() > _MOVES * deviation)
-
     def _chosen_speeds(self, rates: Array, accelerations: Array, moves: bool,
                        ) -> tuple[float, ...]:
         """Return the rates of the friction shapes; later windows have those of one that moves."""
@@ -279,13 +280,15 @@ class Extraction:
         of_lengths = float(np.sqrt(np.mean(white_deviation(window.positions) ** 2)))
         if window.rates is None:
             return of_lengths, float('nan')
-        # Any deviation of rates from differentiated lengths counts as noise, even a wrong unit.
-        smooth = self._wide.taps(1), self._wide.taps()
-        off = convolved(window.rates, smooth[1]) - convolved(window.positions, smooth[0])
-        in_band = np.sqrt(2.0 * WIDE / SAMPLES / self.step)  # fraction of white noise in the band
+        # Any deviation of rates from differentiated lengths counts as noise, even a wrong unit;
+        # the noise of these lengths does not.
+        of_positions, of_rates = self._wide.taps(1), self._wide.taps()
+        off = convolved(window.rates, of_rates) - convolved(window.positions, of_positions)
+        square = float(np.mean(off ** 2) - (of_lengths * np.linalg.norm(of_positions)) ** 2)
         white = float(np.sqrt(np.mean(white_deviation(window.rates) ** 2)))
-        return of_lengths, max(white, _rms(off) / max(in_band, 1e-3),
-                               _ROUNDING * self._size / self._period)
+        return of_lengths, max(
+            white, math.sqrt(max(square, 0.0)) / float(np.linalg.norm(of_rates)),
+            _ROUNDING * self._size / self._period)
 
     def _filtered(self, window: Window, deviations: tuple[float, float],
                   noise: np.random.Generator | None,
@@ -293,41 +296,61 @@ class Extraction:
         """
         Return lengths, rates and accelerations of the legs, without the margin.
 
-        They are followed by rates of the widest band that noise allows, since friction makes
-        rates bend where they change their sign, and the deviation of the noise in them [m/s].
+        They are followed by the rates for the law of friction and their variance (``_quick``).
         """
-        positions, rates = window.positions, window.rates
-        positions = positions + self.platform.parameters['geometry.zero_length']
+        window = window._replace(
+            positions=window.positions + self.platform.parameters['geometry.zero_length'])
+        fast = window
         if noise is not None:
-            positions = positions + deviations[0] * noise.normal(size=positions.shape)
-            rates = None if rates is None else (
-                rates + deviations[1] * noise.normal(size=rates.shape))
-        lengths, rates_wide, accelerations = (self._derivative(
-            self._wide, order, positions, rates, deviations)[0] for order in range(3))
-        quick, deviation = self._derivative(self._wide, 1, positions, rates, deviations)
+            white = noise.normal(size=(2, *window.positions.shape))
+            count = white.shape[1]
+            faster = 1.0 - np.abs(np.fft.rfft(self._narrow.taps(), count))
+            of_fast = np.fft.irfft(
+                np.fft.rfft(white, axis=1) * faster[:, None], count, axis=1)
+            window, fast = (_with_noise(window, deviations, each) for each in (white, of_fast))
+        lengths, rates, accelerations = (
+            self._derivative(self._wide, order, window, deviations)[0] for order in range(3))
+        return lengths, rates, accelerations, *self._quick(fast, deviations)
+
+    def _quick(self, window: Window, deviations: tuple[float, float]) -> tuple[Array, float]:
+        """
+        Return rates of the widest band that noise allows, since friction bends them at reversals.
+
+        They are followed by the variance [(m/s)^2] by which the law of friction is to be wider at
+        them than at true rates. Its slope is a box of variance v^2 / 3, v the parameter
+        ``actuator.coulomb_velocity``. Noise that is slower than the narrow band makes the mean of
+        the law over true rates wider, and is not correlated with what is left. Faster noise is
+        averaged by that band: it makes the law as wide as it is itself.
+        """
+        quick, variance = self._derivative(self._wide, 1, window, deviations)
         band = 2.0 * self._wide.cutoff
         while band * self._period < _WIDEST:
             wider = LowPass.of(self._period, band, self._narrow.cutoff)
-            inner, of_inner = self._derivative(wider, 1, positions, rates, deviations)
-            if of_inner > float(np.min(self._coulomb_velocity)):
+            inner, of_inner = self._derivative(wider, 1, window, deviations)
+            if -of_inner > _WIDTH * float(np.min(self._coulomb_velocity)) ** 2:
                 break
             margin = self._wide.half - wider.half
-            quick, deviation = inner[margin:len(inner) - margin], of_inner
+            quick, variance = inner[margin:len(inner) - margin], of_inner
             band *= 2.0
-        return lengths, rates_wide, accelerations, quick, deviation
+        return quick, variance
 
-    def _derivative(self, band: LowPass, order: int, positions: Array, rates: Array | None,
+    def _derivative(self, band: LowPass, order: int, window: Window,
                     deviations: tuple[float, float]) -> tuple[Array, float]:
-        """Return a derivative of the lengths in a band, and the deviation of its noise."""
+        """Return a derivative of the lengths in a band, and slow less fast variance of noise."""
         band = band._replace(later=self.later)
-        if rates is None:
-            taps = band.taps(order)
-            return convolved(positions, taps), deviations[0] * float(np.linalg.norm(taps))
-        of_positions, of_rates = band.fused(
-            order, max(deviations[0], _ROUNDING * self._size), deviations[1])
-        return (convolved(positions, of_positions) + convolved(rates, of_rates), float(np.hypot(
-            deviations[0] * np.linalg.norm(of_positions),
-            deviations[1] * np.linalg.norm(of_rates))))
+        if window.rates is None:
+            parts = [(window.positions, band.taps(order), deviations[0])]
+        else:
+            of_positions, of_rates = band.fused(
+                order, max(deviations[0], _ROUNDING * self._size), deviations[1])
+            parts = [(window.positions, of_positions, deviations[0]),
+                     (window.rates, of_rates, deviations[1])]
+        narrow = self._narrow.taps()
+        variance = sum(deviation ** 2 * (
+            2.0 * np.sum(np.convolve(taps, narrow) ** 2) - np.sum(taps ** 2))
+            for _, taps, deviation in parts)
+        whole: Array = sum((convolved(signal, taps) for signal, taps, _ in parts), np.zeros(()))
+        return whole, float(variance)
 
     def _decimated(self, rows: Array, sliding: Array) -> Array:
         """Return the decimated regressor (N, 6, n) of rows of motion; ``sliding``: of the law."""
@@ -362,6 +385,13 @@ class Extraction:
             (len(bad) - 2 * self._narrow.half - 1) // self.step + 1)
         wrong: Flags = sums[at + reach + 1] - sums[at - reach] > 0.0
         return wrong, int(np.count_nonzero(stopped.any(axis=1)))
+
+
+def _with_noise(window: Window, deviations: tuple[float, float], white: Array) -> Window:
+    """Return a window with noise (2, N, 6) of lengths and rates added, by their deviations."""
+    of_lengths, of_rates = white * np.reshape(deviations, (2, 1, 1))
+    return window._replace(positions=window.positions + of_lengths,
+                           rates=None if window.rates is None else window.rates + of_rates)
 
 
 def _rms(values: Array) -> float:

@@ -47,7 +47,7 @@ from stewart_dynamics.estimation.posterior import Posterior, posterior
 from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
 from stewart_dynamics.identification.extraction import Extract, Extracts, ORDERS, SAMPLES
 from stewart_dynamics.identification.unknowns import (
-    COULOMB_COLUMNS, inertial_derivative, ORIGINS, PLATFORM, Unknowns)
+    inertial_derivative, ORIGINS, PLATFORM, Unknowns)
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
     from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue)
 from stewart_dynamics.parameters.table import Parameters
@@ -159,14 +159,9 @@ class _Sums(NamedTuple):
 
     @classmethod
     def corrected(cls, grams: Array, of_noise: Array) -> _Sums:
-        """
-        Return the sums without the noise.
-
-        The law of Coulomb friction accounts for it, and that of efforts is not correlated with
-        their derivative.
-        """
+        """Return the sums without the noise; that of efforts and their derivative is another."""
         linear = np.ones(grams.shape[-1])
-        linear[[*COULOMB_COLUMNS, -ORDERS + 1]] = 0.0
+        linear[-ORDERS + 1] = 0.0
         return cls(grams - of_noise * np.outer(linear, linear), of_noise)
 
 
