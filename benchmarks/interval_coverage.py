@@ -42,8 +42,9 @@ sys.path.append(str(HERE.parent / 'test'))
 from estimate_cases import (  # noqa: E402, I100, I202
     about_tilted, AXES, braked, drawn, EXACT, FILE, GIVEN, history_of, identified,
     Judged, MOTIONS, one_axis, Outcome, payload, PAYLOAD_SECONDS, PAYLOAD_SENSORS, prior,
-    recorded, recording, rich, SENSORS, Sensors, stopping, Truth, with_friction)
+    recorded, recording, rich, SENSORS, stopping, Truth, with_friction)
 from independent_hexapod import moving  # noqa: E402, I202
+from recorded import Noise  # noqa: E402, I202
 from referees import rng  # noqa: E402, I202
 
 BEGIN, END = '<!-- coverage: begin -->', '<!-- coverage: end -->'
@@ -202,7 +203,7 @@ def rotors() -> str:
         truth, 'gentle, then rest', 1, EXACT)], truth, truth.parameters), 'platform.inertia.xx')
 
 
-def brakes(mass: float, begin: float, sensors: Sensors, given_mass: float) -> str:
+def brakes(mass: float, begin: float, sensors: Noise, given_mass: float) -> str:
     truth, given = (FILE.changed(platform__mass=each) for each in (mass, given_mass))
     path = rich(rng(3))._replace(warp=stopping(begin, begin + 3.0))
     legs = braked(lambda times: moving(truth.parameters, path(times)), begin, begin + 3.0)

@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 from independent_hexapod import Controlled, Legs, moving
 import numpy as np
 from numpy.typing import NDArray
-from recorded import AMPLITUDES, Recorded
+from recorded import AMPLITUDES, Noise, Recorded
 from referees import rng, ROOT, rotation_about
 from scipy.signal import lfilter
 
@@ -294,28 +294,12 @@ def legs_of(truth: Truth, motion: str, seed: int, seconds: float = SECONDS) -> L
 
 # --- sensors -------------------------------------------------------------------------------------
 
-class Sensors(NamedTuple):
-    """Standard deviations of white noise, and other errors of the measurements."""
-
-    length: float = 5e-6
-    rate: float = 5e-4
-    effort: float = 2.5
-    coloured: float = 2.0
-    """Of the efforts, correlated over 50 ms."""
-    delay: float = 3e-3
-    """Of the efforts."""
-    jitter: float = 0.0
-    """Time at which a sample is taken, by its stamp [s]."""
-    steps: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Of positions, rates and efforts."""
+SENSORS = Noise(length=5e-6, rate=5e-4, effort=2.5)
+EXACT = Noise(0.0, 0.0, 0.0, 0.0, 0.0)
+QUANTIZED = SENSORS._replace(steps=(1e-6, 1e-3, 5.0))
 
 
-SENSORS = Sensors()
-EXACT = Sensors(0.0, 0.0, 0.0, 0.0, 0.0)
-QUANTIZED = Sensors(steps=(1e-6, 1e-3, 5.0))
-
-
-def recording(legs: LegsAt, seed: int, sensors: Sensors = SENSORS, gain: float = 1.0,
+def recording(legs: LegsAt, seed: int, sensors: Noise = SENSORS, gain: float = 1.0,
               seconds: float = SECONDS, rate: float = RATE) -> Recorded:
     """Return a recording of some legs; ``legs`` begin at 0 s."""
     random = rng(9000 + seed)
@@ -330,11 +314,10 @@ def recording(legs: LegsAt, seed: int, sensors: Sensors = SENSORS, gain: float =
               there.rates + sensors.rate * noise[1],
               gain * pushed.forces + sensors.effort * noise[2]
               + sensors.coloured * lfilter([1.0], [1.0, -memory], drive, axis=0))
-    return Recorded(stamps, *(step * np.round(each / step) if step else each
-                              for each, step in zip(values, sensors.steps, strict=True)))
+    return sensors.recorded(stamps, *values)
 
 
-def recorded(truth: Truth, motion: str, seed: int, sensors: Sensors = SENSORS,
+def recorded(truth: Truth, motion: str, seed: int, sensors: Noise = SENSORS,
              seconds: float = SECONDS, rate: float = RATE) -> Recorded:
     """Return a recording of a hexapod in a motion of MOTIONS."""
     return recording(legs_of(truth, motion, seed, seconds), seed, sensors, truth.gain, seconds,
@@ -434,10 +417,10 @@ def history_of(given: Recorded, motion: Motion) -> LegHistory:
 
 
 PAYLOAD_RATE, PAYLOAD_SECONDS = 500.0, 10.0
-PAYLOAD_SENSORS = Sensors(rate=1e-3, effort=5.0, coloured=2.0, delay=0.5 / PAYLOAD_RATE)
+PAYLOAD_SENSORS = SENSORS._replace(rate=1e-3, effort=5.0, delay=0.5 / PAYLOAD_RATE)
 
 
-def payload(truth: Truth, motion: str, seed: int, sensors: Sensors = PAYLOAD_SENSORS,
+def payload(truth: Truth, motion: str, seed: int, sensors: Noise = PAYLOAD_SENSORS,
             given: Parameters = GIVEN) -> Outcome:
     """Return the outcome of the payload service."""
     legs = recorded(truth, motion, seed, sensors, PAYLOAD_SECONDS, PAYLOAD_RATE)

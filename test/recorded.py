@@ -54,14 +54,26 @@ class Recorded(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Standard deviations, and the delay of the efforts."""
+    """Standard deviations of white noise, and other errors of the measurements."""
 
     length: float = 1e-5
     rate: float = 1e-3
     effort: float = 5.0
     coloured: float = 2.0
-    """Correlated over 50 ms."""
+    """Of the efforts, correlated over 50 ms."""
     delay: float = 3e-3
+    """Of the efforts."""
+    jitter: float = 0.0
+    """Time at which a sample is taken, by its stamp [s]."""
+    steps: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of positions, rates and efforts."""
+
+    def recorded(self, times: Array, positions: Array, rates: Array | None, efforts: Array,
+                 ) -> Recorded:
+        """Return a recording of measured values, in steps."""
+        return Recorded(times, *(
+            each if each is None or not step else step * np.round(each / step)
+            for each, step in zip((positions, rates, efforts), self.steps, strict=True)))
 
 
 NOISE = Noise()
@@ -138,10 +150,11 @@ def recorded(p: Parameters, motion: MotionAt, seconds: float, rate: float, seed:
     """
     random = rng(1000 + seed)
     times = np.arange(round(seconds * rate)) / rate
-    found = StewartPlatform(p).inverse_dynamics(motion(times))
+    taken = times + noise.jitter * random.normal(size=len(times)) if noise.jitter else times
+    found = StewartPlatform(p).inverse_dynamics(motion(taken))
     if forces is None:
-        forces = pinocchio_forces(p, motion(times - noise.delay))
-    return Recorded(
+        forces = pinocchio_forces(p, motion(taken - noise.delay))
+    return noise.recorded(
         times, found.lengths - p['geometry.zero_length']
         + noise.length * random.normal(size=(len(times), 6)),
         found.rates + noise.rate * random.normal(size=(len(times), 6)) if with_rates else None,

@@ -209,15 +209,22 @@ def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion:
     Assumes white noise in the efforts alone: numbers that are not asked for are known.
     Unidentifiable parameters get very wide intervals.
     """
-    columns = columns_of(platform, unknowns, motion.rows.reshape(-1, 24))
-    scales = unknowns.deviations[unknowns.asked]
-    per_sample = columns.reshape(-1, columns.shape[-1]) * scales
-    information = per_sample.T @ per_sample * (
-        seconds * options.rate / len(columns) / options.noise ** 2)
-    values, vectors = np.linalg.eigh(information)
+    values, vectors = np.linalg.eigh(_information(
+        platform, unknowns, motion.rows.reshape(1, -1, MOTION), seconds, options)[0])
     least = max(_NOT_IDENTIFIABLE ** -2, 1e-13 * float(values[-1]))
     errors: Array = np.sqrt((vectors ** 2) @ (1.0 / np.maximum(values, least)))
-    return TWO_SIDED * scales * errors
+    return TWO_SIDED * unknowns.deviations[unknowns.asked] * errors
+
+
+def _information(platform: StewartPlatform, unknowns: Unknowns, rows: Array, seconds: float,
+                 options: DesignOptions) -> Array:
+    """Return the information (M, k, k) of motions (M, N, MOTION), in units of deviations."""
+    columns = columns_of(platform, unknowns, rows.reshape(-1, MOTION))
+    columns *= unknowns.deviations[unknowns.asked]
+    each = columns.reshape(len(rows), -1, columns.shape[-1])
+    information: Array = each.swapaxes(1, 2) @ each * (
+        seconds * options.rate / rows.shape[1] / options.noise ** 2)
+    return information
 
 
 def columns_of(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> Array:
@@ -262,12 +269,8 @@ class _Search:
             coefficients /= np.maximum(excess, 0.2)[:, None, None]
         rows = self._rows(coefficients)
         excess = self.limits.excess(rows)
-        columns = columns_of(self.platform, self.unknowns, rows.reshape(-1, rows.shape[-1]))
-        columns = columns.reshape(len(proportions), -1, columns.shape[-1])
-        columns *= self.unknowns.deviations[self.unknowns.asked]
-        information = columns.swapaxes(1, 2) @ columns * (
-            self._options.duration * self._options.rate / rows.shape[1]
-            / self._options.noise ** 2)
+        information = _information(self.platform, self.unknowns, rows, self._options.duration,
+                                   self._options)
         information += np.eye(information.shape[-1]) / _NOT_IDENTIFIABLE ** 2
         variances = np.trace(np.linalg.inv(information), axis1=1, axis2=2)
         # Information grows with the square of the amplitude; excess amplitude costs as much.

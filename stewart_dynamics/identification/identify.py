@@ -323,19 +323,13 @@ class Identification:
         self.parameters = parameters.replaced({'geometry.platform_side': NEGATIVE})
         self.platform = StewartPlatform(self.parameters)
         extraction = self._extraction(window)
-        _, below, _ = self._lag(extraction, window, of_any_scale=False)
-        if below < _BETTER * misfit and self._of_this_model(extraction, window):
+        _, below, scale = self._lag(extraction, window, of_any_scale=False)
+        # efforts of the file's model in any unit, or with another sign
+        if below < _BETTER * misfit and (scale > 0.0 or 1.0 / FAR < -scale < FAR):
             self.unknowns = Unknowns(self.parameters, self._options.kinds)
             return True
         self.parameters, self.platform = parameters, platform
         return False
-
-    def _of_this_model(self, extraction: Extraction, window: Window) -> bool:
-        """Return whether the efforts are those of the file's model in any unit, or with -."""
-        piece = most_motion(window, extraction)
-        extract = extraction(piece, first_pose(extraction.platform, piece)).extract
-        scale = Comparison([extract], self.unknowns).best_scales()[0]
-        return scale > 0.0 or 1.0 / FAR < -scale < FAR
 
     def _read_window(self, path: Path, extraction: Extraction, window: Window,
                      last: WindowRead | None) -> WindowRead:

@@ -91,19 +91,17 @@ def _arguments() -> argparse.ArgumentParser:
 
 def _add_design(parser: argparse.ArgumentParser) -> None:
     """Add the options that only a design has."""
-    default = DesignOptions()
     group = parser.add_argument_group('design of a motion (--design)')
     group.add_argument('--design', action='store_true',
                        help='identify nothing, but design a motion from which the parameters of '
                             f'--identify are identifiable: DIR/{DESIGNED_MOTION} (default DIR: '
                             f'{DESIGNED}), for stewart_trajectory, within the limits of the '
                             'parameter file')
-    group.add_argument('--duration', type=between(2.0, 3600.0), default=default.duration,
-                       metavar='S', help='of the motion (default: %(default)g)')
+    group.add_argument('--duration', type=between(2.0, 3600.0), metavar='S',
+                       help='of the motion (default: %(default)g)')
     group.add_argument('--highest-frequency', dest='frequency', type=between(0.01, 100.0),
-                       default=default.frequency, metavar='HZ',
-                       help='of the motion, below --cutoff (default: %(default)g)')
-    group.add_argument('--harmonics', type=whole(1, 50), default=default.harmonics, metavar='N',
+                       metavar='HZ', help='of the motion, below --cutoff (default: %(default)g)')
+    group.add_argument('--harmonics', type=whole(1, 50), metavar='N',
                        help='of the Fourier series (default: %(default)s)')
     group.add_argument('--amplitude', type=between(1e-6, 1e3), metavar='M',
                        help='displacement of the platform at most, and of its joints by turns; '
@@ -112,15 +110,16 @@ def _add_design(parser: argparse.ArgumentParser) -> None:
                        metavar=('X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA'),
                        help='pose about which it moves, where it begins and ends [m, rad] '
                             '(default: home)')
-    group.add_argument('--noise', type=between(1e-9, 1e9), default=default.noise, metavar='N',
+    group.add_argument('--noise', type=between(1e-9, 1e9), metavar='N',
                        help='standard deviation of the measured efforts, for the predicted '
                             'intervals (default: %(default)g)')
-    group.add_argument('--rate', type=between(1.0, 1e4), default=default.rate, metavar='HZ',
+    group.add_argument('--rate', type=between(1.0, 1e4), metavar='HZ',
                        help='of setpoints and measured efforts (default: %(default)g)')
-    group.add_argument('--generations', type=whole(1, 100000), default=default.generations,
-                       metavar='N', help='of the search; more take longer (default: %(default)s)')
-    group.add_argument('--seed', type=whole(0, 2 ** 32 - 1), default=default.seed, metavar='N',
+    group.add_argument('--generations', type=whole(1, 100000), metavar='N',
+                       help='of the search; more take longer (default: %(default)s)')
+    group.add_argument('--seed', type=whole(0, 2 ** 32 - 1), metavar='N',
                        help='equal seeds give equal motions (default: %(default)s)')
+    parser.set_defaults(**DesignOptions()._asdict())
 
 
 def _run(given: argparse.Namespace) -> int:
@@ -191,28 +190,20 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
     with tqdm(total=asked.generations, disable=None, leave=False, dynamic_ncols=True,
               bar_format='{percentage:3.0f}%|{bar}| designing, {remaining} left') as bar:
         designed = design(parameters, asked, progress)
+    lines = list(_design_lines(designed, asked))
     with whole_folder(folder, options, DESIGNED_MOTION, before) as partial:
         path = partial / DESIGNED_MOTION
         given_values = designed.trajectory.given
-        head = ''.join(f'# {line}'.rstrip() + '\n' for line in _design_head(designed, asked))
+        head = ''.join(f'# {line}'.rstrip() + '\n' for line in (
+            f'Designed to identify {", ".join(asked.kinds)}, seed {asked.seed}.', *lines))
         write_yaml(path, given_values, {
             name: designed.trajectory.table[name].unit for name in given_values}, head)
-    _PROGRAM.say('\n'.join([
-        *_design_lines(designed, asked), '',
-        f'motion: {folder / DESIGNED_MOTION}, for stewart_trajectory --ros-args --params-file']))
-
-
-def _design_head(designed: Design, asked: DesignOptions) -> Iterator[str]:
-    yield f'Designed to identify {", ".join(asked.kinds)}, seed {asked.seed}. Predicted 95 %'
-    yield f'intervals for white noise of {asked.noise:g} N in efforts at {asked.rate:g} Hz:'
-    for n, half in zip(designed.unknowns.asked, designed.half_widths, strict=True):
-        yield f'  {designed.unknowns.names[n]}: +- {half:.2g} {designed.unknowns.units[n]}'
-    yield 'Of what is free between home and the limits, less their margins, it uses:'
-    yield from (f'  {part:.0%} of {name}' for name, part in designed.use.items())
+    _PROGRAM.say('\n'.join([*lines, '', f'motion: {folder / DESIGNED_MOTION}, '
+                            'for stewart_trajectory --ros-args --params-file']))
 
 
 def _design_lines(designed: Design, asked: DesignOptions) -> Iterator[str]:
-    """Yield the lines for the terminal; of the six legs the widest interval is shown."""
+    """Yield predicted intervals, of the six legs the widest, and the use of the limits."""
     yield (f'predicted 95 % intervals: {asked.duration:g} s, white noise of {asked.noise:g} N in '
            f'efforts at {asked.rate:g} Hz')
     unknowns = designed.unknowns

@@ -227,10 +227,7 @@ def most_motion(window: Window, extraction: Extraction) -> Window:
                              ).sum(axis=1))
     first = int(np.argmax(moved[many - 1:] - moved[:len(moved) - many + 1]))
     part = slice(first, first + many)
-    return window._replace(
-        positions=window.positions[part], efforts=window.efforts[part],
-        rates=None if window.rates is None else window.rates[part],
-        outliers=window.outliers[part])
+    return window.part(part, part)
 
 
 def _tried(extraction: Extraction, window: Window, unknowns: Unknowns, fit: Fit) -> float:

@@ -27,7 +27,7 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.identification.windows import (
     FEWEST, period_of, segments, Signal, uniform, Window)
 from stewart_dynamics.messages import type_names
-from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, NUMBERS_END
+from stewart_dynamics.messages.joint_state import JointStateReader, NUMBERS_END
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.replay.bag_topics import find_measured_legs
 
@@ -35,6 +35,7 @@ JOINT_STATE = type_names.JOINT_STATE
 # Maximum number of samples in a window, so that it and its extract fit into memory.
 _WINDOW = 1 << 16
 _LEGS, _EFFORTS = 'legs', 'efforts'
+_NOTHING = Signal(np.empty(0, dtype=np.int64), np.empty((0, 6)))
 
 
 class Topics(NamedTuple):
@@ -69,7 +70,7 @@ class RecordedLegs:
         self.rates: bool | None = None  # whether rates are recorded
         self.period = 0.0  # sampling period [s], known after the first window
         self._one = topics.legs == topics.efforts
-        self._legs, self._efforts = _Buffer(), _Buffer()
+        self._read = dict.fromkeys((_LEGS, _EFFORTS), _NOTHING)
         self._readers: dict[str, JointStateReader] = {}
 
     def windows(self, progress: Callable[[int], None] | None = None) -> Iterator[Window]:
@@ -80,59 +81,52 @@ class RecordedLegs:
             self._take(messages)
             if progress is not None:
                 progress(size)
-            while len(self._legs) > _WINDOW and (self._one or len(self._efforts) > FEWEST):
+            while len(self._read[_LEGS].stamps) > _WINDOW and (
+                    self._one or len(self._read[_EFFORTS].stamps) > FEWEST):
                 yield from self._released(last=False)
         yield from self._released(last=True)
         for key, reader in self._readers.items():
             reader.check(f'{self._recording.path}: {getattr(self._topics, key)}')
 
     def _take(self, messages: Messages) -> None:
-        for n, topic in enumerate(messages.topics):
-            which = messages.of_topic == n
-            if not which.any():
-                continue
-            starts, sizes = messages.starts[which], messages.sizes[which]
-            if topic == _LEGS:
-                if self.rates is None:
-                    self.rates = self._has_rates(messages, starts[:1], sizes[:1])
-                fields = ['position', *(['velocity'] if self.rates else []),
-                          *(['effort'] if self._one else [])]
-                stamps, values = self._read(_LEGS, fields, messages, starts, sizes)
-                count = 12 if self.rates else 6
-                self.samples += len(stamps)
-                self._legs.add(stamps, values[:, :count], self.rejected)
-                if self._one:
-                    self._efforts.add(stamps, values[:, count:], Counter())
-            else:
-                stamps, values = self._read(_EFFORTS, ['effort'], messages, starts, sizes)
-                self._efforts.add(stamps, values, self.rejected)
+        for key, places in messages.places().items():
+            starts, sizes = messages.starts[places], messages.sizes[places]
+            if key not in self._readers:
+                self._readers[key] = self._reader(key, messages, starts[:1], sizes[:1])
+            stamps, values, rejected = self._readers[key].read_many(messages.data, starts, sizes)
+            sound = (np.abs(values) < NUMBERS_END).all(axis=1) & (stamps > 0)
+            self.rejected.update(rejected)
+            if not sound.all():
+                self.rejected['out of range or without a stamp'] += int(np.count_nonzero(~sound))
+            if key == _LEGS:
+                self.samples += int(np.count_nonzero(sound))
+            self._read[key] = _extended(
+                self._read[key], stamps[sound], values[sound], self.rejected)
 
-    def _has_rates(self, messages: Messages, starts: Stamps, sizes: Stamps) -> bool:
-        reader = JointStateReader(self._joints, FIELDS if self._one else FIELDS[:2])
-        stamps, _, _ = reader.read_many(messages.data, starts, sizes)
-        return len(stamps) > 0
-
-    def _read(self, key: str, fields: list[str], messages: Messages, starts: Stamps,
-              sizes: Stamps) -> tuple[Stamps, Array]:
-        reader = self._readers.setdefault(key, JointStateReader(self._joints, fields))
-        stamps, values, rejected = reader.read_many(messages.data, starts, sizes)
-        sound = (np.abs(values) < NUMBERS_END).all(axis=1) & (stamps > 0)
-        self.rejected.update(rejected)
-        if not sound.all():
-            self.rejected['out of range or without a stamp'] += int(np.count_nonzero(~sound))
-        return stamps[sound], values[sound]
+    def _reader(self, key: str, messages: Messages, starts: Stamps, sizes: Stamps,
+                ) -> JointStateReader:
+        """Return the reader of a topic; the first message shows whether rates are recorded."""
+        if key == _EFFORTS:
+            return JointStateReader(self._joints, ['effort'])
+        efforts = ['effort'] if self._one else []
+        reader = JointStateReader(self._joints, ['position', 'velocity', *efforts])
+        self.rates = len(reader.read_many(messages.data, starts, sizes).stamps) > 0
+        return reader if self.rates else JointStateReader(self._joints, ['position', *efforts])
 
     def _released(self, last: bool) -> Iterator[Window]:
         """Yield windows of the buffered samples, and keep those that the next one needs."""
-        legs, efforts = self._legs.signal(), self._efforts.signal()
+        legs, efforts = self._read[_LEGS], self._read[_EFFORTS]
+        if self._one:
+            legs, efforts = (legs._replace(values=part)
+                             for part in (legs.values[:, :-6], legs.values[:, -6:]))
         if len(legs.stamps) < FEWEST or len(efforts.stamps) < FEWEST:
-            self._legs.keep_from(int(legs.stamps[-1]) if len(legs.stamps) else 0)
+            self._read[_LEGS] = self._read[_LEGS].part(slice(-1, None))
             return
         if not self.period:
             self.period = period_of(legs.stamps)
         end = min(int(legs.stamps[-1]), int(efforts.stamps[-1]))
         for part in segments(legs.stamps, self.period):
-            inner = Signal(legs.stamps[part], legs.values[part]).between(0, end)
+            inner = legs.part(part).between(0, end)
             if len(inner.stamps) < FEWEST:
                 continue
             pushes = efforts.between(
@@ -141,45 +135,17 @@ class RecordedLegs:
             if window is not None:
                 yield window
         keep = end if last else end - round(self._overlap * SECOND)
-        self._legs.keep_from(keep)
-        self._efforts.keep_from(keep)
+        self._read = {
+            key: signal.part(slice(int(np.searchsorted(signal.stamps, keep)), None))
+            for key, signal in self._read.items()}
 
 
-class _Buffer:
-    """Samples in the order of their stamps; samples out of order are dropped."""
-
-    def __init__(self) -> None:
-        self._stamps: list[Stamps] = []
-        self._values: list[Array] = []
-        self._newest = -1
-
-    def __len__(self) -> int:
-        return sum(map(len, self._stamps))
-
-    def add(self, stamps: Stamps, values: Array, rejected: Counter[str]) -> None:
-        """Add samples; drop and count samples that are not newer than all before."""
-        if not len(stamps):
-            return
-        before = np.maximum.accumulate(np.concatenate([[self._newest], stamps[:-1]]))
-        rising = stamps > before
-        if not rising.all():
-            rejected['stamp not increasing'] += int(np.count_nonzero(~rising))
-            stamps, values = stamps[rising], values[rising]
-        if len(stamps):
-            self._newest = int(stamps[-1])
-            self._stamps.append(stamps)
-            self._values.append(values)
-
-    def signal(self) -> Signal:
-        """Return all samples."""
-        if not self._stamps:
-            return Signal(np.empty(0, dtype=np.int64), np.empty((0, 6)))
-        self._stamps, self._values = [np.concatenate(self._stamps)], [
-            np.concatenate(self._values)]
-        return Signal(self._stamps[0], self._values[0])
-
-    def keep_from(self, stamp: int) -> None:
-        """Drop samples before a stamp."""
-        whole = self.signal()
-        first = int(np.searchsorted(whole.stamps, stamp))
-        self._stamps, self._values = [whole.stamps[first:]], [whole.values[first:]]
+def _extended(signal: Signal, stamps: Stamps, values: Array, rejected: Counter[str]) -> Signal:
+    """Return a signal with more samples; drop and count those not newer than all before."""
+    if len(signal.stamps):
+        stamps = np.concatenate([signal.stamps, stamps])
+        values = np.concatenate([signal.values, values])
+    rising = np.diff(np.maximum.accumulate(stamps), prepend=0) > 0
+    if not rising.all():
+        rejected['stamp not increasing'] += int(np.count_nonzero(~rising))
+    return Signal(stamps[rising], values[rising])

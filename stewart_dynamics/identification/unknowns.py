@@ -30,7 +30,7 @@ of any size.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 from typing import Any
 
@@ -43,7 +43,6 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, BODY_UNITS, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND,
     FIRST_MOMENT, LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST,
     PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
-from stewart_dynamics.mechanics.kinematics.home_pose import turns_about
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
 from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
@@ -86,6 +85,7 @@ for _origin, _part in ((0, MASS), (1, CENTER), (2, INERTIA), (4, REFLECTED_MASS)
 _ACCELERATION = 10.0
 # Rate at which the scale of friction equals that share, relative to sqrt(acceleration size).
 _RATE = 0.1
+_STEP = 1e-30  # imaginary, of derivatives
 
 
 class Tilt:
@@ -98,32 +98,21 @@ class Tilt:
 
     def __init__(self, gravity: Array) -> None:
         self._gravity = gravity
-        along = int(np.argmax(np.abs(gravity)))
-        self._axes = [axis for axis in range(3) if axis != along]
+        self._axes = np.delete(np.arange(3), np.argmax(np.abs(gravity)))
         self.names = tuple(f'gravity.tilt_{"xyz"[axis]}' for axis in self._axes)
 
     def gravity(self, angles: Array) -> Array:
         """Return gravity, shape (3,), rotated by angles (2,) [rad]."""
-        first, second = self._turns(angles)
-        turned: Array = second @ first @ self._gravity
+        turned = self._gravity
+        for axis, angle in zip(np.eye(3)[self._axes], angles, strict=True):
+            along = axis * (axis @ turned)
+            turned = along + (turned - along) * np.cos(angle) + np.cross(
+                axis, turned) * np.sin(angle)
         return turned
 
     def change(self, angles: Array) -> Array:
         """Return the difference (3,) of rotated gravity and the file's value."""
         return self.gravity(angles) - self._gravity
-
-    def derivative(self, angles: Array) -> Array:
-        """Return the derivative of gravity with respect to the angles, (3, 2)."""
-        first, second = self._turns(angles)
-        about = np.eye(3)[self._axes]
-        turned = first @ self._gravity
-        return np.stack([second @ np.cross(about[0], turned),
-                         np.cross(about[1], second @ turned)], axis=-1)
-
-    def _turns(self, angles: Array) -> tuple[Array, Array]:
-        first, second = (turns_about(axis, np.array([angle]))[0]
-                         for axis, angle in zip(self._axes, angles, strict=True))
-        return first, second
 
 
 class Unknowns:
@@ -204,7 +193,7 @@ class Unknowns:
         angles = values[-3:-1]
         products = self.tilt.change(angles)[:, None, None] * d[_WEIGHING]
         products[..., -3:-1] += (self._level(values)[_WEIGHING, None]
-                                 * self.tilt.derivative(angles)[:, None])
+                                 * _derivative(self.tilt.change, angles)[:, None])
         return np.concatenate([d, products.reshape(-1, len(values))])
 
     def _level(self, values: Array) -> Array:
@@ -277,25 +266,26 @@ def _alike(value: Any, other: Any) -> bool:
 def _inertial(platform: Array) -> Array:
     """Return the ten inertial parameters from mass, center of mass and inertia about it."""
     mass, center, inertia = platform[0], platform[CENTER], platform[INERTIA]
-    ten: Array = np.concatenate([[mass], mass * center, about_origin(mass, center, inertia)])
+    spread = center @ center * np.eye(3) - np.outer(center, center)
+    ten: Array = np.concatenate([
+        [mass], mass * center, inertia + mass * spread[np.triu_indices(3)]])
     return ten
 
 
 def inertial_derivative(platform: Array) -> Array:
     """Return the derivative (10, 10) of the inertial parameters by mass, center and inertia."""
-    mass, center = platform[0], platform[CENTER]
-    d = np.zeros((10, 10))
-    d[0, 0] = 1.0
-    d[CENTER, 0], d[CENTER, CENTER] = center, mass * np.eye(3)
-    d[INERTIA, 0] = about_origin(1.0, center, np.zeros(6))
-    for axis in range(3):
-        # c . c 1 - c c^T
-        unit = np.eye(3)[axis]
-        change = mass * (2.0 * center[axis] * np.eye(3) - np.outer(unit, center)
-                         - np.outer(center, unit))
-        d[INERTIA, 1 + axis] = change[np.triu_indices(3)]
-    d[INERTIA, INERTIA] = np.eye(6)
-    return d
+    return _derivative(_inertial, platform)
+
+
+def _derivative(function: Callable[[Array], Array], at: Array) -> Array:
+    """
+    Return the derivative (n, k) of an analytic function at values (k,), exact to rounding.
+
+    A complex step takes no difference (W. Squire, G. Trapp, "Using complex variables to estimate
+    derivatives of real functions", SIAM Review 40, 1998, doi:10.1137/S003614459631241X).
+    """
+    return np.stack([function(at + _STEP * 1j * axis).imag / _STEP for axis in np.eye(len(at))],
+                    axis=-1)
 
 
 def _leg_scales(p: Parameters) -> Array:

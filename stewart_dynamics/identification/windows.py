@@ -38,8 +38,6 @@ GAP = 4.0
 _OUTLIER = 12.0
 # Efforts jump when a leg reverses; smaller relative deviations are not outliers.
 _OF_EFFORTS = 2e-3
-# Longest run of samples that is replaced; a longer one is a step, not an outlier.
-_LONGEST = 3
 
 
 class Signal(NamedTuple):
@@ -51,7 +49,11 @@ class Signal(NamedTuple):
     def between(self, begin: int, end: int) -> Signal:
         """Return the samples between two stamps, both included."""
         first, last = np.searchsorted(self.stamps, (begin, end + 1))
-        return Signal(self.stamps[first:last], self.values[first:last])
+        return self.part(slice(first, last))
+
+    def part(self, which: slice) -> Signal:
+        """Return some of the samples."""
+        return Signal(self.stamps[which], self.values[which])
 
 
 class Window(NamedTuple):
@@ -66,18 +68,16 @@ class Window(NamedTuple):
 
     def with_lag(self, lag: int) -> Window:
         """Return the window with efforts taken ``lag`` samples later."""
-        if not lag:
-            return self
-        if lag < 0:
-            return self._replace(
-                begin=self.begin + round(-lag * self.period * SECOND),
-                positions=self.positions[-lag:], efforts=self.efforts[:lag],
-                rates=None if self.rates is None else self.rates[-lag:],
-                outliers=self.outliers[:lag] | self.outliers[-lag:])
+        count, before, after = len(self.positions), max(-lag, 0), max(lag, 0)
+        return self.part(slice(before, count - after), slice(after, count - before))
+
+    def part(self, of_legs: slice, of_efforts: slice) -> Window:
+        """Return positions and rates of some samples, and as many efforts."""
         return self._replace(
-            positions=self.positions[:-lag], efforts=self.efforts[lag:],
-            rates=None if self.rates is None else self.rates[:-lag],
-            outliers=self.outliers[:-lag] | self.outliers[lag:])
+            begin=self.begin + round(of_legs.start * self.period * SECOND),
+            positions=self.positions[of_legs], efforts=self.efforts[of_efforts],
+            rates=None if self.rates is None else self.rates[of_legs],
+            outliers=self.outliers[of_legs] | self.outliers[of_efforts])
 
 
 def period_of(stamps: Stamps) -> float:
@@ -162,10 +162,6 @@ def _without_outliers(values: Array, floor: float) -> tuple[Array, Flags]:
     clean = values.copy()
     for column in np.flatnonzero(wild.any(axis=0)):
         bad = wild[:, column]
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], bad, [0]])))
-        for begin, end in edges.reshape(-1, 2):
-            if end - begin > _LONGEST:
-                bad[begin:end] = False
         clean[bad, column] = np.interp(
             np.flatnonzero(bad), np.flatnonzero(~bad), values[~bad, column])
     return clean, wild
