@@ -62,8 +62,6 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     _assets(root, looks)
     world = add(root, 'worldbody')
     base = add(world, 'body', name=hexapod.base_body)
-    # Some versions of MuJoCo look for the centre of mass of shapes without mass.
-    add(base, 'inertial', pos=numbers([0, 0, 0]), mass='0', diaginertia=numbers([0, 0, 0]))
     _geoms(base, looks[hexapod.base])
     for leg in hexapod.legs:
         _leg(base, hexapod, leg, looks)

@@ -38,6 +38,8 @@ GAP = 4.0
 _OUTLIER = 12.0
 # Efforts jump when a leg reverses; smaller relative deviations are not outliers.
 _OF_EFFORTS = 2e-3
+# Longest run of samples that is replaced; a longer one is a step, not an outlier.
+_LONGEST = 3
 
 
 class Signal(NamedTuple):
@@ -162,6 +164,10 @@ def _without_outliers(values: Array, floor: float) -> tuple[Array, Flags]:
     clean = values.copy()
     for column in np.flatnonzero(wild.any(axis=0)):
         bad = wild[:, column]
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], bad, [0]])))
+        for begin, end in edges.reshape(-1, 2):
+            if end - begin > _LONGEST:
+                bad[begin:end] = False
         clean[bad, column] = np.interp(
             np.flatnonzero(bad), np.flatnonzero(~bad), values[~bad, column])
     return clean, wild
