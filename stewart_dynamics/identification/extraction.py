@@ -319,7 +319,7 @@ class Extraction:
         They are followed by the variance [(m/s)^2] by which the law of friction is to be wider at
         them than at true rates. Its slope is a box of variance v^2 / 3, v the parameter
         ``actuator.coulomb_velocity``. Noise that is slower than the narrow band makes the mean of
-        the law over true rates wider, and is not correlated with what is left. Faster noise is
+        the law over true rates wider, and is not correlated with the residuals. Faster noise is
         averaged by that band: it makes the law as wide as it is itself.
         """
         quick, variance = self._derivative(self._wide, 1, window, deviations)
