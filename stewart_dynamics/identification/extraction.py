@@ -27,7 +27,7 @@ Extracts are kept in a temporary file, so that memory does not grow with the bag
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 import math
 import tempfile
 from typing import NamedTuple
@@ -158,6 +158,14 @@ class Extracts:
     def close(self) -> None:
         """Remove the file."""
         self._file.close()
+
+
+class _Term(NamedTuple):
+    """A signal (N, 6), the taps of its filter, and the deviation of its noise."""
+
+    signal: Array
+    taps: Array
+    deviation: float
 
 
 class Extraction:
@@ -309,7 +317,7 @@ class Extraction:
                 np.fft.rfft(white, axis=1) * faster[:, None], count, axis=1)
             window, fast = (_with_noise(window, deviations, each) for each in (white, of_fast))
         lengths, rates, accelerations = (
-            self._derivative(self._wide, order, window, deviations)[0] for order in range(3))
+            _derivative(self._terms(self._wide, order, window, deviations)) for order in range(3))
         return lengths, rates, accelerations, *self._quick(fast, deviations)
 
     def _quick(self, window: Window, deviations: tuple[float, float]) -> tuple[Array, float]:
@@ -322,35 +330,34 @@ class Extraction:
         the law over true rates wider, and is not correlated with the residuals. Faster noise is
         averaged by that band: it makes the law as wide as it is itself.
         """
-        quick, variance = self._derivative(self._wide, 1, window, deviations)
-        band = 2.0 * self._wide.cutoff
-        while band * self._period < _WIDEST:
-            wider = LowPass.of(self._period, band, self._narrow.cutoff)
-            inner, of_inner = self._derivative(wider, 1, window, deviations)
-            if -of_inner > _WIDTH * float(np.min(self._coulomb_velocity)) ** 2:
-                break
-            margin = self._wide.half - wider.half
-            quick, variance = inner[margin:len(inner) - margin], of_inner
-            band *= 2.0
-        return quick, variance
+        narrow = self._narrow.taps()
 
-    def _derivative(self, band: LowPass, order: int, window: Window,
-                    deviations: tuple[float, float]) -> tuple[Array, float]:
-        """Return a derivative of the lengths in a band, and slow less fast variance of noise."""
+        def widening(terms: Sequence[_Term]) -> float:
+            """Return the variance of slow noise less that of fast noise."""
+            return sum(each.deviation ** 2 * float(
+                2.0 * np.sum(np.convolve(each.taps, narrow) ** 2) - np.sum(each.taps ** 2))
+                for each in terms)
+
+        widest, terms = self._wide, self._terms(self._wide, 1, window, deviations)
+        while (band := 2.0 * widest.cutoff) * self._period < _WIDEST:
+            wider = LowPass.of(self._period, band, self._narrow.cutoff)
+            inner = self._terms(wider, 1, window, deviations)
+            if -widening(inner) > _WIDTH * float(np.min(self._coulomb_velocity)) ** 2:
+                break
+            widest, terms = wider, inner
+        quick, margin = _derivative(terms), self._wide.half - widest.half
+        return quick[margin:len(quick) - margin], widening(terms)
+
+    def _terms(self, band: LowPass, order: int, window: Window,
+               deviations: tuple[float, float]) -> list[_Term]:
+        """Return the signals of which a derivative of the lengths in a band is the sum."""
         band = band._replace(later=self.later)
         if window.rates is None:
-            parts = [(window.positions, band.taps(order), deviations[0])]
-        else:
-            of_positions, of_rates = band.fused(
-                order, max(deviations[0], _ROUNDING * self._size), deviations[1])
-            parts = [(window.positions, of_positions, deviations[0]),
-                     (window.rates, of_rates, deviations[1])]
-        narrow = self._narrow.taps()
-        variance = sum(deviation ** 2 * (
-            2.0 * np.sum(np.convolve(taps, narrow) ** 2) - np.sum(taps ** 2))
-            for _, taps, deviation in parts)
-        whole: Array = sum((convolved(signal, taps) for signal, taps, _ in parts), np.zeros(()))
-        return whole, float(variance)
+            return [_Term(window.positions, band.taps(order), deviations[0])]
+        of_positions, of_rates = band.fused(
+            order, max(deviations[0], _ROUNDING * self._size), deviations[1])
+        return [_Term(window.positions, of_positions, deviations[0]),
+                _Term(window.rates, of_rates, deviations[1])]
 
     def _decimated(self, rows: Array, sliding: Array) -> Array:
         """Return the decimated regressor (N, 6, n) of rows of motion; ``sliding``: of the law."""
@@ -385,6 +392,11 @@ class Extraction:
             (len(bad) - 2 * self._narrow.half - 1) // self.step + 1)
         wrong: Flags = sums[at + reach + 1] - sums[at - reach] > 0.0
         return wrong, int(np.count_nonzero(stopped.any(axis=1)))
+
+
+def _derivative(terms: Sequence[_Term]) -> Array:
+    whole: Array = sum((convolved(each.signal, each.taps) for each in terms), np.zeros(()))
+    return whole
 
 
 def _with_noise(window: Window, deviations: tuple[float, float], white: Array) -> Window:
