@@ -1,4 +1,4 @@
-/* Copyright 2026 The stewart_dynamics developers
+/* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
  * The time of each call of the exported C source, for exported_source.py.

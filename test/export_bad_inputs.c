@@ -1,4 +1,4 @@
-/* Copyright 2026 The stewart_dynamics developers
+/* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
  * Inputs that are not valid: each has its return code, and nothing is written. Exits with 0.

@@ -1,4 +1,4 @@
-/* Copyright 2026 The stewart_dynamics developers
+/* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
  * Calls of the exported C source over arrays, for test_export.py and benchmarks/.

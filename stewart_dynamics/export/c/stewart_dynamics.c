@@ -1,4 +1,4 @@
-/* Copyright 2026 The stewart_dynamics developers
+/* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
  * The same operations in the same order as in the Python library, so that results have the same

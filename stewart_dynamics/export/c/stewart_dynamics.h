@@ -1,4 +1,4 @@
-/* Copyright 2026 The stewart_dynamics developers
+/* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
  * Leg lengths, rates and forces of a Gough-Stewart platform (hexapod), for real-time computers.
