@@ -249,6 +249,20 @@ def test_a_file_that_is_better_at_held_out_time_is_said() -> None:
     assert 'validation' in identified([recording(legs, 1)], empty).causes
 
 
+@pytest.mark.parametrize('seed', [3, 5])
+def test_a_unit_is_named_though_the_mass_makes_another_scale_nearer(seed: int) -> None:
+    truth = drawn(seed)  # masses of 1.8 and 0.7 times the file's
+    given = estimate_cases.recorded(truth, 'rich', seed)
+    found = identified([given._replace(efforts=1e-3 * given.efforts)], truth)
+    assert found.causes[0] == 'unit' and 'likely kN in place of N' in found.notices[0]
+
+
+def test_swapped_legs_are_named_before_a_delay_that_fits_them_best() -> None:
+    given = estimate_cases.recorded(drawn(3), 'roll', 3)
+    swapped = given._replace(efforts=given.efforts[:, [1, 0, 2, 3, 4, 5]])
+    assert identified([swapped], drawn(3)).causes[0] == 'swapped'
+
+
 @pytest.mark.parametrize('seed', [2, 3])
 def test_rest_before_and_after_a_motion_is_no_lack_of_fit(seed: int) -> None:
     true, moving = true_hexapod(seed), fourier(seed)

@@ -34,7 +34,7 @@ from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import (
     lack_of_fit, LackOfFit, LEFT_BY_FILTERS, long_pieces)
 from stewart_dynamics.identification.likely_mistakes import (
-    Comparison, LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose, of_validation)
+    Comparison, LONGEST_LAG, most_motion, of_efforts, of_fit, of_no_pose, of_validation)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
@@ -377,8 +377,8 @@ class Identification:
         outliers = 0 if likely else self._leave_out()
         noisy = Noisy(self._moving, self._noisy)
         found = fit(extracts, unknowns, noisy, self._cutoffs)
-        likely = likely or list(of_delay(
-            bag.delay_s + delay for bag, delay in zip(self.bags, found.delays, strict=True)))
+        delays = [bag.delay_s + delay
+                  for bag, delay in zip(self.bags, found.delays, strict=True)]
         written = best_for_file(extracts, self.parameters, options.kinds, self._cutoffs,
                                 found.ratios(unknowns))
         residuals = Residuals.of(extracts, unknowns, written, found.delays, _used)
@@ -389,7 +389,8 @@ class Identification:
         validation, of_time = self._validation(found, noisy) if options.hold_out else (None, [])
         if not likely:
             assert self._first is not None
-            likely += of_fit(self.parameters, unknowns, *self._first, found, lack, left)
+            likely += of_fit(
+                self.parameters, unknowns, *self._first, found, lack, left, delays)
         likely = likely or of_time
         tested = bool(long_pieces(extracts))
         return Identified(
