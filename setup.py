@@ -18,8 +18,8 @@ from setuptools.command.build_ext import build_ext
 
 try:
     from setuptools.command.bdist_wheel import bdist_wheel
-except ImportError:  # before setuptools 70.1; only builds of wheels need it
-    from wheel.bdist_wheel import bdist_wheel
+except ImportError:  # before setuptools 70.1: colcon does without wheels
+    from setuptools import Command as bdist_wheel
 
 package_name = 'stewart_dynamics'
 share = f'share/{package_name}'
@@ -96,7 +96,7 @@ extras_require = {
 CORE = Path(package_name, 'core')
 # The same bits on all processors of a kind: no product is fused into a sum, no sum is reordered.
 FLAGS = ('-std=gnu99', '-O3', '-fPIC', '-ffp-contract=off', '-fno-math-errno',
-         '-fno-trapping-math', '-fno-fast-math', '-Wno-psabi', '-Wno-unknown-warning-option')
+         '-fno-trapping-math', '-Wno-psabi', '-Wno-unknown-warning-option')
 # Versions of lanes.c: the suffix of its function, its lanes, what the processor must have.
 VERSIONS = {'baseline': (2, ())}
 if platform.machine() in ('x86_64', 'AMD64', 'amd64'):
@@ -114,8 +114,9 @@ def c_compiler() -> list[str]:
     if find_spec('ziglang'):
         # Its defaults are this very processor, and checks of undefined behavior.
         return [sys.executable, '-m', 'ziglang', 'cc', '-mcpu=baseline', '-fno-sanitize=undefined']
-    raise SystemExit(f'{package_name}: found no C compiler: install gcc and libc6-dev (on Debian '
-                     'and Ubuntu: apt install build-essential), or: pip install ziglang')
+    raise SystemExit(
+        f'{package_name}: found no C compiler: install one (Debian and Ubuntu: apt install gcc '
+        'libc6-dev); or, for builds without isolation, the package ziglang from PyPI')
 
 
 class BuildCore(build_ext):
@@ -175,7 +176,8 @@ setup(
     packages=find_packages(include=[package_name, f'{package_name}.*']),
     ext_modules=[Extension(f'{package_name}.core.library', [str(CORE / 'library.c')],
                            depends=sorted(map(str, CORE.glob('*.[ch]'))))],
-    cmdclass={'build_ext': BuildCore, 'bdist_wheel': Wheel},
+    cmdclass={'build_ext': BuildCore} | (
+        {'bdist_wheel': Wheel} if hasattr(bdist_wheel, 'get_tag') else {}),
     package_data={package_name: ['py.typed'], f'{package_name}.core': ['*.c', '*.h'],
                   f'{package_name}.calibration': ['templates/*'],
                   f'{package_name}.datasheet': ['templates/*'],

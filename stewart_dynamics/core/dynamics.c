@@ -68,7 +68,7 @@ static void cholesky(system6 * work) {
 }
 
 /* Write the acceleration of a motion under leg forces. */
-static void accelerate(
+FLAT static void accelerate(
   const stewart_platform * platform, stewart_motion * motion, const double forces[6],
   const double wrench[6], const stewart_base * base) {
   double per_size = 1.0 / platform->characteristic_length, inertia[6];
@@ -227,7 +227,7 @@ static load platform_momentum_rate(
   return rates;
 }
 
-void base_wrenches_many(
+FLAT void base_wrenches_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
   int64_t n_wrenches, const double * wrenches, int64_t n_bases, const stewart_base * bases,
   double * results) {
@@ -347,7 +347,7 @@ static void put_regressor(
   }
 }
 
-void regressors_many(
+FLAT void regressors_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
   int64_t n_bases, const stewart_base * bases, double * results) {
   for (int64_t n = 0; n < count; n++) {

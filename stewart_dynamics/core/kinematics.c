@@ -14,7 +14,7 @@ void lengths_many(
   }
 }
 
-void forward_kinematics_many(
+FLAT void forward_kinematics_many(
   const stewart_platform * platform, int64_t count, const double * lengths,
   stewart_motion * motions, int64_t * codes, int64_t * steps, double * residuals) {
   for (int64_t n = 0; n < count; n++) {
