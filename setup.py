@@ -141,7 +141,7 @@ class BuildCore(build_ext):
             for suffix, (lanes, processor) in VERSIONS.items()}
         objects = [str(folder / f'{name}.o') for name in commands]
         compiling = [subprocess.Popen([*compiler, *FLAGS, '-c', *command, '-o', each])
-                     for command, each in zip(commands.values(), objects)]
+                     for command, each in zip(commands.values(), objects, strict=True)]
         done = [each.wait() for each in compiling]  # all, before an error ends this process
         # Renamed when it is complete: running processes keep the old one.
         new = path.with_suffix('.new')
