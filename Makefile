@@ -201,10 +201,15 @@ endif
 	@$(PIP) install --no-build-isolation --requirement $(VENV)/requirements.txt
 	@touch $@
 
+# Without a C compiler, the one of this package is used.
+ZIG := ziglang==0.17.1
+CORE := $(wildcard stewart_dynamics/core/*.[ch])
+
 # Not isolated: the build uses the pinned setuptools. It warns of every editable package that has a
 # folder of its own name.
-$(INSTALLED): $(PREPARED) requirements-fmi.txt setup.py setup.cfg pyproject.toml
+$(INSTALLED): $(PREPARED) requirements-fmi.txt setup.py setup.cfg pyproject.toml $(CORE)
 	@$(PIP) install --no-deps --requirement requirements-fmi.txt
+	@echo '#include <math.h>' | $${CC:-cc} -E -x c - > /dev/null 2>&1 || $(PIP) install $(ZIG)
 	@PYTHONWARNINGS=ignore $(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@
 

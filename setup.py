@@ -3,10 +3,23 @@
 
 
 from glob import glob
+from importlib.util import find_spec
+import os
 from pathlib import Path
+import platform
 import re
+import shlex
+import shutil
+import subprocess
+import sys
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
+
+try:
+    from setuptools.command.bdist_wheel import bdist_wheel
+except ImportError:  # before setuptools 70.1: colcon does without wheels
+    from setuptools import Command as bdist_wheel
 
 package_name = 'stewart_dynamics'
 share = f'share/{package_name}'
@@ -80,6 +93,78 @@ extras_require = {
     ],
 }
 
+CORE = Path(package_name, 'core')
+# The same bits on all processors of a kind: no product is fused into a sum, no sum is reordered.
+FLAGS = ('-std=gnu99', '-O3', '-fPIC', '-ffp-contract=off', '-fno-math-errno',
+         '-fno-trapping-math', '-Wno-psabi', '-Wno-unknown-warning-option')
+# Versions of lanes.c: the suffix of its function, its lanes, what the processor must have.
+VERSIONS = {'baseline': (2, ())}
+if platform.machine() in ('x86_64', 'AMD64', 'amd64'):
+    VERSIONS |= {'avx2': (4, ('-mavx2',)), 'avx512': (8, ('-mavx512f', '-mavx512dq'))}
+
+
+def c_compiler() -> list[str]:
+    """Return the command of a C compiler: $CC, the system's, or that of the package ziglang."""
+    for name in (os.environ.get('CC', ''), 'cc', 'gcc', 'clang'):
+        command = shlex.split(name)
+        if command and shutil.which(command[0]) and subprocess.run(
+                [*command, '-E', '-x', 'c', '-'], input=b'#include <math.h>', check=False,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0:
+            return command
+    if find_spec('ziglang'):
+        # Its defaults are this very processor, and checks of undefined behavior.
+        return [sys.executable, '-m', 'ziglang', 'cc', '-mcpu=baseline', '-fno-sanitize=undefined']
+    raise SystemExit(
+        f'{package_name}: found no C compiler: install one (Debian and Ubuntu: apt install gcc '
+        'libc6-dev); or, for builds without isolation, the package ziglang from PyPI')
+
+
+class BuildCore(build_ext):
+    """Build the shared library of core/, the same for every Python."""
+
+    def get_ext_filename(self, fullname: str) -> str:
+        """Return the name without that of a Python."""
+        return f'{fullname.replace(".", os.sep)}.so'
+
+    def build_extension(self, ext: Extension) -> None:
+        """Compile and link it, if a source is newer."""
+        path = Path(self.get_ext_fullpath(ext.name))
+        times = [os.path.getmtime(each) for each in (*ext.depends, 'setup.py')]
+        if not self.force and path.is_file() and path.stat().st_mtime > max(times):
+            return
+        compiler = c_compiler()
+        folder = Path(self.build_temp)
+        folder.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        commands = {'library': [str(CORE / 'library.c')]} | {
+            suffix: [*processor, f'-DLANES={lanes}', f'-DSUFFIX={suffix}', str(CORE / 'lanes.c')]
+            for suffix, (lanes, processor) in VERSIONS.items()}
+        objects = [str(folder / f'{name}.o') for name in commands]
+        compiling = [subprocess.Popen([*compiler, *FLAGS, '-c', *command, '-o', each])
+                     for command, each in zip(commands.values(), objects, strict=True)]
+        done = [each.wait() for each in compiling]  # all, before an error ends this process
+        # Renamed when it is complete: running processes keep the old one.
+        new = path.with_suffix('.new')
+        if any(done) or subprocess.run(
+                [*compiler, '-shared', *objects, '-lm', '-o', str(new)], check=False).returncode:
+            raise SystemExit(f'{package_name}: {shlex.join(compiler)}: cannot compile {CORE}')
+        new.replace(path)
+
+
+class Wheel(bdist_wheel):
+    """A wheel for every Python 3, and for all systems with the libraries that it needs."""
+
+    def get_tag(self) -> tuple[str, str, str]:
+        """Return the tags of Python, ABI and system."""
+        *_, system = super().get_tag()
+        library = next(Path(self.bdist_dir, CORE).glob('*.so'), None) if self.bdist_dir else None
+        if library and system.startswith('linux_'):
+            versions = re.findall(rb'GLIBC_2\.(\d+)', library.read_bytes())
+            if versions:
+                system = f'manylinux_2_{max(17, *map(int, versions))}_{system[len("linux_"):]}'
+        return 'py3', 'none', system
+
+
 setup(
     name=package_name,
     version=version,
@@ -89,7 +174,12 @@ setup(
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.calibration': ['templates/*'],
+    ext_modules=[Extension(f'{package_name}.core.library', [str(CORE / 'library.c')],
+                           depends=sorted(map(str, CORE.glob('*.[ch]'))))],
+    cmdclass={'build_ext': BuildCore} | (
+        {'bdist_wheel': Wheel} if hasattr(bdist_wheel, 'get_tag') else {}),
+    package_data={package_name: ['py.typed'], f'{package_name}.core': ['*.c', '*.h'],
+                  f'{package_name}.calibration': ['templates/*'],
                   f'{package_name}.datasheet': ['templates/*'],
                   f'{package_name}.export': ['c/*'],
                   f'{package_name}.identification': ['templates/*'],

@@ -95,7 +95,6 @@ def measure(name: str, function: Any, *arrays: Array | None) -> Times:
 def library_calls(platform: StewartPlatform, rows: Array) -> Times:
     """Return the times of the library's call for one motion."""
     singles = [Motion.of_rows(row) for row in rows]
-    platform.inverse_dynamics(singles[0])  # compiled at the first call
     times = np.empty((PYTHON_CALLS // MOTIONS, MOTIONS))
     for of_one in times:
         for n, motion in enumerate(singles):

@@ -19,6 +19,7 @@ import pinocchio as pin
 from scipy.optimize import root
 
 from stewart_dynamics import Motion, Pose, StewartPlatform
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.mechanics.dynamics import forward_dynamics
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
@@ -33,7 +34,7 @@ GUESSES = 1_000_000
 SAMPLES = 20_000
 ABA = '`pin.aba` alone'
 CALL = '`StewartPlatform.forward_dynamics`, one `Motion`'
-NEWTON = 'the compiled function alone, from afar'
+NEWTON = 'the function in C alone, from afar'
 FROM_POSE = '`StewartPlatform.forward_kinematics` from afar, guess a `Pose`'
 
 
@@ -75,7 +76,7 @@ def steps_table(platform: StewartPlatform) -> list[str]:
     rows = guesses.rows.copy()
     codes, steps = np.empty(GUESSES, dtype=np.int64), np.empty(GUESSES, dtype=np.int64)
     residuals = np.empty(GUESSES)
-    forward_kinematics.poses(platform.constants, lengths, rows, codes, steps, residuals)
+    forward_kinematics.poses(platform.structure, lengths, rows, codes, steps, residuals)
     found = codes == FOUND
     determinants = [platform.solve(each.rows)[:, DETERMINANT] for each in (poses, guesses)]
     beyond = determinants[0] * determinants[1] <= 0.0
@@ -97,13 +98,12 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
     one = Motion(motion.position[0], motion.rotation[0], motion.linear_velocity[0],
                  motion.angular_velocity[0])
     row, force, no_wrench = motion.rows[:1].copy(), forces[:1].copy(), np.zeros((1, 6))
-    work = np.empty(forward_dynamics.WORK)
     tree = Tree(platform.parameters)
     q, v, _, _ = tree.state(one)
     dynamics = [
-        Contestant('the compiled function alone', repeated(
-            'solve()', solve=forward_dynamics.solve.bound(
-                platform.constants, row, force, no_wrench, STILL, work)), ABA),
+        Contestant('the function in C alone', repeated(
+            'solve()', solve=function('forward_dynamics_many').bound(
+                platform.structure, 1, row, force, 1, no_wrench, 1, STILL)), ABA),
         Contestant(ABA, repeated(
             'aba(model, data, q, v, tau)', aba=pin.aba, model=tree.model, data=tree.data, q=q,
             v=v, tau=np.zeros(tree.model.nv)), ABA),
@@ -111,8 +111,8 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
             'solve(motion, forces)', solve=platform.forward_dynamics, motion=one,
             forces=forces[0]), ABA),
         Contestant(f'`forward_dynamics.solve`, a sample of {SAMPLES:,}', once(
-            SAMPLES, forward_dynamics.solve, platform.constants, motion.rows.copy(), forces,
-            no_wrench, STILL, work), ABA)]
+            SAMPLES, forward_dynamics.solve, platform.structure, motion.rows.copy(), forces,
+            no_wrench, STILL), ABA)]
 
     random = np.random.default_rng(20260103)
     pose = legal_poses(platform, random, 1)
@@ -123,8 +123,8 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
     def newton(begin: Any) -> Any:
         rows = begin.copy()
         return repeated(
-            'rows[:] = begin; find()', find=forward_kinematics.poses.bound(
-                platform.constants, lengths, rows, codes, steps, residuals),
+            'rows[:] = begin; find()', find=function('forward_kinematics_many').bound(
+                platform.structure, 1, lengths, rows, codes, steps, residuals),
             rows=rows, begin=begin)
 
     near = pose.rows.copy()

@@ -27,11 +27,12 @@ from numpy.typing import NDArray
 import pinocchio as pin
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.export.c_project import platform_source
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics, lagrange
+from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import (
-    DETERMINANT, FORCES, NO_BASE, RESULT, UNIT_LOAD_FORCES, WRENCH)
+    FORCES, NO_BASE, RESULT, WRENCH)
 from stewart_dynamics.parameters.table import inertia_matrix
 
 Array = NDArray[np.float64]
@@ -96,7 +97,7 @@ class PlainC:
     """The exported C source of a hexapod, compiled here and now."""
 
     def __init__(self, parameters: Parameters) -> None:
-        folder = HERE.parent / 'stewart_dynamics' / 'export' / 'c'
+        folder = HERE.parent / 'stewart_dynamics' / 'core'
         with tempfile.TemporaryDirectory() as name:
             hexapod, library = Path(name) / 'hexapod.c', Path(name) / 'hexapod.so'
             hexapod.write_text('#include "stewart_dynamics.h"\n#include <math.h>\n'
@@ -258,10 +259,10 @@ def once(samples: int, function: Callable[..., Any], *arguments: Any) -> Callabl
 
 
 RNEA = '`pin.rnea` alone'
-STEP = 'the compiled step alone'
+STEP = 'the function in C alone'
 CALL = '`StewartPlatform.inverse_dynamics`, one `Motion`'
 MOTION = '`Motion` of six arrays'
-BATCH = '`inverse_dynamics.solve`, one core'
+BATCH = '`solve_many` in C, one core'
 PLAIN_C = 'plain C, one core'
 
 
@@ -269,23 +270,18 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     """Return the contestants of single calls and of batches, after checking that all agree."""
     parameters = example_hexapod()
     hexapod = StewartPlatform(parameters)
-    numbers = hexapod.constants
     motion = random_motions(samples)
     rows, no_wrench = motion.rows, np.zeros((1, WRENCH))
     results, c_results = (np.empty((samples, RESULT)) for _ in range(2))
-    sound, tile = np.empty(samples, dtype=bool), np.empty(inverse_dynamics.TILE)
     c, tree = PlainC(parameters), Tree(parameters)
 
     wrenches = np.random.default_rng(20260102).normal(0.0, 500.0, (samples, WRENCH))
     for name, wrench in ('plain C under a wrench', wrenches), ('plain C', None):
-        inverse_dynamics.solve(
-            numbers, rows, no_wrench if wrench is None else wrench, STILL, results, sound, tile)
+        loads = no_wrench if wrench is None else wrench
+        function('solve_many')(hexapod.structure, samples, rows, len(loads), loads, 1, STILL, 1,
+                               results)
         c.function(*c.arguments(rows, wrench, c_results))
-        # in C the forces under a unit load come last
-        in_order = np.concatenate([
-            results[:, :UNIT_LOAD_FORCES.start], results[:, DETERMINANT:],
-            results[:, UNIT_LOAD_FORCES]], axis=1)
-        if not np.array_equal(c_results, in_order):
+        if not np.array_equal(c_results, results):
             raise SystemExit(f'{name} does not have the bits of the runtime path')
     forces = results[:, FORCES]
     few = [_part(motion, slice(k, k + 1)) for k in range(min(50, samples))]
@@ -298,8 +294,8 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     row, result = rows[:1].copy(), np.empty((1, RESULT))
     q, v, a, _ = tree.state(one)
     single = [
-        Contestant(STEP, repeated('solve()', solve=inverse_dynamics.solve.bound(
-            numbers, row, no_wrench, STILL, result, sound[:1], tile)), RNEA),
+        Contestant(STEP, repeated('solve()', solve=function('solve_one').bound(
+            hexapod.structure, row, no_wrench, STILL, result)), RNEA),
         Contestant(RNEA, repeated(
             'rnea(model, data, q, v, a)', rnea=pin.rnea, model=tree.model, data=tree.data,
             q=q, v=v, a=a), RNEA),
@@ -314,8 +310,8 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
             arguments=c.arguments(row, None, result)), RNEA)]
     batch = [
         Contestant(BATCH, once(
-            samples, inverse_dynamics.solve, numbers, rows, no_wrench, STILL, results, sound,
-            tile),
+            samples, function('solve_many'), hexapod.structure, samples, rows, 1, no_wrench, 1,
+            STILL, 1, results),
             PLAIN_C),
         Contestant(PLAIN_C, once(
             samples, c.function, *c.arguments(rows, None, c_results)), PLAIN_C),
@@ -448,7 +444,7 @@ def run(rounds: int, samples: int = SAMPLES) -> tuple[list[str], list[Figure]]:
              *table(f'a sample in a batch of {samples:,}', batch, turns),
              '', f'{measured_on()} Medians of {rounds} rounds.', '']
     return lines, [
-        Figure('the compiled step', ratio(STEP, single, turns), 1.0, 'times `pin.rnea`'),
+        Figure('the function in C', ratio(STEP, single, turns), 1.0, 'times `pin.rnea`'),
         Figure('`inverse_dynamics(motion)`', ratio(CALL, single, turns), 1.1, 'times `pin.rnea`'),
         Figure(MOTION, microseconds(MOTION, turns), 5.0, 'us'),
         Figure('a sample of a batch', ratio(BATCH, batch, turns), 0.8, 'times plain C')]

@@ -19,7 +19,8 @@ from inverse_dynamics import (
 import numpy as np
 
 from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
-from stewart_dynamics.mechanics.dynamics import forward_dynamics, inverse_dynamics
+from stewart_dynamics.core.binding import function
+from stewart_dynamics.mechanics.dynamics import forward_dynamics
 from stewart_dynamics.mechanics.rows import FORCES, RESULT
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.setpoints.base_input import BaseInput
@@ -50,11 +51,10 @@ def contestants(platform: StewartPlatform) -> list[Contestant]:
     """Return each call, on a base that is still and on one that moves."""
     motion, base = random_motions(SAMPLES), random_base(SAMPLES)
     one, its_base = (type(many).of_rows(many.rows[0].copy()) for many in (motion, base))
-    results, sound = np.empty((SAMPLES, RESULT)), np.empty(SAMPLES, dtype=bool)
-    tile = np.empty(inverse_dynamics.TILE)
-    numbers, rows, no_wrench = platform.constants, motion.rows, np.zeros((1, 6))
+    results = np.empty((SAMPLES, RESULT))
+    hexapod, rows, no_wrench = platform.structure, motion.rows, np.zeros((1, 6))
     forces = platform.solve(rows)[:, FORCES].copy()
-    work, moved = np.empty(forward_dynamics.WORK), rows.copy()
+    moved = rows.copy()
     found = []
     for name, call in ((CALL, 'solve(motion, None, base)'),
                        (WAY_BACK, 'back(motion, forces, None, base)')):
@@ -63,11 +63,10 @@ def contestants(platform: StewartPlatform) -> list[Contestant]:
                 call, solve=platform.inverse_dynamics, back=platform.forward_dynamics,
                 motion=one, forces=forces[0], base=moving), name))
     for name, call in ((BATCH, lambda bases: once(
-            SAMPLES, inverse_dynamics.solve, numbers, rows, no_wrench, bases, results, sound,
-            tile)),
+            SAMPLES, function('solve_many'), hexapod, SAMPLES, rows, 1, no_wrench, len(bases),
+            bases, 1, results)),
             ('`forward_dynamics.solve`, a sample, one core', lambda bases: once(
-                SAMPLES, forward_dynamics.solve, numbers, moved, forces, no_wrench, bases,
-                work))):
+                SAMPLES, forward_dynamics.solve, hexapod, moved, forces, no_wrench, bases))):
         for bases in (STILL, base.rows):
             found.append(Contestant(
                 name + (MOVING if len(bases) > 1 else ''), call(bases), name))

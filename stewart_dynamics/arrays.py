@@ -16,6 +16,7 @@ Integers = NDArray[np.int64]  # indices, counts and codes
 Stamps = NDArray[np.int64]  # times [ns]
 Flags = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
+Records = NDArray[np.void]  # structures of the C library
 
 Six = tuple[float, float, float, float, float, float]
 """One number for each leg, or a wrench or twist."""

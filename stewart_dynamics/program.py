@@ -71,15 +71,17 @@ class Program:
             parser.add_argument('--strict', action='store_true',
                                 help=f'exit code {STRICT} when {self._strict}')
 
-    def prepare(self, functions: Iterable[EntryPoint], mistakes: Iterable[str]) -> None:
-        """Compile functions side by side; print why that is not possible, and likely mistakes."""
-        from stewart_dynamics.compilation.functions import prepare  # late, so that --help is fast
-        from stewart_dynamics.compilation.machine_code import HINT
-
+    def prepare(self, mistakes: Iterable[str], functions: Sequence[EntryPoint] = ()) -> None:
+        """Print likely mistakes; compile functions side by side, or print why that fails."""
         _keep_freed_memory()
-        if HINT:
-            self.complain(HINT)
-        prepare(functions)
+        if functions:
+            # Late, so that --help is fast.
+            from stewart_dynamics.compilation.functions import prepare
+            from stewart_dynamics.compilation.machine_code import HINT
+
+            if HINT:
+                self.complain(HINT)
+            prepare(functions)
         for mistake in mistakes:
             self.complain(f'warning: {mistake}')
 

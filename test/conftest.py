@@ -153,7 +153,7 @@ def ros_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setenv(PROFILES, str(Path(__file__).with_name('discovery.xml')))
         patch.setenv('ROS_LOG_DIR', str(tmp_path_factory.mktemp('log')))
         for name in ('ROS_DOMAIN_ID', 'ROS_STATIC_PEERS', 'ROS_LOCALHOST_ONLY',
-                     'NUMBA_DISABLE_JIT', 'RCUTILS_CONSOLE_OUTPUT_FORMAT',
+                     'RCUTILS_CONSOLE_OUTPUT_FORMAT',
                      'RCUTILS_COLORIZED_OUTPUT'):
             patch.delenv(name, raising=False)
         yield

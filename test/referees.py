@@ -11,15 +11,7 @@ Nothing here uses the package's equations; only Parameters and Motion, which car
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import redirect_stdout
-from functools import cache
-from io import StringIO
-import json
-import os
 from pathlib import Path
-import subprocess
-import sys
-import tempfile
 from typing import Any
 
 import numpy as np
@@ -273,67 +265,6 @@ def friction(p: Parameters, rates: Array) -> Array:
                 + p['actuator.coulomb_friction'] * np.clip(
                     rates / p['actuator.coulomb_velocity'], -1.0, 1.0))
     return f
-
-
-# Runs code read as lines of JSON, and returns its output on stdout and on stderr.
-_UNCOMPILED = """
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
-import json
-import sys
-import traceback
-import warnings
-warnings.simplefilter('always')
-for line in sys.stdin:
-    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
-        try:
-            exec(json.loads(line), {'__name__': 'uncompiled'})
-        except Exception:
-            traceback.print_exc()
-    print(json.dumps([out.getvalue(), err.getvalue()]), flush=True)
-"""
-
-
-@cache
-def _without_compiler() -> subprocess.Popen[str]:
-    """Return the process that runs code with no compiler: one for all, it ends with this one."""
-    return subprocess.Popen(
-        [sys.executable, '-c', _UNCOMPILED], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        text=True, cwd=ROOT / 'test', env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
-
-
-def printed_uncompiled(code: str) -> str:
-    """Return what code in the folder of the tests prints with no compiler."""
-    process = _without_compiler()
-    assert process.stdin is not None
-    assert process.stdout is not None
-    process.stdin.write(json.dumps(code) + '\n')
-    process.stdin.flush()
-    printed, said = json.loads(process.stdout.readline())
-    assert said == ''
-    return str(printed)
-
-
-def assert_uncompiled_gives_the_same(function: Any, *arrays: Array) -> None:
-    """Call a compiled function, and the same without a compiler: all arrays must be equal."""
-    module, name = function.__module__, function.function.__name__
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / 'arrays.npz'
-        np.savez(path, *arrays)
-        printed_uncompiled(f'import numpy as np\nfrom {module} import {name}\n'
-                           f'arrays = [*np.load({str(path)!r}).values()]\n{name}(*arrays)\n'
-                           f'np.savez({str(path)!r}, *arrays)\n')
-        function(*arrays)
-        with np.load(path) as plain:
-            for array, other in zip(arrays, plain.values(), strict=True):
-                np.testing.assert_array_equal(array, other)
-
-
-def printed_compiled_and_not(code: str) -> set[str]:
-    """Return what code in the folder of the tests prints with the compiler and without it."""
-    with redirect_stdout(StringIO()) as out:
-        exec(code, {'__name__': 'compiled'})
-    return {out.getvalue(), printed_uncompiled(code)}
 
 
 class PinocchioReferee:

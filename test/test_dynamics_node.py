@@ -12,7 +12,6 @@ import math
 from pathlib import Path
 import signal
 import subprocess
-import sys
 import time
 from typing import Any
 
@@ -333,26 +332,20 @@ def test_readers_of_the_answers_are_counted(node: DynamicsNode) -> None:
 
 # More setpoints than can be answered
 
-WITHOUT = """\
-import sys
-sys.modules['{}'] = None  # importing it fails, as if it were missing
-from stewart_dynamics.node.node import main
-sys.exit(main())
-"""
-WITHOUT_NUMBA = [sys.executable, '-c', WITHOUT.format('numba')]
-
-
 def test_in_a_burst_the_newest_is_answered_and_dropped_ones_are_counted(start: Start) -> None:
-    node = start(NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
+    node = start()
     node.until_active()
+    node.answer(MOVING)
     key = 'rejected, setpoint: dropped: more came at once than can be answered'
     sent = passed = 0
     while not passed:
         stamps = [node.stamp() for _ in range(500)]
         burst = [(topic, raw(message)) for stamp in stamps
                  for topic, message in MOVING.messages(stamp).items()]
+        node.program.process.send_signal(signal.SIGSTOP)  # they wait for it
         for topic, data in burst:
             node.publish(topic, data)
+        node.program.process.send_signal(signal.SIGCONT)
         sent += len(stamps)
         node.check(node.state_of(stamps[-1]), node.result_of(MOVING))
         passed = _passed_over(node, key, sent)
@@ -372,24 +365,6 @@ def _passed_over(node: DynamicsNode, key: str, sent: int) -> int:
     node.until(lambda: counted('setpoints answered') + counted(key) == sent,
                'every setpoint is answered or counted')
     return counted(key)
-
-
-# Missing libraries
-
-@pytest.mark.parametrize('command, environment', [
-    (WITHOUT_NUMBA, {}), (None, {'NUMBA_DISABLE_JIT': '1'})], ids=['no numba', 'numba disabled'])
-def test_without_a_compiler_it_is_logged_once_and_the_bits_are_the_same(
-        start: Start, command: list[str] | None, environment: dict[str, str]) -> None:
-    node = start(command=command, **environment)
-    node.until_active()
-    for sample in (HOME, MOVING, TURNED, LEAPING):
-        node.answer(sample)
-    # one of the samples is near a singularity, which is logged as well
-    warnings = [line for line in log_lines(node.program.stderr, 'WARN')
-                if ': singularity: ' not in line]
-    assert len(warnings) == 1
-    assert 'the dynamics run uncompiled' in warnings[0]
-    node.stop()
 
 
 # Other sources of setpoints

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 import csv
 import ctypes
 import math
@@ -23,22 +22,23 @@ from referees import (
     Array, random_base_motion, random_motion, random_parameters, random_wrench, rng,
     symmetric_parameters)
 from stewart_dynamics import Motion, Parameters
+from stewart_dynamics.core.binding import record
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.export import main
 from stewart_dynamics.export.c_project import (
-    c_project, check_name, digest, field_values, FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS,
-    SOURCES)
+    c_project, check_name, digest, exported_values, SOURCES)
+from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS, constants_with
 from stewart_dynamics.mechanics.frames.motion import ORTHOGONALITY
 from stewart_dynamics.mechanics.frames.rotation import (
     from_euler, from_quaternion, quaternion_length)
+from stewart_dynamics.mechanics.hexapod_structure import (
+    FIELDS_BEFORE_LEGS, hexapod_structure, LEG_FIELDS)
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.limits import JITTER, JUMP, LIMITS, TOLERANCE
 from stewart_dynamics.mechanics.matrix6 import SMALLEST_PIVOT
 from stewart_dynamics.mechanics.rows import (
-    BASE, CONDITION, DETERMINANT, FORCES, LENGTHS, MOTION, NO_BASE, RESULT, UNIT_LOAD_FORCES,
+    BASE, CONDITION, DETERMINANT, FORCES, LENGTHS, MOTION, RESULT, UNIT_LOAD_FORCES,
     WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import OUTLINES
@@ -47,7 +47,7 @@ from stewart_dynamics.setpoints.step import Setpoint, Step
 from test_drives import driven
 
 ROOT = Path(__file__).resolve().parents[1]
-FOLDER = ROOT / 'stewart_dynamics' / 'export' / 'c'
+FOLDER = ROOT / 'stewart_dynamics' / 'core'
 PLATFORM_FILE = ROOT / 'config' / 'platform.yaml'
 COMPILERS = [name for name in ('gcc', 'clang', 'cc') if shutil.which(name)][:2]
 WARNINGS = ['-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wdouble-promotion', '-Wshadow',
@@ -59,20 +59,9 @@ HAS_WRENCH, HAS_BASE = 1, 2
 OK, OUT_OF_RANGE, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = 0, 5, 6, 7, 8, 9
 
 # The structures of the C source.
-LEG = np.dtype([(name, 'f8', (3,) if name.endswith(('joints', 'axes')) else ())
-                for name in LEG_FIELDS])
-_SIZES: Mapping[str, Any] = {
-    'gravity': (3,), 'platform.center_of_mass': (3,), 'platform.inertia': (6,)}
-HEXAPOD = np.dtype([
-    *((name, 'f8', _SIZES.get(name, ())) for name in FIELDS_BEFORE_LEGS), ('legs', LEG, (6,)),
-    *((name, 'i4' if name.endswith('action') else 'f8') for name in FIELDS_AFTER_LEGS)],
-    align=True)
+HEXAPOD, STATE = record('stewart_platform'), record('stewart_state')
 RESULTS = np.dtype([('moving', 'f8', 12), ('forces', 'f8', 6), ('scalars', 'f8', 3),
                     ('unit_load_forces', 'f8', 6)])
-STATE = np.dtype([
-    ('warning', 'i4'), ('stopped', 'i4'), ('crossings', 'u4'), ('determinant', 'f8'),
-    ('time_to_crossing', 'f8'), ('followed', 'i4'), ('stamp', 'i8'), ('lengths', 'f8', 6)],
-    align=True)
 OUTPUT = np.dtype([('result', RESULTS), ('forces', 'f8', 6), ('exceeded', 'u4', 6)], align=True)
 MOTORS = np.dtype([('all', 'f8', 24)])
 
@@ -110,10 +99,10 @@ def call(function: Any, count: int, *arguments: Any) -> None:
 
 
 def structure(parameters: Parameters) -> Any:
-    """Return a hexapod (1,) as the C source takes it."""
-    hexapod = np.zeros(1, HEXAPOD)
-    for name, value in field_values(parameters).items():
-        (hexapod['legs'] if name in LEG_FIELDS else hexapod)[name] = value
+    """Return a hexapod () as the C source takes it."""
+    hexapod, values = hexapod_structure(parameters), exported_values(parameters)
+    for end in ('base', 'platform'):
+        hexapod['legs'][f'{end}_joint_axis'] = values[f'geometry.{end}_joint_axes']
     return hexapod
 
 
@@ -130,20 +119,20 @@ def random_hexapods(random: np.random.Generator) -> Any:
     legs = hexapods['legs']
     for name in LEG_FIELDS:
         legs[name] = random.normal(0.3, 10.0 ** random.uniform(-2, 1), legs[name].shape)
-    legs['actuator.coulomb_velocity'] = 10.0 ** random.uniform(-4.0, 0.0, (many, 6))
-    legs['geometry.base_joints'] = random.normal(0.0, 1.0, (many, 6, 3))
-    legs['geometry.platform_joints'] = random.normal(0.0, 0.6, (many, 6, 3))
+    legs['coulomb_velocity'] = 10.0 ** random.uniform(-4.0, 0.0, (many, 6))
+    legs['base_joint'] = random.normal(0.0, 1.0, (many, 6, 3))
+    legs['platform_joint'] = random.normal(0.0, 0.6, (many, 6, 3))
     example = Parameters.from_yaml(PLATFORM_FILE)
-    for name in ('geometry.base_joints', 'geometry.platform_joints'):
-        legs[name][random.random(many) < 0.3] = example[name]
+    for name in ('base_joint', 'platform_joint'):
+        legs[name][random.random(many) < 0.3] = example[LEG_FIELDS[name]]
     # Half of them have screws that turn with their legs.
-    legs['actuator.screw_lead'] = random.uniform(0.005, 0.1, (many, 6))
-    legs['drive.gear_ratio'] = random.uniform(0.5, 4.0, (many, 6))
-    legs['drive.screw_rotation'] = legs['drive.gear_ratio'] * random.choice([-1.0, 1.0], (many, 6))
-    legs['drive.screw_rotation'][random.random(many) < 0.5] = 0.0
-    for name in ('drive.base_universal_axes', 'drive.platform_universal_axes'):
+    legs['screw_lead'] = random.uniform(0.005, 0.1, (many, 6))
+    legs['gear_ratio'] = random.uniform(0.5, 4.0, (many, 6))
+    legs['twist_ratio'] = legs['gear_ratio'] * random.choice([-1.0, 1.0], (many, 6))
+    legs['twist_ratio'][random.random(many) < 0.5] = 0.0
+    for name in ('base_universal_axis', 'platform_universal_axis'):
         legs[name] /= np.linalg.norm(legs[name], axis=-1, keepdims=True)
-    hexapods['singularity.characteristic_length'] = random.uniform(0.1, 3.0, many)
+    hexapods['characteristic_length'] = random.uniform(0.1, 3.0, many)
     return hexapods
 
 
@@ -165,32 +154,17 @@ def samples(library: ctypes.CDLL) -> dict[str, Any]:
             'results': np.zeros(SAMPLES, RESULTS), 'codes': np.zeros(SAMPLES, np.int32)}
     call(library.inverse_dynamics, SAMPLES, made['hexapods'], 1, made['motions'],
          made['wrenches'], made['bases'], made['given'], made['results'], made['codes'])
-    constants = np.empty((len(hexapods), CONSTANTS))
-    for n, hexapod in enumerate(hexapods):
-        legs = hexapod['legs']
-        pitch = (legs['drive.screw_rotation'] * legs['actuator.screw_lead']
-                 / (2.0 * math.pi * legs['drive.gear_ratio']))
-        constants[n] = constants_with({  # type: ignore[arg-type]
-            **{name: legs[name] for name in LEG_FIELDS}, **{
-                name: hexapod[name] for name in (*FIELDS_BEFORE_LEGS, *FIELDS_AFTER_LEGS)}},
-            np.column_stack([pitch, legs['drive.base_universal_axes'],
-                             legs['drive.platform_universal_axes']]))
-    made['constants'] = np.repeat(constants, MOTIONS, axis=0)
     return made
 
 
 def test_inverse_dynamics_have_the_bits_of_the_library(samples: dict[str, Any]) -> None:
-    constants, motion, wrench = np.empty(CONSTANTS), np.empty((1, MOTION)), np.empty((1, WRENCH))
-    base, result, sound = np.empty((1, BASE)), np.empty((1, RESULT)), np.empty(1, dtype=bool)
-    solve = inverse_dynamics.solve.bound(
-        constants, motion, wrench, base, result, sound, np.empty(inverse_dynamics.TILE))
-    expected, given = np.empty((SAMPLES, RESULT)), samples['given']
-    for n in range(SAMPLES):
-        constants[:], motion[0] = samples['constants'][n], samples['motions'][n]
-        wrench[0] = samples['wrenches'][n] if given[n] & HAS_WRENCH else 0.0
-        base[0] = samples['bases'][n] if given[n] & HAS_BASE else NO_BASE
-        solve()
-        expected[n] = result[0]
+    given = samples['given'][:, None]
+    wrenches = np.where(given & HAS_WRENCH, samples['wrenches'], 0.0)
+    bases = np.where(given & HAS_BASE, samples['bases'], np.nan)
+    expected = np.vstack([
+        batch.solve(samples['hexapods'][n:n + 1], *(
+            rows[n:n + MOTIONS] for rows in (samples['motions'], wrenches, bases)))
+        for n in range(0, SAMPLES, MOTIONS)])
     check_results(samples['results'], expected, samples['codes'])
     assert np.bincount(samples['codes']).tolist() == [SAMPLES]
 
@@ -199,7 +173,7 @@ def check_results(found: Any, expected: Array, codes: Any) -> None:
     """Check that results have the same numbers as rows (N, RESULT), 0 ulp apart."""
     forces = np.where((codes == SINGULAR)[:, None], 0.0, expected[:, FORCES])
     for name, columns in (('moving', expected[:, :FORCES.start]), ('forces', forces),
-                          ('scalars', expected[:, DETERMINANT:]),
+                          ('scalars', expected[:, DETERMINANT:UNIT_LOAD_FORCES.start]),
                           ('unit_load_forces', expected[:, UNIT_LOAD_FORCES])):
         np.testing.assert_array_equal(found[name], columns, err_msg=name)
     assert np.array_equal(codes == SINGULAR, expected[:, CONDITION] >= 1e12)
@@ -216,18 +190,13 @@ def test_forward_kinematics_have_the_bits_of_the_library(
     poses, codes = np.ascontiguousarray(guesses[:, :12]), np.zeros(SAMPLES, np.int32)
     call(library.forward_kinematics, SAMPLES, samples['hexapods'], lengths, poses, codes)
 
-    constants, wanted, motion = np.empty(CONSTANTS), np.empty((1, 6)), np.empty((1, MOTION))
-    code, steps, residual = np.empty(1, dtype=int), np.empty(1, dtype=int), np.empty(1)
-    find = forward_kinematics.poses.bound(constants, wanted, motion, code, steps, residual)
-    expected, outcomes = np.empty((SAMPLES, 12)), np.empty(SAMPLES, dtype=int)
+    steps, residuals, outcomes = np.empty(1, int), np.empty(1), np.empty(SAMPLES, int)
     for n in range(SAMPLES):
-        constants[:], wanted[0], motion[0] = samples['constants'][n], lengths[n], guesses[n]
-        find()
-        expected[n], outcomes[n] = motion[0, :12], code[0]
-    np.testing.assert_array_equal(poses, expected)
-    of_c = {forward_kinematics.FOUND: OK, forward_kinematics.NO_POSE: NO_POSE,
-            forward_kinematics.SINGULAR: SINGULAR}
-    assert [of_c[each] for each in outcomes.tolist()] == codes.tolist()
+        one = slice(n, n + 1)
+        forward_kinematics.poses(
+            samples['hexapods'][one], lengths[one], guesses[one], outcomes[one], steps, residuals)
+    np.testing.assert_array_equal(poses, guesses[:, :12])
+    assert outcomes.tolist() == codes.tolist()
     assert set(codes.tolist()) >= {OK, NO_POSE}
 
 
@@ -296,8 +265,8 @@ def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
             assert output is not None
             state = output.state
             results[n] = [*output.lengths, *output.rates, *(output.demanded_forces or [0.0] * 6),
-                          *output.unit_load_forces, output.determinant, output.determinant_rate,
-                          output.condition]
+                          output.determinant, output.determinant_rate, output.condition,
+                          *output.unit_load_forces]
             code = SINGULAR if not output.solvable else OK if output.forces else SUPPRESSED
             warned = output.singularity
             exceeded = [0] * 6
@@ -442,7 +411,7 @@ def test_cppcheck_finds_nothing(exported: Path) -> None:
 
 def test_the_source_is_short_and_needs_math_alone() -> None:
     texts = [(FOLDER / name).read_text() for name in SOURCES]
-    assert sum(text.count('\n') for text in texts) < 955
+    assert sum(text.count('\n') for text in texts) < 1050
     assert all(len(line) < 100 for text in texts for line in text.splitlines())
     assert set(re.findall('#include <(.*)>', ''.join(texts))) == {'math.h', 'stddef.h', 'stdint.h'}
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    printed_compiled_and_not, random_motion, random_parameters, random_wrench, relative, rng, ROOT,
+    random_motion, random_parameters, random_wrench, relative, rng, ROOT,
     smooth_motion)
 from simulated import FRICTIONLESS, simulated
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
@@ -544,20 +544,6 @@ def test_a_wrench_on_the_moving_plant_is_found_within_5_percent(rate: float) -> 
         for part in (slice(0, 3), slice(3, 6)):
             assert np.max(np.linalg.norm(errors[:, part], axis=1)) < (
                 0.05 * np.linalg.norm(LOAD[part]))
-
-
-CODE = """
-from test_external_wrench import *
-found = estimates(ExternalWrench(HEXAPOD), [*measured(
-    HEXAPOD, swing(np.arange(20) * 1e-3), LOAD, range(BEGIN, BEGIN + 20_000_000, 1_000_000))])
-print([np.array(each.wrench).tobytes().hex() for each in found[1:]], found[-1])
-"""
-
-
-def test_compiled_and_not_gives_the_same_bits() -> None:
-    printed = printed_compiled_and_not(CODE)
-    assert len(printed) == 1
-    assert len(printed.pop()) > 1000
 
 
 # Messages on ~/measured_legs: any layout, any order of names, and every reason of rejection

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    assert_uncompiled_gives_the_same, derivative, each_relative, energies, friction, moved,
-    PinocchioReferee, random_base_motion, random_motion, random_parameters, random_wrench,
+    derivative, each_relative, energies, friction, moved,
+    PinocchioReferee, random_motion, random_parameters, random_wrench,
     relative, rng, ROOT, size_of)
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics.dynamics import forward_dynamics, lagrange
+from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.rows import ACCELERATION, NO_BASE, TWIST
 from stewart_dynamics.parameters.table import inertia_matrix
@@ -339,14 +339,3 @@ def test_a_singular_pose_has_accelerations() -> None:
         0.5 * p['geometry.base_joints']).ravel()}))  # parallel legs: no forces hold a turn
     motion = Motion([0.0, 0.0, 1.0], np.eye(3), [0.1, 0.2, 0.3], [0.1, 0.2, 0.3])
     assert np.all(np.isfinite(accelerations(platform.forward_dynamics(motion, np.ones(6)))))
-
-
-def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
-    p = random_parameters(rng())
-    rows, forces = random_motion(p, rng(), 10).rows, np.arange(60.0).reshape(10, 6)
-    hexapod, wrench = StewartPlatform(p).constants, random_wrench(p, rng(), 10)
-    base = random_base_motion(p, rng(), 10).rows
-    base[::3] = np.nan
-    assert_uncompiled_gives_the_same(
-        forward_dynamics.solve, hexapod, rows, forces, wrench, base,
-        np.zeros(forward_dynamics.WORK))

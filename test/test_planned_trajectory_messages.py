@@ -19,7 +19,6 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import (
     BaseMotion, check_planned_trajectory, Motion, Parameters, StewartPlatform)
 from stewart_dynamics.arrays import NO_WRENCH, Six
-from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, OK, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.node.tasks import LENGTH, TaskQueue
@@ -346,7 +345,7 @@ class Timed:
         self.pieces: list[str] = []
         self.done: list[tuple[str, float]] = []
         self.queue: TaskQueue[PlannedOutcome] = TaskQueue(
-            self._timer, Preparation(),
+            self._timer,
             lambda outcome, came: self.done.append((outcome.message, came)))
 
     def _timer(self, callback: Callable[[], None]) -> Any:

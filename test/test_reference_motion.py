@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from checked_results import checked
 import numpy as np
 import pytest
 
 from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics.frames import rotation as rotations
-from stewart_dynamics.mechanics.singularity_warning import (
-    advance, Singularity, STATE, thresholds)
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, DETERMINANT, DETERMINANT_RATE, RESULT)
+from stewart_dynamics.mechanics.singularity_warning import Singularity
 from stewart_dynamics.reference_motion.motion import motion_at, sample_time, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
@@ -246,11 +248,12 @@ def test_files_suit_the_hexapod(path: Path, platform: StewartPlatform) -> None:
     assert np.all(np.abs(result.rates) <= p['limits.velocity_max'])
     singular = path.stem == 'trajectory_singular'
     assert np.any(np.abs(result.forces) > p['limits.force_max']) == singular
-    warned, state = False, np.zeros(STATE)
+    warned, state, row = False, Singularity(), np.zeros(RESULT)
     for sample in zip(result.determinant, result.determinant_rate, result.condition_number,
                       strict=True):
-        advance(state, thresholds(p), *sample)
-        warned |= Singularity.of(state.tolist()).warning
+        row[[DETERMINANT, DETERMINANT_RATE, CONDITION]] = sample
+        state, _ = checked(p, row, state)
+        warned |= state.warning
     assert warned == singular
     assert singular or result.condition_number.max() < 5.0
 

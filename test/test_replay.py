@@ -11,7 +11,6 @@ import csv
 import io
 import json
 import math
-import os
 from pathlib import Path
 import re
 import signal
@@ -811,16 +810,15 @@ def test_it_needs_no_ros() -> None:
 
 @pytest.fixture(scope='module')
 def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a bag that takes many seconds where nothing is compiled, a part of one each chunk."""
-    return chunked_bag(tmp_path_factory.mktemp('bags') / 'long.mcap', 12000, 100_000)
+    """Return a bag that takes seconds, a part of one each chunk."""
+    return chunked_bag(tmp_path_factory.mktemp('bags') / 'long.mcap', 120_000, 100_000)
 
 
 def begun(bag: Path, out: Path) -> subprocess.Popen[str]:
     """Return a replay that is in the middle of its work."""
     process = subprocess.Popen(
         [sys.executable, '-m', 'stewart_dynamics.replay', *arguments(bag, out, '--no-report')],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     end = time.monotonic() + 300.0
     while not any(path.stat().st_size for path in out.glob('.*/legs.csv')):
         assert time.monotonic() < end
@@ -854,9 +852,7 @@ def test_an_interrupted_replay_leaves_nothing(
         _, text = process.communicate(timeout=300)
         # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
         assert process.returncode in (130, -signal.SIGINT)
-    hint, last = text.splitlines()
-    assert hint.startswith('stewart_replay: NUMBA_DISABLE_JIT is set')
-    assert last == 'stewart_replay: interrupted'
+    assert text == 'stewart_replay: interrupted\n'
     assert not list((tmp_path / 'out').iterdir())
 
 

@@ -21,7 +21,7 @@ import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'ros2_control' / 'stewart_dynamics_controller'
-C_SOURCE = ROOT / 'stewart_dynamics' / 'export' / 'c'
+C_SOURCE = ROOT / 'stewart_dynamics' / 'core'
 NAME = 'stewart_dynamics_controller'
 
 
@@ -54,7 +54,7 @@ def test_parameters_are_those_of_the_node() -> None:
     spec.loader.exec_module(tables)
     assert tables.CONTROLLER_PARAMETERS.read_text() == tables.controller_parameters()
     source = (PACKAGE / 'src' / 'hexapod.cpp').read_text()
-    for name in set(tables.CONTROLLER_NAMES) & set(tables.LEG_FIELDS[2:]):
+    for name in set(tables.CONTROLLER_NAMES) & set([*tables.LEG_FIELDS.values()][2:]):
         assert f'"{name}"' in source, name  # read, and named in errors
 
 

@@ -7,10 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-import os
-from pathlib import Path
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -19,7 +15,6 @@ from referees import (
     random_motion, random_parameters, random_wrench, rng, ROOT)
 
 from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
-from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.mechanics.single_sample import SingleSample
 
 MANY = 40
@@ -45,7 +40,7 @@ def wrench(platform: StewartPlatform) -> Any:
 
 def test_one_sample_is_the_batch_bit_for_bit(
         platform: StewartPlatform, motion: Motion, wrench: Any) -> None:
-    single = SingleSample(platform.constants)
+    single = SingleSample(platform.structure)
     batch = platform.inverse_dynamics(motion, wrench)
     back = platform.forward_dynamics(motion, batch.forces, wrench)
     lengths = batch.lengths.copy()
@@ -69,27 +64,6 @@ def test_one_sample_is_the_batch_bit_for_bit(
         assert np.array_equal(platform.inverse_dynamics(motion[n]).rows, no_load.rows[n])
     at = Motion.from_pose(guess[0])
     assert platform.forward_kinematics(lengths[0], at) == poses[0]
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
-def test_lengths_compile_nothing_and_inverse_dynamics_one_module_for_one_and_many(
-        tmp_path: Path) -> None:
-    code = f"""
-import sys
-from stewart_dynamics import Motion, StewartPlatform
-platform = StewartPlatform.from_yaml({str(ROOT / 'config' / 'platform.yaml')!r})
-motions = Motion.from_euler([[0.0, 0.0, 1.1]] * 3, [[0.0, 0.0, 0.1]] * 3)
-platform.inverse_kinematics(motions), platform.inverse_kinematics(motions[0])
-print('lengths', file=sys.stderr)
-platform.inverse_dynamics(motions), platform.inverse_dynamics(motions[0])
-"""
-    done = subprocess.run([sys.executable, '-c', code], check=True, capture_output=True, text=True,
-                          env={**os.environ, 'STEWART_DYNAMICS_CACHE_DIR': str(tmp_path)})
-    lengths, dynamics = done.stderr.splitlines()
-    assert lengths == 'lengths'
-    assert 'compiling stewart_dynamics.mechanics.dynamics.inverse_dynamics ' in dynamics
-    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_results_do_not_share_memory(platform: StewartPlatform, motion: Motion) -> None:

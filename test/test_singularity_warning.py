@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 
+from checked_results import checked
 import numpy as np
 import pytest
 from referees import (
@@ -18,7 +19,7 @@ from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatfor
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import (
-    advance, Cause, Singularity, thresholds, time_to_crossing, UNSOLVABLE_CONDITION)
+    Cause, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
 from stewart_dynamics.parameters.tolerances import HYSTERESIS
 
 PARAMETERS = symmetric_parameters().replaced({
@@ -28,9 +29,9 @@ PARAMETERS = symmetric_parameters().replaced({
 
 def advanced(state: Singularity, parameters: Parameters, *sample: float) -> Singularity:
     """Return the state after one more sample: det, its rate, condition number."""
-    numbers = np.array(state, dtype=float)
-    advance(numbers, thresholds(parameters), *sample)
-    return Singularity.of(numbers.tolist())
+    result = np.zeros(RESULT)
+    result[[DETERMINANT, DETERMINANT_RATE, CONDITION]] = sample
+    return checked(parameters, result, state)[0]
 
 
 def after(*samples: tuple[float, float, float], start: Singularity | None = None) -> Singularity:

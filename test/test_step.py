@@ -10,6 +10,7 @@ from itertools import product
 import math
 from typing import Any
 
+from checked_results import checked
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import (
-    angle_values, any_exceeded, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JITTER, JUMP,
+    angle_values, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JITTER, JUMP,
     LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA, OF_RESULTS, PLATFORM_ANGLE_MAX, result_values,
     TOLERANCE, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, NO_BASE, RATES, RESULT
@@ -384,7 +385,8 @@ WITHIN = {LENGTH_MIN: 1.2, LENGTH_MAX: 1.2, CLEARANCE_MIN: 0.1}  # others 0.0
 @pytest.mark.parametrize('limit', LIMITS)
 @pytest.mark.parametrize('leg', range(6))
 def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: int) -> None:
-    limits = Limits(symmetric_parameters().replaced(GIVEN))
+    parameters = symmetric_parameters().replaced(GIVEN)
+    limits = Limits(parameters)
     bound = float(limits.bounds[limit][leg])
     outward = -1.0 if limit in MINIMA else 1.0
     signs = (1.0, -1.0) if limit in (VELOCITY_MAX, FORCE_MAX) else (1.0,)
@@ -405,8 +407,7 @@ def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: i
         result = np.zeros(RESULT)
         result[LENGTHS], result[RATES], result[FORCES] = (
             values[name] for name in (LENGTH_MAX, VELOCITY_MAX, FORCE_MAX))
-        assert any_exceeded(limits.thresholds[:4].ravel(), result) == (
-            exceeded and limit in OF_RESULTS[:3], exceeded and limit == FORCE_MAX)
+        assert checked(parameters, result)[1] == (exceeded and limit in OF_RESULTS)
 
 
 def test_values_of_a_sample_are_those_of_their_limits() -> None:
@@ -426,10 +427,11 @@ def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
 
 
 def test_unknown_forces_exceed_no_limit() -> None:
-    limits = Limits(symmetric_parameters().replaced({FORCE_MAX: 1.0}))
-    result = np.zeros(RESULT)
-    result[LENGTHS], result[FORCES] = 1.2, np.nan
-    assert any_exceeded(limits.thresholds[:4].ravel(), result) == (False, False)
+    limited = symmetric_parameters().replaced({FORCE_MAX: 1.0})
+    limits, result = Limits(limited), np.zeros(RESULT)
+    result[LENGTHS], result[FORCES] = 1.2, 5.0
+    assert checked(limited, result)[1]
+    assert not checked(limited, result, base_known=False)[1]
     assert limits.exceeded(result_values((1.2,) * 6, (0.0,) * 6, None)) == ()
 
 

@@ -17,8 +17,6 @@ from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant, PlantState
-from stewart_dynamics.simulator.plant_dynamics import (
-    COMMANDS, STATE_POSITION, STATE_QUATERNION, STATE_TWIST)
 from test_drives import driven
 from test_plant import motion_of, ZERO
 
@@ -64,10 +62,10 @@ def test_with_losses_torques_give_the_acceleration_and_forces_that_need_them(see
                         *random.normal(size=(2, 3)) * 10.0 ** random.uniform(-5.0, 0.0),
                         *random.normal(size=(2, 3)) * 10.0 ** random.uniform(-1.0, 1.5))
         motors, forces = platform.motors(motion), platform.inverse_dynamics(motion).forces
-        plant._state[STATE_POSITION] = motion.position
-        plant._state[STATE_QUATERNION] = to_quaternion(motion.rotation)
-        plant._state[STATE_TWIST] = motion.rows[12:18]
-        plant._loads[COMMANDS] = motors.torques
+        state = plant._plant['state']
+        state['position'][:], state['quaternion'][:], state['twist'][:] = (
+            motion.position, to_quaternion(motion.rotation), motion.rows[12:18])
+        plant._plant['commands'][:] = motors.torques
         state = plant._run(0)
         # A hexapod whose rotors dominate has little acceleration for a lot of torque.
         assert relative(state.acceleration, motion.rows[18:24]) < 1e-9

@@ -21,7 +21,8 @@ from pathlib import Path
 import re
 from typing import Any
 
-from stewart_dynamics.export.c_project import FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS
+from stewart_dynamics.mechanics.hexapod_structure import (
+    FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
 from stewart_dynamics.node.node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
@@ -50,7 +51,8 @@ CONTROLLER = (
 
 # Parameters of the node that the controller reads: it commands forces, not motor torques.
 CONTROLLER_NAMES = ('joints', 'base_frame', 'setpoint.timeout', *(
-    name for name in (*FIELDS_BEFORE_LEGS, *LEG_FIELDS, *FIELDS_AFTER_LEGS)
+    name for fields in (FIELDS_BEFORE_LEGS, LEG_FIELDS, FIELDS_AFTER_LEGS)
+    for name in fields.values()
     if not name.startswith('drive.')
     and name not in ('actuator.screw_lead', 'setpoint.sync_tolerance')))
 

@@ -28,7 +28,7 @@ import numpy as np
 from stewart_dynamics.arrays import Bytes, Integers
 from stewart_dynamics.bags.blocks import (
     compact, cost, described, IN_A_BLOCK, LARGEST_CHUNK, LATEST, merged, split)
-from stewart_dynamics.compilation.functions import compiled, entry_point
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import BagError, one_line, shown
 from stewart_dynamics.messages.recorded import Messages
 import zstandard
@@ -64,60 +64,22 @@ class Scan(NamedTuple):
     end: int  # end of the last record
 
 
-@compiled
-def _integer(data: Bytes, at: int, size: int) -> np.int64:
-    """Return the little-endian integer at a place; 0 if it is not in the data."""
-    value = np.int64(0)
-    if at + size <= len(data):
-        for k in range(size):
-            value |= np.int64(data[at + k]) << np.int64(8 * k)
-    return value
-
-
-@entry_point('u1[::1]', 'i8[::1]', 'i8[:,::1]', 'i8[::1]')
-def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> None:
-    """
-    List the messages of some channels, and all records that are not messages.
-
-    data (M,): the bytes of the records. The scan ends where the fields that it reads are not in
-        them, where the lengths in a message or a message index are inconsistent, or at an opcode
-        that is not valid.
-    numbers (65536,): number of the topic of each channel, or IGNORED.
-    found (4, K): output: see Scan. Records beyond K are only counted.
-    totals (2,): in: bits of the valid opcodes, and the end that no record may exceed. Output: K
-        and end, see Scan.
-    """
-    count = at = 0
-    while at + HEAD <= len(data):
-        opcode, begin, length = np.int64(data[at]), at + HEAD, _integer(data, at + 1, 8)
-        # Fields up to this offset are read.
-        needed = 22 if opcode == 5 else 6 if opcode == 7 else 2 if opcode in (3, 4) else 0
-        if opcode > 12 or not totals[0] >> opcode & 1 or begin + needed > len(data) or not (
-                needed <= length <= totals[1] - begin):
-            break
-        if opcode == 7 and _integer(data, begin + 2, 4) != length - 6:
-            break
-        kind, value, skipped = -opcode, _integer(data, begin, 2), 0
-        if opcode == 5:
-            kind, value, skipped = numbers[value], _integer(data, begin + 6, 8), 22
-        if opcode != 5 or kind >= 0:
-            if count < found.shape[1]:
-                found[0, count] = kind
-                found[1, count] = value if value >= 0 else np.int64(9223372036854775807)
-                found[2, count] = begin + skipped
-                found[3, count] = length - skipped
-            count += 1
-        at = int(begin + length)
-    totals[0], totals[1] = count, at
-
-
 def scanned(data: bytes, numbers: Integers, valid: int, limit: int) -> Scan:
-    """Return the records in these bytes that end before a limit, see ``scan``."""
+    """
+    Return the messages of some channels in these bytes, and all records that are not messages.
+
+    The scan ends where the fields that it reads are not in the data, where the lengths in a
+    message or a message index are inconsistent, or at an opcode that is not valid.
+
+    numbers (65536,): number of the topic of each channel, or IGNORED.
+    valid: bits of the valid opcodes.
+    limit: the end that no record may exceed.
+    """
     array = np.frombuffer(data, np.uint8)
     room = 8192  # for most chunks this is enough, and they are scanned once
     while True:
         found, totals = np.empty((4, room), np.int64), np.array([valid, limit])
-        scan(array, numbers, found, totals)
+        function('scan_records')(len(array), array, numbers, room, found, totals)
         count, end = totals.tolist()
         if count <= room:
             kinds, values, starts, sizes = found[:, :count]

@@ -12,14 +12,11 @@ import tempfile
 
 from stewart_dynamics.bags.blocks import of_good_length, Source
 from stewart_dynamics.bags.find import files_of
-from stewart_dynamics.bags.mcap_file import MAGIC, McapFile, scan
+from stewart_dynamics.bags.mcap_file import MAGIC, McapFile
 from stewart_dynamics.bags.sqlite_file import SqliteFile
 from stewart_dynamics.errors import BagError, one_line, shown_name
 from stewart_dynamics.messages.recorded import Messages
 import zstandard
-
-# The machine code that every bag needs.
-FUNCTIONS = (scan,)
 
 _SQLITE = b'SQLite format 3\0'
 _ROS_1 = b'#ROSBAG V'

@@ -84,7 +84,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.bags.find import is_bag_file
     from stewart_dynamics.calibration.measured_poses import read_poses
     from stewart_dynamics.calibration.noise import Noise
-    from stewart_dynamics.calibration.one_run import CalibrationOptions, FUNCTIONS, run
+    from stewart_dynamics.calibration.one_run import CalibrationOptions, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
     from stewart_dynamics.calibration.results import result_text
     from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
@@ -105,7 +105,7 @@ def _run(given: argparse.Namespace) -> int:
             given.poses, parameters, given.node, given.measured, given.pose)
     else:
         measured = read_poses(given.poses, parameters['joints'], given.mm, given.degrees)
-    _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))
+    _PROGRAM.prepare(likely_mistakes(parameters))
     result = run(measured, str(given.poses), parameters, output, options)
     for each in result['likely_mistakes']:
         _PROGRAM.complain(f'warning: {each["text"]}')

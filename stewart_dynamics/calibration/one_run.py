@@ -13,16 +13,12 @@ from stewart_dynamics.calibration.calibration_report import write_report
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.results import comments, document
-from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import HOLD_OUT
 from stewart_dynamics.reporting.results_folder import (
     CALIBRATED_PARAMETERS, CALIBRATION, check_free, remove_abandoned, REPORT_PAGE, whole_folder)
 from stewart_dynamics.whole_file import write_json
-
-# Functions that every calibration needs as machine code.
-FUNCTIONS = (forward_kinematics.poses,)
 
 
 class CalibrationOptions(NamedTuple):

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.bags import recording
 from stewart_dynamics.capability import box_condition, box_legs, travel
 from stewart_dynamics.datasheet import claimed_box, ratings, workspace
 from stewart_dynamics.datasheet.claimed_box import largest_length, LARGEST_RULE
@@ -22,7 +21,6 @@ from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import answer, AXES
 from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, uses
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -68,9 +66,7 @@ _SLOWEST = 1.0
 STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
 
 # The machine code that every datasheet needs.
-FUNCTIONS = (travel.travels, box_legs.legs_in_box, box_condition.condition_in_box,
-             inverse_dynamics.solve, regressor.regressors,
-             *recording.FUNCTIONS)
+FUNCTIONS = travel.travels, box_legs.legs_in_box, box_condition.condition_in_box
 
 
 def write_datasheet(parameters: Parameters, order: Order, folder: Path, options: Options,

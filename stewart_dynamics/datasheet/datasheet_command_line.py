@@ -95,11 +95,11 @@ def _run(given: argparse.Namespace) -> int:
     check_order(order, parameters)
     check_free(given.output, options, DATASHEET)
     remove_abandoned([given.output])
-    _PROGRAM.prepare(FUNCTIONS, (
+    _PROGRAM.prepare((
         *likely_mistakes(parameters), *soft_legs(parameters, order.leg_stiffness),
         *(() if order.box is None else doubtful_ranges(order.box, parameters)),
         *mistakes_in_options(parameters, {'--pose': given.pose}, {
-            '--pivot': given.pivot, '--payload': given.payload and given.payload[1:]})))
+            '--pivot': given.pivot, '--payload': given.payload and given.payload[1:]})), FUNCTIONS)
     size = 0 if given.motion is None else bytes_of(given.motion)
     # Each stage counts as a part of the bag, whose reading is the longest where it is large.
     part = max(size // len(STAGES), 1)

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics import __version__
+from stewart_dynamics.core.binding import header
 from stewart_dynamics.errors import ParameterError, shown, StewartError
 from stewart_dynamics.export.golden_vectors import COLUMNS, golden_vectors, PARTS
-from stewart_dynamics.mechanics.drives.screws import motor_turns, screw_constants
+from stewart_dynamics.mechanics.hexapod_structure import (
+    field_values, FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.limits import Limits
-from stewart_dynamics.mechanics.rows import BASE_AXIS, PLATFORM_AXIS
-from stewart_dynamics.parameters.table import (
-    LEG_SHAPE, OUTLINES, PARAMETERS, Parameters, SUPPRESS_FORCES)
+from stewart_dynamics.parameters.table import OUTLINES, PARAMETERS, Parameters
 
 SOURCES = 'stewart_dynamics.h', 'stewart_dynamics.c'  # files that are the same for every hexapod
 
@@ -52,7 +52,9 @@ def check_name(name: str) -> str:
 
 
 def source(file: str) -> str:
-    """Return the text of a file in this package's folder ``c``."""
+    """Return the text of a file of the library in C, or in this package's folder ``c``."""
+    if file in SOURCES:
+        return header(file)
     return files(__package__).joinpath('c', file).read_text(encoding='utf-8')
 
 
@@ -84,34 +86,9 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
             'test_golden.c': filled('test_golden.c'), 'CMakeLists.txt': filled('CMakeLists.txt')}
 
 
-# Fields of stewart_leg and stewart_platform in their order, with the parameters that they hold.
-LEG_FIELDS = (
-    'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
-    'legs.cylinder.mass', 'legs.cylinder.center_of_mass', 'legs.cylinder.inertia',
-    'legs.piston.mass', 'legs.piston.center_of_mass', 'legs.piston.inertia',
-    'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction',
-    'actuator.coulomb_velocity', 'limits.length_min', 'limits.length_max', 'limits.velocity_max',
-    'limits.force_max', 'geometry.base_joint_axes', 'limits.base_joint_angle_max',
-    'geometry.platform_joint_axes', 'limits.platform_joint_angle_max', *LEG_SHAPE,
-    'actuator.screw_lead', 'drive.gear_ratio', 'drive.efficiency',
-    'drive.back_driving_efficiency', 'drive.screw_rotation', 'drive.base_universal_axes',
-    'drive.platform_universal_axes')
-FIELDS_BEFORE_LEGS = (
-    'gravity', 'platform.mass', 'platform.center_of_mass', 'platform.inertia')
-FIELDS_AFTER_LEGS = (
-    'limits.leg_clearance_min', 'singularity.characteristic_length',
-    'singularity.warn_condition', 'singularity.stop_condition', 'singularity.warn_time',
-    'setpoint.sync_tolerance', 'singularity.action', 'limits.action')
-_IF_NOT_SET = {'limits.length_min': 0.0, 'limits.leg_clearance_min': -math.inf}
-
-
-def field_values(parameters: Parameters) -> dict[str, Any]:
+def exported_values(parameters: Parameters) -> dict[str, Any]:
     """
-    Return the value of each field under the name of its parameter.
-
-    An array for the fields of the legs, (6,) or (6, 3); a limit that is not set is infinite, a
-    length or radius that is not set zero. Axes are unit vectors, zero if not needed;
-    ``drive.screw_rotation`` is the turn of the motor for a turn of its leg.
+    Return ``field_values`` with the axes of the joints whose angles are limited.
 
     Raises ParameterError: axes that are needed are not given, and there is no home pose; or the
         clearance of the legs is limited, and a plate is given, which the C source does not know.
@@ -121,45 +98,34 @@ def field_values(parameters: Parameters) -> dict[str, Any]:
         raise ParameterError(
             f'{", ".join(plates)}: must not be set with limits.leg_clearance_min: the exported '
             'source has the clearance between legs, not that from plates')
-    values: dict[str, Any] = {}
-    for name in (*FIELDS_BEFORE_LEGS, *LEG_FIELDS, *FIELDS_AFTER_LEGS):
-        value = parameters[name]
-        if value is None:
-            value = _IF_NOT_SET.get(name, math.inf if name.startswith('limits.') else 0.0)
-        values[name] = int(value == SUPPRESS_FORCES) if isinstance(value, str) else value
+    values = field_values(parameters)
     angles = angles_to_check(parameters, Limits(parameters).of_joints)
-    axes = np.zeros((12, 3)) if angles is None else np.nan_to_num(angles.axes)
-    values['geometry.base_joint_axes'] = axes[:6]
-    values['geometry.platform_joint_axes'] = axes[6:]
-    screws = screw_constants(parameters)
-    values['drive.screw_rotation'] = motor_turns(parameters)
-    values['drive.base_universal_axes'] = screws[:, BASE_AXIS]
-    values['drive.platform_universal_axes'] = screws[:, PLATFORM_AXIS]
-    for name in LEG_FIELDS:
-        if np.ndim(values[name]) < 1:
-            values[name] = np.full(6, values[name])
+    if angles is not None:
+        axes = np.nan_to_num(angles.axes)
+        values['geometry.base_joint_axes'] = axes[:6]
+        values['geometry.platform_joint_axes'] = axes[6:]
     return values
 
 
 def digest(parameters: Parameters) -> str:
     """Return the SHA-256 of the values of all fields, in hexadecimal digits."""
     text = '\n'.join(f'{name} {" ".join(_numbers(value))}'
-                     for name, value in field_values(parameters).items())
+                     for name, value in exported_values(parameters).items())
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def platform_source(parameters: Parameters, name: str) -> str:
     """Return the C definition of a hexapod, ``const stewart_platform NAME``."""
-    values = field_values(parameters)
+    values = exported_values(parameters)
     lines = [f'const stewart_platform {name} = {{']
-    lines += (_field(each, values[each], '  ') for each in FIELDS_BEFORE_LEGS)
+    lines += (_field(each, values[each], '  ') for each in FIELDS_BEFORE_LEGS.values())
     lines.append('  {')
     for leg, joint in enumerate(parameters['joints']):
         lines.append(f'    {{  /* leg {leg + 1}: {in_comment(joint)} */')
-        lines += (_field(each, values[each][leg], '      ') for each in LEG_FIELDS)
+        lines += (_field(each, values[each][leg], '      ') for each in LEG_FIELDS.values())
         lines.append('    },')
     lines.append('  },')
-    lines += (_field(each, values[each], '  ') for each in FIELDS_AFTER_LEGS)
+    lines += (_field(each, values[each], '  ') for each in FIELDS_AFTER_LEGS.values())
     return '\n'.join([*lines, '};', ''])
 
 

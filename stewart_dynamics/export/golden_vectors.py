@@ -6,7 +6,7 @@ Golden vectors: a motion of a hexapod, and the results of the node's step for it
 
 The motion begins at the home pose, or where it is likely to be, and swings farther and faster in
 all six directions until limits are exceeded; parts of it are on a moving base and under a wrench.
-The results are those of the library, not of the C source.
+The results are those of the library.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND
+from stewart_dynamics.core.binding import CODES
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.limits import JUMP, LIMITS, OF_MOTORS
@@ -27,9 +28,8 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 
 # Return codes of the C source.
-OK, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = 0, 6, 7, 8, 9
-_CODES = {forward_kinematics.FOUND: OK, forward_kinematics.NO_POSE: NO_POSE,
-          forward_kinematics.SINGULAR: SINGULAR}
+OK, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = (CODES[f'STEWART_{name}'] for name in (
+    'OK', 'SINGULAR', 'SUPPRESSED', 'NO_POSE', 'NO_MOTORS'))
 # Bits of stewart_output.exceeded, from the lowest one.
 _BITS = (*LIMITS, JUMP)
 
@@ -75,7 +75,7 @@ def golden_vectors(parameters: Parameters) -> Array:
     """Return the vectors (N, len(COLUMNS)); samples whose numbers overflow are left out."""
     # The C source checks no limits of motors.
     step = Step(parameters.replaced(dict.fromkeys(OF_MOTORS)))
-    constants = hexapod_constants(parameters)
+    hexapod = hexapod_structure(parameters)
     drives = None if parameters['actuator.screw_lead'] is None else Drives(parameters)
     motions = _motions(parameters)
     weight = parameters['platform.mass'] * 10.0 + 1.0
@@ -97,10 +97,10 @@ def golden_vectors(parameters: Parameters) -> Array:
         state = output.state
         code, steps, residual = np.empty(1, dtype=int), np.empty(1, dtype=int), np.empty(1)
         forward_kinematics.poses(
-            constants, np.array([output.lengths]), guess, code, steps, residual)
+            hexapod, np.array([output.lengths]), guess, code, steps, residual)
         rows.append([
             stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(output),
-            *_motors(drives, motions[n], output), _CODES[int(code[0])], *guess[0, :POSE.stop]])
+            *_motors(drives, motions[n], output), int(code[0]), *guess[0, :POSE.stop]])
     return np.array(rows, dtype=float).reshape(-1, len(COLUMNS))
 
 

@@ -37,7 +37,7 @@ estimate starts again there, as after a gap.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 import math
 from struct import Struct
@@ -46,17 +46,14 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
-from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.core.binding import CODES, function, places
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics
-from stewart_dynamics.mechanics.dynamics.bodies import drive_row
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import (
-    BASE, consecutive, FORCES, MOTION, NO_BASE, PARTS_OF_WRENCH, POSITION, RESULT,
-    ROTATION, WRENCH)
+    NO_BASE, PARTS_OF_WRENCH, POSE, POSITION, ROTATION, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 
@@ -64,18 +61,14 @@ from stewart_dynamics.parameters.table import Parameters
 EXTERNAL_WRENCH = 'external_wrench'
 WRENCH_LIMITS = {f'{EXTERNAL_WRENCH}.{part}_max': part for part in PARTS_OF_WRENCH}
 
-# The outcome of a measurement, besides the codes of forward_kinematics.
-_OUT_OF_RANGE = 3
-
-# One measurement as numbers, since an array costs time to pass: inputs, then results.
-_MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _ACROSS, _CODE = consecutive(
-    MOTION, WRENCH, 6, 1, 1, 1, 1)
-# The motion given is the previous one, or the guess.
-(_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION, _BASE_BEFORE,
- _BASE, _TARGET, _WRITTEN, _RESULT, _TILE) = consecutive(
-    CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, BASE, BASE, 1, _CODE.stop, RESULT,
-    inverse_dynamics.TILE)
-_GIVEN = Struct(f'{_WRITTEN.start - _LENGTHS.start}d')
+# One measurement as numbers, since an array costs time to pass: inputs, then results. The motion
+# given is the previous one, or the guess.
+_PLACES = places('one_measurement')
+_WRITTEN = _PLACES['motion_after'].start
+_MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _ACROSS, _CODE = (
+    slice(part.start - _WRITTEN, part.stop - _WRITTEN) for part in (_PLACES[name] for name in (
+        'motion_after', 'after', 'differences', 'steps', 'residual', 'across', 'code')))
+_GIVEN = Struct(f'{_WRITTEN}d')
 _GIVES = Struct(f'{_CODE.stop}d')
 
 
@@ -132,33 +125,6 @@ class Estimate(NamedTuple):
         return math.hypot(*self.wrench[3:]) if self.wrench else 0.0
 
 
-@inlined
-def _add_external_wrench(constants: Array, motion: Array, model_forces: Array,
-                         measured_forces: Array, weight: float, wrench: Array) -> None:
-    """Add w_ext = J_inv^T (f_model - f_measured), times a weight, row by row."""
-    position = motion[0], motion[1], motion[2]
-    rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
-                motion[10], motion[11])
-    for leg in range(6):
-        r0, r1, r2, r3, r4, r5 = drive_row(constants, leg, position, rotation)
-        force = weight * (model_forces[leg] - measured_forces[leg])
-        wrench[0] += force * r0
-        wrench[1] += force * r1
-        wrench[2] += force * r2
-        wrench[3] += force * r3
-        wrench[4] += force * r4
-        wrench[5] += force * r5
-
-
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
-def _many(constants: Array, motions: Array, model_forces: Array, measured_forces: Array,
-          wrenches: Array) -> None:
-    for n in range(len(motions)):
-        wrenches[n] = 0.0
-        _add_external_wrench(
-            constants, motions[n], model_forces[n], measured_forces[n], 1.0, wrenches[n])
-
-
 def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: Array,
                       measured_forces: Array) -> Array:
     """
@@ -168,56 +134,9 @@ def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: A
     rows of motion (N, 12) or (N, MOTION) only the poses are used.
     """
     wrenches = np.empty((len(motions), WRENCH))
-    motions, model_forces, measured_forces = map(
-        np.ascontiguousarray, (motions, model_forces, measured_forces))
-    _many(platform.constants, motions, model_forces, measured_forces, wrenches)
+    function('external_wrenches_many')(platform.structure, len(motions), *map(
+        np.ascontiguousarray, (motions[:, POSE], model_forces, measured_forces)), wrenches)
     return wrenches
-
-
-@entry_point('f8[::1]')
-def _one(numbers: Array) -> None:
-    """Write the results of one measurement."""
-    constants, written = numbers[_PLATFORM], numbers[_WRITTEN]
-    before, motion, wrench, differences = (
-        numbers[_MOTION], written[_MOTION_AFTER], written[_AFTER], written[_DIFFERENCES])
-    for n in range(MOTION):
-        motion[n] = before[n]
-    # Whether the setpoint is on the other side of a singularity; nan: no setpoint.
-    sides = forward_kinematics.determinant(constants, before) * numbers[_TARGET.start]
-    written[_ACROSS.start] = 1.0 if sides < 0.0 else 0.0
-    code, written[_STEPS.start], written[_RESIDUAL.start] = forward_kinematics.pose(
-        constants, numbers[_LENGTHS], motion)
-    written[_CODE.start] = code
-    if code != forward_kinematics.FOUND:
-        return
-    forward_kinematics.twist(constants, numbers[_RATES], motion)
-    dt = numbers[_INTERVAL.start]
-    for n in range(6):
-        motion[18 + n] = (motion[12 + n] - before[12 + n]) / dt if dt > 0.0 else 0.0
-        before[18 + n] = motion[18 + n]
-        wrench[n] = 0.0
-        differences[n] = 0.0
-    if dt > 0.0:
-        forces, result = numbers[_FORCES], numbers[_RESULT]
-        for end in range(2):  # the mean of both ends
-            at = motion if end else before
-            base = numbers[_BASE] if end else numbers[_BASE_BEFORE]
-            inverse_dynamics.solve_one(
-                constants, at, numbers[_KNOWN], base, result, numbers[_TILE])
-            model_forces = result[FORCES]
-            _add_external_wrench(constants, at, model_forces, forces, 0.5, wrench)
-            for n in range(6):
-                differences[n] += 0.5 * (forces[n] - model_forces[n])
-        for n in range(6):
-            filtered = numbers[_BEFORE.start + n]
-            wrench[n] = filtered + numbers[_GAIN.start] * (wrench[n] - filtered)
-    for n in range(_STEPS.start):
-        if not math.isfinite(written[n]):
-            written[_CODE.start] = _OUT_OF_RANGE
-
-
-# The machine code that a measurement needs.
-FUNCTIONS = (_one,)
 
 
 class ExternalWrench:
@@ -229,9 +148,9 @@ class ExternalWrench:
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
-        self._numbers = np.zeros(_TILE.stop)
-        self._memory = self._numbers.data  # the same as bytes
-        self._numbers[_PLATFORM] = StewartPlatform(parameters).constants
+        numbers = np.zeros(_WRITTEN + _CODE.stop)
+        self._memory = numbers.data  # the same as bytes
+        self._bound = function('estimate_one').bound(hexapod_structure(parameters), numbers)
         self._size = parameters['singularity.characteristic_length']
         self._longest_gap = round(parameters['setpoint.timeout'] * SECOND)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
@@ -287,13 +206,12 @@ class ExternalWrench:
                motion: Sequence[float], base_before: tuple[float, ...],
                base: tuple[float, ...], target: Target | None = None,
                ) -> tuple[float, ...]:
-        # Computed here: compiled code has an expm1 of its own.
         gain = -math.expm1(-self._rate * interval)
         _GIVEN.pack_into(
-            self._memory, 8 * _LENGTHS.start, *given, *before, gain, interval, *motion,
+            self._memory, 0, *given, *before, gain, interval, *motion,
             *base_before, *base, math.nan if target is None else target.determinant)
         self._bound()
-        return _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
+        return _GIVES.unpack_from(self._memory, _GIVEN.size)
 
     def _distance(self, one: Sequence[float], other: Sequence[float]) -> float:
         """Return how far two poses are apart [m], turns by the characteristic length."""
@@ -307,10 +225,6 @@ class ExternalWrench:
         if target is not None:
             yield target.motion
         yield from self._homes
-
-    @cached_property
-    def _bound(self) -> Callable[[], object]:
-        return _one.bound(self._numbers)
 
     @cached_property
     def _homes(self) -> list[list[float]]:
@@ -328,7 +242,7 @@ class ExternalWrench:
 def _error(measurement: Measurement, result: tuple[float, ...],
            ) -> PoseError | SingularityError | MotionError:
     code, lengths = result[_CODE.start], ', '.join(f'{x:.6g}' for x in measurement.lengths)
-    if code == _OUT_OF_RANGE:
+    if code == CODES['STEWART_OUT_OF_RANGE']:
         return MotionError(f'stamp {measurement.stamp} ns')
     if code == forward_kinematics.SINGULAR:
         return SingularityError(f'lengths [{lengths}] m')

@@ -98,7 +98,6 @@ MEASURED_LEGS = 'measured_legs'
 
 # Why a message is rejected, beside the reasons of ``joint_state`` and ``rejections``.
 UNSTAMPED = 'without a stamp'
-NOT_COMPILED = 'not compiled yet'
 NOT_CONVERGED = 'forward kinematics did not converge'
 SINGULAR = 'singular pose'
 

@@ -23,14 +23,12 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, SECOND
-from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.estimation.noisy_rates import rates_in_noise, smoothed_law
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.external_wrench.body_fit import (
     about, Body, BodyFit, FittedBody, LegSamples, ROUNDS, TEN)
 from stewart_dynamics.external_wrench.measured_legs import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, stamps_of, TURNED)
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     BODY_UNITS, COULOMB_FRICTION, FIRST_MOMENT, LINEAR, linear_parameters, PLATFORM,
     VISCOUS_FRICTION)
@@ -38,10 +36,8 @@ from stewart_dynamics.mechanics.rows import ACCELERATION, BASE, FORCES, GRAVITY,
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
 
-FUNCTIONS = inverse_dynamics.solve, regressor.regressors
-
 # Measurements between two yields.
-PIECE = 128 if COMPILED else 1
+PIECE = 128
 _COPIED = 1024
 
 # Half the width of a window: minimum [s], and minimum in measurements.

@@ -114,7 +114,7 @@ def _add_design(parser: argparse.ArgumentParser) -> None:
 def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import find_bags
-    from stewart_dynamics.identification.results import FUNCTIONS, result_text, run
+    from stewart_dynamics.identification.results import result_text, run
     from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes, mistakes_in_options
     from stewart_dynamics.parameters.table import Parameters
 
@@ -128,7 +128,7 @@ def _run(given: argparse.Namespace) -> int:
         return DONE
     output = given.output or Path(IDENTIFIED)
     bags = [bag for path in given.bags for bag in find_bags(path, output)]
-    _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))
+    _PROGRAM.prepare(likely_mistakes(parameters))
     result = run(bags, parameters, output, options, _PROGRAM.complain)
     _PROGRAM.say(result_text(result))
     return _PROGRAM.end(output, {bag['bag']: bag['missing'] for bag in result['bags']},

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.bags import recording
 from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.estimation.posterior import IDENTIFIABLE
@@ -30,8 +29,6 @@ from stewart_dynamics.identification.identify import (
     Identification, Identified, Residuals)
 from stewart_dynamics.identification.lack_of_fit import PIECE, WHOLE
 from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
-from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.least_squares import (
     Identifiability, identifiability, TWO_SIDED)
 from stewart_dynamics.parameters.table import Parameters
@@ -56,10 +53,6 @@ NOT_TESTED = ('not tested for a lack of fit: what can be used of the motion is t
               'ends that the filters take')
 # Largest number of samples in the curves of the report; later samples are not drawn.
 _MOST = 12_000
-
-# Functions that every identification needs as machine code.
-FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,
-             *recording.FUNCTIONS)
 
 
 def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: IdentificationOptions,

@@ -1,35 +1,29 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""
-Batches: arguments as rows, results and leg lengths; all processors share large ones.
-
-Leg lengths alone (1) are computed in plain numpy: nothing has to be compiled for them.
-"""
+"""Batches: arguments as rows, results and leg lengths; all processors share large ones."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+import math
 import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.compilation.machine_code import COMPILED
+from stewart_dynamics.arrays import Array, Integers, Records
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import SingularityError
 from stewart_dynamics.mechanics.arguments import (
     common_shape, copies, optional_array, place, wrong_type)
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import joints_of
 from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
 from stewart_dynamics.mechanics.rows import (
     CONDITION, MOTION, NO_BASE, POSE, POSITION, RESULT, WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
-from stewart_dynamics.mechanics.vectors import add, dot, rotate, subtract
 
 # Samples for one thread at least: a millisecond of work, far more than the start of a thread.
 _SAMPLES_FOR_A_THREAD = 4096
@@ -56,27 +50,31 @@ def loaded(motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
     return rows, load, bases, shape
 
 
-def solve(constants: Array, motions: Array, wrenches: Array | None = None,
+def solve(hexapod: Records, motions: Array, wrenches: Array | None = None,
           bases: Array | None = None, condition: bool = True) -> Array:
     """
     Return the rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
 
-    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    hexapod (): its structure, see ``hexapod_structure``.
     motions (N, MOTION): rows of motion, see ``rows`` for the layout.
     wrenches (N, WRENCH) or (1, WRENCH): external wrenches at the platform's origin, base axes [N,
         N m]; one row for all.
     bases (N, BASE) or (1, BASE): rows of the base's motion, one row for all; without them it is
         still.
-    condition: whether the condition number is computed.
+    condition: whether the condition number, half of the work, is computed; else it is zero.
     """
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     bases = _NO_BASE if bases is None else compact(bases)
     results = np.empty((len(motions), RESULT))
-    sound = np.empty(len(motions) if condition else 0, dtype=bool)
-    in_parts(inverse_dynamics.solve, (constants,), motions, wrenches, bases, results, sound,
-             scratch=(inverse_dynamics.TILE,))
+    in_parts(_solve, (hexapod, condition), motions, wrenches, bases, results)
     return results
+
+
+def _solve(hexapod: Records, condition: bool, motions: Array, wrenches: Array, bases: Array,
+           results: Array) -> None:
+    function('solve_many')(hexapod, len(motions), motions, len(wrenches), wrenches, len(bases),
+                           bases, condition, results)
 
 
 def find_unsolvable(
@@ -95,18 +93,11 @@ def find_unsolvable(
     return unsolvable
 
 
-def leg_lengths(constants: Array, poses: Array) -> Array:
-    """
-    Return the lengths (..., 6) [m] of the legs in poses (..., POSE), unchecked.
-
-    All legs and samples go side by side through the operations of ``bodies.leg_line``, and get
-    the same bits.
-    """
-    numbers: Any = [poses[..., n, None] for n in range(POSE.stop)]  # arrays for scalars
-    legs: Any = np.arange(6)
-    base_joints, platform_joints = joints_of(constants, legs)
-    leg = subtract(add(numbers[:3], rotate(numbers[3:], platform_joints)), base_joints)
-    lengths: Array = np.sqrt(dot(leg, leg))
+def leg_lengths(hexapod: Records, poses: Array) -> Array:
+    """Return the lengths (..., 6) [m] of the legs in poses (..., POSE) or more, unchecked."""
+    shape = poses.shape[:-1]
+    lengths = np.empty((*shape, 6))
+    function('lengths_many')(hexapod, math.prod(shape), compact(poses[..., POSE]), lengths)
     return lengths
 
 
@@ -122,7 +113,7 @@ def in_parts(compute: Callable[..., object], constants: tuple[Any, ...], *arrays
         compute(*constants, *rows, *([np.empty(scratch)] if scratch else []))
 
     samples = len(arrays[0])
-    threads = min(_CPUS, samples // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
+    threads = min(_CPUS, samples // _SAMPLES_FOR_A_THREAD)
     if threads < 2:
         call(*arrays)
         return
@@ -137,5 +128,5 @@ def in_parts(compute: Callable[..., object], constants: tuple[Any, ...], *arrays
 
 
 def compact(array: Array) -> Array:
-    """Return the array, or a copy in the layout that the functions are compiled for."""
+    """Return the array, or a copy of float64 in C order, as functions in C take it."""
     return np.ascontiguousarray(array, dtype=float)

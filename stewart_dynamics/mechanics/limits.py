@@ -13,9 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Six
-from stewart_dynamics.compilation.functions import inlined
-from stewart_dynamics.mechanics.rows import (
-    BASE_JOINT_ANGLES, consecutive, FORCES, LENGTHS, PLATFORM_JOINT_ANGLES, RATES)
+from stewart_dynamics.mechanics.rows import BASE_JOINT_ANGLES, PLATFORM_JOINT_ANGLES
 from stewart_dynamics.parameters.table import OUTLINES, Parameters
 
 LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = OF_RESULTS = (
@@ -36,9 +34,6 @@ TOLERANCE = 1e-9
 # Tolerance of the stamps of setpoints [s]: a leg may move at its rate limit for this additional
 # time before a setpoint counts as a jump.
 JITTER = 1e-3
-
-# Thresholds in a row, in the order of OF_RESULTS.
-_SHORTEST, _LONGEST, _FASTEST, _STRONGEST = consecutive(6, 6, 6, 6)
 
 
 class Quantity(NamedTuple):
@@ -179,31 +174,3 @@ class Limits:
 def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
     """Return whether a value, or where an array, is past the threshold of a limit."""
     return value < threshold if limit in MINIMA else abs(value) > threshold
-
-
-@inlined
-def any_exceeded(thresholds: Array, result: Array) -> tuple[bool, bool]:
-    """
-    Return whether a row of a result exceeds a limit of lengths or rates, and one of forces.
-
-    Thresholds are those of OF_RESULTS (24,); nan exceeds none.
-    """
-    moving, loaded = False, False
-    for leg in range(6):
-        if (result[LENGTHS.start + leg] < thresholds[_SHORTEST.start + leg]
-                or result[LENGTHS.start + leg] > thresholds[_LONGEST.start + leg]
-                or abs(result[RATES.start + leg]) > thresholds[_FASTEST.start + leg]):
-            moving = True
-        if abs(result[FORCES.start + leg]) > thresholds[_STRONGEST.start + leg]:
-            loaded = True
-    return moving, loaded
-
-
-@inlined
-def jumps(thresholds: Array, lengths: Array, followed: Array, elapsed: float) -> bool:
-    """Return whether a leg cannot move from one length to another (6,) within a time [s]."""
-    found = False
-    for leg in range(6):
-        if abs(lengths[leg] - followed[leg]) > thresholds[_FASTEST.start + leg] * elapsed:
-            found = True
-    return found

@@ -3,7 +3,7 @@
 
 
 """
-The layout of a sample as a row of numbers.
+The layout of a sample as a row of numbers: that of the structures in C.
 
 All layers pass motions, wrenches, base motions and results as rows of float64, SI units, base
 axes; ``rows[..., FORCES]`` is a quantity of all samples.
@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import math
 
+from stewart_dynamics.core.binding import places
+
 # A row of a motion. The rotation is row by row.
-POSITION, ROTATION = slice(0, 3), slice(3, 12)
-POSE = slice(0, 12)
-LINEAR_VELOCITY, ANGULAR_VELOCITY = slice(12, 15), slice(15, 18)
-TWIST = slice(12, 18)
-LINEAR_ACCELERATION, ANGULAR_ACCELERATION = slice(18, 21), slice(21, 24)
-ACCELERATION = slice(18, 24)
-MOTION = 24
+(POSITION, ROTATION, LINEAR_VELOCITY, ANGULAR_VELOCITY, LINEAR_ACCELERATION,
+ ANGULAR_ACCELERATION) = places('stewart_motion').values()
+POSE, TWIST = slice(0, ROTATION.stop), slice(ROTATION.stop, ANGULAR_VELOCITY.stop)
+ACCELERATION = slice(ANGULAR_VELOCITY.stop, ANGULAR_ACCELERATION.stop)
+MOTION: int = ANGULAR_ACCELERATION.stop
 
 # A row of a wrench: force and moment, and their units.
 WRENCH = 6
@@ -28,16 +28,17 @@ PARTS_OF_WRENCH = {'force': 'N', 'moment': 'N m'}
 
 # A row of a base's motion, base axes. One of nan adds no load: the base is still, or its motion is
 # not known.
-GRAVITY, BASE_ACCELERATION = slice(0, 3), slice(3, 6)
-BASE_ANGULAR_VELOCITY, BASE_ANGULAR_ACCELERATION = slice(6, 9), slice(9, 12)
-BASE = 12
-NO_BASE = (math.nan,) * BASE
+GRAVITY, BASE_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_ANGULAR_ACCELERATION = places(
+    'stewart_base').values()
+BASE: int = BASE_ANGULAR_ACCELERATION.stop
+NO_BASE: tuple[float, ...] = (math.nan,) * BASE
 
 # A row of a result.
-LENGTHS, RATES, FORCES = slice(0, 6), slice(6, 12), slice(12, 18)
-UNIT_LOAD_FORCES = slice(18, 24)
-DETERMINANT, DETERMINANT_RATE, CONDITION = 24, 25, 26
-RESULT = 27
+LENGTHS, RATES, FORCES, _DETERMINANT, _RATE, _CONDITION, UNIT_LOAD_FORCES = places(
+    'stewart_result').values()
+DETERMINANT, DETERMINANT_RATE, CONDITION = (
+    part.start for part in (_DETERMINANT, _RATE, _CONDITION))
+RESULT: int = UNIT_LOAD_FORCES.stop
 
 # A row of joint angles, see ``joint_angles``.
 BASE_JOINT_ANGLES, PLATFORM_JOINT_ANGLES = slice(0, 6), slice(6, 12)

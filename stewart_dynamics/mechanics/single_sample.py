@@ -5,21 +5,21 @@
 The calls of the library for one sample, as fast as a control loop or an MPC needs them.
 
 A call takes little more time than the arithmetic: arguments are copied to memory whose address
-the machine code knows already. A call returns None if an argument must be converted or is wrong,
+the function in C knows already. A call returns None if an argument must be converted or is wrong,
 or if the result is not sound; the call for batches then converts the argument or raises the error.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.compilation.functions import EntryPoint
-from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, inverse_dynamics
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
@@ -41,34 +41,49 @@ class SingleSample:
     ``forward_kinematics`` returns the row of the pose (12,).
     """
 
-    def __init__(self, constants: Array) -> None:
-        motion, six, base = np.zeros((1, MOTION)), np.empty((1, 6)), np.array([NO_BASE])
+    def __init__(self, hexapod: Records) -> None:
+        def solve(motion: Array, wrench: Array, base: Array, result: Array) -> Callable[[], Any]:
+            return function('solve_one').bound(hexapod, motion, wrench, base, result)
+
+        def accelerate(motion: Array, forces: Array, wrench: Array, base: Array,
+                       ) -> Callable[[], Any]:
+            return function('forward_dynamics_many').bound(
+                hexapod, 1, motion, forces, 1, wrench, 1, base)
+
+        def base_wrench(motion: Array, wrench: Array, base: Array, result: Array,
+                        ) -> Callable[[], Any]:
+            return function('base_wrenches_many').bound(
+                hexapod, 1, motion, 1, wrench, 1, base, result)
+
+        def pose(lengths: Array, motion: Array, code: Any, steps: Any, residual: Array,
+                 ) -> Callable[[], Any]:
+            return function('forward_kinematics_many').bound(
+                hexapod, 1, lengths, motion, code, steps, residual)
+
+        motion, six, base = np.zeros(MOTION), np.empty(6), np.array(NO_BASE)
         self.inverse_dynamics = _Dynamics(
-            inverse_dynamics.solve, constants, motion=motion, wrench=six, base=base,
-            result=np.empty((1, RESULT)), sound=np.empty(1, dtype=bool),
-            work=np.empty(inverse_dynamics.TILE)).call
+            solve, motion=motion, wrench=six, base=base, result=np.empty(RESULT)).call
         self.forward_dynamics = _Dynamics(
-            forward_dynamics.solve, constants, motion=motion, forces=six, wrench=six, base=base,
-            work=np.empty(forward_dynamics.WORK)).call
-        self.base_wrench = _Dynamics(base_wrench.base_wrenches, constants, motion=motion,
-                                     wrench=six, base=base, result=six).call
+            accelerate, motion=motion, forces=six, wrench=six, base=base).call
+        self.base_wrench = _Dynamics(
+            base_wrench, motion=motion, wrench=six, base=base, result=six).call
         self.forward_kinematics = _ForwardKinematics(
-            forward_kinematics.poses, constants, lengths=six, motion=motion,
-            code=np.empty(1, np.int64), steps=np.empty(1, np.int64), residual=np.empty(1)).call
+            pose, lengths=six, motion=motion, code=np.empty(1, np.int64),
+            steps=np.empty(1, np.int64), residual=np.empty(1)).call
 
 
 class _Memories:
     """The memory of calls of a function: as much as there are calls at the same time."""
 
-    def __init__(self, function: EntryPoint, constants: Array, **arrays: NDArray[Any]) -> None:
-        self._function, self._constants, self._arrays = function, constants, arrays
+    def __init__(self, bound: Callable[..., Callable[[], Any]], **arrays: NDArray[Any]) -> None:
+        self._bound, self._arrays = bound, arrays
         self._free: list[tuple[Any, ...]] = []  # its pop and append are atomic
 
     def _new(self) -> tuple[Any, ...]:
         """Return the function bound to new arrays, the arrays, and a memoryview of each."""
         arrays = {name: array.copy() for name, array in self._arrays.items()}
-        return (self._function.bound(self._constants, *arrays.values()), arrays,
-                {name: array.reshape(-1).data for name, array in arrays.items()})
+        return (self._bound(*arrays.values()), arrays,
+                {name: array.data for name, array in arrays.items()})
 
 
 class _Dynamics(_Memories):
@@ -76,10 +91,10 @@ class _Dynamics(_Memories):
 
     def _new(self) -> tuple[Any, ...]:
         solve, arrays, views = super()._new()
-        motion = arrays['motion'][0]
-        result = arrays['result'][0] if 'result' in arrays else motion
+        motion = arrays['motion']
+        result = arrays.get('result', motion)
         return (solve, views['motion'], views.get('forces'), views['wrench'], views['base'],
-                result, motion[ACCELERATION] if result is motion else result, views.get('sound'))
+                result, motion[ACCELERATION] if result is motion else result)
 
     def call(self, motion: Motion, forces: Any, wrench: Any, base: BaseMotion | None,
              ) -> Array | None:
@@ -90,7 +105,7 @@ class _Dynamics(_Memories):
             memory = self._free.pop()
         except IndexError:
             memory = self._new()
-        solve, of_motion, of_forces, of_wrench, of_base, result, checked, sound = memory
+        solve, of_motion, of_forces, of_wrench, of_base, result, checked = memory
         try:
             of_motion[:] = motion.rows
             if of_forces is not None:
@@ -100,9 +115,10 @@ class _Dynamics(_Memories):
                 of_base[:] = base.rows
                 if of_base[0] != of_base[0]:
                     return None  # nan would be a still base
-            solve()
-            is_sound = math.isfinite(sum(checked.tolist())) if sound is None else sound[0]
-            return result.copy() if is_sound else None
+            sound = solve()
+            if sound is None:
+                sound = math.isfinite(sum(checked.tolist()))
+            return result.copy() if sound else None
         except _NO_FLOATS:
             return None
         finally:
@@ -127,7 +143,7 @@ class _ForwardKinematics(_Memories):
             views['lengths'][:] = lengths
             views['motion'][:_POSE] = guess.rows[..., :_POSE]
             solve()
-            return (arrays['motion'][0, :_POSE].copy()
+            return (arrays['motion'][:_POSE].copy()
                     if views['code'][0] == forward_kinematics.FOUND else None)
         except _NO_FLOATS:
             return None

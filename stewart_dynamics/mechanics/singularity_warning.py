@@ -18,10 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.parameters.tolerances import HYSTERESIS
 
 # At this condition number a solution of J_inv^T f = wrench has fewer than four valid digits of
 # sixteen: forces are neither computed nor published.
@@ -58,9 +55,6 @@ _TEXTS = {
 # stop_condition, the last det(J) that was not zero, time to crossing, changes of sign so far.
 CAUSE, STOPPED, LAST, TIME, CROSSINGS, STATE = range(6)
 
-# The thresholds as an array, in this order.
-WARN_CONDITION, STOP_CONDITION, WARN_TIME, THRESHOLDS = range(4)
-
 
 def time_to_crossing(determinant: ArrayLike, determinant_rate: ArrayLike) -> NDArray[Any]:
     """Return the time after which det(J) is zero at its present rate [s]; inf if never."""
@@ -68,48 +62,6 @@ def time_to_crossing(determinant: ArrayLike, determinant_rate: ArrayLike) -> NDA
     with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         time = -det / rate
     return np.where(time >= 0.0, time, np.inf)
-
-
-def thresholds(parameters: Parameters) -> Array:
-    """Return the thresholds that parameters give, (THRESHOLDS,)."""
-    return np.array([parameters[f'singularity.{name}'] for name in (
-        'warn_condition', 'stop_condition', 'warn_time')])
-
-
-@inlined
-def forget(state: Array) -> None:
-    """Reset the state but for the count of crossings: the next sample is the first."""
-    state[CAUSE] = Cause.NONE.value
-    state[STOPPED] = 0.0
-    state[LAST] = 0.0
-
-
-@inlined
-def advance(state: Array, limits: Array, determinant: float, determinant_rate: float,
-            condition: float) -> None:
-    """
-    Update a state by one more sample.
-
-    state (STATE,): written.
-    limits (THRESHOLDS,): the thresholds; later elements of the array are not read.
-    determinant, determinant_rate, condition: values of the sample.
-    """
-    hysteresis = HYSTERESIS if state[CAUSE] > 0.0 else 1.0
-    time = -determinant / determinant_rate if determinant_rate != 0.0 else math.inf
-    if not time >= 0.0:
-        time = math.inf
-    cause = Cause.NONE.value
-    if determinant * state[LAST] < 0.0:
-        cause = Cause.CROSSED.value
-        state[CROSSINGS] += 1.0
-    elif condition >= limits[WARN_CONDITION] * hysteresis:
-        cause = Cause.CONDITION.value
-    elif time < limits[WARN_TIME] / hysteresis:
-        cause = Cause.PREDICTED.value
-    stop = limits[STOP_CONDITION] * (HYSTERESIS if state[STOPPED] > 0.0 else 1.0)
-    state[CAUSE], state[STOPPED], state[TIME] = cause, condition >= stop, time
-    if determinant != 0.0:
-        state[LAST] = determinant
 
 
 class Singularity(NamedTuple):

@@ -22,7 +22,7 @@ from stewart_dynamics.mechanics.drives.screws import screw_constants
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, lagrange, regressor
 from stewart_dynamics.mechanics.dynamics.force_breakdown import (
     ForceBreakdown, ForceBreakdownRows, SOURCES)
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import constants_with
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     LINEAR, linear_parameters, names_of)
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
@@ -30,6 +30,7 @@ from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
 from stewart_dynamics.mechanics.frames.motion import (
     check_kind, listed, Motion, motion_rows, Pose)
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
@@ -60,8 +61,10 @@ class StewartPlatform:
     ----------
     parameters : Parameters
         As given.
-    constants : (CONSTANTS,)
-        The hexapod as the compiled functions take it, see ``hexapod_constants``.
+    structure : ()
+        The hexapod as the functions in C take it, see ``hexapod_structure``.
+    constants : (n,)
+        As the functions that numba compiles take it, see ``hexapod_constants``.
     screws : (6, SCREW)
         The screws as the readable functions take them, see ``drives.screws``; zero if guided.
     solve : callable
@@ -81,9 +84,10 @@ class StewartPlatform:
                              'reads a file, Parameters takes a dict')
         self.parameters = parameters
         self.screws = screw_constants(parameters)
-        self.constants = constants_with(parameters, self.screws)
-        self.solve = partial(batch.solve, self.constants)
-        self._single = SingleSample(self.constants)
+        self.structure = hexapod_structure(parameters, self.screws)
+        self.constants = hexapod_constants(parameters)
+        self.solve = partial(batch.solve, self.structure)
+        self._single = SingleSample(self.structure)
         self._breakdown: ForceBreakdownRows | None = None
         self._home: Pose | None = None
         self._joint_angles: JointAngles | None = None
@@ -220,8 +224,8 @@ class StewartPlatform:
         """Return ``regressor`` (N, 6, LINEAR) of rows of motion, unchecked, see ``solve``."""
         bases = np.array([NO_BASE]) if bases is None else bases
         matrices = np.empty((len(rows), 6, LINEAR))
-        batch.in_parts(regressor.regressors, (self.constants,), *map(
-            batch.compact, (rows, bases)), matrices, scratch=regressor.WORK)
+        batch.in_parts(regressor.regressors, (self.structure,), *map(
+            batch.compact, (rows, bases)), matrices)
         return matrices
 
     def regressors_at_rest(self, rows: Array, gravity: Array) -> Array:
@@ -258,7 +262,7 @@ class StewartPlatform:
         """Return rows (N, 6) of ``base_wrench`` of rows of motion, unchecked, see ``solve``."""
         bases = self._still.rows[None] if bases is None else bases
         results = np.empty((len(rows), WRENCH))
-        batch.in_parts(base_wrench.base_wrenches, (self.constants,), *map(
+        batch.in_parts(base_wrench.base_wrenches, (self.structure,), *map(
             batch.compact, (rows, wrenches, bases)), results)
         return results
 
@@ -294,16 +298,14 @@ class StewartPlatform:
                              wrench=load.shape[:-1], base=bases.shape[:-1])
         rows, pushes, load, bases = (
             copies(array, shape) for array in (motion.rows, pushes, load, bases))
-        batch.in_parts(forward_dynamics.solve, (self.constants,), rows, pushes, load, bases,
-                       scratch=forward_dynamics.WORK)
+        batch.in_parts(forward_dynamics.solve, (self.structure,), rows, pushes, load, bases)
         rows = check_finite('accelerations', rows.reshape(*shape, MOTION), len(shape))
         return Motion.of_rows(rows)
 
     def inverse_kinematics(self, pose: Pose | Motion) -> Array:
         """Return the six leg lengths at a pose, (..., 6) [m]."""
         check_kind(pose, Pose, Motion)
-        with np.errstate(all='ignore'):
-            lengths = batch.leg_lengths(self.constants, pose.rows)
+        lengths = batch.leg_lengths(self.structure, pose.rows)
         return check_finite('leg lengths', lengths, len(pose.shape))
 
     def forward_kinematics(self, lengths: ArrayLike, guess: Pose | Motion | None = None) -> Pose:
@@ -343,7 +345,7 @@ class StewartPlatform:
         wanted, rows = copies(wanted, shape), motion_rows(guess, shape)
         codes, steps = np.empty(len(rows), dtype=np.int64), np.empty(len(rows), dtype=np.int64)
         residuals = np.empty(len(rows))
-        batch.in_parts(forward_kinematics.poses, (self.constants,), wanted, rows, codes, steps,
+        batch.in_parts(forward_kinematics.poses, (self.structure,), wanted, rows, codes, steps,
                        residuals)
         if codes.any():
             at = int(np.argmax(codes > 0))
@@ -375,7 +377,7 @@ class StewartPlatform:
         shape = common_shape(pose=pose.shape, rates=given.shape[:-1])
         given, rows = copies(given, shape), motion_rows(pose, shape)
         batch.find_unsolvable(rows, self.solve(rows), shape, 'raise')
-        forward_kinematics.twists(self.constants, given, rows)
+        forward_kinematics.twists(self.structure, given, rows)
         return check_finite('twist', rows[:, TWIST].reshape(*shape, 6).copy(), len(shape))
 
     def joint_angles(self, pose: Pose | Motion) -> tuple[Array, Array]:

@@ -18,15 +18,14 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.capability import travel
-from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError, StewartError
-from stewart_dynamics.external_wrench import estimate as external_wrench, payload
+from stewart_dynamics.external_wrench import payload
 from stewart_dynamics.external_wrench.estimate import (
-    EXTERNAL_WRENCH, ExternalWrench, Target, WRENCH_LIMITS)
+    EXTERNAL_WRENCH, ExternalWrench, Target)
 from stewart_dynamics.external_wrench.measured_legs import (
-    LegHistory, MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
+    LegHistory, MEASURED_LEGS, MeasuredLegs)
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, WARN
@@ -39,14 +38,13 @@ from stewart_dynamics.node.tasks import (
 from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD, TRAVEL
 from stewart_dynamics.parameters.table import AS_MEASURED, Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
-from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
+from stewart_dynamics.planned import messages as planned
 from stewart_dynamics.ros.declared_parameters import changed, declare_parameters, log_changes
 from stewart_dynamics.ros.rclpy_workarounds import (
     answer_impossible_transitions, OneShotTimer)
 from stewart_dynamics.ros.repeated_log import RepeatedLog
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signals import SIGNALS
-from stewart_dynamics.setpoints import base_wrench
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH, BaseWrench
 from stewart_dynamics.setpoints.inputs import WRENCH
 from stewart_dynamics.setpoints.joining import Setpoints
@@ -74,9 +72,7 @@ class _Models(NamedTuple):
 
     @classmethod
     def of(cls, parameters: Parameters) -> _Models:
-        step = Step(parameters)
-        step.prepare()  # no setpoint waits for a compilation
-        return cls(step, ExternalWrench(parameters), BaseWrench(parameters))
+        return cls(Step(parameters), ExternalWrench(parameters), BaseWrench(parameters))
 
 
 class DynamicsNode(LifecycleNode):
@@ -96,21 +92,16 @@ class DynamicsNode(LifecycleNode):
         self._active = False
         self._configured = False
         self._topics = NodeTopics(self)
-        self._planned_code = Preparation(*planned_trajectory.FUNCTIONS)
-        self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
-        self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
         self._travel_code = Preparation(travel.travels)
         self._base_wrench_read = False  # it has a subscriber
         self._planned: TaskQueue[planned.PlannedOutcome] = TaskQueue(
-            partial(OneShotTimer, self, PAUSE), self._planned_code, self._on_outcome)
+            partial(OneShotTimer, self, PAUSE), self._on_outcome)
         self._payload = PayloadService(self, self._identify_payload, self._on_payload)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         # A steady clock: ROS time may stand still or jump.
         self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         answer_impossible_transitions(
             self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
-        if machine_code.HINT:
-            self.get_logger().warning(machine_code.HINT)
         self._starting = self._settings['autostart']
         if self._starting:
             if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
@@ -123,7 +114,7 @@ class DynamicsNode(LifecycleNode):
     # -- lifecycle --------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Compile the dynamics and open the topics."""
+        """Make the models and open the topics."""
         try:
             self._configure()
         except Exception as exc:
@@ -191,12 +182,7 @@ class DynamicsNode(LifecycleNode):
             self.get_logger().warning(mistake)
         begun = time.monotonic()
         self._models = SIGNALS.interruptible(partial(_Models.of, self._settings))
-        if _expects_measured_legs(self._settings):
-            # Measured legs are expected: none of them is rejected because code is missing.
-            for code in (self._external_wrench_code, self._payload.code):
-                SIGNALS.interruptible(code.finish)
-        how = 'compiled ' if machine_code.COMPILED else ''
-        self.get_logger().info(f'{how}dynamics ready after {time.monotonic() - begun:.1f} s')
+        self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
         self._messages = OutputMessages(self._settings)
         self._model_messages = ModelMessages(self._settings)
         self._topics.make(self._settings, self._on_setpoint, self._on_base, {
@@ -337,9 +323,6 @@ class DynamicsNode(LifecycleNode):
     def _on_measured_legs(self, data: bytes) -> None:
         if not self._active:
             return
-        if not self._external_wrench_code.begin():
-            self._on_rejection(Rejection(MEASURED_LEGS, NOT_COMPILED), 'this takes seconds, once')
-            return
         now = time.monotonic()
         diagnostics = self._diagnostics.external_wrench
         diagnostics.heard(now)
@@ -361,10 +344,6 @@ class DynamicsNode(LifecycleNode):
             self) -> Iterator[payload.PayloadOutcome | None] | payload.PayloadOutcome:
         if not self._active:
             return payload.PayloadOutcome('the node is not active')
-        if not self._external_wrench_code.begin():
-            return payload.PayloadOutcome(
-                'the code for measured legs is being compiled, which takes seconds, once: move '
-                'the hexapod for payload.window after that, and ask again')
         if silence := self._diagnostics.external_wrench.silence(time.monotonic()):
             return payload.PayloadOutcome(silence)
         mistake = self._measured_legs.mistake
@@ -425,14 +404,8 @@ class DynamicsNode(LifecycleNode):
         self._log.write_last(now)
         if not self._active:
             return
-        for topic, code in ((planned.INPUT, self._planned_code),
-                            (MEASURED_LEGS, self._external_wrench_code),
-                            (MEASURED_LEGS, self._payload.code)):
-            if not code.ready and self._topics.writers_of(topic):
-                code.begin()  # the first message will come soon
         publishers = self._topics.publishers
-        reads = publishers[BASE_WRENCH].get_subscription_count() > 0
-        self._base_wrench_read = reads and self._base_wrench_code.begin()
+        self._base_wrench_read = publishers[BASE_WRENCH].get_subscription_count() > 0
         self._publish_due(now)  # the last answer before a silence
         self._transforms_read = (
             TF in publishers and publishers[TF].get_subscription_count() > 0)
@@ -464,12 +437,6 @@ class DynamicsNode(LifecycleNode):
             self._markers.write = Markers(parameters).write  # a payload moves the centre of mass
             self._travel.use(parameters)
         return SetParametersResult(successful=True)
-
-
-def _expects_measured_legs(parameters: Parameters) -> bool:
-    """Return whether parameters announce measured legs."""
-    return (parameters['joint_states.source'] == AS_MEASURED
-            or any(parameters[limit] is not None for limit in WRENCH_LIMITS))
 
 
 def main() -> int:

@@ -21,8 +21,7 @@ from rclpy.time import Time
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from stewart_dynamics.compilation.functions import Preparation
-from stewart_dynamics.external_wrench.payload import FUNCTIONS, Payload, PayloadOutcome
+from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome
 from stewart_dynamics.ros.rclpy_workarounds import create_later_service, OneShotTimer
 
 Outcome = TypeVar('Outcome')
@@ -40,14 +39,12 @@ class TaskQueue(Generic[Outcome]):
     Works on tasks in order and in pieces, one at each tick of a timer.
 
     timer: makes the timer, which calls back once after each start.
-    code: compilation of the functions that a task calls; tasks wait until it is ready.
     done: called with an outcome and the time of arrival of its task [s].
     """
 
-    def __init__(self, timer: Callable[[Callable[[], None]], OneShotTimer], code: Preparation,
+    def __init__(self, timer: Callable[[Callable[[], None]], OneShotTimer],
                  done: Callable[[Outcome, float], None]) -> None:
         self._timer = timer(self._on_timer)
-        self._code = code
         self._done = done
         self._waiting: deque[tuple[Iterator[Outcome | None], float]] = deque()
 
@@ -63,15 +60,11 @@ class TaskQueue(Generic[Outcome]):
 
     def add(self, work: Iterator[Outcome | None], came: float) -> None:
         """Add a task that arrived at a time [s]."""
-        self._code.begin()
         self._waiting.append((work, came))
         self._timer.start()
 
     def _on_timer(self) -> None:
         """Do one piece of the first task."""
-        if not self._code.ready:
-            self._timer.start()
-            return
         work, came = self._waiting[0]
         outcome = next(work)
         if outcome is not None:
@@ -108,10 +101,9 @@ class PayloadService:
             self, node: Node,
             work: Callable[[], Iterator[PayloadOutcome | None] | PayloadOutcome],
             done: Callable[[PayloadOutcome, float], None]) -> None:
-        self.code = Preparation(*FUNCTIONS)
         self._begin, self._done = work, done
         self._tasks: TaskQueue[PayloadOutcome] = TaskQueue(
-            partial(OneShotTimer, node, _PAUSE), self.code, self._end)
+            partial(OneShotTimer, node, _PAUSE), self._end)
         self._waiting: list[Callable[[Any], None]] = []
         # Never destroyed before the node: a waiting request would get no answer.
         create_later_service(node, Trigger, f'~/{IDENTIFY_PAYLOAD}', self._on_request)

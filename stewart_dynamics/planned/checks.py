@@ -21,7 +21,7 @@ from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
 from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS as ACCELERATIONS_OF_MOTORS, ANGLES as ANGLES_OF_MOTORS, AVAILABLE_TORQUES,
     Drives, motor_ratio, Motors, SPEEDS)
-from stewart_dynamics.mechanics.dynamics import friction
+from stewart_dynamics.mechanics.dynamics.friction import friction
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
@@ -271,10 +271,9 @@ class Checks:
         middle = Cubics(
             at_here, at_there, rate_here * durations[which, None],
             rate_there * durations[which, None]).middle_rate() / durations[which, None]
-        of_rates = np.empty((3, len(which), 6))
-        for rates, its in zip((rate_here, rate_there, middle), of_rates, strict=True):
-            friction.friction(np.ascontiguousarray(rates), np.zeros(6), self._coulomb,
-                              self._coulomb_velocity, its)
+        of_rates = np.stack([friction(np.ascontiguousarray(rates), np.zeros(6), self._coulomb,
+                                      self._coulomb_velocity)
+                             for rates in (rate_here, rate_there, middle)])
         others = here[:, FORCES] - of_rates[0], there[:, FORCES] - of_rates[1]
         highest = np.maximum(*others) + of_rates.max(axis=0)
         lowest = np.minimum(*others) + of_rates.min(axis=0)

@@ -22,14 +22,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers, NANOSECOND, SECOND, Stamps
-from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
-from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics import (
-    forward_kinematics, joint_angles, leg_clearance)
+    forward_kinematics, leg_clearance)
 from stewart_dynamics.mechanics.limits import TEMPERATURE_RISE_MAX
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_VELOCITY, consecutive, FORCES, LENGTHS, LINEAR_VELOCITY, RATES, WRENCH)
@@ -81,16 +79,11 @@ class PlannedTrajectory:
     """The largest absolute force as a part of limits.force_max; 0 without that limit."""
 
 
-# The machine code that a check needs.
-FUNCTIONS = (
-    inverse_dynamics.solve, forward_kinematics.twists, forward_kinematics.poses,
-    joint_angles.joint_haversines, leg_clearance.leg_clearances, friction.friction)
-
 # Points and samples between them that a trajectory may need.
 MOST_SAMPLES = 1_000_000
 # Maximum number of intervals between points or samples that are processed between two yields:
-# about half a millisecond of work. Uncompiled, one takes a millisecond.
-PIECE = 256 if COMPILED else 1
+# about half a millisecond of work.
+PIECE = 256
 # Where nothing waits meanwhile, larger pieces take less time in all.
 _LARGE_PIECE = 16 * PIECE
 # Upper end of the range of time_from_start [s].
@@ -360,9 +353,9 @@ class _Work:
         legs, durations = block.legs.selected(which), block.points.durations[which, None]
         poses, count = samples.motions.copy(), len(which)
         codes, steps = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
-        constants = self._platform.constants
+        hexapod = self._platform.structure
         forward_kinematics.poses(
-            constants, legs.at(fraction[:, None]), poses, codes, steps, np.empty(count))
+            hexapod, legs.at(fraction[:, None]), poses, codes, steps, np.empty(count))
         lost = np.flatnonzero(codes != forward_kinematics.FOUND)
         if len(lost):
             count = int(lost[0])
@@ -371,7 +364,7 @@ class _Work:
             return []
         poses = poses[:count]
         forward_kinematics.twists(
-            constants, legs.rate_at(fraction[:, None])[:count] / durations[:count], poses)
+            hexapod, legs.rate_at(fraction[:, None])[:count] / durations[:count], poses)
         found = samples.until(count)
         ways = np.zeros(count - 1)
         if self._reach is not None:

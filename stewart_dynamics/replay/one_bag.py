@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
-from stewart_dynamics.bags import recording as bag_recording
 from stewart_dynamics.bags.find import bytes_of, RESULT
 from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
@@ -40,7 +39,7 @@ from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
-from stewart_dynamics.setpoints import base_wrench, inputs, step
+from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection, stamp_of
@@ -50,10 +49,6 @@ from stewart_dynamics.whole_file import write_json
 VERSION = 1  # version of summary.json; increased when the meaning of a key changes
 
 Progress = Callable[[int, int], None]
-
-# The machine code that every replay needs.
-FUNCTIONS = (
-    *step.FUNCTIONS, *base_wrench.FUNCTIONS, *bag_recording.FUNCTIONS)
 
 # Starting a process takes as long as writing the outputs of a bag of this size [bytes].
 _LARGE = 32 << 20

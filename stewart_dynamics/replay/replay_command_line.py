@@ -106,14 +106,13 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.replay.bag_report import share_plotly
     from stewart_dynamics.replay.many_bags import replay_fleet
-    from stewart_dynamics.replay.one_bag import FUNCTIONS
 
     interrupt_on_signals()
     parameters = Parameters.from_yaml(given.params, given.node)
     bags = folders_of_results(given.bags, given.output)
     if options.report and given.plotly == 'shared':
         options = options._replace(plotly=share_plotly(given.output))
-    _PROGRAM.prepare(FUNCTIONS, likely_mistakes(parameters))  # now, not in each process
+    _PROGRAM.prepare(likely_mistakes(parameters))
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
         return _one(*bags[0], parameters, options, given.strict)
     fleet = replay_fleet(

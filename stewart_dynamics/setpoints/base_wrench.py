@@ -18,7 +18,7 @@ from struct import Struct
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Six
-from stewart_dynamics.mechanics.dynamics import base_wrench
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -32,9 +32,6 @@ BASE_WRENCH = 'base_wrench'
 _MOTION, _WRENCH, _BASE, _RESULT = consecutive(MOTION, WRENCH, BASE, WRENCH)
 _GIVEN = Struct(f'{_RESULT.start}d')
 _GIVES = Struct(f'{WRENCH}d')
-
-# Compiled functions required.
-FUNCTIONS = (base_wrench.base_wrenches,)
 
 
 class BaseWrench:
@@ -75,6 +72,6 @@ class BaseWrench:
     @cached_property
     def _bound(self) -> Callable[[], object]:
         motion, wrench, base, result = (
-            self._numbers[part][None] for part in (_MOTION, _WRENCH, _BASE, _RESULT))
-        return base_wrench.base_wrenches.bound(
-            self._platform.constants, motion, wrench, base, result)
+            self._numbers[part] for part in (_MOTION, _WRENCH, _BASE, _RESULT))
+        return function('base_wrenches_many').bound(
+            self._platform.structure, 1, motion, 1, wrench, 1, base, result)

@@ -13,83 +13,30 @@ suppressed force does not hide a limit.
 
 from __future__ import annotations
 
-import math
 from struct import Struct
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, Stamps
-from stewart_dynamics.compilation.functions import entry_point
+from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.mechanics.drives import motors
-from stewart_dynamics.mechanics.drives.heat import warmed
 from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
-from stewart_dynamics.mechanics.drives.motors import Drives, put_motors
-from stewart_dynamics.mechanics.limits import (
-    Exceedance, SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE)
-from stewart_dynamics.mechanics.rows import consecutive, FORCES
+from stewart_dynamics.mechanics.drives.motors import Drives
+from stewart_dynamics.mechanics.limits import Exceedance
+from stewart_dynamics.mechanics.rows import consecutive
 from stewart_dynamics.parameters.table import Parameters
 
 # A row of the motors of a setpoint: temperature rises of the windings [K]; whether all numbers to
 # publish are finite, a limit is exceeded, and one of speed or temperature; the row of
 # ``mechanics.drives``: angles, speeds, torques as published and as demanded, then the rest.
-RISES, SOUND, EXCEEDING, RUNNING, OF_DRIVES = consecutive(6, 1, 1, 1, motors.MOTORS)
+RISES, SOUND, EXCEEDING, RUNNING, OF_DRIVES = places('checked_motors').values()
 MOTOR_ROW = OF_DRIVES.stop
 ANGLES, SPEEDS, TORQUES, DEMANDED_TORQUES = (
     slice(OF_DRIVES.start + part.start, OF_DRIVES.start + part.stop) for part in (
         motors.ANGLES, motors.SPEEDS, motors.COMMANDS, motors.BREAKAWAY_TORQUES))
-# Thresholds and constants: speed, temperature rise, thermal resistance and time constant.
-_FASTEST, _HOTTEST, _RESISTANCE, _TIME_CONSTANT = consecutive(6, 6, 6, 6)
 # State of the windings: temperature rises [K], and copper heat since the last setpoint [W].
 _WINDINGS = 12
 _COLD = (0.0,) * _WINDINGS
-
-
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[::1]', 'f8[:,::1]', 'f8[::1]', 'f8[:,::1]', 'f8[:,::1]',
-             'f8[:,::1]', 'f8[::1]', 'b1[::1]', 'f8[::1]', 'f8[:,::1]')
-def check_motors(constants: Array, drives: Array, torque_max: Array, curve: Array,
-                 thresholds: Array, motions: Array, results: Array, forces: Array,
-                 elapsed: Array, jumped: Flags, windings: Array, rows: Array) -> None:
-    """
-    Write the motors of setpoints in order, and update the windings.
-
-    constants, drives, torque_max, curve, motions, results, forces: as in ``motor_rows``; forces as
-        published.
-    thresholds (24,): limits of speeds and temperature rises, thermal resistances and time
-        constants.
-    elapsed (N,): time from the last setpoint that was not a jump [s].
-    jumped (N,): the motors cannot follow, and the windings keep their state.
-    windings (12,): temperature rises [K], and copper heat [W] that is held until the next
-        setpoint.
-    rows (N, MOTOR_ROW): written.
-    """
-    for n in range(len(motions)):
-        row = rows[n]
-        drive = row[OF_DRIVES]
-        put_motors(constants, drives, torque_max, curve, motions[n], results[n, FORCES],
-                   forces[n], drive)
-        sound, exceeding, running = True, False, False
-        for leg in range(6):
-            rise = warmed(windings[leg], windings[6 + leg], elapsed[n],
-                          thresholds[_RESISTANCE.start + leg],
-                          thresholds[_TIME_CONSTANT.start + leg])
-            row[RISES.start + leg] = rise
-            heat = drive[motors.COPPER_HEAT.start + leg]
-            if not jumped[n]:
-                windings[leg] = rise
-                if math.isfinite(heat):  # else as before
-                    windings[6 + leg] = heat
-            speed, torque = row[SPEEDS.start + leg], row[DEMANDED_TORQUES.start + leg]
-            sound = (sound and math.isfinite(row[ANGLES.start + leg]) and math.isfinite(speed)
-                     and not math.isinf(torque))
-            if (abs(speed) > thresholds[_FASTEST.start + leg]
-                    or rise > thresholds[_HOTTEST.start + leg]):
-                running = True
-            available = drive[motors.AVAILABLE_TORQUES.start + leg]
-            if abs(torque) > available * (1.0 + TOLERANCE):
-                exceeding = True
-        row[SOUND.start] = 1.0 if sound else 0.0
-        row[EXCEEDING.start] = 1.0 if exceeding or running else 0.0
-        row[RUNNING.start] = 1.0 if running else 0.0
 
 
 # Layout of one setpoint's motors in memory.
@@ -106,16 +53,11 @@ class MotorStep:
         self._arguments = Drives(parameters).arguments
         self._limits = MotorLimits(parameters)
         self._warms = parameters['drive.thermal_resistance'] is not None
-        self._thresholds = np.concatenate([
-            *((1.0 + TOLERANCE) * self._limits.bounds[limit]
-              for limit in (SPEED_MAX, TEMPERATURE_RISE_MAX)),
-            *(parameters[name] if self._warms else np.full(6, math.nan)
-              for name in ('drive.thermal_resistance', 'drive.thermal_time_constant'))])
         numbers = np.zeros(_ROW.stop)
         self._memory, self._row = numbers.data, numbers[_ROW]
-        self._solve = check_motors.bound(
-            *self._arguments, self._thresholds, motion[None], result[None], forces[None],
-            numbers[_ELAPSED], np.zeros(1, dtype=bool), numbers[_STATE], self._row[None])
+        self._solve = function('check_motors_many').bound(
+            *self._arguments, 1, motion, result, forces, numbers[_ELAPSED],
+            np.zeros(1, dtype=bool), numbers[_STATE], self._row)
 
     def __call__(self, elapsed: float, before: tuple[float, ...] | None,
                  ) -> tuple[tuple[float, ...], tuple[Exceedance, ...], tuple[float, ...] | None]:
@@ -141,8 +83,9 @@ class MotorStep:
         """Return rows (N, MOTOR_ROW) of a sequence of setpoints, and the windings' state."""
         rows = np.empty((len(motions), MOTOR_ROW))
         windings = np.array(before or _COLD)
-        check_motors(*self._arguments, self._thresholds, np.ascontiguousarray(motions), results,
-                     forces, elapsed, jumped, windings, rows)
+        function('check_motors_many')(
+            *self._arguments, len(motions), np.ascontiguousarray(motions), results, forces,
+            elapsed, jumped, windings, rows)
         return rows, tuple(windings.tolist()) if self._warms and len(rows) else before
 
 

@@ -10,8 +10,6 @@ setpoints and for batches.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
 import math
 from struct import Struct
 from typing import Any, NamedTuple
@@ -19,25 +17,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, NO_WRENCH, Six, Stamps
-from stewart_dynamics.compilation.functions import entry_point
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
+from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    angle_values, ANGLES, CLEARANCE_MIN, Exceedance, JITTER, Limits, OF_RESULTS, result_values)
+    angle_values, ANGLES, CLEARANCE_MIN, Exceedance, JITTER, Limits, result_values)
 from stewart_dynamics.mechanics.rows import (
-    BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
-    RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, NO_BASE, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
-    CAUSE, Singularity, STATE, thresholds, TIME, UNSOLVABLE_CONDITION)
+    CAUSE, Singularity, STATE, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
 from stewart_dynamics.setpoints.motor_step import (
     EXCEEDING, MotorStep, RUNNING, times_followed, TORQUES)
-from stewart_dynamics.setpoints.published_forces import (
-    check, check_many, FORCE_MAX, LIMITS, LIMITS_SUPPRESS, OF_WARNING, SUPPRESS)
 
 
 class Setpoint(NamedTuple):
@@ -129,7 +122,7 @@ def restarts_of(restarts: Flags, kept: Flags, waiting: bool = False) -> tuple[Fl
     Return the restarts of those setpoints (N,) that are kept, and whether one waits for the next.
 
     A restart that is left out passes to the next setpoint that is kept; one was already waiting
-    or not. ``DynamicsNode`` and ``published_forces`` do so setpoint by setpoint.
+    or not. ``DynamicsNode`` and ``check_many`` in C do so setpoint by setpoint.
     """
     of_kept = np.cumsum(restarts)[kept] + waiting
     still = np.count_nonzero(restarts) + waiting > of_kept.max(initial=0)
@@ -201,33 +194,13 @@ class Outputs(NamedTuple):
 
 
 # Layout of one setpoint in memory, inputs and results: packing is faster than passing arrays.
-_RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING, _JUMPED = consecutive(RESULT, 6, STATE, 1, 1, 1)
-(_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BASE, _BEFORE, _FOLLOWED, _ELAPSED, _RESTART, _IS_STAMP,
- _BASE_KNOWN, _WRITTEN, _TILE) = consecutive(
-     CONSTANTS, FORCE_MAX.stop, MOTION, WRENCH, BASE, STATE, 6, 1, 1, 1, 1, _JUMPED.stop,
-     inverse_dynamics.TILE)
-_GIVEN = Struct(f'{_WRITTEN.start - _MOTION.start}d')
+_PLACES = places('one_setpoint')
+_MOTION, _RESULT = _PLACES['motion'], _PLACES['result']
+_FORCES, _AFTER, _ANSWERED, _EXCEEDING, _JUMPED = (
+    slice(part.start - _RESULT.start, part.stop - _RESULT.start) for part in (
+        _PLACES[name] for name in ('forces', 'after', 'answered', 'exceeding', 'jumped')))
+_GIVEN = Struct(f'{_RESULT.start}d')
 _GIVES = Struct(f'{_JUMPED.stop}d')
-
-
-@entry_point('f8[::1]')
-def _one(numbers: Array) -> None:
-    """Solve and check one setpoint, as ``solve`` and ``check_many`` do for a batch."""
-    settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
-    state, result = written[_AFTER], written[_RESULT]
-    for n in range(STATE):
-        state[n] = numbers[_BEFORE.start + n]
-    inverse_dynamics.solve_one(
-        numbers[_PLATFORM], numbers[_MOTION], numbers[_WRENCH], numbers[_BASE], result,
-        numbers[_TILE])
-    written[_ANSWERED.start], written[_EXCEEDING.start], written[_JUMPED.start] = check(
-        settings, settings[LIMITS], numbers[_IS_STAMP.start] > 0.0,
-        numbers[_BASE_KNOWN.start] > 0.0, state, numbers[_RESTART.start] > 0.0,
-        numbers[_FOLLOWED], numbers[_ELAPSED.start], result, written[_FORCES])
-
-
-# Compiled functions required for a batch.
-FUNCTIONS = inverse_dynamics.solve, check_many
 
 _FIRST = Singularity()
 _NO_LENGTHS = (math.nan,) * 6  # no setpoint is a jump from these
@@ -245,16 +218,9 @@ class Step:
         self.parameters = parameters
         self._platform = StewartPlatform(parameters)
         self._limits = Limits(parameters)
-        self._numbers = np.zeros(_TILE.stop)
+        self._numbers = np.zeros(_RESULT.start + _JUMPED.stop)
         self._memory = self._numbers.data  # the same as bytes
-        self._numbers[_PLATFORM] = self._platform.constants
-        self._settings = settings = self._numbers[_SETTINGS]
-        settings[OF_WARNING] = thresholds(parameters)
-        settings[SUPPRESS] = parameters['singularity.action'] == SUPPRESS_FORCES
         self._limits_suppress = parameters['limits.action'] == SUPPRESS_FORCES
-        settings[LIMITS_SUPPRESS] = self._limits_suppress
-        settings[LIMITS] = self._limits.thresholds[:len(OF_RESULTS)].ravel()
-        settings[FORCE_MAX] = self._limits.force_max
         # Margin by which the time between two setpoints may exceed that between their stamps [s].
         self._slack = JITTER + parameters['setpoint.sync_tolerance']
         self._slack_of_arrival = JITTER + parameters['setpoint.timeout']
@@ -264,18 +230,10 @@ class Step:
         self._clearance = clearance_to_check(parameters)
         self._clearance_of_one = (
             None if self._clearance is None else self._clearance.of_one(self._numbers[_MOTION]))
-        written = self._numbers[_WRITTEN]
         self._motors = MotorStep(
-            parameters, self._numbers[_MOTION], written[_RESULT], written[_FORCES],
-            ) if parameters.drives else None
-
-    def prepare(self) -> None:
-        """Load or compile the function of single setpoints; else the first call does."""
-        _ = self._solve
-
-    @cached_property
-    def _solve(self) -> Callable[[], object]:
-        return _one.bound(self._numbers)
+            parameters, self._numbers[_MOTION], self._numbers[_RESULT],
+            self._numbers[_PLACES['forces']]) if parameters.drives else None
+        self._solve = function('step_one').bound(self._platform.structure, self._numbers)
 
     def __call__(self, setpoint: Setpoint, before: State | None) -> Output | None:
         """
@@ -290,12 +248,12 @@ class Step:
             since = (stamp - before.stamp) * NANOSECOND
             elapsed = since + (self._slack if setpoint.stamped else self._slack_of_arrival)
         _GIVEN.pack_into(
-            self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
+            self._memory, 0, *setpoint.motion, *setpoint.wrench,
             *(setpoint.base or NO_BASE), *(before.singularity or _FIRST),
             *(before.lengths or _NO_LENGTHS), elapsed, setpoint.restart,
             -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
         self._solve()
-        written = _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
+        written = _GIVES.unpack_from(self._memory, _GIVEN.size)
         if not written[_ANSWERED.start]:
             return None
         lengths, rates = written[LENGTHS], written[RATES]
@@ -306,7 +264,7 @@ class Step:
                        if written[_EXCEEDING.start] else ())
         if jumped and before.lengths:
             exceedances += self._limits.jumps(lengths, before.lengths, elapsed)
-        # Limits that are not checked by machine code.
+        # Limits that are not checked in C.
         of_pose: tuple[Exceedance, ...] = ()
         angles: tuple[float, ...] = ()
         if self._angles_of_one is not None:
@@ -361,7 +319,7 @@ class Step:
                                 state=outputs.state._replace(windings=windings))
 
     def _checked(self, setpoints: Batch, before: State) -> Outputs:
-        """Return the outputs as far as machine code checks them: no joints, no motors."""
+        """Return the outputs as far as they are checked in C: no joints, no motors."""
         results = self._platform.solve(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
         number = len(results)
@@ -373,9 +331,10 @@ class Step:
         slack = np.full(number, self._slack)
         if setpoints.stamped is not None:
             slack[~setpoints.stamped] = self._slack_of_arrival
-        check_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
-                   slack, state, followed_at, followed, results, forces, states, answered,
-                   exceeding, jumped)
+        function('check_many')(
+            self._platform.structure, number, setpoints.stamps, setpoints.base_known,
+            setpoints.restarts, slack, state, followed_at, followed, results, forces, states,
+            answered, exceeding, jumped)
         stamps = setpoints.stamps
         if not answered.all():
             stamps, results, forces, states, exceeding, jumped = (

@@ -9,15 +9,10 @@ import math
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.compilation.functions import inlined
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import record
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
-from stewart_dynamics.mechanics.rows import consecutive
 from stewart_dynamics.parameters.table import Parameters
-
-# The stops as an array, six numbers of each kind.
-_SHORTEST, _LONGEST, _STIFFNESS, _DAMPING = consecutive(6, 6, 6, 6)
-STOPS = 24
 
 
 def stiffness_and_damping(parameters: Parameters) -> tuple[Array, Array]:
@@ -36,28 +31,15 @@ def stiffness_and_damping(parameters: Parameters) -> tuple[Array, Array]:
             carried * 2.0 * parameters['end_stops.damping_ratio'] * omega)
 
 
-def stops_of(parameters: Parameters) -> Array:
-    """Return the stops as an array (STOPS,) for ``stop_force``."""
-    stops = np.empty(STOPS)
-    for where, limit, never in ((_SHORTEST, LENGTH_MIN, -math.inf),
-                                (_LONGEST, LENGTH_MAX, math.inf)):
-        stops[where] = never if parameters[limit] is None else parameters[limit]
-    stops[_STIFFNESS], stops[_DAMPING] = stiffness_and_damping(parameters)
+def stops_of(parameters: Parameters) -> Records:
+    """
+    Return the stops as the plant takes them.
+
+    Kelvin-Voigt elements, without the pull of their dampers as a leg leaves a stop.
+    """
+    stops = np.zeros((), record('end_stops'))
+    for field, limit, never in (('shortest', LENGTH_MIN, -math.inf),
+                                ('longest', LENGTH_MAX, math.inf)):
+        stops[field] = never if parameters[limit] is None else parameters[limit]
+    stops['stiffness'], stops['damping'] = stiffness_and_damping(parameters)
     return stops
-
-
-@inlined
-def stop_force(stops: Array, leg: int, length: float, rate: float) -> float:
-    """
-    Return the force of a leg's end stops [N], + pushes; a stop never pulls.
-
-    A Kelvin-Voigt element, without the pull of its damper as the leg leaves the stop.
-    """
-    stiffness, damping = stops[_STIFFNESS.start + leg], stops[_DAMPING.start + leg]
-    too_short = stops[_SHORTEST.start + leg] - length
-    too_long = length - stops[_LONGEST.start + leg]
-    if too_short > 0.0:
-        return float(max(0.0, stiffness * too_short - damping * rate))
-    if too_long > 0.0:
-        return float(-max(0.0, stiffness * too_long + damping * rate))
-    return 0.0

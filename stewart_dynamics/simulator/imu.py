@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.dynamics.base_load import carried
+from stewart_dynamics.mechanics.frames.base_motion import carried
 from stewart_dynamics.mechanics.frames.motion import matrix_of_quaternion
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)

@@ -22,7 +22,6 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import SECOND, Six
-from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import finite, MalformedError
@@ -83,8 +82,6 @@ class SimulatorNode(Node):
         self._settings = declare_parameters(self, SimulatorParameters)
         self._stepped = bool(self.get_parameter('use_sim_time').value)
         self._log = RepeatedLog(self.get_logger())
-        if machine_code.HINT:
-            self.get_logger().warning(machine_code.HINT)
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
         begun = time.monotonic()

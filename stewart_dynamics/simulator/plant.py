@@ -5,8 +5,23 @@
 The plant: the hexapod as it moves under leg forces.
 
 Gravity, friction, end stops, actuators that saturate: what ``stewart_simulator`` puts in the
-place of hardware. Equal commands give equal bits. See ``simulator.plant_dynamics`` for the
-integration, and ``simulator.end_stops``.
+place of hardware. Equal commands give equal bits. See ``simulator.end_stops`` for the end stops.
+
+The method is the classical Runge-Kutta method of fourth order, on position, quaternion and twist.
+After every step the quaternion is divided by its length, which keeps the order (Hairer, Lubich,
+Wanner, Geometric Numerical Integration, 2nd ed., IV.4, doi:10.1007/3-540-30666-8). Forces and
+wrench are constant within a call, so that the work of a leg force is the force times the change
+of its drive's coordinate, exactly, and an energy balance shows the error of the method alone. The
+motion of the base is given at begin, middle and end of a call, which are the stages of the method
+where a call is one step; with more steps it is the parabola through them.
+
+The load of a screw is (k torque - m_r q'') / c, see ``drives.motors``: under a torque a leg has
+the force k torque / c and the reflected mass m_r / c. c depends on the direction of the power,
+which is assumed, and assumed again where the load that follows contradicts it.
+
+End stops act between cylinder and piston, along the leg. With the forces of the drives they are
+added up, except where screws turn with their legs (``drives.screws``): drives act with the rows of
+J_q there, end stops with those of J_inv, as a wrench on the platform.
 
 The step is short enough for friction and end stops, whose modes are the fastest by far. With them
 a hexapod is ``M x'' + J^T D J x' + J^T K J x = 0``, with M its mass matrix, D the damping of the
@@ -25,21 +40,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
+from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.drives.motors import DRIVE, Drives, motor_ratio
-from stewart_dynamics.mechanics.dynamics.forward_dynamics import WORK
+from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.limits import Limits, result_values
 from stewart_dynamics.mechanics.rows import consecutive, NO_BASE
-from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 from stewart_dynamics.simulator.end_stops import stiffness_and_damping, stops_of
 from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
-from stewart_dynamics.simulator.plant_dynamics import (
-    advance, BASE_BEGIN, LARGEST_MOVE, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,
-    RESULT_MOTORS, RESULT_RATES, RESULT_SOUND, SCRATCH, STATE, STATE_POSITION, STATE_QUATERNION,
-    STATE_TWIST)
-
 # The Runge-Kutta method is stable for all modes s with |h s| below 2.6 that do not grow by
 # themselves; up to 1 their error is small as well, with a margin for nonlinear terms.
 _REACH = 1.0
@@ -116,8 +126,21 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
 
 # In the numbers of the motors.
 ANGLES, SPEEDS, TORQUES = consecutive(6, 6, 6)
-_OF_MOTORS = slice(RESULT_MOTORS.start, RESULT_MOTORS.start + TORQUES.stop)
-_NUMBERS = Struct(f'{STATE + _OF_MOTORS.stop}d')
+
+# The plant as numbers: commands and loads; from the state on, what a call returns.
+_PLACES = places('one_plant')
+_COMMANDS, _BASES, _STATE = _PLACES['commands'], _PLACES['bases'], _PLACES['state']
+_LENGTHS, _RATES, _FORCES, _ACCELERATION, _SOUND, _MOTORS = (
+    slice(part.start - _STATE.start, part.stop - _STATE.start) for part in (
+        _PLACES[name] for name in (
+            'lengths', 'rates', 'forces', 'acceleration', 'sound', 'motors')))
+_POSITION, _QUATERNION, _TWIST = places('plant_state').values()
+_OF_MOTORS = slice(_MOTORS.start, _MOTORS.start + TORQUES.stop)
+_NUMBERS = Struct(f'{_OF_MOTORS.stop}d')
+
+# In one step the platform may turn by at most this [rad], and a platform joint move by at most
+# this part of its leg's length: a larger move would not be resolved.
+LARGEST_MOVE = 0.5
 
 
 class PlantState(NamedTuple):
@@ -157,21 +180,21 @@ class Plant:
         self.steps = round(period / parameters['step']) * self.substeps  # steps in a period
         self._step = period / self.steps
         self._limits = Limits(parameters)
-        self._loads = np.array(NO_WRENCH + NO_WRENCH + 3 * NO_BASE)
-        numbers = np.zeros(STATE + RESULT)
-        self._memory = numbers.data  # the same as bytes
-        self._state, self._result = numbers[:STATE], numbers[STATE:]
-        pose = parameters['initial_pose']
-        self._state[STATE_POSITION] = pose[:3]
-        self._state[STATE_QUATERNION] = to_quaternion(from_euler(pose[3:]))
-        drives = Drives(parameters).arguments if parameters.drives else (
-            StewartPlatform(parameters).constants, np.empty((0, DRIVE)), np.empty(0),
-            np.empty((0, 2)))
+        plant = np.zeros(1, record('one_plant'))
+        self._plant = plant[0]
+        self._numbers = plant.view(np.float64)
+        self._memory = self._numbers.data  # the same as bytes
         self._driven = bool(parameters.drives)
-        self._take_none, self._take_steps = (advance.bound(
-            *drives, parameters['commands'] == TORQUE, stops_of(parameters),
-            self._limits.force_max, self._loads, self._state, self._result, steps, self._step,
-            np.empty(SCRATCH), np.empty(WORK)) for steps in (0, self.steps))
+        plant['by_torques'] = parameters['commands'] == TORQUE
+        plant['driven'], plant['step'] = self._driven, self._step
+        plant['stops'], plant['force_max'] = stops_of(parameters), self._limits.force_max
+        self._numbers[_BASES] = NO_BASE * 3
+        pose = parameters['initial_pose']
+        state = self._numbers[_STATE]
+        state[_POSITION], state[_QUATERNION] = pose[:3], to_quaternion(from_euler(pose[3:]))
+        drives = Drives(parameters).arguments if self._driven else (
+            hexapod_structure(parameters), np.zeros((), record('leg_drives')), 0, np.empty((0, 2)))
+        self._take_steps = function('plant_advance').bound(*drives, plant)
         self.state = self._run(0)._replace(acceleration=NO_WRENCH)  # the present one
         self._check_lengths()
         self._deviations = np.repeat([
@@ -188,16 +211,16 @@ class Plant:
         of its motion at begin, middle and end of the period; by default it is still.
         """
         if not self.fault:
-            self._loads[:BASE_BEGIN.start] = commands + wrench
-            self._loads[BASE_BEGIN.start:] = math.nan if base is None else base.ravel()
+            self._numbers[_COMMANDS.start:_BASES.start] = commands + wrench
+            self._numbers[_BASES] = math.nan if base is None else base.ravel()
             self.state = self._run(self.steps)
         return self.state
 
     def brake(self) -> PlantState:
         """Return the state at rest in the present pose: the brakes take all speed at once."""
         if not self.fault:
-            self._state[STATE_TWIST] = 0.0
-            self._loads[:] = NO_WRENCH + NO_WRENCH + 3 * NO_BASE
+            self._numbers[_STATE][_TWIST] = 0.0
+            self._numbers[_COMMANDS.start:_BASES.stop] = NO_WRENCH + NO_WRENCH + 3 * NO_BASE
             self.state = self._run(0)._replace(acceleration=NO_WRENCH)
         return self.state
 
@@ -213,25 +236,23 @@ class Plant:
         numbers: Any = tuple((
             state.lengths + state.rates + state.forces
             + self._deviations * self._noise.standard_normal(18)).tolist())
-        return state._replace(lengths=numbers[RESULT_LENGTHS], rates=numbers[RESULT_RATES],
-                              forces=numbers[RESULT_FORCES])
+        return state._replace(lengths=numbers[:6], rates=numbers[6:12], forces=numbers[12:])
 
     def _run(self, steps: int) -> PlantState:
-        (self._take_steps if steps else self._take_none)()
-        numbers = _NUMBERS.unpack_from(self._memory)
-        state, result = numbers[:STATE], numbers[STATE:]
-        lengths = result[RESULT_LENGTHS]
-        if not result[RESULT_SOUND]:
+        self._plant['steps'] = steps
+        self._take_steps()
+        numbers = _NUMBERS.unpack_from(self._memory, 8 * _STATE.start)
+        lengths = numbers[_LENGTHS]
+        if not numbers[_SOUND.start]:
             self.fault = (
-                f'held at rest permanently: after position {list(state[STATE_POSITION])} m the '
+                f'held at rest permanently: after position {list(numbers[_POSITION])} m the '
                 'motion cannot be computed: numbers overflow, or within a step of '
                 f'{self._step:.3g} s the platform turns by more than {LARGEST_MOVE} rad or a '
                 'joint moves by more than that part of its leg; shortest leg '
                 f'{min(lengths):.3g} m')
         return PlantState(
-            lengths, result[RESULT_RATES], result[RESULT_FORCES], state[:STATE_TWIST.start],
-            state[STATE_TWIST], result[RESULT_ACCELERATION],
-            result[_OF_MOTORS] if self._driven else ())
+            lengths, numbers[_RATES], numbers[_FORCES], numbers[:_TWIST.start], numbers[_TWIST],
+            numbers[_ACCELERATION], numbers[_OF_MOTORS] if self._driven else ())
 
     def _check_lengths(self) -> None:
         """Raise ParameterError where the hexapod does not fit between its end stops."""

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The motors of the legs: angle, speed, torque, current, power and copper heat; compiled.
+The motors of the legs: angle, speed, torque, current, power and copper heat.
 
 A motor turns k = 2 pi gear_ratio / lead radians for each metre of its drive's coordinate q, which
 is the length L of its leg, + extends. The force f of the leg is that of ``inverse_dynamics``, with
@@ -37,17 +37,13 @@ from typing import NamedTuple, TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.mechanics import batch
-from stewart_dynamics.mechanics.dynamics.bodies import drive_motion
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.leg_curves import columns, figure, LEGS
-from stewart_dynamics.mechanics.limits import TOLERANCE
-from stewart_dynamics.mechanics.rows import (
-    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, consecutive, FORCES, LINEAR_ACCELERATION,
-    LINEAR_VELOCITY, POSITION, ROTATION)
-from stewart_dynamics.mechanics.vectors import read3, read9
+from stewart_dynamics.mechanics.limits import SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE
+from stewart_dynamics.mechanics.rows import FORCES
 from stewart_dynamics.parameters.table import Parameters
 
 if TYPE_CHECKING:
@@ -57,15 +53,10 @@ if TYPE_CHECKING:
 # A row of the six motors' quantities. Commands are the torques of the forces that are published,
 # clipped to the available torques.
 (ANGLES, SPEEDS, COMMANDS, BREAKAWAY_TORQUES, TORQUES, ACCELERATIONS, CURRENTS, POWER, COPPER_HEAT,
- AVAILABLE_TORQUES) = consecutive(*[6] * 10)
-MOTORS = 60
+ AVAILABLE_TORQUES) = places('motor_row').values()
+MOTORS = AVAILABLE_TORQUES.stop
 # Columns in the order of the C source.
 MECHANICAL = np.r_[ANGLES, SPEEDS, ACCELERATIONS, TORQUES]
-
-# Constants of one drive.
-(_RATIO, _ZERO, _MASS, _DRIVING, _DRIVEN, _SLOW, _TORQUE_CONSTANT, _RESISTANCE) = range(8)
-DRIVE = 8
-
 
 # Columns of a table of motors, in the order of Motors.
 _COLUMNS = ('angle', 'speed', 'acceleration', 'torque', 'current', 'power', 'copper_heat',
@@ -144,132 +135,29 @@ class Motors(NamedTuple):
         return f'<Motors of shape {self.angles.shape[:-1]}: {", ".join(self._fields)}>'
 
 
-@inlined
-def torque_factor(drive: Array, power: float, rate: float) -> float:
-    """Return c for a rate of the drive and the sign of the power that its load takes."""
-    slip = abs(rate) / drive[_SLOW]
-    loss: float = drive[_DRIVING] if power > 0.0 else drive[_DRIVEN]
-    return 1.0 + loss * (1.0 if slip > 1.0 else slip)
-
-
-@inlined
-def screw_torque(drive: Array, load: float, rate: float) -> float:
-    """Return the torque at the motor for a load [N] of the screw at a rate of the drive."""
-    torque: float = load / drive[_RATIO] * torque_factor(drive, load * rate, rate)
-    return torque
-
-
-@inlined
-def ratio_and_mass(drive: Array) -> tuple[float, float]:
-    """Return k [rad/m] and the reflected mass [kg] of a drive."""
-    return drive[_RATIO], drive[_MASS]
-
-
-@inlined
-def curve_torque(curve: Array, speed: float) -> float:
-    """Return the torque of a torque-speed curve (n, 2) at a speed; inf without points."""
-    points = len(curve)
-    if points == 0:
-        return math.inf
-    speed = abs(speed)
-    torque: float = curve[0, 1]
-    for n in range(1, points):
-        if speed > curve[n - 1, 0]:
-            part = min((speed - curve[n - 1, 0]) / (curve[n, 0] - curve[n - 1, 0]), 1.0)
-            torque = curve[n - 1, 1] + part * (curve[n, 1] - curve[n - 1, 1])
-    return 0.0 if speed > curve[points - 1, 0] * (1.0 + TOLERANCE) else torque
-
-
-@inlined
-def clipped(torque: float, available: float) -> float:
-    """Return a torque limited to +- available; nan stays nan."""
-    return (available if torque > available else -available if torque < -available else torque)
-
-
-@inlined
-def motor_motion(constants: Array, drive: Array, leg: int, motion: Array,
-                 ) -> tuple[float, float, float, float, float]:
-    """Return angle, speed and acceleration of a motor, and rate and acceleration of its drive."""
-    coordinate, rate, acc = drive_motion(
-        constants, leg, read3(motion, POSITION.start), read9(motion, ROTATION.start),
-        read3(motion, LINEAR_VELOCITY.start), read3(motion, ANGULAR_VELOCITY.start),
-        read3(motion, LINEAR_ACCELERATION.start), read3(motion, ANGULAR_ACCELERATION.start))
-    ratio = drive[_RATIO]
-    return ratio * (coordinate - drive[_ZERO]), ratio * rate, ratio * acc, rate, acc
-
-
-@inlined
-def put_motors(constants: Array, drives: Array, torque_max: Array, curve: Array, motion: Array,
-               demanded: Array, forces: Array, row: Array) -> None:
-    """Write the motors of a motion and its demanded forces (6,); see ``motor_rows``."""
-    for leg in range(6):
-        drive = drives[leg]
-        angle, speed, speed_rate, rate, acc = motor_motion(constants, drive, leg, motion)
-        ratio, mass = ratio_and_mass(drive)
-        own = mass / ratio / ratio * speed_rate
-        load = demanded[leg] - mass * acc
-        torque = own + screw_torque(drive, load, rate)
-        breakaway = torque
-        if abs(rate) < drive[_SLOW]:
-            breakaway = own + load / ratio * (1.0 + drive[_DRIVING])
-            other = own + load / ratio * (1.0 + drive[_DRIVEN])
-            if abs(other) > abs(breakaway):
-                breakaway = other
-        available = min(torque_max[leg], curve_torque(curve, speed))
-        command = own + screw_torque(drive, forces[leg] - mass * acc, rate)
-        current = torque / drive[_TORQUE_CONSTANT]
-        heat = drive[_RESISTANCE] * current * current
-        row[ANGLES.start + leg] = angle
-        row[SPEEDS.start + leg] = speed
-        row[COMMANDS.start + leg] = clipped(command, available)
-        row[BREAKAWAY_TORQUES.start + leg] = breakaway
-        row[TORQUES.start + leg] = torque
-        row[ACCELERATIONS.start + leg] = speed_rate
-        row[CURRENTS.start + leg] = current
-        row[POWER.start + leg] = torque * speed + heat
-        row[COPPER_HEAT.start + leg] = heat
-        row[AVAILABLE_TORQUES.start + leg] = available
-
-
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]',
-             'f8[:,::1]', 'f8[:,::1]')
-def motor_rows(constants: Array, drives: Array, torque_max: Array, curve: Array, motions: Array,
-               results: Array, forces: Array, rows: Array) -> None:
-    """
-    Write the motors of each motion.
-
-    constants (CONSTANTS,), drives (6, DRIVE): constants of the hexapod, and of the drives.
-    torque_max (6,): [N m]
-    curve (n, 2): speed and torque at the points of the torque-speed curve [rad/s, N m].
-    motions (N, MOTION), results (N, RESULT): motions, their results of ``inverse_dynamics``.
-    forces (N, 6): forces of the legs for which commands are written [N].
-    rows (N, MOTORS): written.
-    """
-    for n in range(len(motions)):
-        put_motors(constants, drives, torque_max, curve, motions[n], results[n, FORCES],
-                   forces[n], rows[n])
-
-
 class Drives:
     """
     The motors of a hexapod: rows of motions and of their results to rows of motors.
 
-    arguments: the first of ``motor_rows``: constants of hexapod and drives, limits of torque.
+    arguments: the first of the functions in C: hexapod, drives, and the points of the torque-speed
+        curve with their number.
     """
 
     def __init__(self, parameters: Parameters) -> None:
         curve = parameters['drive.torque_speed']
+        curve = np.empty((0, 2)) if curve is None else np.array(curve)
         self.arguments = (
-            hexapod_constants(parameters), drive_constants(parameters),
-            np.array(_six(parameters, 'drive.torque_max', math.inf)),
-            np.empty((0, 2)) if curve is None else np.array(curve))
+            hexapod_structure(parameters), drives_structure(parameters), len(curve), curve)
 
     def __call__(self, motions: Array, results: Array) -> Array:
         """Return rows (N, MOTORS) for rows of motion and results, unchecked."""
         rows = np.empty((len(motions), MOTORS))
-        batch.in_parts(motor_rows, self.arguments, *map(batch.compact, (
+        batch.in_parts(self._write, (), *map(batch.compact, (
             motions, results, results[:, FORCES])), rows)
         return rows
+
+    def _write(self, motions: Array, results: Array, forces: Array, rows: Array) -> None:
+        function('motors_many')(*self.arguments, len(motions), motions, results, forces, rows)
 
 
 def motor_ratio(parameters: Parameters) -> Array:
@@ -281,12 +169,26 @@ def motor_ratio(parameters: Parameters) -> Array:
 
 
 def drive_constants(p: Parameters) -> Array:
-    """Return the constants (6, DRIVE) of the drives; nan where they are not given."""
+    """Return the constants (6, 8) of the drives, see ``leg_drive`` in C; nan if not given."""
     return np.column_stack([
         motor_ratio(p), p['geometry.zero_length'], p['actuator.reflected_mass'],
         1.0 / p['drive.efficiency'] - 1.0, p['drive.back_driving_efficiency'] - 1.0,
         p['actuator.coulomb_velocity'], _six(p, 'drive.torque_constant', math.nan),
         _six(p, 'drive.resistance', math.nan)])
+
+
+def drives_structure(p: Parameters) -> Records:
+    """Return the structure () of the drives."""
+    drives = np.zeros((), record('leg_drives'))
+    drives['legs'] = np.ascontiguousarray(drive_constants(p)).view(record('leg_drive'))[:, 0]
+    drives['torque_max'] = _six(p, 'drive.torque_max', math.inf)
+    for field, limit in (('fastest', SPEED_MAX), ('hottest', TEMPERATURE_RISE_MAX)):
+        drives[field] = (1.0 + TOLERANCE) * _six(p, limit, math.inf)
+    # Without thermal resistance there are no temperatures.
+    for field, name in (('thermal_resistance', 'drive.thermal_resistance'),
+                        ('time_constant', 'drive.thermal_time_constant')):
+        drives[field] = p[name] if p['drive.thermal_resistance'] is not None else math.nan
+    return drives
 
 
 def _six(p: Parameters, name: str, missing: float) -> Array:

@@ -20,8 +20,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.drives.screws import screw_constants
 from stewart_dynamics.mechanics.dynamics.friction import friction
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.dynamics.lagrange import drive_rates
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, CONDITION, FORCES, GRAVITY, MOTION, RATES, TWIST)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -97,10 +97,10 @@ class ForceBreakdownRows:
         self._friction = tuple(parameters[f'actuator.{name}'].copy() for name in (
             'viscous_friction', 'coulomb_friction', 'coulomb_velocity'))
         self._parameters, self._screws = parameters, screw_constants(parameters)
-        self._whole = hexapod_constants(parameters)
-        self._weightless = hexapod_constants(
+        self._whole = hexapod_structure(parameters)
+        self._weightless = hexapod_structure(
             parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION}))
-        self._platform_only = hexapod_constants(
+        self._platform_only = hexapod_structure(
             parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION, **_NO_LEGS}))
 
     def __call__(self, motions: Array, wrenches: Array, bases: Array | None = None) -> Array:
@@ -154,11 +154,9 @@ class ForceBreakdownRows:
         results = solve(self._weightless, rows)
         by.velocity[:] = results[:, FORCES]
         # By the friction law: as a difference it would lose its digits near a singularity.
-        own = np.empty((len(rows), 6))
         rates = results[:, RATES].copy() if not self._screws.any() else drive_rates(
             self._parameters, rows, self._screws)
-        friction(rates, *self._friction, own)
-        by.friction[:] = own
+        by.friction[:] = friction(rates, *self._friction)
         by.base_motion[:] = 0.0 if bases is None else (
             solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)
         forces[unknown] = np.nan

@@ -10,31 +10,20 @@ a function of the rate alone, without a jump at standstill.
 
 from __future__ import annotations
 
+import numpy as np
+
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.core.binding import function
 
 
-@inlined
-def with_friction(force: float, rate: float, viscous: float, coulomb: float,
-                  coulomb_velocity: float) -> float:
-    """Return a force [N] plus the force that overcomes the friction at a rate [m/s]."""
-    slip = rate / coulomb_velocity
-    return (force + viscous * rate
-            + coulomb * (-1.0 if slip < -1.0 else 1.0 if slip > 1.0 else slip))
-
-
-@entry_point('f8[:,::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[:,::1]')
-def friction(rates: Array, viscous: Array, coulomb: Array, coulomb_velocity: Array,
-             forces: Array) -> None:
+def friction(rates: Array, viscous: Array, coulomb: Array, coulomb_velocity: Array) -> Array:
     """
-    Write the forces that overcome the friction.
+    Return the forces (N, 6) that overcome the friction [N].
 
     rates (N, 6): [m/s]
     viscous, coulomb, coulomb_velocity (6,): coefficients [N s/m], forces [N] and rates below which
         the latter are linear [m/s].
-    forces (N, 6): written [N].
     """
-    for n in range(len(rates)):
-        for leg in range(6):
-            forces[n, leg] = with_friction(
-                0.0, rates[n, leg], viscous[leg], coulomb[leg], coulomb_velocity[leg])
+    forces = np.empty((len(rates), 6))
+    function('friction_many')(viscous, coulomb, coulomb_velocity, len(rates), rates, forces)
+    return forces

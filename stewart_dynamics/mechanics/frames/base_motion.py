@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
-from stewart_dynamics.mechanics.dynamics.base_load import carried
 from stewart_dynamics.mechanics.frames.motion import (
     as_rotation, check_kind, Field, listed, Motion, Pose, row_by_row, RowSamples)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
     BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, NO_BASE,
     ROTATION)
-from stewart_dynamics.mechanics.vectors import Matrix3, rotate, rotate_back, subtract, Vector3
+from stewart_dynamics.mechanics.vectors import (
+    add, cross, Matrix3, rotate, rotate_back, subtract, Vector3)
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
 
@@ -195,3 +195,8 @@ def row_of_imu(specific_force: Vector3, spin: Vector3, spin_rate: Vector3, posit
     spin, spin_rate = rotate(rotation, spin), rotate(rotation, spin_rate)
     gravity = subtract(carried(spin, spin_rate, position), rotate(rotation, specific_force))
     return (*gravity, *_STILL, *spin, *spin_rate)
+
+
+def carried(spin: Vector3, spin_rate: Vector3, arm: Vector3) -> Vector3:
+    """Return W' x r + W x (W x r): the acceleration of a point fixed to a turning body."""
+    return add(cross(spin_rate, arm), cross(spin, cross(spin, arm)))

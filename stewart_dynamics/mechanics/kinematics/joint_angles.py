@@ -22,78 +22,30 @@ import math
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
-from stewart_dynamics.mechanics.dynamics.bodies import leg_line
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, HomeDirections
 from stewart_dynamics.mechanics.limits import ANGLES, OF_JOINTS
-from stewart_dynamics.mechanics.rows import (
-    ANGULAR_VELOCITY, BASE_JOINT_ANGLES, JOINT_ANGLES, LINEAR_VELOCITY, PLATFORM_JOINT_ANGLES,
-    POSITION, ROTATION)
-from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, norm, read3, read9, rotate_back, scale, subtract, Vector3)
+from stewart_dynamics.mechanics.rows import JOINT_ANGLES
 from stewart_dynamics.parameters.table import Parameters
 
 
-@inlined
-def _angle(axis: Vector3, direction: Vector3) -> float:
-    sine = cross(axis, direction)
-    return math.atan2(norm(sine), dot(axis, direction))
-
-
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
-def joint_angles(constants: Array, axes: Array, motions: Array, angles: Array) -> None:
+def joint_angles(hexapod: Records, axes: Array, motions: Array, angles: Array) -> None:
     """
     Write the angles of the joints in each motion.
 
-    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
+    hexapod (): its structure, see ``hexapod_structure``.
     axes (12, 3): unit vectors: of the base joints in base axes, of the platform joints in platform
         axes.
     motions (N, MOTION): rows of motion.
     angles (N, JOINT_ANGLES): written [rad]; nan where an axis is.
     """
-    for row in range(len(motions)):
-        position = read3(motions[row], POSITION.start)
-        rotation = read9(motions[row], ROTATION.start)
-        for leg in range(6):
-            _, _, _, s = leg_line(constants, leg, position, rotation)
-            angles[row, BASE_JOINT_ANGLES.start + leg] = _angle(read3(axes[leg], 0), s)
-            angles[row, PLATFORM_JOINT_ANGLES.start + leg] = _angle(
-                read3(axes[6 + leg], 0), rotate_back(rotation, s))
-
-
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
-def joint_haversines(constants: Array, axes: Array, motions: Array, values: Array,
-                     rates: Array) -> None:
-    """
-    Write sin^2(angle / 2) of the joints, and its time derivative, both (N, JOINT_ANGLES).
-
-    The other arguments are those of ``joint_angles``. Where numbers overflow, nan is written.
-    """
-    for row in range(len(motions)):
-        motion = motions[row]
-        rotation = read9(motion, ROTATION.start)
-        omega = read3(motion, ANGULAR_VELOCITY.start)
-        for leg in range(6):
-            a, length, inverse_length, s = leg_line(
-                constants, leg, read3(motion, POSITION.start), rotation)
-            known = 1.0 if 0.0 < length < math.inf else math.nan
-            x_rate = add(read3(motion, LINEAR_VELOCITY.start), cross(omega, a))
-            s_rate = scale(inverse_length, subtract(x_rate, scale(dot(s, x_rate), s)))
-            axis = read3(axes[leg], 0)
-            half = subtract(axis, s)
-            values[row, leg] = known * 0.25 * dot(half, half)
-            rates[row, leg] = -0.5 * dot(axis, s_rate)
-            axis = read3(axes[6 + leg], 0)
-            half = subtract(axis, rotate_back(rotation, s))
-            values[row, 6 + leg] = known * 0.25 * dot(half, half)
-            rates[row, 6 + leg] = -0.5 * dot(
-                axis, rotate_back(rotation, subtract(s_rate, cross(omega, s))))
+    function('joint_angles_many')(hexapod, axes, len(motions), motions, angles)
 
 
 BASE_AXES, PLATFORM_AXES = AXES = 'geometry.base_joint_axes', 'geometry.platform_joint_axes'
@@ -116,7 +68,7 @@ class JointAngles:
     """
 
     def __init__(self, parameters: Parameters, needed: Sequence[str] = AXES) -> None:
-        self._constants = hexapod_constants(parameters)
+        self._hexapod = hexapod_structure(parameters)
         self.axes = np.concatenate([
             axes if name in needed else np.full((6, 3), np.nan)
             for name, axes in zip(AXES, _axes(parameters, needed), strict=True)])
@@ -124,14 +76,14 @@ class JointAngles:
     def __call__(self, motions: Array) -> Array:
         """Return the angles (N, JOINT_ANGLES) [rad] in motions (N, MOTION)."""
         angles = np.empty((len(motions), JOINT_ANGLES))
-        batch.in_parts(joint_angles, (self._constants, self.axes), batch.compact(motions), angles)
+        batch.in_parts(joint_angles, (self._hexapod, self.axes), batch.compact(motions), angles)
         return angles
 
     def of_one(self, motion: Array) -> Callable[[], tuple[float, ...]]:
         """Return a function that gives the angles (JOINT_ANGLES,) of a row's current values."""
         angles = np.empty((1, JOINT_ANGLES))
-        compute = joint_angles.bound(
-            self._constants, self.axes, motion.reshape(1, len(motion)), angles)
+        compute = function('joint_angles_many').bound(
+            self._hexapod, self.axes, 1, motion, angles)
 
         def of_row() -> tuple[float, ...]:
             compute()
@@ -142,7 +94,8 @@ class JointAngles:
     def haversines(self, motions: Array) -> tuple[Array, Array]:
         """Return sin^2(angle / 2) and its rate [1/s], both (N, JOINT_ANGLES), in motions."""
         values, rates = (np.empty((len(motions), JOINT_ANGLES)) for _ in range(2))
-        joint_haversines(self._constants, self.axes, batch.compact(motions), values, rates)
+        function('joint_haversines_many')(
+            self._hexapod, self.axes, len(motions), batch.compact(motions), values, rates)
         return values, rates
 
 
@@ -161,7 +114,7 @@ def likely_mistakes(parameters: Parameters) -> Iterator[str]:
                    'more than any joint of a leg: in degrees?')
     given = [axes for axes in AXES if parameters[axes] is not None]
     if not given:
-        return  # the angles at home are zero; no machine code is loaded for that
+        return  # the angles at home are zero
     try:
         home = Motion.from_pose(home_pose(parameters)).rows
     except ParameterError:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The clearance of the legs: smallest distance of a leg from another one, or from a plate; compiled.
+The clearance of the legs: smallest distance of a leg from another one, or from a plate.
 
 Each leg is two capsules on one axis, from the base joint along the leg: the cylinder, as long as
 ``legs.cylinder.length`` but no longer than the leg, and the thinner piston, as long as the leg:
@@ -27,22 +27,18 @@ import math
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
+from stewart_dynamics.arrays import Array, Integers, Records
+from stewart_dynamics.compilation.functions import compiled, inlined
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
-from stewart_dynamics.mechanics.dynamics.bodies import leg_line
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants, joints_of
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
-from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, norm, put3, read3, read9, rotate_back, scale, subtract, Vector3)
+    add, cross, dot, norm, read3, scale, subtract, Vector3)
 from stewart_dynamics.parameters.table import BASE_OUTLINE, LEG_SHAPE, Parameters, PLATFORM_OUTLINE
 
 BASE, PLATFORM = 6, 7  # numbers of the plates, where 0 to 5 are legs
-
-# The axis of a leg in scratch memory: base joint, direction, length, length of the cylinder.
-_BASE, _DIRECTION, _LENGTH, _CYLINDER, _AXIS = 0, 3, 6, 7, 8
 
 
 @inlined
@@ -56,38 +52,6 @@ def _shortest(gap: Vector3, s: Vector3, t: Vector3, cosine: float, along_s: floa
     y = gap[1] + u * s[1] - v * t[1]
     z = gap[2] + u * s[2] - v * t[2]
     return x, y, z
-
-
-@inlined
-def _distance(gap: Vector3, s: Vector3, t: Vector3, cosine: float, along_s: float,
-              along_t: float, u: float, u_end: float, v_end: float) -> float:
-    """Return the least ``|gap + u s - v t|`` for 0 <= u <= u_end and 0 <= v <= v_end."""
-    return norm(_shortest(gap, s, t, cosine, along_s, along_t, u, u_end, v_end))
-
-
-@inlined
-def _pair_clearance(shapes: Array, axes: Array, i: int, j: int) -> float:
-    """Return the clearance of two legs of shapes (6, 3) on axes (6, _AXIS); negative: overlap."""
-    s, t = read3(axes[i], _DIRECTION), read3(axes[j], _DIRECTION)
-    gap = subtract(read3(axes[i], _BASE), read3(axes[j], _BASE))
-    cosine, along_s, along_t = dot(s, t), dot(gap, s), dot(gap, t)
-    normal = cross(s, t)
-    square = dot(normal, normal)
-    u = dot(gap, subtract(scale(cosine, t), s)) / square if square > 0.0 else 0.0
-    length, cylinder = axes[i, _LENGTH], axes[i, _CYLINDER]
-    other_length, other_cylinder = axes[j, _LENGTH], axes[j, _CYLINDER]
-    thick, thin = shapes[i, 0], shapes[i, 2]
-    other_thick, other_thin = shapes[j, 0], shapes[j, 2]
-    clearance: float = min(
-        min(_distance(gap, s, t, cosine, along_s, along_t, u, length, other_length)
-            - thin - other_thin,
-            _distance(gap, s, t, cosine, along_s, along_t, u, cylinder, other_length)
-            - thick - other_thin),
-        min(_distance(gap, s, t, cosine, along_s, along_t, u, length, other_cylinder)
-            - thin - other_thick,
-            _distance(gap, s, t, cosine, along_s, along_t, u, cylinder, other_cylinder)
-            - thick - other_thick))
-    return clearance
 
 
 @compiled
@@ -151,62 +115,20 @@ def from_plate(plate: Array, first: int, end: int, p: Vector3, p_end: Vector3, e
     return shortest
 
 
-@inlined
-def _keep_nearest(clearances: Array, nearest: Integers, leg: int, other: int, clearance: float,
-                  ) -> None:
-    if clearance < clearances[leg]:
-        clearances[leg], nearest[leg] = clearance, other
-
-
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]',
-             'i8[:,::1]', 'f8[:,::1]')
-def leg_clearances(constants: Array, shapes: Array, base: Array, platform: Array, motions: Array,
-                   clearances: Array, nearest: Integers, axes: Array) -> None:
+def leg_clearances(hexapod: Records, base: Array, platform: Array, motions: Array,
+                   clearances: Array, nearest: Integers) -> None:
     """
     Write the clearance of each leg from the nearest other leg or plate.
 
-    constants (CONSTANTS,): constants of the hexapod, see ``hexapod_constants``.
-    shapes (6, 3): radius and length of the cylinder and radius of the piston of each leg [m].
+    hexapod (): its structure, see ``hexapod_structure``.
     base, platform (M, 3): corners of the plates, base frame and platform frame [m]; none without a
         plate.
     motions (N, MOTION): rows of motion.
     clearances, nearest (N, 6): written: clearance [m], negative where legs overlap; and number of
         the leg or plate.
-    axes (6, _AXIS): scratch memory.
     """
-    for row in range(len(motions)):
-        position = read3(motions[row], POSITION.start)
-        rotation = read9(motions[row], ROTATION.start)
-        for leg in range(6):
-            _, length, _, direction = leg_line(constants, leg, position, rotation)
-            joint, _ = joints_of(constants, leg)
-            axis = axes[leg]
-            put3(axis, _BASE, joint)
-            put3(axis, _DIRECTION, direction)
-            axis[_LENGTH], axis[_CYLINDER] = length, min(shapes[leg, 1], length)
-            clearances[row, leg], nearest[row, leg] = math.inf, leg
-        for i in range(6):
-            for j in range(i + 1, 6):
-                clearance = _pair_clearance(shapes, axes, i, j)
-                _keep_nearest(clearances[row], nearest[row], i, j, clearance)
-                _keep_nearest(clearances[row], nearest[row], j, i, clearance)
-        for leg in range(6):
-            joint, direction = read3(axes[leg], _BASE), read3(axes[leg], _DIRECTION)
-            if len(platform):
-                begin = rotate_back(rotation, subtract(joint, position))
-                vector = from_plate(
-                    platform, 0, len(platform), begin, add(begin, scale(
-                        axes[leg, _CYLINDER], rotate_back(rotation, direction))),
-                    clearances[row, leg] + shapes[leg, 0])
-                _keep_nearest(clearances[row], nearest[row], leg, PLATFORM,
-                              norm(vector) - shapes[leg, 0])
-            if len(base):
-                vector = from_plate(
-                    base, 0, len(base), add(joint, scale(shapes[leg, 1], direction)),
-                    add(joint, scale(axes[leg, _LENGTH], direction)),
-                    clearances[row, leg] + shapes[leg, 2])
-                _keep_nearest(clearances[row], nearest[row], leg, BASE,
-                              norm(vector) - shapes[leg, 2])
+    function('clearances_many')(hexapod, len(base), base, len(platform), platform, len(motions),
+                                motions, clearances, nearest)
 
 
 class LegClearance:
@@ -231,7 +153,7 @@ class LegClearance:
             for name in (BASE_OUTLINE, PLATFORM_OUTLINE))
         self.reach = float(np.linalg.norm(np.concatenate([
             parameters['geometry.platform_joints'], self.platform]), axis=1).max())
-        self._constants = hexapod_constants(parameters), self.shapes, self.base, self.platform
+        self._constants = hexapod_structure(parameters), self.base, self.platform
 
     def __call__(self, motions: Array) -> Array:
         """Return the clearance of each leg (N, 6) [m] in motions (N, MOTION)."""
@@ -241,15 +163,15 @@ class LegClearance:
         """Return the clearance of each leg (N, 6) [m], and number of the leg or plate."""
         clearances, nearest = np.empty((len(motions), 6)), np.empty((len(motions), 6), np.int64)
         batch.in_parts(leg_clearances, self._constants, batch.compact(motions), clearances,
-                       nearest, scratch=(6, _AXIS))
+                       nearest)
         return clearances, nearest
 
     def of_one(self, motion: Array) -> Callable[[], tuple[tuple[float, ...], tuple[int, ...]]]:
         """Return a function that gives ``nearest`` (6,) of a row's current values."""
         clearances, nearest = np.empty((1, 6)), np.empty((1, 6), np.int64)
-        compute = leg_clearances.bound(
-            *self._constants, motion.reshape(1, len(motion)), clearances, nearest,
-            np.empty((6, _AXIS)))
+        hexapod, base, platform = self._constants
+        compute = function('clearances_many').bound(
+            hexapod, len(base), base, len(platform), platform, 1, motion, clearances, nearest)
 
         def of_row() -> tuple[tuple[float, ...], tuple[int, ...]]:
             compute()

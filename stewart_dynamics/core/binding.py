@@ -1,0 +1,149 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Structures, codes and functions of the C library, read from its headers.
+
+``record('stewart_motion')`` is the numpy type of a structure, ``CODES['STEWART_OK']`` a code,
+``function('solve_many')`` a function. A call passes arrays by their addresses, after a check of
+their types; their sizes are the caller's concern.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import ctypes
+from functools import cache, partial
+from importlib.resources import files
+from pathlib import Path
+import re
+from typing import Any, cast, NamedTuple
+
+import numpy as np
+
+_FOLDER = Path(__file__).parent
+_NUMBERS: dict[str, tuple[np.dtype[Any], Any]] = {
+    'double': (np.dtype(np.float64), ctypes.c_double), 'int': (np.dtype(np.intc), ctypes.c_int),
+    'unsigned': (np.dtype(np.uintc), ctypes.c_uint),
+    'uint8_t': (np.dtype(np.uint8), ctypes.c_uint8),
+    'uint32_t': (np.dtype(np.uint32), ctypes.c_uint32),
+    'int64_t': (np.dtype(np.int64), ctypes.c_int64)}
+"""Types of numbers in the headers: those of arrays, and of arguments."""
+
+
+def header(name: str) -> str:
+    """Return the text of a header or source file of the library."""
+    return files(__package__).joinpath(name).read_text(encoding='utf-8')
+
+
+def _declarations() -> str:
+    text = header('stewart_dynamics.h') + header('library.h')
+    return re.sub(r'/\*.*?\*/|^#.*?$', ' ', text, flags=re.DOTALL | re.MULTILINE)
+
+
+_TEXT = _declarations()
+
+CODES = {name: int(value) for enum in re.findall(r'enum \{(.*?)\};', _TEXT, re.DOTALL)
+         for name, value in re.findall(r'(\w+) = (\d+)', enum)}
+"""Return codes, causes of the singularity warning, and bits of exceeded limits."""
+
+
+@cache
+def record(name: str) -> np.dtype[Any]:
+    """Return the type of an array of structures, laid out as the compiler lays them out."""
+    if name in _NUMBERS:
+        return _NUMBERS[name][0]
+    found = re.search(rf'typedef struct \{{([^}}]*)\}} {name};', _TEXT)
+    if found is None:
+        raise KeyError(name)
+    return np.dtype(list(_fields(found[1])), align=True)
+
+
+def _fields(text: str) -> Iterator[tuple[str, np.dtype[Any], tuple[int, ...]]]:
+    for kind, names in re.findall(r'(\w+)\s+([^;]+);', text):
+        for name, count in re.findall(r'(\w+)(?:\[(\d+)\])?(?:,|$)', names.strip()):
+            yield name, record(kind), (int(count),) if count else ()
+
+
+def places(name: str) -> dict[str, slice]:
+    """Return where each field of a structure of doubles is in a row of its numbers."""
+    fields: Any = record(name).fields
+    return {field: slice(offset // 8, (offset + kind.itemsize) // 8)
+            for field, (kind, offset, *_) in fields.items()}
+
+
+class _Argument(NamedTuple):
+    """An argument of a function in C."""
+
+    kind: str
+    pointer: bool
+
+    def passed(self, value: Any) -> Any:
+        """Return a value of Python as ctypes passes it; TypeError: another type of array."""
+        if not self.pointer:
+            return _NUMBERS[self.kind][1](value)
+        if value is None:
+            return ctypes.c_void_p()
+        wanted = record(self.kind)
+        numbers = np.dtype(np.float64 if wanted.fields else {'uint8_t': bool}.get(
+            self.kind, wanted))
+        if value.dtype not in (wanted, numbers) or not value.flags.c_contiguous:
+            raise TypeError(f'an array of {value.dtype}, shape {value.shape}: must be of '
+                            f'{self.kind}, in C order')
+        return ctypes.c_void_p(value.ctypes.data)
+
+
+class Function:
+    """A function of the library, with the arguments that its header declares."""
+
+    def __init__(self, name: str) -> None:
+        found = re.search(rf'(\w+) {name}\(([^)]*)\);', _TEXT)
+        if found is None:
+            raise KeyError(name)
+        self.name = name
+        self._returns = None if found[1] == 'void' else _NUMBERS[found[1]][1]
+        self._arguments = [
+            _Argument(*part) for part in (
+                (kind, bool(star or size)) for kind, star, size in re.findall(
+                    r'(?:const )?(\w+) (\*?) ?\w+(\[\d+\])?', found[2]))]
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it; other threads run meanwhile."""
+        return self._of(_library(ctypes.CDLL))(*self._passed(arguments))
+
+    def bound(self, *arguments: Any) -> Callable[[], Any]:
+        """
+        Return a function without arguments that calls it with these, which stay where they are.
+
+        It takes a tenth of the time of a call, and other threads wait for it: for single samples.
+        """
+        passed = self._passed(arguments)
+        call: Any = partial(self._of(_library(ctypes.PyDLL)), *passed)
+        call.arrays = arguments  # their memory must live as long as the call
+        return cast('Callable[[], Any]', call)
+
+    def _of(self, library: ctypes.CDLL) -> Any:
+        # A function object of its own: types of results are attributes of it.
+        native = library[self.name]
+        native.restype = self._returns
+        return native
+
+    def _passed(self, arguments: tuple[Any, ...]) -> list[Any]:
+        return [each.passed(value)
+                for each, value in zip(self._arguments, arguments, strict=True)]
+
+
+@cache
+def _library(kind: type[ctypes.CDLL]) -> ctypes.CDLL:
+    path = _FOLDER / 'library.so'
+    try:
+        return kind(str(path))
+    except OSError as exc:
+        raise ImportError(f'{path}: {exc}: not built for this system: install the package with '
+                          'pip, or build it with colcon or make') from exc
+
+
+@cache
+def function(name: str) -> Function:
+    """Return a function of the library; KeyError if its headers do not declare it."""
+    return Function(name)

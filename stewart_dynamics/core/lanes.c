@@ -1,0 +1,129 @@
+/* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The inverse dynamics of many samples, LANES at a time: stewart_dynamics.c with numbers that are
+ * vectors, one lane for each sample. A lane has the bits of the sample alone: the same operations
+ * in the same order, none of them fused. The build compiles this file for several kinds of
+ * processors, with a SUFFIX and the number of LANES of each; library.c selects one.
+ */
+
+#include "library.h"
+
+#include <math.h>
+
+#define STEWART_LANES
+
+typedef double real __attribute__((vector_size(8 * LANES)));
+typedef int64_t choice __attribute__((vector_size(8 * LANES)));
+
+static real number(double a) {
+  real r = {0.0};
+  for (int k = 0; k < LANES; k++) {r[k] = a;}
+  return r;
+}
+
+static real choose(choice first, real a, real b)
+{return (real)((first & (choice)a) | (~first & (choice)b));}
+
+static int any(choice each) {
+  int64_t found = 0;
+  for (int k = 0; k < LANES; k++) {found |= each[k];}
+  return found != 0;
+}
+
+static real root(real a) {
+  real r = a;
+  for (int k = 0; k < LANES; k++) {r[k] = sqrt(a[k]);}
+  return r;
+}
+
+static choice sign_bit(void) {return (choice)number(-0.0);}
+static real absolute(real a) {return (real)((choice)a & ~sign_bit());}
+
+static real signed_as(real a, real sign)
+{return (real)(((choice)a & ~sign_bit()) | ((choice)sign & sign_bit()));}
+
+static real angle(real y, real x) {
+  real r = y;
+  for (int k = 0; k < LANES; k++) {r[k] = atan2(y[k], x[k]);}
+  return r;
+}
+
+static void exchange(choice wanted, real * a, real * b, int step) {
+  for (int n = 0; n < 6 * step; n += step) {
+    real old = a[n];
+    a[n] = choose(wanted, b[n], old), b[n] = choose(wanted, old, b[n]);
+  }
+}
+
+/* The structures of stewart_dynamics.h, with the samples side by side. */
+typedef struct {
+  real position[3], rotation[9];
+  real linear_velocity[3], angular_velocity[3], linear_acceleration[3], angular_acceleration[3];
+} motions;
+
+typedef struct {
+  real gravity[3], linear_acceleration[3], angular_velocity[3], angular_acceleration[3];
+} bases;
+
+typedef struct {
+  real lengths[6], rates[6], forces[6];
+  real determinant, determinant_rate, condition_number, unit_load_forces[6];
+} results;
+
+#define stewart_motion motions
+#define stewart_base bases
+#define stewart_result results
+#include "stewart_dynamics.c"
+#undef stewart_motion
+#undef stewart_base
+#undef stewart_result
+
+#define JOINED(a, b) a ## b
+#define NAMED(a, b) JOINED(a, b)
+
+/* See solve_many in library.h. */
+void NAMED(solve_lanes_, SUFFIX)(
+  const stewart_platform * platform, int64_t count, const double * motion_rows,
+  int64_t n_wrenches, const double * wrench_rows, int64_t n_bases, const double * base_rows,
+  int conditioned, double * result_rows);
+
+/* Write rows, from the first one on, to lanes; lanes behind the last row have its numbers. */
+static void spread(
+  real * to, int width, const double * rows, int64_t n_rows, int64_t first, int64_t count) {
+  for (int k = 0; k < LANES; k++) {
+    int64_t row = n_rows == 1 ? 0 : first + k < count ? first + k : count - 1;
+    for (int n = 0; n < width; n++) {to[n][k] = rows[row * width + n];}
+  }
+}
+
+void NAMED(solve_lanes_, SUFFIX)(
+  const stewart_platform * platform, int64_t count, const double * motion_rows,
+  int64_t n_wrenches, const double * wrench_rows, int64_t n_bases, const double * base_rows,
+  int conditioned, double * result_rows) {
+  enum {MOTION = sizeof(motions) / sizeof(real), BASE = sizeof(bases) / sizeof(real),
+    RESULT = sizeof(results) / sizeof(real)};
+  for (int64_t first = 0; first < count; first += LANES) {
+    motions motion;
+    bases base;
+    results result;
+    real wrench[6];
+    spread((real *)&motion, MOTION, motion_rows, count, first, count);
+    spread(wrench, 6, wrench_rows, n_wrenches, first, count);
+    spread((real *)&base, BASE, base_rows, n_bases, first, count);
+    load external = {read3(wrench), read3(wrench + 3)};
+    choice moving = base.gravity[0] == base.gravity[0];  /* else nan: the base is still */
+    if (any(moving)) {
+      load carried = carry(platform, &motion, &base);
+      real change[6], loaded[6];
+      put3(change, carried.force), put3(change + 3, carried.moment);
+      for (int n = 0; n < 6; n++) {loaded[n] = choose(moving, wrench[n] - change[n], wrench[n]);}
+      external.force = read3(loaded), external.moment = read3(loaded + 3);
+    }
+    solve(platform, &motion, external, conditioned, &result);
+    const real * numbers = (const real *)&result;
+    for (int k = 0; k < LANES && first + k < count; k++) {
+      for (int n = 0; n < RESULT; n++) {result_rows[(first + k) * RESULT + n] = numbers[n][k];}
+    }
+  }
+}

@@ -1,0 +1,86 @@
+/* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The functions of library.h, compiled with stewart_dynamics.c as one piece: they share its
+ * functions for one leg, one platform, one matrix. Each file has a part of them.
+ */
+
+#include "stewart_dynamics.c"
+
+#include <string.h>
+
+#include "library.h"
+
+/* A function into which all that it calls is inlined: twice as fast. */
+#define FLAT __attribute__((flatten))
+
+typedef void lanes_function(
+  const stewart_platform * platform, int64_t count, const double * motions, int64_t n_wrenches,
+  const double * wrenches, int64_t n_bases, const double * bases, int conditioned,
+  double * results);
+
+lanes_function solve_lanes_baseline;
+#if defined(__x86_64__) || defined(_M_X64)
+lanes_function solve_lanes_avx2, solve_lanes_avx512;
+#endif
+
+int64_t processor_kind(void) {
+#if defined(__x86_64__) || defined(_M_X64)
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) {return 2;}
+  if (__builtin_cpu_supports("avx2")) {return 1;}
+#endif
+  return 0;
+}
+
+static lanes_function * solve_lanes(void) {
+#if defined(__x86_64__) || defined(_M_X64)
+  int64_t kind = processor_kind();
+  return kind == 2 ? solve_lanes_avx512 : kind == 1 ? solve_lanes_avx2 : solve_lanes_baseline;
+#else
+  return solve_lanes_baseline;
+#endif
+}
+
+void solve_many(
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  int64_t n_wrenches, const double * wrenches, int64_t n_bases, const stewart_base * bases,
+  int64_t conditioned, stewart_result * results) {
+  solve_lanes()(
+    platform, count, (const double *)motions, n_wrenches, wrenches, n_bases,
+    (const double *)bases, conditioned != 0, (double *)results);
+}
+
+/* Whether a base adds a load: one of nan adds none. */
+static int moves(const stewart_base * base) {return base->gravity[0] == base->gravity[0];}
+
+static load load_of(const double wrench[6]) {
+  load external = {read3(wrench), read3(wrench + 3)};
+  return external;
+}
+
+/* Write the result of one sample, unchecked. */
+FLAT static void solve_sample(
+  const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
+  const stewart_base * base, stewart_result * result) {
+  load external = load_of(wrench);
+  if (moves(base)) {
+    load carried = carry(platform, motion, base);
+    external.force = subtract(external.force, carried.force);
+    external.moment = subtract(external.moment, carried.moment);
+  }
+  solve(platform, motion, external, 1, result);
+}
+
+int64_t solve_one(
+  const stewart_platform * platform, const stewart_motion * motion, const double * wrench,
+  const stewart_base * base, stewart_result * result) {
+  solve_sample(platform, motion, wrench, base, result);
+  return all_finite(result, sizeof *result) && result->condition_number < UNSOLVABLE_CONDITION;
+}
+
+#include "setpoints.c"
+#include "kinematics.c"
+#include "dynamics.c"
+#include "motors.c"
+#include "plant.c"
+#include "records.c"

@@ -1,0 +1,219 @@
+/* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The functions that Python calls beside those of stewart_dynamics.h, for many samples.
+ *
+ * An array has a structure, or the numbers named, for each of `count` samples. `wrenches` and
+ * `bases` have one for each or, where n_wrenches or n_bases is 1, one for all; a base with gravity
+ * nan is still. Inputs are not checked; results of numbers that overflow are not finite. Python
+ * reads the structures, the functions and the names of codes from this text.
+ */
+
+#ifndef STEWART_LIBRARY_H
+#define STEWART_LIBRARY_H
+
+#include "stewart_dynamics.h"
+
+/* The singularity warning after a sample: stewart_state as numbers. */
+typedef struct {
+  double cause, stopped, determinant, time_to_crossing, crossings;
+} warning_state;
+
+/* A setpoint of the node, what it gives, and the state before. Flags are 0 or 1. */
+typedef struct {
+  stewart_motion motion;
+  double wrench[6];
+  stewart_base base;
+  warning_state before;
+  double followed[6]; /* lengths of the last setpoint that was not a jump, or nan [m] */
+  double elapsed;     /* since that setpoint, with the tolerance of stamps; or infinite [s] */
+  double restart, stamp_valid, base_known;
+  stewart_result result; /* forces nan where J_inv cannot be solved or the base is not known */
+  double forces[6];      /* to publish [N]; nan where suppressed */
+  warning_state after;
+  double answered, exceeding, jumped; /* answered: all numbers are finite */
+} one_setpoint;
+
+/* Drive of a leg: turn of the motor by metre [rad/m]; where the angle is zero [m]; reflected mass
+   [kg]; losses of a motor that drives, and is driven, less 1; rate below which they are linear
+   [m/s]; [N m/A], [Ohm]. */
+typedef struct {
+  double ratio, zero, mass, driving, driven, slow, torque_constant, resistance;
+} leg_drive;
+
+/* The motors in a motion, six numbers each: see drives/motors.py. */
+typedef struct {
+  double angles[6], speeds[6], commands[6], breakaway_torques[6], torques[6], accelerations[6];
+  double currents[6], power[6], copper_heat[6], available_torques[6];
+} motor_row;
+
+/* The drives of a hexapod, and limits of their motors; nan where not given. */
+typedef struct {
+  leg_drive legs[6];
+  double torque_max[6];
+  double fastest[6], hottest[6];                   /* thresholds [rad/s, K] */
+  double thermal_resistance[6], time_constant[6];  /* [K/W], [s] */
+} leg_drives;
+
+/* The motors of a setpoint; flags are 0 or 1. */
+typedef struct {
+  double rises[6]; /* of the windings' temperatures [K] */
+  double sound, exceeding, running; /* finite; a limit exceeded; one of speed or temperature */
+  motor_row drives;
+} checked_motors;
+
+/* A measurement of the legs, and the external wrench that it gives: see external_wrench/. */
+typedef struct {
+  double lengths[6], rates[6], forces[6];
+  double known[6];          /* load on the platform [N, N m] */
+  double before[6];         /* external wrench of the last measurement [N, N m] */
+  double gain, interval;    /* of the filter; since the last measurement [s] */
+  stewart_motion motion;    /* the last one, or the guess */
+  stewart_base base_before, base;
+  double target;            /* det(J) at the last setpoint, or nan */
+  stewart_motion motion_after;
+  double after[6], differences[6]; /* external wrench [N, N m]; measured - model [N] */
+  double steps, residual;   /* of the forward kinematics */
+  double across;            /* the setpoint is on the other side of a singularity */
+  double code;
+} one_measurement;
+
+/* End stops: a spring and a damper at either end of the stroke, lengths infinite without. */
+typedef struct { double shortest[6], longest[6], stiffness[6], damping[6]; } end_stops;
+
+/* The simulated hexapod, its commands and loads in a period, and its state after it. */
+typedef struct {
+  double position[3], quaternion[4], twist[6];
+} plant_state;
+
+typedef struct {
+  double by_torques, driven;           /* flags: commands are torques; drives are given */
+  double steps, step;                  /* in a period, and the length of one [s] */
+  end_stops stops;
+  double force_max[6];
+  double commands[6], wrench[6];       /* [N] or [N m]; on the platform [N, N m] */
+  stewart_base bases[3];               /* at begin, middle and end of the period */
+  plant_state state;
+  double lengths[6], rates[6], forces[6], acceleration[6];
+  double sound;                        /* all steps could be computed */
+  motor_row motors;
+} one_plant;
+
+/* Inverse dynamics; without `conditioned` the condition numbers, half of the work, are zero. */
+void solve_many(
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  int64_t n_wrenches, const double * wrenches, int64_t n_bases, const stewart_base * bases,
+  int64_t conditioned, stewart_result * results);
+
+/* Inverse dynamics of one sample; returns whether J_inv can be solved and all is finite. */
+int64_t solve_one(
+  const stewart_platform * platform, const stewart_motion * motion, const double * wrench,
+  const stewart_base * base, stewart_result * result);
+
+/* The kind of processor for which solve_many computes: 0 baseline, 1 AVX2, 2 AVX-512. */
+int64_t processor_kind(void);
+
+/* Checks of a setpoint and its published forces; and of setpoints in order. */
+void step_one(const stewart_platform * platform, one_setpoint * setpoint);
+void check_many(
+  const stewart_platform * platform, int64_t count, const int64_t * stamps,
+  const uint8_t * bases_known, const uint8_t * restarts, const double * slack,
+  warning_state * state, int64_t * followed_at, double * followed, stewart_result * results,
+  double * forces, warning_state * states, uint8_t * answered, uint8_t * exceeding,
+  uint8_t * jumped);
+
+/* Leg lengths (count, 6) of poses [m]. */
+void lengths_many(
+  const stewart_platform * platform, int64_t count, const stewart_pose * poses, double * lengths);
+
+/* Poses of lengths (count, 6) [m] into motions, which have the guesses. */
+void forward_kinematics_many(
+  const stewart_platform * platform, int64_t count, const double * lengths,
+  stewart_motion * motions, int64_t * codes, int64_t * steps, double * residuals);
+
+/* Twists of leg rates (count, 6) [m/s] into motions. */
+void twists_many(
+  const stewart_platform * platform, int64_t count, const double * rates,
+  stewart_motion * motions);
+
+/* Accelerations under leg forces (count, 6) [N] into motions. */
+void forward_dynamics_many(
+  const stewart_platform * platform, int64_t count, stewart_motion * motions,
+  const double * forces, int64_t n_wrenches, const double * wrenches, int64_t n_bases,
+  const stewart_base * bases);
+
+/* Wrenches of the hexapod on its base, at its origin, base axes (count, 6) [N, N m]. */
+void base_wrenches_many(
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  int64_t n_wrenches, const double * wrenches, int64_t n_bases, const stewart_base * bases,
+  double * results);
+
+/* Regressors (count, 6, LINEAR): see dynamics/regressor.py. */
+void regressors_many(
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  int64_t n_bases, const stewart_base * bases, double * results);
+
+/* Angles (count, 12) between legs and axes (12, 3) of base and platform joints [rad]. */
+void joint_angles_many(
+  const stewart_platform * platform, const double * axes, int64_t count,
+  const stewart_motion * motions, double * angles);
+
+/* sin^2(angle / 2) of the same, and its rate [1/s]; nan where numbers overflow. */
+void joint_haversines_many(
+  const stewart_platform * platform, const double * axes, int64_t count,
+  const stewart_motion * motions, double * values, double * rates);
+
+/* Clearance of each leg (count, 6) [m] from the nearest leg, or plate of n_base or n_moving
+   corners (n, 3); number of the leg, 6 for the plate of the base, 7 of the platform. */
+void clearances_many(
+  const stewart_platform * platform, int64_t n_base, const double * base, int64_t n_moving,
+  const double * moving, int64_t count, const stewart_motion * motions, double * clearances,
+  int64_t * nearest);
+
+/* Friction (count, 6) at rates (count, 6) [N]; coefficients of each leg (6,). */
+void friction_many(
+  const double * viscous, const double * coulomb, const double * coulomb_velocity, int64_t count,
+  const double * rates, double * forces);
+
+/* Temperature rises (count, 6) [K] of windings with copper heat (count, 6) [W]; the first row of
+   them is given. */
+void warm_many(
+  int64_t count, const double * times, const double * heat, const double * resistance,
+  const double * time_constant, double * rises);
+
+/* Motors of motions, with demanded forces in the results, for published forces (count, 6) [N]; the
+   curve has n points of speed and torque. */
+void motors_many(
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  int64_t count, const stewart_motion * motions, const stewart_result * results,
+  const double * forces, motor_row * rows);
+
+/* The same for setpoints in order, with the windings' rises [K] and heat [W] (12,). */
+void check_motors_many(
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  int64_t count, const stewart_motion * motions, const stewart_result * results,
+  const double * forces, const double * elapsed, const uint8_t * jumped, double * windings,
+  checked_motors * rows);
+
+/* External wrenches (count, 6) of model forces and measured ones (count, 6), in poses. */
+void external_wrenches_many(
+  const stewart_platform * platform, int64_t count, const stewart_pose * poses,
+  const double * model_forces, const double * measured_forces, double * wrenches);
+void estimate_one(const stewart_platform * platform, one_measurement * measurement);
+
+/* A period of the simulated hexapod; without steps, its state as it is. */
+void plant_advance(
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  one_plant * plant);
+
+/* The records of an MCAP file: see bags/mcap_file.py. found is (4, room). */
+void scan_records(
+  int64_t size, const uint8_t * data, const int64_t * numbers, int64_t room, int64_t * found,
+  int64_t * totals);
+
+/* Copy count parts of data, one after the other. */
+void gather_bytes(
+  const uint8_t * data, int64_t count, const int64_t * starts, const int64_t * sizes,
+  uint8_t * out);
+
+#endif

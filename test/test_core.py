@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The library in C: its structures and calls, and several samples side by side."""
+
+from __future__ import annotations
+
+import ctypes
+from importlib.util import find_spec
+import os
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import (
+    QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, rng, ROOT,
+    symmetric_parameters)
+from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics.core import binding
+from stewart_dynamics.core.binding import CODES, function, places, record
+from stewart_dynamics.mechanics.rows import BASE, MOTION, POSE, RESULT, TWIST
+
+CORE = ROOT / 'stewart_dynamics' / 'core'
+COMPILER = next(filter(None, map(shutil.which, ('cc', 'gcc', 'clang'))), None)
+KINDS = ('baseline', 'avx2', 'avx512')[:function('processor_kind')() + 1]
+SIZES = 1, 2, 3, 7, 8, 9, 33
+
+
+def hexapods() -> list[Parameters]:
+    """Return a random hexapod, one with screws that turn with its legs, and a symmetric one."""
+    random = random_parameters(rng(1))
+    return [random, random.replaced({
+        'actuator.screw_lead': 0.02, 'drive.gear_ratio': 1.5,
+        'drive.screw_rotation': 'universal'}), symmetric_parameters()]
+
+
+def samples(parameters: Parameters, count: int) -> tuple[Any, Any, Any]:
+    """Return motions, wrenches and bases: ordinary, singular, overflowing, at rest, still."""
+    random = rng(count)
+    motions = random_motion(parameters, random, count).rows.copy()
+    motions[1::5, :POSE.stop] = [0.0, 0.0, 1.0, *QUARTER_TURN.ravel()]
+    motions[2::7, TWIST] *= 1e200
+    motions[3::5, TWIST.start:] = 0.0
+    bases = random_base_motion(parameters, random, count).rows.copy()
+    bases[::3] = np.nan
+    return motions, random_wrench(parameters, random, count), bases
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('hexapod', range(3))
+def test_samples_side_by_side_have_the_bits_of_each_alone(kind: str, hexapod: int) -> None:
+    parameters = hexapods()[hexapod]
+    structure = StewartPlatform(parameters).structure
+    many = ctypes.CDLL(str(CORE / 'library.so'))[f'solve_lanes_{kind}']
+    for count in SIZES:
+        motions, wrenches, bases = samples(parameters, count)
+        for loads, moving in ((wrenches, bases), (wrenches[:1], bases[-1:])):
+            alone, found = np.empty((2, count, RESULT))
+            for n in range(count):
+                function('solve_one')(
+                    structure, motions[n], loads[n % len(loads)].copy(),
+                    moving[n % len(moving)].copy(), alone[n])
+            pointers = [ctypes.c_void_p(each.ctypes.data) for each in (
+                structure, motions, loads, moving, found)]
+            many(pointers[0], ctypes.c_int64(count), pointers[1], ctypes.c_int64(len(loads)),
+                 pointers[2], ctypes.c_int64(len(moving)), pointers[3], 1, pointers[4])
+            assert np.array_equal(found, alone, equal_nan=True)
+
+
+def test_without_the_condition_number_the_rest_has_the_same_bits() -> None:
+    for parameters in hexapods():
+        platform = StewartPlatform(parameters)
+        motions, wrenches, bases = samples(parameters, 33)
+        whole = platform.solve(motions, wrenches, bases)
+        rest = platform.solve(motions, wrenches, bases, condition=False)
+        at = places('stewart_result')['condition_number']
+        assert not rest[:, at].any()
+        rest[:, at] = whole[:, at]
+        assert np.array_equal(rest, whole, equal_nan=True)
+
+
+@pytest.mark.skipif(COMPILER is None, reason='needs a C compiler')
+def test_structures_are_laid_out_as_the_compiler_lays_them_out(tmp_path: Path) -> None:
+    text = (CORE / 'stewart_dynamics.h').read_text() + (CORE / 'library.h').read_text()
+    names = re.findall(r'^\}? ?.*\} (\w+);$|^  (\w+);$', text, re.MULTILINE)
+    listed = [a or b for a, b in names if re.search(rf'\b{a or b};', text)]
+    assert {'stewart_platform', 'one_setpoint', 'one_plant', 'leg_drives'} <= set(listed)
+    lines, expected = [], []
+    for name in listed:
+        fields: Any = record(name).fields
+        lines.append(f'printf("%zu\\n", sizeof({name}));')
+        expected.append(record(name).itemsize)
+        for field, (_, offset) in fields.items():
+            lines.append(f'printf("%zu\\n", offsetof({name}, {field}));')
+            expected.append(offset)
+    source = tmp_path / 'sizes.c'
+    source.write_text('#include "library.h"\n#include <stddef.h>\n#include <stdio.h>\n'
+                      f'int main(void) {{{"".join(lines)} return 0;}}\n')
+    program = tmp_path / 'sizes'
+    subprocess.run([str(COMPILER), f'-I{CORE}', source, '-o', program], check=True)
+    printed = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+    assert [int(each) for each in printed.split()] == expected
+    assert (8 * MOTION, 8 * BASE, 8 * RESULT) == tuple(
+        record(f'stewart_{name}').itemsize for name in ('motion', 'base', 'result'))
+
+
+def test_codes_are_those_of_the_header() -> None:
+    assert (CODES['STEWART_OK'], CODES['STEWART_NO_MOTORS']) == (0, 9)
+    assert (CODES['STEWART_CROSSED'], CODES['STEWART_JUMP']) == (3, 128)
+
+
+@pytest.mark.parametrize('motions', [
+    np.zeros((2, MOTION), dtype=np.float32), np.zeros((MOTION, 2)).T, np.zeros(48, dtype='>f8'),
+    np.zeros((2, MOTION), dtype=np.int64)])
+def test_an_array_of_another_type_or_layout_is_rejected(motions: Any) -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    with pytest.raises(TypeError, match='must be of stewart_motion, in C order'):
+        function('twists_many')(platform.structure, 2, np.zeros((2, 6)), motions)
+
+
+def test_a_function_that_no_header_declares_is_an_error() -> None:
+    with pytest.raises(KeyError, match='no_such_function'):
+        function('no_such_function')
+
+
+def test_a_library_that_is_not_built_is_one_line(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(binding, '_FOLDER', tmp_path)
+    binding._library.cache_clear()
+    try:
+        with pytest.raises(ImportError, match=r'library\.so: .*not built for this system: ins'):
+            function('processor_kind')()
+    finally:
+        binding._library.cache_clear()
+
+
+@pytest.mark.skipif(find_spec('ziglang') is not None, reason='there is always a compiler')
+def test_without_a_compiler_the_build_says_in_one_line_what_to_install(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, 'setup.py', '-q', 'build_ext', '--build-lib', tmp_path / 'lib',
+         '--build-temp', tmp_path / 'temp'], cwd=ROOT, capture_output=True, text=True,
+        env={**{name: text for name, text in os.environ.items() if name != 'CC'},
+             'PATH': str(tmp_path)})
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith(
+        'stewart_dynamics: found no C compiler: install one (Debian and Ubuntu: apt install gcc ')
