@@ -21,13 +21,12 @@ from stewart_dynamics.capability.box_cells import (
     ARM, BASE_AXIS, BOUND, CENTER, DEPTH, EXCESS, gradient_of, HALF, halve, place_of,
     PLATFORM_AXIS, prepare_legs, put_box, put_point, SHIFT, TURN, turned, UPPER)
 from stewart_dynamics.capability.singular_values import BEND, put6
-from stewart_dynamics.capability.travel_legs import (
-    BASE_ANGLE_MAX, LENGTH_MAX, LENGTH_MIN, PLATFORM_ANGLE_MAX)
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.vectors import (
     add, dot, norm, put3, read3, scale, subtract, Vector3)
 
+LENGTH_MIN, LENGTH_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX = range(4)
 # The largest excess is found to this part of a limit (of a radian); whether it is above zero to
 # the tolerance of limits.
 _EXACT = 1e-7

@@ -14,11 +14,14 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import travel
+from stewart_dynamics.capability.clearance import Clearance
 from stewart_dynamics.capability.force_intervals import (
     largest_multiple, quadratic_exit)
 from stewart_dynamics.capability.growth import Growth
 from stewart_dynamics.capability.motions import Deviations, faster, timed
 from stewart_dynamics.capability.motor_bounds import MotorBounds
+from stewart_dynamics.capability.quantities import (
+    Angles, Conditioning, Lengths, starts_at)
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
 from stewart_dynamics.capability.travel import ENDS, LIMITS
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
@@ -26,7 +29,6 @@ from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, wrong_type)
-from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, PLATFORM, with_point_mass)
@@ -140,6 +142,15 @@ class Capability:
         self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes
         self._plates = (none, none) if clearance is None else (clearance.base, clearance.platform)
         self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
+        size = float(platform.parameters['singularity.characteristic_length'])
+        nearest = float(self._bounds[travel.CLEARANCE_MIN, 0])
+        self._margins = travel.PoseMargins(
+            Lengths(self._bounds[:2]),
+            Angles(self._bounds[2:4], self._axes[:6]) if (
+                self._bounds[2:4] < math.pi).any() else None,
+            Conditioning(self._pose_limits.stop_condition, size),
+            None if clearance is None else Clearance(
+                clearance.shapes, nearest, size, *map(len, self._plates)), size)
         self._motors = MotorBounds(platform.parameters) if platform.parameters.drives else None
         self._frictionless = StewartPlatform(platform.parameters.replaced({
             'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}))
@@ -174,13 +185,9 @@ class Capability:
         shape = common_shape(pose=pose.shape, direction=directions.shape[:-1],
                              pivot=pivots.shape[:-1])
         rows = motion_rows(pose, shape)
-        values = np.empty(len(rows))
-        codes, legs = (np.empty(len(rows), dtype=np.int64) for _ in range(2))
-        constants = (self.platform.constants, self._axes, self._bounds, self._shapes,
-                     *self._plates, self._pose_limits.stop_condition)
-        in_parts(travel.travels, constants, rows, copies(directions, shape),
-                 copies(pivots, shape), values, codes, legs,
-                 scratch=travel.memory_of(self._plates))
+        starts = starts_at(self.platform.parameters, self._axes, self._plates, rows,
+                           copies(pivots, shape))
+        values, codes, legs = travel.travels(self._margins, starts, copies(directions, shape))
         if np.isnan(values).any():
             at = int(np.isnan(values).argmax())
             where = list(map(int, np.unravel_index(at, shape))) if shape else ''

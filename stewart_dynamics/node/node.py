@@ -17,7 +17,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 
-from stewart_dynamics.capability import travel
 from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
@@ -99,7 +98,6 @@ class DynamicsNode(LifecycleNode):
         self._planned_code = Preparation(*planned_trajectory.FUNCTIONS)
         self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
         self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
-        self._travel_code = Preparation(travel.travels)
         self._base_wrench_read = False  # it has a subscriber
         self._planned: TaskQueue[planned.PlannedOutcome] = TaskQueue(
             partial(OneShotTimer, self, PAUSE), self._planned_code, self._on_outcome)
@@ -156,7 +154,7 @@ class DynamicsNode(LifecycleNode):
         self._joint_states = PublisherAtRate(
             publishers.get(JOINT_STATES), rate, self._model_messages.joint_states)
         self._transforms_read = False  # they have a subscriber
-        self._travel = TravelPublisher(parameters, publishers[TRAVEL], self._travel_code)
+        self._travel = TravelPublisher(parameters, publishers[TRAVEL])
         self._model_measured = parameters['joint_states.source'] == AS_MEASURED
         self._handled, self._rested = -math.inf, False
         self._active = True
