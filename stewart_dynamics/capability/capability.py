@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.capability import travel
 from stewart_dynamics.capability.clearance import Clearance
 from stewart_dynamics.capability.force_intervals import (
@@ -145,7 +145,8 @@ class Capability:
         size = float(platform.parameters['singularity.characteristic_length'])
         nearest = float(self._bounds[travel.CLEARANCE_MIN, 0])
         self._margins = travel.PoseMargins(
-            Lengths(self._bounds[:2]),
+            Lengths(self._bounds[:2]) if (self._bounds[0] > 0.0).any() or np.isfinite(
+                self._bounds[1]).any() else None,
             Angles(self._bounds[2:4], self._axes[:6]) if (
                 self._bounds[2:4] < math.pi).any() else None,
             Conditioning(self._pose_limits.stop_condition, size),
@@ -203,7 +204,7 @@ class Capability:
 
         Lengths, joint angles, clearance of the legs, the condition number up to
         ``singularity.stop_condition``, and the sign of det(J), by branch and bound
-        (``capability.box_cells``). The work is bounded: a box that is within the limits, but too
+        (``capability.reachable``). The work is bounded: a box that is within the limits, but too
         near to a singularity, may be answered with ``certain`` False and a worst pose whose excess
         is negative.
 
@@ -227,23 +228,16 @@ class Capability:
         Return the largest factor by which a box of ranges can be scaled and still is reachable.
 
         Arguments are those of ``reachable``; each range includes zero. The box of the answer is
-        proven to be reachable. Where lengths or joint angles limit, a box larger by 1e-8 is not;
-        where the clearance of the legs limits it is found to 1 %, if that takes a bounded number
-        of steps; where a singularity limits the number of steps may end the proof earlier.
-        ``upper`` is the shortest travel towards an end or the middle of each range: no larger
-        factor is reachable. Rotations grow up to a turn.
+        proven to be reachable, and one of the factor ``upper``, which a travel in it gives, is
+        not. They differ by 1e-9 of it where lengths or joint angles limit; by 1e-3 where the
+        clearance of the legs or a singularity limits, and by more where that is not decided
+        within a bounded number of steps. Rotations grow up to a turn.
         """
         ranges = checked_ranges(box)
         if (ranges[:, 0] > 0.0).any() or (ranges[:, 1] < 0.0).any():
             raise MotionError('box: a range without zero cannot be scaled')
-        factor, worst = self._boxes(pose, pivot).factor(ranges)
-        middle: Array = np.zeros(6)
-        ways = np.stack(np.meshgrid(*np.stack([*ranges.T, middle], axis=1)), axis=-1)
-        ways = ways.reshape(-1, 6)
-        ends = self.travel(self._single(pose), ways[ways.any(axis=1)], pivot).value
-        upper = max(float(ends.min()), factor)
-        return Extent(factor, '', -1, upper=upper) if worst is None else Extent(
-            factor, worst.limit, worst.leg, upper=upper)
+        found = self._boxes(pose, pivot).factor(ranges)
+        return Extent(found.value, found.limit, found.leg, upper=found.upper)
 
     def smallest(self, quantity: Callable[[Pose], ArrayLike], box: ArrayLike,
                  pose: Pose | Motion | None = None, pivot: ArrayLike | None = None) -> InBox:
@@ -335,8 +329,15 @@ class Capability:
         center = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
         if center.ndim > 1:
             raise MotionError(f'pivot: shape {center.shape}: must be (3,)')
-        return Boxes(self.platform, self._axes, self._bounds, self._shapes, self._plates,
-                     self._single(pose).rows, center)
+        row = self._single(pose).rows
+        starts = starts_at(self.platform.parameters, self._axes, self._plates, row[None],
+                           center[None])
+
+        def ends(directions: Array) -> travel.Ends:
+            every: Integers = np.zeros(len(directions), dtype=np.int64)
+            return travel.travels(self._margins, starts.take(every), directions)
+
+        return Boxes(self.platform, self._margins, starts, ends, row, center)
 
     def wrench(self, pose: Pose | Motion, direction: ArrayLike, base: BaseMotion | None = None,
                *, continuous: bool = False) -> Extent:

@@ -19,13 +19,14 @@ base joint and of either end contains it.
 from __future__ import annotations
 
 from collections.abc import Iterator
+import copy
 from itertools import combinations, product
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.capability.intervals import dot, Enclosure, joined, where
-from stewart_dynamics.capability.quantities import Moved, ROUNDING
+from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.capability.intervals import dot, Enclosure, joined, unit, where
+from stewart_dynamics.capability.quantities import Moved, Quantity, ROUNDING
 
 # Corners of a leg: base joint, end of the cylinder (twice: no longer than the leg, and as it is),
 # and platform joint. The plates of base and platform follow those of six legs.
@@ -35,7 +36,7 @@ _BASE_JOINT, _CYLINDER, _CYLINDER_END, _PLATFORM_JOINT, _OF_LEG = range(5)
 _NEAR, _RIDGE = 0.05, 1e-3
 
 
-class Clearance:
+class Clearance(Quantity):
     """
     The clearance of the legs from each other and from the plates; margins relative to the size.
 
@@ -46,7 +47,7 @@ class Clearance:
     legs (M,): leg of each margin, of two legs the first.
     """
 
-    tolerance = ROUNDING
+    tolerance, fine, coarse, exact = ROUNDING, 1e-3, 1.04, 0.1
 
     def __init__(self, shapes: Array, limit: float, size: float, base: int, platform: int) -> None:
         self._cylinders, self._limit, self._size = shapes[:, 1], limit, size
@@ -72,14 +73,29 @@ class Clearance:
         self.legs = np.concatenate(legs_of)
         self.codes = np.full(len(self.legs), 4)
 
+    def only(self, open_: Flags) -> Clearance:
+        """Return the clearance of the pairs that have open margins (M,)."""
+        kinds, legs, first = [], [self.legs[:0]], 0
+        for p, q, radii in self._kinds:
+            margins = slice(first, first + 2 * q.size)
+            which = open_[margins].reshape(len(p), -1).any(axis=1)
+            if which.any():
+                kinds.append((p[which], q[which], radii[which]))
+                legs.append(self.legs[margins].reshape(len(p), -1)[which].ravel())
+            first = margins.stop
+        found = copy.copy(self)
+        found._kinds, found.legs = kinds, np.concatenate(legs)
+        found.codes = self.codes[:len(found.legs)]
+        return found
+
     def margins(self, moved: Moved) -> Enclosure:
         """Return margins (N, M): those of a pair's corners all are positive where it is clear."""
         frames = list(self._corners(moved))
         return joined([self._of_pairs(frames, moved, *kind) for kind in self._kinds])
 
-    def values(self, moved: Moved) -> Array:
-        """Return margins at points."""
-        return self.margins(moved).center
+    def excesses(self, margins: Array) -> Array:
+        """Return by how much the clearance is too small, relative to the size."""
+        return -margins
 
     def _corners(self, moved: Moved) -> Iterator[Enclosure]:
         """Yield the corners of all bodies (N, K, 3), and as they are seen from the platform."""
@@ -91,8 +107,7 @@ class Clearance:
                  moved.fixed(starts.arms),
                  (moved.turned_back(moved.fixed(starts.base) - moved.shift),
                   moved.fixed(starts.platform)))):
-            cylinders = joints + (ends - joints) * (
-                moved.inverse_lengths * self._cylinders)[..., None]
+            cylinders = joints + unit(ends - joints) * self._cylinders[:, None]
             inside = (moved.lengths.center <= self._cylinders)[..., None]
             legs = joined([each[:, :, None] for each in (
                 joints, where(inside, ends, cylinders), cylinders, ends)], axis=-2)

@@ -151,6 +151,23 @@ def cross(a: Enclosure, b: Enclosure) -> Enclosure:
     return (a[..., _NEXT] * b[..., _AFTER]) - (a[..., _AFTER] * b[..., _NEXT])
 
 
+def length(vectors: Array) -> Array:
+    """Return the lengths (..., 1) of vectors (..., 3)."""
+    lengths: Array = np.sqrt(np.einsum('...i,...i->...', vectors, vectors))[..., None]
+    return lengths
+
+
+def unit(vectors: Enclosure) -> Enclosure:
+    """Return unit vectors along vectors (..., 3); unknown where one may turn by 90 degrees."""
+    middle = vectors.center / length(vectors.center)
+    along = dot(vectors, middle)
+    # tangents of the angles from the middle: how far a vector grows does not count
+    across = (vectors - along[..., None] * middle) * along.inverse()[..., None]
+    half = np.fmin(0.25 * ((across.spread + across.rest) ** 2).sum(axis=-1, keepdims=True), 0.5)
+    return (across + middle) * Enclosure(
+        1.0 - half, np.zeros((len(across.slopes), *half.shape)), half + _ROUNDING)
+
+
 def joined(parts: Sequence[Enclosure], axis: int = -1) -> Enclosure:
     """Return enclosures one after the other along an axis, counted from the last one."""
     return Enclosure(*(np.concatenate(each, axis=axis) for each in zip(*(

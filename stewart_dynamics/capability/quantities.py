@@ -19,14 +19,16 @@ base's, and vectors are rows (..., 3).
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.capability.intervals import cross, dot, Enclosure, joined
+from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.capability.intervals import (
+    cross, dot, Enclosure, joined, length, unit)
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.parameters.table import Parameters
@@ -116,7 +118,7 @@ class Moved:
         """Return vectors (N, M, 3) that turn with the platform."""
         center = vectors @ self._rotation
         return Enclosure(center, center @ self._spins, np.broadcast_to(
-            self._bend * _length(vectors), center.shape))
+            self._bend * length(vectors), center.shape))
 
     def fixed(self, vectors: Array) -> Enclosure:
         """Return vectors (N, M, 3) that do not move."""
@@ -133,68 +135,83 @@ class Moved:
         seen: Array = np.einsum('nij,nj->ni', self._rotation[rows], normals)
         return seen
 
-    def directions(self) -> Enclosure:
-        """Return the unit vectors of the legs (N, 6, 3)."""
-        middle = self.lines.center / _length(self.lines.center)
-        along = dot(self.lines, middle)
-        # tangents of the angles from the middle: what a leg moves along itself does not count
-        across = (self.lines - along[..., None] * middle) * along.inverse()[..., None]
-        half = np.fmin(0.25 * ((across.spread + across.rest) ** 2).sum(
-            axis=-1, keepdims=True), 0.5)
-        return (across + middle) * Enclosure(1.0 - half, np.zeros((len(
-            across.slopes), *half.shape)), half + _EPS)
 
-
-def _length(vectors: Array) -> Array:
-    """Return lengths (..., 1) of vectors (..., 3)."""
-    lengths: Array = np.sqrt(np.einsum('...i,...i->...', vectors, vectors))[..., None]
-    return lengths
-
-
-class Lengths:
+class Quantity(ABC):
     """
-    Lengths of the legs; margins (N, 12) ``l^2 / min^2 - 1`` and ``1 - l^2 / max^2``.
+    A quantity that has limits; its margins are positive where they are kept.
 
-    bounds (2, 6): shortest and longest lengths [m].
+    legs, codes (M,): leg, -1 for none, and code of the limit of each margin, see ``travel.ENDS``.
+    tolerance: a travel may pass a part where a margin is negative by no more than this.
+    fine: a box is tried that is smaller by this part than one that is not reachable.
+    coarse: where a proof does not end the factor of a box is found to this ratio.
+    exact: the largest excess in a box is found to this part of a limit; near zero always, and if
+        infinite only its sign.
+    most: largest number of cells of a box.
     """
 
-    tolerance = 1e-10  # a travel may pass a part where a limit is exceeded by no more
-    legs, codes = np.tile(np.arange(6), 2), np.repeat([0, 1], 6)
+    legs: Integers
+    codes: Integers
+    tolerance, fine, coarse, exact, most = 1e-10, 1e-9, 1.01, 1e-7, 100_000
+
+    @abstractmethod
+    def margins(self, moved: Moved) -> Enclosure:
+        """Return margins (N, M) over cells."""
+
+    def values(self, moved: Moved) -> Array:
+        """Return numbers (N, M) of the signs of the margins at points, with simple roots."""
+        return self.margins(moved).center
+
+    def only(self, open_: Flags) -> Quantity:
+        """Return the quantity with less margins, at least those that are open (M,)."""
+        del open_
+        return self
+
+    @abstractmethod
+    def excesses(self, margins: Array) -> Array:
+        """Return by how much limits are exceeded, relative, at margins (N, M)."""
+
+    def excesses_at(self, moved: Moved) -> Array:
+        """Return by how much limits are exceeded, relative, at points."""
+        return self.excesses(self.values(moved))
+
+    def weights(self, moved: Moved, slopes: Array) -> Array:
+        """Return by how much the edges of cells count (D, N); slopes (D, N): of one margin."""
+        found: Array = np.abs(slopes) + 0.1 * (
+            length(moved.joints.slopes)[..., 0] / moved.lengths.center).max(axis=2)
+        return found
+
+
+class Lengths(Quantity):
+    """
+    Lengths of the legs; margins (N, M) ``l^2 / min^2 - 1`` and ``1 - l^2 / max^2``.
+
+    bounds (2, 6): shortest and longest lengths [m]; 0 and infinity do not limit.
+    """
 
     def __init__(self, bounds: Array) -> None:
         self.bounds = bounds
-        shortest, longest = bounds
-        limited = shortest > 0.0
-        with np.errstate(divide='ignore'):
-            self._scales = np.where(limited, 1.0 / shortest ** 2, 0.0), -1.0 / longest ** 2
-        self._offsets = np.where(limited, -1.0, 1.0), np.ones(6)
+        self.codes, self.legs = np.nonzero([bounds[0] > 0.0, bounds[1] < math.inf])
+        self._signs: Array = np.where(self.codes > 0, -1.0, 1.0)
+        self._scales: Array = self._signs / bounds[self.codes, self.legs] ** 2
 
     def margins(self, moved: Moved) -> Enclosure:
         """Return margins over cells."""
-        return joined([moved.squares * scale + offset for scale, offset in zip(
-            self._scales, self._offsets, strict=True)])
+        squares: Enclosure = moved.squares[:, self.legs]
+        return squares * self._scales - self._signs
 
-    def values(self, moved: Moved) -> Array:
-        """Return margins at points."""
-        return self.margins(moved).center
-
-    @staticmethod
-    def excesses(margins: Array) -> Array:
-        """Return by how much limits are exceeded, relative, at margins (N, 12)."""
-        return np.concatenate([
-            1.0 - np.sqrt(np.maximum(1.0 + margins[:, :6], 0.0)),
-            np.sqrt(np.maximum(1.0 - margins[:, 6:], 0.0)) - 1.0], axis=1)
+    def excesses(self, margins: Array) -> Array:
+        """Return by how much limits are exceeded, relative, at margins (N, M)."""
+        ratios = np.sqrt(np.maximum(1.0 + self._signs * margins, 0.0))
+        return np.asarray(self._signs * (1.0 - ratios))
 
 
-class Angles:
+class Angles(Quantity):
     """
     Angles of the joints; margins (N, M) ``cos angle - cos max`` of those that have a limit.
 
     bounds (2, 6): largest angles at base and platform [rad].
     axes (6, 3): of the base joints.
     """
-
-    tolerance = 1e-10  # as of the lengths
 
     def __init__(self, bounds: Array, axes: Array) -> None:
         self._axes, self._limited = axes, np.flatnonzero(bounds.ravel() < math.pi)
@@ -207,10 +224,6 @@ class Angles:
         return joined([dot(moved.lines, axes) * moved.inverse_lengths for axes in (
             self._axes, moved.turned(moved.starts.axes))])[:, self._limited] - self._cosines
 
-    def values(self, moved: Moved) -> Array:
-        """Return margins at points."""
-        return self.margins(moved).center
-
     def excesses(self, margins: Array) -> Array:
         """Return by how much limits are exceeded, relative, at margins (N, 12)."""
         found: Array = np.arccos(np.clip(
@@ -218,7 +231,7 @@ class Angles:
         return found
 
 
-class Conditioning:
+class Conditioning(Quantity):
     """
     The condition number of the scaled J_inv; one margin ``1 - condition / stop``.
 
@@ -228,15 +241,20 @@ class Conditioning:
     ``(1 + F)^-1 = 1 - F + F^2 (1 + F)^-1`` with ``F = S^-1 U^T E V``.
     """
 
-    tolerance = 0.0
+    tolerance, fine, coarse, exact, most = 0.0, 1e-3, 1.15, math.inf, 80_000
     legs, codes = np.array([-1]), np.array([5])
 
     def __init__(self, stop: float, size: float) -> None:
-        self._stop, self._size = stop, size
+        self.stop, self._size = stop, size
+
+    def weights(self, moved: Moved, slopes: Array) -> Array:
+        """Return by how much the edges of cells change the matrix (D, N)."""
+        matrices = self.matrices(moved)
+        return _norm(_inverses(matrices.center) @ matrices.slopes)
 
     def matrices(self, moved: Moved) -> Enclosure:
         """Return the scaled J_inv (N, 6, 6)."""
-        directions = moved.directions()
+        directions = unit(moved.lines)
         return joined([directions, cross(
             moved.turned(moved.starts.levers / self._size), directions)])
 
@@ -248,9 +266,18 @@ class Conditioning:
         """
         matrices = self.matrices(moved).center
         singular = np.linalg.svd(matrices, compute_uv=False)
-        room = singular[:, 5] / singular[:, 0] * self._stop
+        room = singular[:, 5] / singular[:, 0] * self.stop
         kept = np.linalg.det(matrices) * moved.starts.sides >= 0.0
         return (np.where(kept, room, -room) - 1.0)[:, None]
+
+    def excesses(self, margins: Array) -> Array:
+        """Return ``condition / stop - 1`` at margins."""
+        return -margins
+
+    def excesses_at(self, moved: Moved) -> Array:
+        """Return ``condition / stop - 1`` at points; infinite past a singularity."""
+        room = self.values(moved) + 1.0
+        return np.asarray(np.where(room > 0.0, 1.0 / room - 1.0, math.inf))
 
     def margins(self, moved: Moved) -> Enclosure:
         """Return margins (N, 1)."""
@@ -262,13 +289,16 @@ class Conditioning:
             left = 1.0 - _norm(change)
             bounds = _norm(np.abs(matrices.center) + matrices.spread + matrices.rest) * _norm(
                 inverse) / left
-            center = np.where(left > 0.0, 1.0 - bounds / self._stop, np.nan)
+            center = np.where(left > 0.0, 1.0 - bounds / self.stop, np.nan)
             slopes, rest = np.zeros((len(matrices.slopes), len(center))), np.zeros(len(center))
             finer = ~(center > 0.0)
             if finer.any():
-                exact = 1.0 - _condition(matrices[finer]) * (1.0 / self._stop)
-                center[finer], slopes[:, finer], rest[finer] = (
-                    exact.center, exact.slopes, exact.rest)
+                exact, bounds = _condition(matrices[finer])
+                exact = 1.0 - exact * (1.0 / self.stop)
+                kept = bounds < self.stop
+                center[finer] = np.where(kept, 1.0 - bounds / self.stop, exact.center)
+                slopes[:, finer], rest[finer] = np.where(kept, 0.0, exact.slopes), np.where(
+                    kept, 0.0, exact.rest)
         return Enclosure(center, slopes, rest)[:, None]
 
 
@@ -286,8 +316,12 @@ def _inverses(matrices: Array) -> Array:
         return np.full_like(matrices, np.nan)
 
 
-def _condition(matrices: Enclosure) -> Enclosure:
-    """Return the condition numbers of matrices (N, 6, 6); unknown where one may be singular."""
+def _condition(matrices: Enclosure) -> tuple[Enclosure, Array]:
+    """
+    Return the condition numbers of matrices (N, 6, 6), and bounds of them that large cells need.
+
+    Not finite where one may be singular.
+    """
     u, singular, vt = np.linalg.svd(matrices.center)
     ut, v = np.swapaxes(u, 1, 2), np.swapaxes(vt, 1, 2)
     slopes, rest = ut @ matrices.slopes @ v, np.abs(ut) @ matrices.rest @ np.abs(v)
@@ -298,8 +332,9 @@ def _condition(matrices: Enclosure) -> Enclosure:
     bend = (1.0 - left) * _norm(both * sizes) / np.where(left > 0.0, left, np.nan)
     back = (..., slice(None, None, -1), slice(None, None, -1))  # the largest comes first
     inverse = _largest(1.0 / singular[:, ::-1], (-both * slopes)[back], (both * rest)[back])
+    bounds = (singular[:, 0] + _norm(sizes)) / singular[:, 5] / np.where(left > 0.0, left, np.nan)
     return _largest(singular, slopes, rest) * Enclosure(
-        inverse.center, inverse.slopes, inverse.rest + bend)
+        inverse.center, inverse.slopes, inverse.rest + bend), bounds
 
 
 def _largest(values: Array, slopes: Array, rest: Array) -> Enclosure:

@@ -15,7 +15,7 @@ than 1e-10 may be passed. Lengths of a travel that only moves or only turns have
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.capability.clearance import Clearance
 from stewart_dynamics.capability.intervals import Enclosure
 from stewart_dynamics.capability.quantities import (
-    Angles, Conditioning, Lengths, Moved, ROUNDING, Starts)
+    Angles, Conditioning, Lengths, Moved, Quantity, ROUNDING, Starts)
 from stewart_dynamics.mechanics import limits
 
 CLEARANCE_MIN, SINGULARITY, NOTHING = 4, 5, 6
@@ -58,31 +58,20 @@ class Ends(NamedTuple):
     legs: Integers
 
 
-class Quantity(Protocol):
-    """Margins of limits; ``legs`` and ``codes`` are those of their columns."""
-
-    @property
-    def tolerance(self) -> float: ...
-
-    @property
-    def legs(self) -> Integers: ...
-
-    @property
-    def codes(self) -> Integers: ...
-
-    def margins(self, moved: Moved) -> Enclosure: ...
-
-    def values(self, moved: Moved) -> Array: ...
-
-
 class PoseMargins(NamedTuple):
     """The quantities of a hexapod that have limits; None where nothing is limited."""
 
-    lengths: Lengths
+    lengths: Lengths | None
     angles: Angles | None
     condition: Conditioning
     clearance: Clearance | None
     size: float  # of the hexapod [m]
+
+    @property
+    def given(self) -> list[Quantity]:
+        """Return the quantities, those that are proven in a short time first."""
+        return [each for each in (self.lengths, self.angles, self.clearance, self.condition)
+                if each is not None]
 
 
 class _Travels:
@@ -130,7 +119,7 @@ def _shorten(ends: Ends, margins: PoseMargins, block: _Travels) -> None:
     ends.values[still] = 2.0 * math.pi / block.rates[still]
     closed = still | (block.rates == 0.0)
     ways = margins.size / block.speeds
-    if closed.any():
+    if closed.any() and margins.lengths is not None:
         _keep(ends, np.flatnonzero(closed), *_ends_of_lengths(
             margins.lengths, block.take(closed)))
     for quantity, which in ((margins.lengths, ~closed), (margins.angles, ways > 0.0),
@@ -181,9 +170,8 @@ def _ends_of_lengths(lengths: Lengths, block: _Travels) -> tuple[Array, Integers
         t = np.where(rates > 0.0, 2.0 * np.arctan2(above, below) / rates, above / below)
         t = np.where(above > 0.0, t, 0.0)
         t = np.where(value - deepest >= -exact, math.inf, t)
-        found.append(np.where(room < -exact, 0.0, t))
+        found.append(np.where(room < -exact, 0.0, np.where(np.isfinite(bound), t, math.inf)))
     exits = np.concatenate(found, axis=1)
-    exits[:, np.isposinf(lengths.bounds[1]).nonzero()[0]] = math.inf
     best = exits.argmin(axis=1)
     return exits[np.arange(len(best)), best], LENGTH_MAX - best // 6, best % 6
 

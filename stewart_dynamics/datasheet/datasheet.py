@@ -14,7 +14,6 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags import recording
-from stewart_dynamics.capability import box_condition, box_legs
 from stewart_dynamics.datasheet import claimed_box, ratings, workspace
 from stewart_dynamics.datasheet.claimed_box import largest_length, LARGEST_RULE
 from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
@@ -68,8 +67,7 @@ _SLOWEST = 1.0
 STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
 
 # The machine code that every datasheet needs.
-FUNCTIONS = (box_legs.legs_in_box, box_condition.condition_in_box,
-             inverse_dynamics.solve, regressor.regressors,
+FUNCTIONS = (inverse_dynamics.solve, regressor.regressors,
              *recording.FUNCTIONS)
 
 
