@@ -539,9 +539,10 @@ class Capability:
         Positions and rotation vectors from a center grow by the factor, and their rates and
         accelerations with them. Lengths, joint angles, clearance and singularities end the factor
         as they end a ``travel`` from the center. Rates, forces, and speeds and torques of motors
-        are bounded between factors (``growth_bounds``), in intervals that are bisected until no
-        limit is exceeded before the answer: it is the first root, exact to rounding errors. Only
-        a part in which a limit is exceeded by no more than 1e-10 of it may be passed.
+        are sampled at ``growth.STEPS`` equal steps of the factor, up to that end; where it has
+        none, up to 1, and from then on up to twice the factor. The answer is the first root in
+        the first step at whose end a limit is exceeded, exact to rounding errors; a limit that
+        is exceeded only between two steps is passed.
 
         Parameters
         ----------
@@ -555,8 +556,7 @@ class Capability:
         Raises
         ------
         MotionError
-            Next to a singularity, or after ``growth.MOST_INTERVALS`` intervals, it is not known
-            whether a limit is exceeded.
+            Next to a singularity it is not known whether a limit is exceeded.
 
         """
         check_kind(motion, Motion)
