@@ -10,8 +10,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-from stewart_dynamics.arrays import Bytes, Integers
-from stewart_dynamics.compilation.functions import entry_point
 from stewart_dynamics.errors import one_line
 from stewart_dynamics.messages.recorded import Messages
 import zstandard
@@ -99,28 +97,13 @@ def split(block: Messages, time: int) -> tuple[Messages, Messages]:
     return block.chosen(slice(at)), compact(block.chosen(slice(at, None)))
 
 
-@entry_point('u1[::1]', 'i8[::1]', 'i8[::1]', 'u1[::1]')
-def _gather(data: Bytes, starts: Integers, sizes: Integers, out: Bytes) -> None:
-    """Copy messages, one after the other."""
-    at = 0
-    for n in range(len(starts)):
-        for k in range(starts[n], starts[n] + sizes[n]):
-            out[at] = data[k]
-            at += 1
-
-
-# The machine code that blocks need.
-FUNCTIONS = (_gather,)
-
-
 def compact(block: Messages) -> Messages:
     """Return a block without the bytes that belong to no message of it, if these are many."""
     if len(block.data) < _FEW_BYTES or 2 * (total := int(block.sizes.sum())) >= len(block.data):
         return block
-    data = np.empty(total, dtype=np.uint8)
-    _gather(block.data, np.ascontiguousarray(block.starts), np.ascontiguousarray(block.sizes),
-            data)
-    return block._replace(starts=np.cumsum(block.sizes) - block.sizes, data=data)
+    starts = np.cumsum(block.sizes) - block.sizes
+    at = np.arange(total) + np.repeat(block.starts - starts, block.sizes)
+    return block._replace(starts=starts, data=block.data[at])
 
 
 class RowsFile:

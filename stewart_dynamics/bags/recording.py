@@ -10,7 +10,6 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 import tempfile
 
-from stewart_dynamics.bags import blocks
 from stewart_dynamics.bags.blocks import of_good_length, Source
 from stewart_dynamics.bags.find import files_of
 from stewart_dynamics.bags.mcap_file import MAGIC, McapFile, scan
@@ -20,7 +19,7 @@ from stewart_dynamics.messages.recorded import Messages
 import zstandard
 
 # The machine code that every bag needs.
-FUNCTIONS = (*blocks.FUNCTIONS, scan)
+FUNCTIONS = (scan,)
 
 _SQLITE = b'SQLite format 3\0'
 _ROS_1 = b'#ROSBAG V'

@@ -197,11 +197,16 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
         yield LikelyMistake(*found[0][1:])
 
 
-def of_validation(before: Array, after: Array, measured: Array) -> Iterator[LikelyMistake]:
-    """Yield a likely mistake if the file predicts held-out efforts better than the fit."""
+def of_validation(before: Array, after: Array, measured: Array, deviation: float,
+                  ) -> Iterator[LikelyMistake]:
+    """
+    Yield a likely mistake if the file predicts held-out efforts better than the fit.
+
+    ``deviation``: of the fit's prediction [N], RMS; twice as much is no reason.
+    """
     file, fitted, size = (math.sqrt(float(np.mean(each ** 2))) for each in (
         before, after, measured))
-    if fitted > _WORSE * file + LEFT_BY_FILTERS * size:
+    if fitted > math.hypot(_WORSE * file + LEFT_BY_FILTERS * size, 2.0 * deviation):
         yield LikelyMistake(
             'validation', f'on held-out time the residual is {file:.3g} N by the file and '
             f'{fitted:.3g} N by a fit to the rest: the file is better; the model does not hold in '
