@@ -81,7 +81,7 @@ class Factor(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """What a search over a box has found."""
+    """Result of a search over a box."""
 
     point: Array  # worst point [d; r] (6,)
     code: int  # of the limit, and leg

@@ -185,11 +185,9 @@ def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array,
 
     ways (N,): parts of the travels in which legs move by the size of the hexapod.
     """
-    begin = quantity.values(block.at(np.arange(len(ends)), np.zeros(len(ends))))
-    exits = np.where(begin.min(axis=1) < -ROUNDING, 0.0, math.inf)
-    finite = np.isfinite(ends)
+    exits, finite = np.full(len(ends), math.inf), np.isfinite(ends)
     bottoms, tops = np.zeros(len(ends)), np.where(finite, ends, _WINDOW * ways)
-    which = np.flatnonzero(exits > 0.0)
+    which = np.flatnonzero(ends > 0.0)
     while len(which):
         parts = np.where(finite[which, None], _PARTS, np.where(
             bottoms[which, None] > 0.0, _LATER_PARTS, _FIRST_PARTS))
@@ -199,8 +197,8 @@ def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array,
         which = which[(exits[which] == math.inf) & ~finite[which]
                       & (tops[which] < _FARTHEST * ways[which])]
         bottoms[which], tops[which] = tops[which], _WINDOW * tops[which]
-    columns = begin.argmin(axis=1)
-    if len(ended := np.flatnonzero((exits > 0.0) & (exits < math.inf))):
+    columns: Integers = np.zeros(len(exits), dtype=np.int64)
+    if len(ended := np.flatnonzero(exits < math.inf)):
         columns[ended] = quantity.values(block.at(ended, exits[ended])).argmin(axis=1)
     return exits, quantity.codes[columns], quantity.legs[columns]
 
@@ -222,6 +220,11 @@ def _search(quantity: Quantity, block: _Travels, exits: Array, narrow: Array, of
                                        quantity.tolerance)
         if not open_.any():
             return
+        begun = of[open_ & (low == 0.0)]
+        if len(begun) and used == len(open_):
+            outside = quantity.values(block.at(begun, np.zeros(len(begun)))).min(
+                axis=1) < -ROUNDING
+            exits[begun[outside]] = 0.0
         middle, half = 0.5 * (low + high)[open_], 0.5 * (high - low)[open_]
         of, low, high = of[open_], middle + first[open_] * half, middle + last[open_] * half
         short = high - low <= np.maximum(narrow[of], _FAR * high)
