@@ -12,13 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.capability import travel
+from stewart_dynamics.capability.clearance import Clearance
 from stewart_dynamics.capability.force_intervals import (
     largest_multiple, quadratic_exit)
 from stewart_dynamics.capability.growth import Growth
 from stewart_dynamics.capability.motions import Deviations, faster, timed
 from stewart_dynamics.capability.motor_bounds import MotorBounds
+from stewart_dynamics.capability.quantities import (
+    Angles, Conditioning, Lengths, starts_at)
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
 from stewart_dynamics.capability.travel import ENDS, LIMITS
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
@@ -26,7 +29,6 @@ from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, wrong_type)
-from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, PLATFORM, with_point_mass)
@@ -140,6 +142,16 @@ class Capability:
         self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes
         self._plates = (none, none) if clearance is None else (clearance.base, clearance.platform)
         self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
+        size = float(platform.parameters['singularity.characteristic_length'])
+        nearest = float(self._bounds[travel.CLEARANCE_MIN, 0])
+        self._margins = travel.PoseMargins(
+            Lengths(self._bounds[:2]) if (self._bounds[0] > 0.0).any() or np.isfinite(
+                self._bounds[1]).any() else None,
+            Angles(self._bounds[2:4], self._axes[:6]) if (
+                self._bounds[2:4] < math.pi).any() else None,
+            Conditioning(self._pose_limits.stop_condition, size),
+            None if clearance is None else Clearance(
+                clearance.shapes, nearest, size, *map(len, self._plates)), size)
         self._motors = MotorBounds(platform.parameters) if platform.parameters.drives else None
         self._frictionless = StewartPlatform(platform.parameters.replaced({
             'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}))
@@ -174,13 +186,9 @@ class Capability:
         shape = common_shape(pose=pose.shape, direction=directions.shape[:-1],
                              pivot=pivots.shape[:-1])
         rows = motion_rows(pose, shape)
-        values = np.empty(len(rows))
-        codes, legs = (np.empty(len(rows), dtype=np.int64) for _ in range(2))
-        constants = (self.platform.constants, self._axes, self._bounds, self._shapes,
-                     *self._plates, self._pose_limits.stop_condition)
-        in_parts(travel.travels, constants, rows, copies(directions, shape),
-                 copies(pivots, shape), values, codes, legs,
-                 scratch=travel.memory_of(self._plates))
+        starts = starts_at(self.platform.parameters, self._axes, self._plates, rows,
+                           copies(pivots, shape))
+        values, codes, legs = travel.travels(self._margins, starts, copies(directions, shape))
         if np.isnan(values).any():
             at = int(np.isnan(values).argmax())
             where = list(map(int, np.unravel_index(at, shape))) if shape else ''
@@ -196,7 +204,7 @@ class Capability:
 
         Lengths, joint angles, clearance of the legs, the condition number up to
         ``singularity.stop_condition``, and the sign of det(J), by branch and bound
-        (``capability.box_cells``). The work is bounded: a box that is within the limits, but too
+        (``capability.reachable``). The work is bounded: a box that is within the limits, but too
         near to a singularity, may be answered with ``certain`` False and a worst pose whose excess
         is negative.
 
@@ -220,23 +228,16 @@ class Capability:
         Return the largest factor by which a box of ranges can be scaled and still is reachable.
 
         Arguments are those of ``reachable``; each range includes zero. The box of the answer is
-        proven to be reachable. Where lengths or joint angles limit, a box larger by 1e-8 is not;
-        where the clearance of the legs limits it is found to 1 %, if that takes a bounded number
-        of steps; where a singularity limits the number of steps may end the proof earlier.
-        ``upper`` is the shortest travel towards an end or the middle of each range: no larger
-        factor is reachable. Rotations grow up to a turn.
+        proven to be reachable, and one of the factor ``upper``, which a travel in it gives, is
+        not. They differ by 1e-9 of it where lengths or joint angles limit; by 1e-3 where the
+        clearance of the legs or a singularity limits, and by more where that is not decided
+        within a bounded number of steps. Rotations grow up to a turn.
         """
         ranges = checked_ranges(box)
         if (ranges[:, 0] > 0.0).any() or (ranges[:, 1] < 0.0).any():
             raise MotionError('box: a range without zero cannot be scaled')
-        factor, worst = self._boxes(pose, pivot).factor(ranges)
-        middle: Array = np.zeros(6)
-        ways = np.stack(np.meshgrid(*np.stack([*ranges.T, middle], axis=1)), axis=-1)
-        ways = ways.reshape(-1, 6)
-        ends = self.travel(self._single(pose), ways[ways.any(axis=1)], pivot).value
-        upper = max(float(ends.min()), factor)
-        return Extent(factor, '', -1, upper=upper) if worst is None else Extent(
-            factor, worst.limit, worst.leg, upper=upper)
+        found = self._boxes(pose, pivot).factor(ranges)
+        return Extent(found.value, found.limit, found.leg, upper=found.upper)
 
     def smallest(self, quantity: Callable[[Pose], ArrayLike], box: ArrayLike,
                  pose: Pose | Motion | None = None, pivot: ArrayLike | None = None) -> InBox:
@@ -328,8 +329,15 @@ class Capability:
         center = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
         if center.ndim > 1:
             raise MotionError(f'pivot: shape {center.shape}: must be (3,)')
-        return Boxes(self.platform, self._axes, self._bounds, self._shapes, self._plates,
-                     self._single(pose).rows, center)
+        row = self._single(pose).rows
+        starts = starts_at(self.platform.parameters, self._axes, self._plates, row[None],
+                           center[None])
+
+        def ends(directions: Array) -> travel.Ends:
+            every: Integers = np.zeros(len(directions), dtype=np.int64)
+            return travel.travels(self._margins, starts.take(every), directions)
+
+        return Boxes(self.platform, self._margins, starts, ends, row, center)
 
     def wrench(self, pose: Pose | Motion, direction: ArrayLike, base: BaseMotion | None = None,
                *, continuous: bool = False) -> Extent:
@@ -531,9 +539,10 @@ class Capability:
         Positions and rotation vectors from a center grow by the factor, and their rates and
         accelerations with them. Lengths, joint angles, clearance and singularities end the factor
         as they end a ``travel`` from the center. Rates, forces, and speeds and torques of motors
-        are bounded between factors (``growth_bounds``), in intervals that are bisected until no
-        limit is exceeded before the answer: it is the first root, exact to rounding errors. Only
-        a part in which a limit is exceeded by no more than 1e-10 of it may be passed.
+        are sampled at ``growth.STEPS`` equal steps of the factor, up to that end; where it has
+        none, up to 1, and from then on up to twice the factor. The answer is the first root in
+        the first step at whose end a limit is exceeded, exact to rounding errors; a limit that
+        is exceeded only between two steps is passed.
 
         Parameters
         ----------
@@ -547,8 +556,7 @@ class Capability:
         Raises
         ------
         MotionError
-            Next to a singularity, or after ``growth.MOST_INTERVALS`` intervals, it is not known
-            whether a limit is exceeded.
+            Next to a singularity it is not known whether a limit is exceeded.
 
         """
         check_kind(motion, Motion)

@@ -43,8 +43,6 @@ class MotorBounds:
     limited, limits_speeds: there is a limit of torques, of speeds.
     ratio (6,): turns of the motors for each metre of their drives [rad/m].
     inertia (6,): at the motors' shafts [kg m^2].
-    scales (two of (6,)): torques per load [m]: of the motor that drives, and of the one that is
-        driven.
     fastest (6,): ``drive.speed_max``, or infinity [rad/s].
     """
 
@@ -55,7 +53,6 @@ class MotorBounds:
         self.ratio, self._mass = constants[:, 0], constants[:, 2]
         self._factors = 1.0 + constants[:, 3], 1.0 + constants[:, 4]
         self.inertia = self._mass / self.ratio ** 2
-        self.scales = tuple(each / self.ratio for each in self._factors)
         self._strongest, self.fastest = bound_of(p, TORQUE_MAX), bound_of(p, SPEED_MAX)
         self.limits_speeds = bool(np.isfinite(self.fastest).any())
         self._curve = p[TORQUE_SPEED]
@@ -93,37 +90,6 @@ class MotorBounds:
     def _names(self, largest: Array) -> Array:
         return np.where(
             largest < self._strongest, short_name(TORQUE_SPEED), short_name(TORQUE_MAX))
-
-    def between(self, low: Array, high: Array, rates: tuple[Array, Array],
-                friction: tuple[Array, Array], band: Array) -> list[Array]:
-        """
-        Return bounds of ``ratios`` in an interval.
-
-        low, high (6, N, 6): bounds of the quantities of ``GrowthBounds``.
-        rates (two of (N, 6)): bounds of the rates of the drives, low and high [m/s].
-        friction (two of (N, 6)): bounds of the Coulomb friction, low and high [N].
-        band (6,): rates below which a drive is near standstill.
-        """
-        speeds, load = ((low[n], high[n]) for n in (2, 3))
-        with np.errstate(invalid='ignore'):  # both factors count where loads are not bounded
-            sign = np.sign(rates[0]) * ((rates[0] >= band) | (rates[1] <= -band))
-            power = sign * (load[0] + friction[0]), sign * (load[1] + friction[1])
-        largest: Array = np.zeros(sign.shape)
-        for n, scale, unused in ((4, self.scales[0], np.maximum(*power) < 0.0),
-                                 (5, self.scales[1], np.minimum(*power) > 0.0)):
-            extra = np.minimum(*(scale * each for each in friction)), np.maximum(
-                *(scale * each for each in friction))
-            torque = np.maximum(-low[n] - extra[0], high[n] + extra[1])
-            largest = np.where(unused, largest, np.maximum(largest, torque))
-        fastest = np.maximum(-speeds[0], speeds[1])
-        slowest = np.maximum(np.maximum(speeds[0], -speeds[1]), 0.0)
-        available = np.minimum(self._largest(slowest), self._largest(fastest))
-        for speed, least in () if self._curve is None else self._curve:
-            inside = (slowest < speed) & (speed < fastest)
-            available = np.where(inside, np.minimum(available, least), available)
-        with np.errstate(divide='ignore', invalid='ignore'):
-            return [fastest / self.fastest,
-                    np.where(largest == 0.0, 0.0, np.minimum(largest / available, _FAR_BEYOND))]
 
     @property
     def forces_at_rest(self) -> Array:

@@ -5,42 +5,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.capability import box_condition
-from stewart_dynamics.capability.box_cells import CELL, DEPTH, EXCESS, FOUND, LEG, POINT, UPPER
-from stewart_dynamics.capability.box_clearance import clearance_in_box, PAIRS
-from stewart_dynamics.capability.box_condition import condition_in_box
-from stewart_dynamics.capability.box_legs import legs_in_box
-from stewart_dynamics.capability.clearance_bounds import CORNER, rows_of
-from stewart_dynamics.capability.travel import CLEARANCE_MIN, ENDS
+from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.capability.quantities import Moved, Quantity, Starts
+from stewart_dynamics.capability.travel import (
+    ENDS, Ends, LIMITS, NOTHING, PoseMargins, SINGULARITY as SINGULAR)
+from stewart_dynamics.capability.workspace import smallest
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import characteristic_length_of
-from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector
-from stewart_dynamics.mechanics.limits import SINGULARITY, TOLERANCE
+from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
+from stewart_dynamics.mechanics.limits import (
+    CLEARANCE_MIN, LENGTH_MAX, Limits, OF_JOINTS, SINGULARITY, TOLERANCE)
 from stewart_dynamics.mechanics.rows import POSE
-from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Largest numbers of cells: for each limit of each leg, for the clearance of each pair of legs, and
-# for the condition number.
-_MOST_OF_LEGS, _MOST_OF_CLEARANCE, _MOST_OF_CONDITION = 20_000, 100_000, 100_000
-# The largest excess of a clearance is found to this part.
-_COARSE = 0.1
-# Factors of a box are found to this part.
-_EXACT = 1e-9
-# For a box that ends at a clearance or a singularity the factor is found to these parts: each
-# proof takes longer.
-_EXACT_OF_CLEARANCE = 0.01
-_EXACT_OF_CONDITION = 1e-3
+# Largest number of boxes that are tried for a factor, and number of cells of a round whose worst
+# corners are tried.
+_MOST_TRIALS, _LIKELY = 50, 16
 # Smaller bounds that are not zero have no finite factor [m, rad].
 SMALLEST = 1e-300
 # Boxes of translations are proven up to this multiple of the hexapod's size.
@@ -82,118 +71,200 @@ class Reachable(NamedTuple):
     """
 
 
-class _Proof(NamedTuple):
-    worst: Worst
-    certain: bool
-    part: float
-    """Excess relative to the limit."""
+class Factor(NamedTuple):
+    """How far a box can be scaled."""
+
+    value: float  # proven to be reachable
+    upper: float  # not reachable
+    limit: str  # empty where nothing limits
+    leg: int
+
+
+class _Found(NamedTuple):
+    """Result of a search over a box."""
+
+    point: Array  # worst point [d; r] (6,)
+    code: int  # of the limit, and leg
+    leg: int
+    part: float  # excess there, relative to the limit
+    certain: bool  # no point exceeds a limit
 
 
 class Boxes:
     """
     Boxes of ranges around a pose.
 
+    Branch and bound: the margins of all limits are enclosed over cells of a box (``intervals``),
+    and cells in which a limit is not proven to be kept are divided.
+
     Parameters
     ----------
     platform : StewartPlatform
         The hexapod.
-    axes, bounds, shapes, plates : (12, 3), (5, 6), (6, 3), two of (M, 3)
-        As in ``travel.travels``.
+    margins : PoseMargins
+        Quantities that have limits.
+    starts : Starts
+        The pose from which boxes are measured, and its pivot.
+    travel : callable
+        Takes directions (N, 6), returns the ends of travels from the pose.
     row, pivot : (MOTION,), (3,)
-        Pose from which boxes are measured, and center of rotation in the platform frame [m].
+        The pose as a row of motion, and center of rotation in the platform frame [m].
 
     """
 
-    def __init__(self, platform: StewartPlatform, axes: Array, bounds: Array, shapes: Array,
-                 plates: Sequence[Array], row: Array, pivot: Array) -> None:
-        self._platform, self._axes = platform, axes
-        self._bounds, self._shapes, self._plates = bounds[:CLEARANCE_MIN], shapes, plates
-        self._nearest = float(bounds[CLEARANCE_MIN, 0])
-        self._row, self._pivot = row, pivot
-        self._stop = stop_condition_of(platform.parameters)
-        self._legs = np.empty((6, LEG))
-        self._cells = np.empty((DEPTH + 2, CELL))
-        self._work = np.empty((7, box_condition.WORK))
-        self._corners = np.empty((rows_of(plates, 6), CORNER))
+    def __init__(self, platform: StewartPlatform, margins: PoseMargins, starts: Starts,
+                 travel: Callable[[Array], Ends], row: Array, pivot: Array) -> None:
+        self._platform, self._margins, self._starts = platform, margins, starts
+        self._travel, self._row, self._pivot = travel, row, pivot
+        self._bounds = Limits(platform.parameters).bounds
+        self._size = margins.size
 
     def reachable(self, ranges: Array) -> Reachable:
         """Return whether a box (6, 2) is within the limits."""
-        box = _box(ranges)
-        worst, certain, part = self._worst_of_legs(box)
-        if not certain:
-            return Reachable(False, worst)
-        if self._nearest > -math.inf:
-            near, certain, part_of_clearance = self._worst_clearance(box)
-            if not certain:
-                return Reachable(False, near)
-            if part_of_clearance > part:
-                worst, part = near, part_of_clearance
-        singular, certain, part_of_condition = self._worst_condition(box)
-        return Reachable(
-            certain, singular if not certain or part_of_condition > part else worst)
+        found: list[_Found] = []
+        for quantity in self._margins.given:
+            of_one = self._worst(quantity, ranges)
+            if not of_one.certain and of_one.part <= TOLERANCE:  # not decided
+                of_one = max(of_one, self._searched(quantity, ranges), key=lambda each: each.part)
+            if not of_one.certain:
+                return Reachable(False, self._worst_pose(of_one))
+            found.append(of_one)
+        return Reachable(True, self._worst_pose(max(found, key=lambda each: each.part)))
 
-    def factor(self, ranges: Array) -> tuple[float, Worst | None]:
+    def factor(self, ranges: Array) -> Factor:
         """
-        Return the largest factor by which a box can be scaled, and the worst pose above it.
+        Return the largest factor by which a box can be scaled.
 
-        None where nothing limits up to a turn.
+        The travel along a ray of the box is a factor that is not reachable. Below the shortest
+        one the box is proven, or a pose that exceeds a limit gives a shorter ray.
         """
-        size = characteristic_length_of(self._platform.constants)
-        sizes = np.abs(ranges).max(axis=1) / np.array([size, size, size, 1.0, 1.0, 1.0])
+        sizes = np.abs(ranges).max(axis=1) / np.array([*[self._size] * 3, 1.0, 1.0, 1.0])
         unit = float(sizes.max())
         ranges = ranges / unit
         # rotation vectors of more than a turn add nothing
         turned = float(sizes[3:].max()) / unit
         most = 2.0 * math.pi / turned if turned > 2.0 * math.pi / _LARGEST else math.inf
-        factor, worst = _largest(
-            lambda factor: self._worst_of_legs(_box(factor * ranges)), most, _EXACT)
-        if factor > 0.0 and self._nearest > -math.inf:
-            factor, worst = _largest(
-                lambda factor: self._worst_clearance(_box(factor * ranges), math.inf), factor,
-                _EXACT_OF_CLEARANCE, worst)
-        if factor > 0.0:
-            factor, worst = _largest(
-                lambda factor: self._worst_condition(_box(factor * ranges)), factor,
-                _EXACT_OF_CONDITION, worst)
-        return factor / unit, worst
+        rays = np.stack(np.meshgrid(*np.column_stack([ranges, np.zeros(6)])), axis=-1)
+        rays = rays.reshape(-1, 6)
+        upper, code, leg = self._shortest(rays[rays.any(axis=1)])
+        limit, trial = (code, leg), min(upper, most, _LARGEST)
+        if not upper < most:
+            limit = NOTHING, -1
+        for quantity in self._margins.given:
+            if limit[0] in quantity.codes:
+                trial = min(trial, upper * (1.0 - quantity.fine))
+            proven, open_ = 0.0, math.inf
+            for _ in range(_MOST_TRIALS):
+                if not proven < trial:
+                    break
+                found = self._searched(quantity, trial * ranges)
+                if found.part <= TOLERANCE:
+                    found = self._worst(quantity, trial * ranges, first=True)
+                if found.certain:
+                    proven = trial
+                    if open_ == math.inf or open_ <= quantity.coarse * proven:
+                        break
+                    trial = 0.5 * (proven + open_)
+                elif found.part > 0.0:
+                    ray = self._shortest(found.point[None] / trial)
+                    upper, limit = min(trial, ray[0]), ray[1:]
+                    trial = upper * (1.0 - quantity.fine)
+                else:  # not decided
+                    limit = found.code, found.leg
+                    open_ = trial
+                    trial = 0.5 * (proven + open_) if proven > 0.0 else 0.75 * open_
+            trial = proven
+        if limit[0] == NOTHING:
+            return Factor(most / unit, math.inf, '', -1)
+        return Factor(trial / unit, max(upper, trial) / unit, ENDS[limit[0]], limit[1])
 
-    def _worst_of_legs(self, box: Array) -> _Proof:
-        """Return the worst pose of lengths and joint angles, and whether limits are kept."""
-        found = np.zeros((24, FOUND))
-        legs_in_box(
-            self._platform.constants, self._axes, self._bounds, self._row, self._pivot, box,
-            _MOST_OF_LEGS, self._legs, self._cells, found)
-        limited = np.isfinite(found[:, EXCESS])
-        sizes = np.where(limited, self._bounds.ravel(), 1.0)
-        parts = np.where(limited, found[:, EXCESS] / sizes, -math.inf)
-        at = int(parts.argmax())
-        certain = bool(np.all(found[:, UPPER] <= TOLERANCE * sizes))
-        return _Proof(Worst(self.poses(found[at, POINT]), at % 6, ENDS[at // 6],
-                            float(found[at, EXCESS])), certain, float(parts[at]))
+    def _shortest(self, directions: Array) -> tuple[float, int, int]:
+        """Return the shortest travel, its code and its leg."""
+        ends = self._travel(directions)
+        at = int(ends.values.argmin())
+        return float(ends.values[at]), int(ends.codes[at]), int(ends.legs[at])
 
-    def _worst_clearance(self, box: Array, coarse: float = _COARSE) -> _Proof:
-        """Return the worst pose by clearance of the legs, and whether the limit is kept."""
-        found = np.empty((len(PAIRS), FOUND))
-        clearance_in_box(
-            self._platform.constants, self._axes, self._shapes, *self._plates, self._nearest,
-            self._row, self._pivot, box, _MOST_OF_CLEARANCE, coarse, self._legs, self._cells,
-            self._corners, found)
-        at = int(found[:, EXCESS].argmax())
-        excess = float(found[at, EXCESS])
-        certain = bool(np.all(found[:, UPPER] <= TOLERANCE * self._nearest))
-        size = self._platform.parameters['singularity.characteristic_length']
-        return _Proof(Worst(self.poses(found[at, POINT]), PAIRS[at][0],
-                            ENDS[CLEARANCE_MIN], excess), certain, excess / size)
+    def _searched(self, quantity: Quantity, ranges: Array) -> _Found:
+        """Return the worst point that a local search finds, where a proof takes long."""
+        if quantity.exact <= 1e-6:
+            return _Found(ranges[:, 0], NOTHING, -1, -math.inf, False)
+        found = smallest(lambda points: -quantity.excesses_at(self._at(points)).max(axis=1),
+                         lambda points: points, ranges)
+        column = int(quantity.excesses_at(self._at(found.pose[None])).argmax())
+        return _Found(found.pose, int(quantity.codes[column]), int(quantity.legs[column]),
+                      -found.value, False)
 
-    def _worst_condition(self, box: Array) -> _Proof:
-        """Return the worst pose by condition number, and whether it stays below its limit."""
-        found, count = np.empty(FOUND), np.empty(1, dtype=np.int64)
-        condition_in_box(
-            self._platform.constants, self._axes, self._row, self._pivot, box, self._stop,
-            _MOST_OF_CONDITION, self._legs, self._cells, self._work, found, count)
-        excess = float(found[EXCESS])
-        return _Proof(Worst(self.poses(found[POINT]), -1, SINGULARITY, excess),
-                      bool(found[UPPER] == 0.0), excess / self._stop)
+    def _at(self, points: Array) -> Moved:
+        """Return the legs at points (N, 6)."""
+        return Moved(self._starts, points, np.zeros((0, len(points), 6)))
+
+    def _worst(self, quantity: Quantity, ranges: Array, first: bool = False) -> _Found:
+        """
+        Search for the largest excess over a box.
+
+        first: the search ends with the first point that exceeds a limit.
+        """
+        axes = np.flatnonzero(np.ptp(ranges, axis=1) > 0.0)
+        points, halves = ranges.mean(axis=1)[None], 0.5 * np.ptp(ranges, axis=1)[None, axes]
+        worst, used, certain = _Found(
+            points[0], NOTHING, -1, -math.inf, False), 0, True
+        with np.errstate(all='ignore'):
+            while len(points):
+                used += len(points)
+                edges = np.zeros((len(axes), len(points), 6))
+                edges[np.arange(len(axes)), :, axes] = halves.T
+                moved = Moved(self._starts, points, edges)
+                margins = quantity.margins(moved)
+                bounds = quantity.excesses(margins.low)
+                bounds[np.isnan(bounds)] = math.inf
+                columns = bounds.argmax(axis=1)
+                rows = np.arange(len(points))
+                slopes = margins.slopes[:, rows, columns].T
+                uppers = bounds[rows, columns]
+                likely = np.argsort(-uppers)[:_LIKELY]
+                tried = points[likely]
+                tried[:, axes] -= np.copysign(halves[likely], slopes[likely])
+                tried = np.concatenate([points[likely], tried])
+                parts = quantity.excesses_at(self._at(tried))
+                at, column = np.unravel_index(int(parts.argmax()), parts.shape)
+                if parts[at, column] > worst.part:
+                    worst = _Found(tried[at], int(quantity.codes[column]), int(
+                        quantity.legs[column]), float(parts[at, column]), False)
+                if worst.part > TOLERANCE and first:
+                    return worst
+                enough = 0.5 * TOLERANCE if first else _enough(worst.part, quantity.exact)
+                left = uppers > enough
+                if used > quantity.most:
+                    certain = not (uppers > TOLERANCE).any()
+                    break
+                weights = quantity.weights(moved, margins.slopes[:, rows, columns]).T[left]
+                points, halves = points[left], halves[left]
+                quantity = quantity.only(np.asarray((bounds > enough).any(axis=0)))
+                for _ in range(3 if len(points) < 64 else 1):
+                    if len(points):
+                        points, halves, weights = _halved(points, halves, weights, axes)
+        return worst._replace(certain=certain and worst.part <= TOLERANCE)
+
+    def _worst_pose(self, found: _Found) -> Worst:
+        """Return the pose of a search, with its excess in units of the limit."""
+        code, leg = found.code, found.leg
+        pose = self.poses(found.point)
+        if code == SINGULAR:
+            solved = self._platform.inverse_dynamics(Motion.from_pose(pose), singular='nan')
+            excess = float(solved.condition_number) - self._margins.condition.stop
+            if not solved.determinant * self._starts.sides[0] > 0.0:
+                excess = math.inf
+            return Worst(pose, -1, SINGULARITY, excess)
+        name = LIMITS[code]
+        if name == CLEARANCE_MIN:
+            values = LegClearance(self._platform.parameters)(Motion.from_pose(pose).rows[None])[0]
+        elif name in OF_JOINTS:
+            values = self._platform.joint_angles(pose)[OF_JOINTS.index(name)]
+        else:
+            values = self._platform.inverse_kinematics(pose)
+        excess = float(values[leg] - self._bounds[name][leg])
+        return Worst(pose, leg, ENDS[code], excess if name in (
+            LENGTH_MAX, *OF_JOINTS) else -excess)
 
     def poses(self, points: Array) -> Pose:
         """Return the poses of translations and rotation vectors (..., 6)."""
@@ -221,26 +292,20 @@ def checked_ranges(value: ArrayLike) -> Array:
     return ranges
 
 
-def _box(ranges: Array) -> Array:
-    """Return middle and half widths (12,) of ranges (6, 2)."""
-    return np.concatenate([ranges.mean(axis=1), 0.5 * np.ptp(ranges, axis=1)])
+def _enough(best: float, exact: float) -> float:
+    """Return the relative excess that cells need not exceed: nothing depends on more digits."""
+    least = 0.5 * TOLERANCE
+    return least if -exact <= best <= least else best + exact
 
 
-def _largest(prove: Callable[[float], _Proof], most: float, exact: float,
-             worst: Worst | None = None) -> tuple[float, Worst | None]:
-    """Return the largest factor, up to ``most``, that is proven, and the worst pose above it."""
-    begin = prove(0.0)
-    if not begin.certain:
-        return 0.0, begin.worst
-    bound = min(most, _LARGEST)
-    low, high, trial = 0.0, math.inf, min(bound, 1.0) if worst is None else bound
-    while high - low > exact * high or high == math.inf:
-        proof = prove(trial)
-        if proof.certain:
-            low = trial
-            if trial >= bound:
-                return most, worst
-        else:
-            high, worst = trial, proof.worst
-        trial = min(2.0 * trial, bound) if high == math.inf else 0.5 * (low + high)
-    return low, worst
+def _halved(points: Array, halves: Array, weights: Array, axes: Integers,
+            ) -> tuple[Array, Array, Array]:
+    """Return cells divided along the axes of their largest weights."""
+    rows, at = np.arange(len(points)), weights.argmax(axis=1)
+    halves, weights = halves.copy(), weights.copy()
+    halves[rows, at] *= 0.5
+    weights[rows, at] *= 0.5
+    step = np.zeros(points.shape)
+    step[rows, axes[at]] = halves[rows, at]
+    return (np.concatenate([points - step, points + step]), np.tile(halves, (2, 1)),
+            np.tile(weights, (2, 1)))

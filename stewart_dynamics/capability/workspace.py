@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, Limits, OF_JOINTS, short_name,
     SINGULARITY)
@@ -325,10 +325,10 @@ class InBox(NamedTuple):
     """The smallest value of a quantity that was found in a box, and its pose."""
 
     value: float
-    pose: Pose
+    pose: Any
 
 
-def smallest(quantity: Callable[[Pose], Array], poses: Callable[[Array], Pose], ranges: Array,
+def smallest(quantity: Callable[[Any], Array], poses: Callable[[Array], Any], ranges: Array,
              ) -> InBox:
     """
     Return the smallest value of a quantity that a search finds in a box (6, 2).

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.capability import box_condition, box_legs, travel
 from stewart_dynamics.datasheet import claimed_box, ratings, workspace
 from stewart_dynamics.datasheet.claimed_box import largest_length, LARGEST_RULE
 from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
@@ -66,7 +65,6 @@ _SLOWEST = 1.0
 STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
 
 # The machine code that every datasheet needs.
-FUNCTIONS = travel.travels, box_legs.legs_in_box, box_condition.condition_in_box
 
 
 def write_datasheet(parameters: Parameters, order: Order, folder: Path, options: Options,

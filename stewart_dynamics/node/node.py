@@ -17,7 +17,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 
-from stewart_dynamics.capability import travel
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError, StewartError
@@ -92,7 +91,6 @@ class DynamicsNode(LifecycleNode):
         self._active = False
         self._configured = False
         self._topics = NodeTopics(self)
-        self._travel_code = Preparation(travel.travels)
         self._base_wrench_read = False  # it has a subscriber
         self._planned: TaskQueue[planned.PlannedOutcome] = TaskQueue(
             partial(OneShotTimer, self, PAUSE), self._on_outcome)
@@ -147,7 +145,7 @@ class DynamicsNode(LifecycleNode):
         self._joint_states = PublisherAtRate(
             publishers.get(JOINT_STATES), rate, self._model_messages.joint_states)
         self._transforms_read = False  # they have a subscriber
-        self._travel = TravelPublisher(parameters, publishers[TRAVEL], self._travel_code)
+        self._travel = TravelPublisher(parameters, publishers[TRAVEL])
         self._model_measured = parameters['joint_states.source'] == AS_MEASURED
         self._handled, self._rested = -math.inf, False
         self._active = True

@@ -19,7 +19,6 @@ from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiAr
 
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.capability.travel import LIMITS
-from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -81,12 +80,10 @@ class TravelPublisher(PublisherAtRate):
     Publishes ``~/travel``: how far the platform can go from the pose of the last setpoint.
 
     parameters: geometry and limits; ``use`` replaces them.
-    code: machine code that is compiled once somebody subscribes.
     """
 
-    def __init__(self, parameters: Parameters, publisher: Any, code: Preparation) -> None:
+    def __init__(self, parameters: Parameters, publisher: Any) -> None:
         super().__init__(publisher, TRAVEL_RATE, self._message)
-        self._code = code
         self._read = self._said = False
         self.use(parameters)
 
@@ -97,9 +94,8 @@ class TravelPublisher(PublisherAtRate):
 
     def look(self) -> str:
         """Check whether there is a subscriber; return a notice where no limit is set, once."""
-        subscribed = self._publisher.get_subscription_count() > 0
-        self._read = subscribed and self._code.begin()
-        if not subscribed:
+        self._read = self._publisher.get_subscription_count() > 0
+        if not self._read:
             return ''
         unlimited = all(self._parameters[name] is None for name in LIMITS)
         said, self._said = self._said, True
