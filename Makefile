@@ -175,9 +175,7 @@ docs-site: $(INSTALLED)
 
 installed: $(INSTALLED)
 
-# With all machine code, which takes half a minute on two cores.
 environment: $(INSTALLED)
-	@$(VENV)/bin/stewart_dynamics --compile
 
 $(PREPARED): $(REQUIREMENTS)
 	@for python in $(PYTHONS); do \

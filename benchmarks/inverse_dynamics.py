@@ -411,7 +411,7 @@ def measured_on() -> str:
                          text=True).stdout.strip()
     cpus = len(os.sched_getaffinity(0))
     return (f'{processor_name()}, {cpus} cores. Python {platform.python_version()}, '
-            f'numpy {np.__version__}, numba {version("numba")}, '
+            f'numpy {np.__version__}, '
             f'Pinocchio {pin.__version__}, gcc {gcc}.')
 
 

@@ -474,7 +474,7 @@ def main() -> None:
         if 'base' in options.parts:
             lines[BEGIN_BASE, END_BASE] = base_lines(
                 options.rounds, options.seconds, Path(name))
-    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
+    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'ros-rclpy'))
     computer = (f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
                 f'{platform.python_version()}, {versions}. {options.rounds} turns of '
                 f'{options.seconds} s each.')

@@ -148,7 +148,7 @@ def main() -> None:
     else:
         with tempfile.TemporaryDirectory() as name:
             marks, lines = (BEGIN, END), latency(options.rounds, options.seconds, Path(name))
-        versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
+        versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'ros-rclpy'))
         lines += [f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
                   f'{platform.python_version()}, {versions}. {options.rounds} turns of '
                   f'{options.seconds} s each.', '']

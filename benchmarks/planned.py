@@ -141,7 +141,7 @@ def main() -> None:
         f'processor. To hand the middleware a message of {len(trajectory(POINTS)) / 1e6:.1f} MB '
         f'takes {np.median(message):.1f} ms in the middle, {np.percentile(message, 90):.1f} ms '
         'for one of ten.'), '']
-    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
+    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'ros-rclpy'))
     lines += [f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
               f'{platform.python_version()}, {versions}. {options.rounds} turns of '
               f'{options.seconds} s each.', '']

@@ -370,7 +370,7 @@ def fleet_words(folder: Path) -> str:
 def measured_on(size: float, rounds: int) -> str:
     """Return processor, versions, and how it was measured."""
     versions = ', '.join(f'{name} {version(name)}' for name in (
-        'numpy', 'numba', 'rosbags', 'orjson', 'pyarrow'))
+        'numpy', 'rosbags', 'orjson', 'pyarrow'))
     return (f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
             f'{platform.python_version()}, {versions}. The bag has {size:.0f} MB. Medians of '
             f'{rounds} rounds; the longer bag once.')

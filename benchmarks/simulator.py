@@ -256,7 +256,7 @@ def main() -> None:
         parser.error('--rounds and --seconds must be at least 1')
     with tempfile.TemporaryDirectory() as name:
         nodes = node_rows(options.seconds, Path(name))
-    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
+    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'ros-rclpy'))
     lines = ['', *markdown(period_rows(options.rounds)), '', *markdown(nodes), '',
              *markdown(energy_rows()), '',
              f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '

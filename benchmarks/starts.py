@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How long programs take to start: for the first time on a computer, and each time after that.
+How long programs take to start.
 
 Run by hand, ``make bench``, on Linux; see README.md beside this file.
 """
@@ -15,7 +15,6 @@ import signal
 from statistics import median
 import subprocess
 import sys
-import tempfile
 import time
 from typing import NamedTuple
 
@@ -96,20 +95,17 @@ def until_ended(command: Sequence[str], environment: Mapping[str, str]) -> Start
 
 
 Run = Callable[[Sequence[str], Mapping[str, str]], Start]
-COLD: dict[str, tuple[Run, Sequence[str]]] = {
-    'the node, until it is ready': (until_ready, NODE),
+OF_NODE, OF_BARE_NODE = (
+    'the node, until it is ready', 'a bare lifecycle node with the same topics')
+STARTS: dict[str, tuple[Run, Sequence[str]]] = {
+    OF_NODE: (until_ready, NODE),
     'the first inverse dynamics of the library': (until_ended, FIRST_CALL),
-}
-WARM: dict[str, tuple[Run, Sequence[str]]] = {
-    **COLD,
-    'a bare lifecycle node with the same topics': (until_ready, BARE_NODE),
+    OF_BARE_NODE: (until_ready, BARE_NODE),
     '`import stewart_dynamics`': (
         until_ended, [sys.executable, '-c', 'import stewart_dynamics']),
     '`from stewart_dynamics import StewartPlatform`': (
         until_ended, [sys.executable, '-c', 'from stewart_dynamics import StewartPlatform']),
     '`import numpy`': (until_ended, [sys.executable, '-c', 'import numpy']),
-    '`import numba`, as the compiler does': (
-        until_ended, [sys.executable, '-c', 'import numba']),
     'Python': (until_ended, [sys.executable, '-c', 'pass']),
     '`stewart_replay --help`': (until_ended, [str(executable('stewart_replay')), '--help']),
 }
@@ -119,34 +115,18 @@ def run(rounds: int) -> tuple[list[str], list[Figure]]:
     """Measure; return the lines for the page, and the figures with targets."""
     environment = {
         **os.environ, 'ROS_DOMAIN_ID': DOMAIN, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
-    cold: dict[str, list[Start]] = {name: [] for name in COLD}
-    warm: dict[str, list[Start]] = {name: [] for name in WARM}
+    found: dict[str, list[Start]] = {name: [] for name in STARTS}
     for number in range(-1, rounds):  # the first does not count
-        for name, (take, command) in WARM.items():
+        for name, (take, command) in STARTS.items():
             start = take(command, environment)
             if number >= 0:
-                warm[name].append(start)
-        if number >= 0 and number % 4 == 0:
-            for name, (take, command) in COLD.items():
-                with tempfile.TemporaryDirectory() as folder:
-                    cold[name].append(take(
-                        command, {**environment, 'STEWART_DYNAMICS_CACHE_DIR': folder}))
-
-    def of(starts: list[Start]) -> Start:
-        return Start(*map(median, zip(*starts, strict=True)))
-
-    compiling = {name: of(cold[name]).processor - of(warm[name]).processor for name in COLD}
-    cells = [('start', 's', 'processor s', 'of that compiling'), *(
-        (f'for the first time: {name}', f'{of(starts).seconds:.2f}', f'{of(starts).processor:.2f}',
-         f'{compiling[name]:.1f}') for name, starts in cold.items()), *(
-        (name, f'{of(starts).seconds:.2f}', f'{of(starts).processor:.2f}', '')
-        for name, starts in warm.items())]
-    node, call = COLD
-    return ['', *markdown(cells), '', f'{processor_name()}. Medians of {rounds} starts, of '
-            f'{len(cold[node])} of the first ones.', ''], [
-        Figure('compiling for the node', compiling[node], 6.0, 'processor s'),
-        Figure('compiling for the first inverse dynamics', compiling[call], 3.0, 'processor s'),
-        Figure('start of the node', of(warm[node]).seconds, 0.5, 's'),
-        Figure('`import stewart_dynamics`', of(warm['`import stewart_dynamics`']).seconds, 0.06,
-               's'),
-        Figure('`stewart_replay --help`', of(warm['`stewart_replay --help`']).seconds, 0.2, 's')]
+                found[name].append(start)
+    of = {name: Start(*map(median, zip(*starts, strict=True))) for name, starts in found.items()}
+    cells = [('start', 's', 'processor s'), *(
+        (name, f'{each.seconds:.2f}', f'{each.processor:.2f}') for name, each in of.items())]
+    return ['', *markdown(cells), '', f'{processor_name()}. Medians of {rounds} starts.', ''], [
+        Figure('start of the node', of[OF_NODE].seconds, 0.5, 's'),
+        Figure('start of the node, times that of a bare one',
+               of[OF_NODE].seconds / of[OF_BARE_NODE].seconds, 1.5, ''),
+        Figure('`import stewart_dynamics`', of['`import stewart_dynamics`'].seconds, 0.06, 's'),
+        Figure('`stewart_replay --help`', of['`stewart_replay --help`'].seconds, 0.2, 's')]

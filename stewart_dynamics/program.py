@@ -14,13 +14,10 @@ import os
 from pathlib import Path
 import re
 import sys
-from typing import Any, TextIO, TYPE_CHECKING
+from typing import Any, TextIO
 
 from stewart_dynamics import __version__, signals
 from stewart_dynamics.errors import one_line, shown_name, StewartError
-
-if TYPE_CHECKING:
-    from stewart_dynamics.compilation.functions import EntryPoint
 
 DONE, STRICT, PARTLY_READ = 0, 1, 3
 BAD_INPUT, INTERRUPTED = signals.BAD_INPUT, signals.INTERRUPTED
@@ -71,17 +68,9 @@ class Program:
             parser.add_argument('--strict', action='store_true',
                                 help=f'exit code {STRICT} when {self._strict}')
 
-    def prepare(self, mistakes: Iterable[str], functions: Sequence[EntryPoint] = ()) -> None:
-        """Print likely mistakes; compile functions side by side, or print why that fails."""
+    def prepare(self, mistakes: Iterable[str]) -> None:
+        """Print likely mistakes, and keep memory that is freed."""
         _keep_freed_memory()
-        if functions:
-            # Late, so that --help is fast.
-            from stewart_dynamics.compilation.functions import prepare
-            from stewart_dynamics.compilation.machine_code import HINT
-
-            if HINT:
-                self.complain(HINT)
-            prepare(functions)
         for mistake in mistakes:
             self.complain(f'warning: {mistake}')
 

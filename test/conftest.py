@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 # these, waiting threads cost as much again, and other processes need the cores.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-COMPILE_ALL = 'from stewart_dynamics.compile_all import compile_all; compile_all()'
-
 # Whoever runs the tests may ignore signals (nohup; a shell's background job), and processes
 # inherit it. The tests send them, and ask what a program does that heeds them.
 HANDLERS = {signal.SIGHUP: signal.SIG_DFL, signal.SIGINT: signal.default_int_handler,
@@ -50,18 +48,6 @@ settings.load_profile('repeatable')
 # The module running needs ROS; the tests of the library do not, so it is imported where used.
 
 ROS_PACKAGE = re.compile(r'rclpy|\w+_(msgs|srvs|interfaces)')
-
-
-def pytest_sessionstart(session: pytest.Session) -> None:
-    """Before several processes run the tests, compile once what each of them would compile."""
-    is_worker = hasattr(session.config, 'workerinput')
-    if not is_worker and getattr(session.config.option, 'numprocesses', None):
-        # Meanwhile, as bytecode, the test modules, as many as there is time for: their errors are
-        # reported by the processes.
-        with subprocess.Popen([sys.executable, '-m', 'pytest', '--collect-only', '-qq',
-                               Path(__file__).parent], stdin=DEVNULL, stdout=DEVNULL) as reading:
-            subprocess.run([sys.executable, '-c', COMPILE_ALL], check=True, stdin=DEVNULL)
-            reading.terminate()
 
 
 @pytest.hookimpl(wrapper=True)

@@ -7,9 +7,7 @@ Mutation testing: how many wrong lines of the package the tests notice.
 ``python test/mutation.py`` draws a random sample of small changes (an operator, a comparison, a
 constant, a condition, a call) in the modules named, makes each in a copy of the package, and runs
 the test modules that name the module, quick tests first, until one fails. It prints the share
-killed, every survivor, and the mutants killed only by the time limit. Mutants of ``mechanics`` run
-uncompiled, so that they need no compilation. Tests that need ROS, that fail uncompiled or that
-take long are left out, and of each property few examples are tried (``mutation_plugin``): the
+killed, every survivor, and the mutants killed only by the time limit. Tests that need ROS or take long are left out, and of each property few examples are tried (``mutation_plugin``): the
 share killed is a lower bound.
 """
 
@@ -186,17 +184,13 @@ class Suite:
     ----------
     folder : Path
         Gets the durations.
-    compiled : bool
-        Whether numba compiles.
 
     """
 
-    def __init__(self, folder: Path, compiled: bool) -> None:
-        self._durations = folder / f'durations_{compiled}.json'
+    def __init__(self, folder: Path) -> None:
+        self._durations = folder / 'durations.json'
         self._environment = {**os.environ, 'PYTHONDONTWRITEBYTECODE': '1',
                              'PYTHONSAFEPATH': '1', 'MUTATION_DURATIONS': str(self._durations)}
-        if not compiled:
-            self._environment['NUMBA_DISABLE_JIT'] = '1'
 
     def measure(self, modules: list[str]) -> None:
         """Run whole test modules on the package as it is, and note how long each test takes."""
@@ -219,7 +213,7 @@ class Suite:
 def fate(mutant: Mutant, suite: Suite, modules: list[str], seconds: float) -> str:
     """Return whether a mutant was killed, survived all tests, or did not end in time."""
     with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(ROOT / PACKAGE, Path(folder) / PACKAGE)  # with the compiled code kept
+        shutil.copytree(ROOT / PACKAGE, Path(folder) / PACKAGE)  # with the C library
         (Path(folder) / mutant.path.relative_to(ROOT)).write_text(mutant.text(), encoding='utf-8')
         try:
             return 'killed' if suite.fails(Path(folder), modules, seconds) else 'survived'
@@ -248,13 +242,10 @@ def main() -> None:
     ends: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(len(
             os.sched_getaffinity(0))) as pool:
-        suites = {compiled: Suite(Path(folder), compiled) for compiled in (False, True)}
-        named = {compiled: sorted({name for path, names in modules.items() for name in names
-                                   if is_compiled(path) == compiled}) for compiled in suites}
-        list(pool.map(lambda compiled: named[compiled] and suites[compiled].measure(
-            named[compiled]), suites))
-        fates = pool.map(lambda mutant: fate(mutant, suites[is_compiled(
-            mutant.path)], modules[mutant.path], given.seconds), sample)
+        suite = Suite(Path(folder))
+        suite.measure(sorted({name for names in modules.values() for name in names}))
+        fates = pool.map(lambda mutant: fate(
+            mutant, suite, modules[mutant.path], given.seconds), sample)
         for mutant, end in zip(sample, fates, strict=True):
             ends[end] += 1
             if end != 'killed':
@@ -264,11 +255,6 @@ def main() -> None:
     killed = len(sample) - ends['survived']  # an endless loop is noticed, too
     print(f'{killed} of {len(sample)} mutants killed, {100.0 * killed / len(sample):.1f} %; '
           f'{len(everything)} possible in {len(paths)} modules')
-
-
-def is_compiled(path: Path) -> bool:
-    """Return whether the tests of a module run compiled."""
-    return 'mechanics' not in path.relative_to(ROOT).parts
 
 
 if __name__ == '__main__':

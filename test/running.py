@@ -58,7 +58,6 @@ from referees import PLATFORM, ROOT  # noqa: F401
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
@@ -268,8 +267,6 @@ class Inside:
         self._done = done
         with ExitStack() as stack:
             self._said = stack.enter_context(_Stderr())
-            stack.enter_context(patch.object(
-                machine_code, 'announce', get_logger('inside').info))
             with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
                 rclpy.init(args=sys.argv, domain_id=domain)
                 try:

@@ -600,14 +600,6 @@ def test_a_signal_ends_it_with_exit_code_0(
     assert participants(node.domain) == 1, 'it did not leave; the one is in this process'
 
 
-def test_a_signal_ends_it_while_it_starts(start: Start) -> None:
-    node = start(STEWART_DYNAMICS_CACHE_DIR='cache')  # an empty one: it compiles for seconds
-    # The node is there, and is compiling: no setpoint topic yet.
-    node.until(lambda: node.peer.node.count_services(f'{NODE}/get_parameters'),
-               'the node is there')
-    node.stop()
-
-
 # An error in parameters is reported in one line: all rules are in test_parameters.py
 
 def test_a_rejected_parameter_is_reported_in_one_line(domain: int, tmp_path: Path) -> None:

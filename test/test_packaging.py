@@ -36,7 +36,6 @@ KEYS = {
     'hypothesis': 'python3-hypothesis', 'jinja2': 'python3-jinja2', 'lz4': '',
     'matplotlib': 'python3-matplotlib', 'mcap': '', 'mcap_ros2': '', 'mujoco': '',
     'numba': 'python3-numba',
-    'llvmlite': 'python3-numba',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
     'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '', 'pyarrow': '',
     'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',

@@ -64,7 +64,6 @@ _SLOWEST = 1.0
 
 STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
 
-# The machine code that every datasheet needs.
 
 
 def write_datasheet(parameters: Parameters, order: Order, folder: Path, options: Options,

@@ -70,7 +70,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.bags.find import bytes_of
     from stewart_dynamics.datasheet.claimed_box import doubtful_ranges, read_box
     from stewart_dynamics.datasheet.datasheet import (
-        check_order, FUNCTIONS, is_possible, Order, Progress, soft_legs, STAGES, write_datasheet)
+        check_order, is_possible, Order, Progress, soft_legs, STAGES, write_datasheet)
     from stewart_dynamics.datasheet.datasheet_text import sheet_text
     from stewart_dynamics.datasheet.rated_hexapod import Payload
     from stewart_dynamics.mechanics.frames.motion import Pose
@@ -99,7 +99,7 @@ def _run(given: argparse.Namespace) -> int:
         *likely_mistakes(parameters), *soft_legs(parameters, order.leg_stiffness),
         *(() if order.box is None else doubtful_ranges(order.box, parameters)),
         *mistakes_in_options(parameters, {'--pose': given.pose}, {
-            '--pivot': given.pivot, '--payload': given.payload and given.payload[1:]})), FUNCTIONS)
+            '--pivot': given.pivot, '--payload': given.payload and given.payload[1:]})))
     size = 0 if given.motion is None else bytes_of(given.motion)
     # Each stage counts as a part of the bag, whose reading is the longest where it is large.
     part = max(size // len(STAGES), 1)

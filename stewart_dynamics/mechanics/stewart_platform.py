@@ -22,7 +22,6 @@ from stewart_dynamics.mechanics.drives.screws import screw_constants
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, lagrange, regressor
 from stewart_dynamics.mechanics.dynamics.force_breakdown import (
     ForceBreakdown, ForceBreakdownRows, SOURCES)
-from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     LINEAR, linear_parameters, names_of)
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
@@ -85,7 +84,6 @@ class StewartPlatform:
         self.parameters = parameters
         self.screws = screw_constants(parameters)
         self.structure = hexapod_structure(parameters, self.screws)
-        self.constants = hexapod_constants(parameters)
         self.solve = partial(batch.solve, self.structure)
         self._single = SingleSample(self.structure)
         self._breakdown: ForceBreakdownRows | None = None

@@ -63,10 +63,7 @@ def given_parameters(arguments: Sequence[str], node: str, kind: type[ParameterSe
 
 
 def dynamics() -> int:
-    """Run the node stewart_dynamics, or compile all; return the exit code."""
-    if '--compile' in sys.argv[1:]:
-        SIGNALS.watch(end_at_once=True)
-        return int(_imported('compile_all').compile_all())
+    """Run the node stewart_dynamics; return its exit code."""
     return _run('parameters.table', 'Parameters', 'node.node')
 
 
@@ -83,13 +80,9 @@ def trajectory() -> int:
 
 def usage(kind: type[ParameterSet]) -> str:
     """Return what ``--help`` prints."""
-    from stewart_dynamics.parameters.table import Parameters
-
-    compiles = kind.node == Parameters.node
     return '\n'.join([
         f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]',
-        *(['       stewart_dynamics --compile    compile all machine code now, and end']
-          if compiles else []), '', 'parameters:',
+        '', 'parameters:',
         *(_described(each) for each in kind.table.values() if each.name not in kind.unused),
         *(['', 'accepted, so that programs can share a file, and not used:',
            f'  {", ".join(name for name in kind.table if name in kind.unused)}']

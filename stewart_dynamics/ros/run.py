@@ -20,7 +20,6 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
-from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.ros.console_scripts import parameter_files
@@ -57,7 +56,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         def show(message: Warning | str, *_: Any, **__: Any) -> None:
             logger.warning(str(message))
 
-        machine_code.announce, warnings.showwarning = logger.info, show
+        warnings.showwarning = show
         with without_security_libraries():
             node = make_node()
         if warning:
@@ -70,7 +69,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         stop = done or Future()
         spin(executor, node, stop, lambda: SIGNALS.received)
         return stop.result() or 0
-    except KeyboardInterrupt:  # while it compiled
+    except KeyboardInterrupt:
         return 0
     except UnknownROSArgsError as exc:
         print(f'{kind.node}: {str(exc).strip("[]")}: unknown after --ros-args; see --help',

@@ -28,91 +28,14 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers, Records
-from stewart_dynamics.compilation.functions import compiled, inlined
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
-from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, norm, read3, scale, subtract, Vector3)
 from stewart_dynamics.parameters.table import BASE_OUTLINE, LEG_SHAPE, Parameters, PLATFORM_OUTLINE
 
 BASE, PLATFORM = 6, 7  # numbers of the plates, where 0 to 5 are legs
-
-
-@inlined
-def _shortest(gap: Vector3, s: Vector3, t: Vector3, cosine: float, along_s: float,
-              along_t: float, u: float, u_end: float, v_end: float) -> Vector3:
-    """Return the shortest ``gap + u s - v t`` for 0 <= u <= u_end and 0 <= v <= v_end."""
-    u = min(max(u, 0.0), u_end)
-    v = min(max(cosine * u + along_t, 0.0), v_end)
-    u = min(max(cosine * v - along_s, 0.0), u_end)
-    x = gap[0] + u * s[0] - v * t[0]
-    y = gap[1] + u * s[1] - v * t[1]
-    z = gap[2] + u * s[2] - v * t[2]
-    return x, y, z
-
-
-@compiled
-def between(p: Vector3, p_end: Vector3, q: Vector3, q_end: Vector3) -> Vector3:
-    """Return the shortest vector from a segment q to a segment p."""
-    along, other_along = subtract(p_end, p), subtract(q_end, q)
-    length, other_length = norm(along), norm(other_along)
-    s = scale(1.0 / length if length > 0.0 else 0.0, along)
-    t = scale(1.0 / other_length if other_length > 0.0 else 0.0, other_along)
-    gap = subtract(p, q)
-    cosine = dot(s, t)
-    normal = cross(s, t)
-    square = dot(normal, normal)
-    u = dot(gap, subtract(scale(cosine, t), s)) / square if square > 0.0 else 0.0
-    return _shortest(gap, s, t, cosine, dot(gap, s), dot(gap, t), u, length, other_length)
-
-
-@compiled
-def from_plate(plate: Array, first: int, end: int, p: Vector3, p_end: Vector3, enough: float,
-               ) -> Vector3:
-    """
-    Return the shortest vector from a plate to a segment; zero where the segment crosses it.
-
-    plate (M, 3 or more): rows that begin with the corners of the plate, in order [m].
-    first, end: its rows.
-    p, p_end (3,): ends of the segment.
-    enough: where the segment is this far from the plane of the plate, the distance from the plane
-        will do [m].
-    """
-    origin = read3(plate[first], 0)
-    area = (0.0, 0.0, 0.0)
-    for n in range(first + 1, end - 1):
-        area = add(area, cross(subtract(read3(plate[n], 0), origin),
-                               subtract(read3(plate[n + 1], 0), origin)))
-    normal = scale(1.0 / norm(area), area)
-    height = dot(normal, subtract(p, origin))
-    end_height = dot(normal, subtract(p_end, origin))
-    crossing = (height < 0.0) != (end_height < 0.0)
-    if not crossing and min(abs(height), abs(end_height)) >= enough:
-        return scale(min(abs(height), abs(end_height)), normal)
-    part = height / (height - end_height) if crossing else 0.0
-    x = add(p, scale(part, subtract(p_end, p)))
-    above = end_above = True
-    shortest, distance = x, math.inf
-    for n in range(first, end):
-        corner = read3(plate[n], 0)
-        following = read3(plate[n + 1 if n + 1 < end else first], 0)
-        inward = cross(normal, subtract(following, corner))
-        above = above and dot(inward, subtract(p, corner)) >= 0.0
-        end_above = end_above and dot(inward, subtract(p_end, corner)) >= 0.0
-        crossing = crossing and dot(inward, subtract(x, corner)) >= 0.0
-        vector = between(p, p_end, corner, following)
-        if norm(vector) < distance:
-            shortest, distance = vector, norm(vector)
-    if crossing:
-        return 0.0, 0.0, 0.0
-    if above and abs(height) < distance:
-        shortest, distance = scale(height, normal), abs(height)
-    if end_above and abs(end_height) < distance:
-        shortest = scale(end_height, normal)
-    return shortest
 
 
 def leg_clearances(hexapod: Records, base: Array, platform: Array, motions: Array,
