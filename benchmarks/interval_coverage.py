@@ -126,7 +126,8 @@ def coverage(seeds: int, motions: Sequence[str]) -> list[str]:
         ('motion', 'truth in intervals', 'lowest', 'identified alone', 'lowest',
          'identified of a run', 'half of the interval by the prior', 'runs with a notice'),
         *(summary(*each) for each in of_motion.items())]), '', *markdown([
-            ('motion', *GROUPS), *(tuple(details(*each)) for each in of_motion.items())]), '']
+            ('motion', *GROUPS), *(tuple(details(*each)) for each in of_motion.items())]), '',
+            f'{seeds} seeds of each motion.', '']
 
 
 # --- recordings that are poor, or in conflict with the file --------------------------------------

@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 import re
 import shutil
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.identification.identify_command_line import main
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 Array = NDArray[np.float64]
 
@@ -111,6 +114,24 @@ def test_the_true_hexapod_is_found_within_its_intervals(
     assert StewartPlatform.from_yaml(written).check() == ()
     report = (tmp_path / 'found' / 'report.html').read_text()
     assert '22 of 22 parameters identified' in report
+
+
+def test_the_report_draws_the_leg_with_the_largest_residual(
+        identified: Callable[..., Any], tmp_path: Path, browser: Browser) -> None:
+    _, result, _, _ = identified('fourier')
+    page, errors = browser.new_page(), list[str]()
+    page.on('pageerror', lambda error: errors.append(str(error)))
+    page.goto((tmp_path / 'found' / 'report.html').as_uri())
+    page.wait_for_selector('#rates .scatterlayer .trace')
+    legs = result['residuals']['legs']
+    worst = max(legs, key=lambda leg: legs[leg]['after_rms_n'])
+    assert page.locator('#legs [aria-pressed=true]').inner_text() == worst
+    assert page.locator('#rates .scatterlayer .trace').count() == 2
+    residuals = page.evaluate("document.getElementById('rates').data[1].y")
+    assert np.sqrt(np.nanmean(np.square(residuals))) == pytest.approx(
+        legs[worst]['after_rms_n'], rel=0.2)
+    assert not errors
+    page.close()
 
 
 def test_brakes_at_the_start_do_not_widen_the_intervals(identified: Callable[..., Any],

@@ -8,6 +8,9 @@ from __future__ import annotations
 from contextlib import closing
 from pathlib import Path
 
+import estimate_cases
+from estimate_cases import drawn, identified, MOTIONS, recording, Truth, with_friction
+from independent_hexapod import Legs, moving
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -225,6 +228,39 @@ def test_longer_delays_are_a_likely_mistake(
     likely = identify(simulated(Case(true_hexapod(2)), 2)).likely
     assert likely[0].what == 'delay'
     assert f'{word} than the positions by 0.1 s or more' in likely[0].text
+
+
+@pytest.mark.parametrize(('truth', 'motion'), [
+    (drawn(0), 'yaw'), (with_friction(0), 'gentle, then rest')])
+def test_a_right_model_holds_at_held_out_time(truth: Truth, motion: str) -> None:
+    """Also where a fit with other legs, or with the noise of rates, is a little worse there."""
+    assert identified([estimate_cases.recorded(truth, motion, 0)], truth).causes == ()
+
+
+def test_a_file_that_is_better_at_held_out_time_is_said() -> None:
+    empty, path = with_friction(1), MOTIONS['rich'](rng(7))
+    loaded = empty.changed(platform__mass=400.0)
+
+    def legs(times: Array) -> Legs:
+        forces = np.where(times[:, None] < 15.0, *(
+            moving(each.parameters, path(times)).forces for each in (loaded, empty)))
+        return moving(empty.parameters, path(times))._replace(forces=forces)
+
+    assert 'validation' in identified([recording(legs, 1)], empty).causes
+
+
+@pytest.mark.parametrize('seed', [3, 5])
+def test_a_unit_is_named_though_the_mass_makes_another_scale_nearer(seed: int) -> None:
+    truth = drawn(seed)  # masses of 1.8 and 0.7 times the file's
+    given = estimate_cases.recorded(truth, 'rich', seed)
+    found = identified([given._replace(efforts=1e-3 * given.efforts)], truth)
+    assert found.causes[0] == 'unit' and 'likely kN in place of N' in found.notices[0]
+
+
+def test_swapped_legs_are_named_before_a_delay_that_fits_them_best() -> None:
+    given = estimate_cases.recorded(drawn(3), 'roll', 3)
+    swapped = given._replace(efforts=given.efforts[:, [1, 0, 2, 3, 4, 5]])
+    assert identified([swapped], drawn(3)).causes[0] == 'swapped'
 
 
 @pytest.mark.parametrize('seed', [2, 3])

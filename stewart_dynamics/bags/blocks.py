@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import one_line
 from stewart_dynamics.messages.recorded import Messages
 import zstandard
@@ -102,10 +101,9 @@ def compact(block: Messages) -> Messages:
     """Return a block without the bytes that belong to no message of it, if these are many."""
     if len(block.data) < _FEW_BYTES or 2 * (total := int(block.sizes.sum())) >= len(block.data):
         return block
-    data = np.empty(total, dtype=np.uint8)
-    function('gather_bytes')(block.data, len(block.starts), np.ascontiguousarray(block.starts),
-                             np.ascontiguousarray(block.sizes), data)
-    return block._replace(starts=np.cumsum(block.sizes) - block.sizes, data=data)
+    starts = np.cumsum(block.sizes) - block.sizes
+    at = np.arange(total) + np.repeat(block.starts - starts, block.sizes)
+    return block._replace(starts=starts, data=block.data[at])
 
 
 class RowsFile:

@@ -7,8 +7,6 @@
 
 #include "stewart_dynamics.c"
 
-#include <string.h>
-
 #include "library.h"
 
 /* A function into which all that it calls is inlined: twice as fast. */

@@ -225,9 +225,4 @@ void scan_records(
   int64_t size, const uint8_t * data, const int64_t * numbers, int64_t room, int64_t * found,
   int64_t * totals);
 
-/* Copy count parts of data, one after the other. */
-void gather_bytes(
-  const uint8_t * data, int64_t count, const int64_t * starts, const int64_t * sizes,
-  uint8_t * out);
-
 #endif

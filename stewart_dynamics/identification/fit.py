@@ -93,6 +93,17 @@ class Fit(NamedTuple):
         rest = np.diag(self.covariance) - sum(each ** 2 for each in parts.values())
         return {'noise': np.sqrt(np.maximum(rest, 0.0)), **parts}
 
+    def of_prediction(self, extracts: Extracts, unknowns: Unknowns,
+                      chosen: Callable[[Extract], Flags]) -> float:
+        """Return the RMS deviation of the efforts that the fit predicts [N]."""
+        squares, count = 0.0, 0
+        for extract in extracts:
+            e = extract.columns[chosen(extract)] @ directions(
+                unknowns, self.values, self.delays, extract.bag, self.delay_deviations)
+            squares += float(np.sum((e @ self.posterior.covariance) * e))
+            count += len(e)
+        return math.sqrt(squares / max(count, 1))
+
 
 class Noisy(NamedTuple):
     """For each bag the number of an extract, and this extract again with more noise of legs."""

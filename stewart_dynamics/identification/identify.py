@@ -34,7 +34,7 @@ from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import (
     lack_of_fit, LackOfFit, LEFT_BY_FILTERS, long_pieces)
 from stewart_dynamics.identification.likely_mistakes import (
-    Comparison, LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose, of_validation)
+    Comparison, LONGEST_LAG, most_motion, of_efforts, of_fit, of_no_pose, of_validation)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
@@ -377,8 +377,8 @@ class Identification:
         outliers = 0 if likely else self._leave_out()
         noisy = Noisy(self._moving, self._noisy)
         found = fit(extracts, unknowns, noisy, self._cutoffs)
-        likely = likely or list(of_delay(
-            bag.delay_s + delay for bag, delay in zip(self.bags, found.delays, strict=True)))
+        delays = [bag.delay_s + delay
+                  for bag, delay in zip(self.bags, found.delays, strict=True)]
         written = best_for_file(extracts, self.parameters, options.kinds, self._cutoffs,
                                 found.ratios(unknowns))
         residuals = Residuals.of(extracts, unknowns, written, found.delays, _used)
@@ -386,12 +386,12 @@ class Identification:
         fitted = Residuals.of(extracts, unknowns, found.values, found.delays, _used)
         left = float(np.sqrt(
             np.mean(fitted.after ** 2) / (np.mean(fitted.measured ** 2) + 1e-300)))
-        validation = self._validation(found) if options.hold_out else None
+        validation, of_time = self._validation(found, noisy) if options.hold_out else (None, [])
         if not likely:
             assert self._first is not None
-            likely += of_fit(self.parameters, unknowns, *self._first, found, lack, left)
-        if not likely and validation is not None:
-            likely += of_validation(validation.before, validation.after, validation.measured)
+            likely += of_fit(
+                self.parameters, unknowns, *self._first, found, lack, left, delays)
+        likely = likely or of_time
         tested = bool(long_pieces(extracts))
         return Identified(
             unknowns, found, written, tuple(self.bags),
@@ -449,8 +449,15 @@ class Identification:
             found.append(np.repeat(of_free > of_held, _BLOCK)[:len(each)])
         return found
 
-    def _validation(self, found: Fit) -> Residuals | None:
-        """Return the residuals at the end of each bag with a fit to the rest."""
+    def _validation(self, found: Fit, noisy: Noisy,
+                    ) -> tuple[Residuals | None, list[LikelyMistake]]:
+        """
+        Return the residuals at the end of each bag with a fit to the rest, and a likely mistake.
+
+        Values that fit best with legs and gain of the file may predict the end worse than the file
+        where only these are off; then all that is uncertain is fitted to the rest, and may be
+        off by its uncertainty, where legs slide: in others friction has any value.
+        """
         ends = [bag.seconds * (1.0 - self._options.hold_out) for bag in self.bags]
 
         def rest(extract: Extract) -> Flags:
@@ -462,10 +469,23 @@ class Identification:
         counts = [sum(np.count_nonzero(chosen(each), axis=0) for each in self.extracts)
                   for chosen in (rest, held_out)]
         if np.min(counts) < _FEWEST:
-            return None
-        of_rest = best_for_file(self.extracts, self.parameters, self._options.kinds,
-                                self._cutoffs, found.ratios(self.unknowns), rest)
-        return Residuals.of(self.extracts, self.unknowns, of_rest, found.delays, held_out)
+            return None, []
+        extracts, unknowns = self.extracts, self.unknowns
+        written = Residuals.of(extracts, unknowns, best_for_file(
+            extracts, self.parameters, self._options.kinds, self._cutoffs,
+            found.ratios(unknowns), rest), found.delays, held_out)
+        if not list(of_validation(written.before, written.after, written.measured, 0.0)):
+            return written, []
+        whole = fit(extracts, unknowns, noisy, self._cutoffs, rest)
+        slow = self.parameters['actuator.coulomb_velocity']
+
+        def sliding(extract: Extract) -> Flags:
+            flags: Flags = held_out(extract) & (np.abs(extract.legs[..., 1]) > slow)
+            return flags
+
+        end = Residuals.of(extracts, unknowns, whole.values, whole.delays, sliding)
+        deviation = whole.of_prediction(extracts, unknowns, sliding)
+        return written, list(of_validation(end.before, end.after, end.measured, deviation))
 
     def close(self) -> None:
         """Remove the temporary file."""

@@ -10,7 +10,8 @@ squared misfit of data and prior together, twice the logarithm of the likelihood
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from itertools import combinations
 import math
 
@@ -24,7 +25,8 @@ from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import LackOfFit, LEFT_BY_FILTERS
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.drives.measured_efforts import mistake_of_scale
+from stewart_dynamics.mechanics.drives.measured_efforts import (
+    FAR, known_scales, mistake_of_scale)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
@@ -32,8 +34,8 @@ from stewart_dynamics.reporting.estimates import LikelyMistake
 _SUSPICIOUS = 0.03
 # A residual above this fraction means that the model does not describe the recording.
 _UNEXPLAINED = 0.3
-# A cause must reduce the residual to this fraction.
-_BETTER = 0.5
+# Swapped legs must reduce the misfit to this fraction, and more than another cause does.
+_BETTER = 0.7
 # Deviation of the efforts, relative to them, where hypotheses are compared; largest misfit of one
 # that is taken.
 _ROUGHLY, _WELL = 0.01, 0.1
@@ -153,30 +155,35 @@ def of_efforts(comparison: Comparison, p: Parameters, of_motors: bool) -> Iterat
         if (comparison.misfit() - comparison.misfit(likeliest) < _CLEARLY
                 or comparison.relative(likeliest) > _WELL):
             return
+        # a known one, though the mass of the file is far off
+        known = [each for each in known_scales(p, of_motors)
+                 if 1.0 / FAR < each / likeliest < FAR and comparison.relative(each) < _WELL]
+        likeliest = min(known, key=comparison.misfit, default=likeliest)
     if mistake := mistake_of_scale(likeliest, p, of_motors):
         yield LikelyMistake(*mistake)
 
 
 def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit,
-           lack: LackOfFit | None, residual: float) -> Iterator[LikelyMistake]:
+           lack: LackOfFit | None, residual: float, delays: Sequence[float],
+           ) -> Iterator[LikelyMistake]:
     """
-    Yield a likely mistake if the residual is a large fraction of the efforts.
+    Yield a likely mistake if the residuals are more than noise, or a delay is long.
 
     Legs are swapped in the first window. ``residual`` is the RMS of the residuals divided by that
-    of the efforts.
+    of the efforts; ``delays`` are those of the bags [s].
     """
     left = 1.0 if lack is None else lack.left
-    if lack is not None and lack.cause == 'zero_length' and lack.ranked[0].columns == 6:
-        yield LikelyMistake(lack.cause, f'geometry.zero_length looks wrong: {lack.text}')
-        return
-    if residual < _SUSPICIOUS:
+    late = list(of_delay(delays))
+    if residual < _SUSPICIOUS and lack is None and not late:
         return
     piece, joints = most_motion(window, extraction), p['joints']
-    now = _tried(extraction, piece, unknowns, fit)
+    now = _tried(extraction, piece, unknowns, fit.delays[0])
     found = [(now, 'misfit', (
         f'the residual is {100.0 * residual:.0f} % of the efforts whatever the parameters: '
         'positions and efforts may not belong together, or the geometry is wrong'))]
     best = min(_BETTER, left)
+    undelayed = copy(extraction)  # the delay that fits wrong legs best may be any
+    undelayed.later = 0.0
     for a, b in combinations(range(6), 2):
         order = [{a: b, b: a}.get(leg, leg) for leg in range(6)]
         efforts, legs = piece.efforts[:, order], piece._replace(
@@ -185,7 +192,8 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
         for which, swapped in (('positions and efforts', legs._replace(efforts=efforts)),
                                ('efforts', piece._replace(efforts=efforts)),
                                ('positions', legs)):
-            misfit = _tried(extraction, swapped, unknowns, fit)
+            misfit = min(_tried(each, swapped, unknowns, delay) for each, delay in (
+                (extraction, fit.delays[0]), (undelayed, 0.0)))
             if misfit < best * now:
                 found.append((misfit, 'swapped', f'the {which} of {joints[a]} and {joints[b]} '
                                                  'look swapped'))
@@ -193,15 +201,24 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
     if misfit < _BETTER * now:
         yield LikelyMistake(
             what, f'{text}: the residual becomes {misfit / now:.2f} times as large')
+    elif late:
+        yield from late
+    elif lack is not None and lack.cause == 'zero_length' and lack.ranked[0].columns == 6:
+        yield LikelyMistake(lack.cause, f'geometry.zero_length looks wrong: {lack.text}')
     elif residual > _UNEXPLAINED:
         yield LikelyMistake(*found[0][1:])
 
 
-def of_validation(before: Array, after: Array, measured: Array) -> Iterator[LikelyMistake]:
-    """Yield a likely mistake if the file predicts held-out efforts better than the fit."""
+def of_validation(before: Array, after: Array, measured: Array, deviation: float,
+                  ) -> Iterator[LikelyMistake]:
+    """
+    Yield a likely mistake if the file predicts held-out efforts better than the fit.
+
+    ``deviation``: of the fit's prediction [N], RMS; twice as much is no reason.
+    """
     file, fitted, size = (math.sqrt(float(np.mean(each ** 2))) for each in (
         before, after, measured))
-    if fitted > _WORSE * file + LEFT_BY_FILTERS * size:
+    if fitted > math.hypot(_WORSE * file + LEFT_BY_FILTERS * size, 2.0 * deviation):
         yield LikelyMistake(
             'validation', f'on held-out time the residual is {file:.3g} N by the file and '
             f'{fitted:.3g} N by a fit to the rest: the file is better; the model does not hold in '
@@ -219,7 +236,7 @@ def most_motion(window: Window, extraction: Extraction) -> Window:
     return window.part(part, part)
 
 
-def _tried(extraction: Extraction, window: Window, unknowns: Unknowns, fit: Fit) -> float:
+def _tried(extraction: Extraction, window: Window, unknowns: Unknowns, delay: float) -> float:
     """Return the RMS misfit of a window, relative to its efforts; infinite without a pose."""
     try:
         extract = extraction(window, first_pose(extraction.platform, window)).extract
@@ -227,4 +244,4 @@ def _tried(extraction: Extraction, window: Window, unknowns: Unknowns, fit: Fit)
         return float('inf')
     if np.count_nonzero(extract.used) < _FEWEST * extract.used.size:
         return float('inf')
-    return Comparison([extract], unknowns).relative(delay=fit.delays[0])
+    return Comparison([extract], unknowns).relative(delay=delay)

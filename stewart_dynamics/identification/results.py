@@ -258,7 +258,7 @@ def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapp
     legs = list(found.parameters['joints'])
     curves, spectra = _curves(extracts, found)
     data = {'legs': legs, 'curves': [base64_of(column, '<f4') for column in curves.T],
-            'spectra': spectra}
+            'spectra': spectra, 'first': int(np.argmax(found.residuals.after))}
     script = plotly_script()
     bag = result['bags'][0]['bag']
     text = page(
@@ -269,7 +269,11 @@ def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapp
 
 
 def _curves(extracts: Extracts, found: Identified) -> tuple[Array, list[dict[str, str]]]:
-    """Return times, efforts and forces before and after (M, 19), and spectra of residuals."""
+    """
+    Return curves (M, 25), and spectra of residuals.
+
+    The columns are times, efforts, forces before and after, and rates of the legs.
+    """
     u = found.unknowns
     timeout = found.parameters['setpoint.timeout']
     spectrum = Spectrum(12, timeout)
@@ -285,9 +289,9 @@ def _curves(extracts: Extracts, found: Identified) -> tuple[Array, list[dict[str
         elapsed = float(times[-1]) + 10.0 * timeout  # no step between bags
         if count < _MOST:
             rows = np.concatenate(
-                [extract.times[:, None], effort, effort - residuals[0], effort - residuals[1]],
-                axis=1)[:_MOST - count]
-            curves.append(np.concatenate([rows, np.full((1, 19), np.nan)]))
+                [extract.times[:, None], effort, effort - residuals[0], effort - residuals[1],
+                 extract.legs[..., 1]], axis=1)[:_MOST - count]
+            curves.append(np.concatenate([rows, np.full((1, rows.shape[1]), np.nan)]))
             count += len(rows)
     density = spectrum.density()
     spectra = [] if density is None else [

@@ -22,18 +22,25 @@ const columns = data.curves.map(numbers);
 const times = columns[0];
 const line = (name, y, of, width, dash) => (
   {x: times, y, name, type: 'scatter', mode: 'lines', line: {color: of, width, dash}, connectgaps: false});
+const drawn = Math.ceil(times.length / 3000);  // of so many residuals over the rate one
 const less = (a, b) => a.map((each, n) => each - b[n]);
 
 // Forces and residuals of one leg.
 let range = null;
 function show(leg) {
-  const [effort, before, after] = [1, 7, 13].map((first) => columns[first + leg]);
+  const [effort, before, after, rate] = [1, 7, 13, 19].map((first) => columns[first + leg]);
   Plotly.react('forces', [
     line('measured', effort, color('black'), 2.2), line('by the file', before, color('leg4'), 1.4),
     line('by the identified parameters', after, color('leg0'), 1.4, 'dot')], layout('force [N]'), CONFIG);
   Plotly.react('residuals', [
     line('residual by the file', less(effort, before), color('leg4'), 1.2),
     line('by the identified parameters', less(effort, after), color('leg0'), 1.2)], layout('residual [N]'), CONFIG);
+  const some = (each) => each.filter((_, n) => n % drawn === 0);
+  Plotly.react('rates', [[before, 'by the file', 'leg4'], [after, 'by the identified parameters', 'leg0']].map(([force, name, of]) => ({
+    x: some(rate), y: some(less(effort, force)), name, type: 'scatter', mode: 'markers', marker: {size: 3, color: color(of), opacity: 0.5},
+  })), layout('residual [N]', {
+    xaxis: {title: {text: 'rate of the leg [m/s]'}, gridcolor: color('grid'), zerolinecolor: color('zero')}, hovermode: 'closest',
+  }), CONFIG);
   document.querySelectorAll('#legs button').forEach((button, n) => button.setAttribute('aria-pressed', n === leg));
 }
 
@@ -44,7 +51,7 @@ data.legs.forEach((name, leg) => {
   button.addEventListener('click', () => show(leg));
   document.getElementById('legs').append(button);
 });
-show(0);
+show(data.first);
 for (const [one, other] of [['forces', 'residuals'], ['residuals', 'forces']]) {
   document.getElementById(one).on('plotly_relayout', (change) => {
     const wanted = change['xaxis.autorange'] ? null : [change['xaxis.range[0]'], change['xaxis.range[1]']];

@@ -237,6 +237,14 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> EffortMist
         what, f'the efforts are {scale:.3g} times what the model computes: {likely}')
 
 
+def known_scales(p: Parameters, of_motors: bool) -> list[float]:
+    """Return the scales of efforts that ``mistake_of_scale`` attributes to a unit."""
+    if of_motors:
+        return _per_effort(p)
+    torques = [] if p['actuator.screw_lead'] is None else [float(np.mean(1.0 / motor_ratio(p)))]
+    return [factor for factor, _ in _FACTORS] + torques
+
+
 def _per_effort(p: Parameters) -> list[float]:
     """Return the mean leg forces for torques, and for currents, of 1."""
     ratio, constant = motor_ratio(p), p['drive.torque_constant']
