@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 import pinocchio as pin
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.core.binding import function
+from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.export.c_project import platform_source
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
@@ -292,10 +292,13 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
 
     one = _single(_part(motion, slice(0, 1)))
     row, result = rows[:1].copy(), np.empty((1, RESULT))
+    sample, places_of = np.zeros(1, record('one_motion')), places('one_motion')
+    numbers = sample.view(float)
+    numbers[places_of['motion']], numbers[places_of['base']] = row, STILL
     q, v, a, _ = tree.state(one)
     single = [
         Contestant(STEP, repeated('solve()', solve=function('solve_one').bound(
-            hexapod.structure, row, no_wrench, STILL, result)), RNEA),
+            hexapod.structure, sample)), RNEA),
         Contestant(RNEA, repeated(
             'rnea(model, data, q, v, a)', rnea=pin.rnea, model=tree.model, data=tree.data,
             q=q, v=v, a=a), RNEA),

@@ -56,15 +56,18 @@ def samples(parameters: Parameters, count: int) -> tuple[Any, Any, Any]:
 def test_samples_side_by_side_have_the_bits_of_each_alone(kind: str, hexapod: int) -> None:
     parameters = hexapods()[hexapod]
     structure = StewartPlatform(parameters).structure
+    of = places('one_motion')
     many = ctypes.CDLL(str(CORE / 'library.so'))[f'solve_lanes_{kind}']
     for count in SIZES:
         motions, wrenches, bases = samples(parameters, count)
         for loads, moving in ((wrenches, bases), (wrenches[:1], bases[-1:])):
             alone, found = np.empty((2, count, RESULT))
+            sample = np.zeros(1, record('one_motion'))
             for n in range(count):
-                function('solve_one')(
-                    structure, motions[n], loads[n % len(loads)].copy(),
-                    moving[n % len(moving)].copy(), alone[n])
+                sample['wrench'], row = loads[n % len(loads)], sample.view(float)
+                row[of['motion']], row[of['base']] = motions[n], moving[n % len(moving)]
+                function('solve_one')(structure, sample)
+                alone[n] = row[of['result']]
             pointers = [ctypes.c_void_p(each.ctypes.data) for each in (
                 structure, motions, loads, moving, found)]
             many(pointers[0], ctypes.c_int64(count), pointers[1], ctypes.c_int64(len(loads)),

@@ -335,7 +335,6 @@ def test_readers_of_the_answers_are_counted(node: DynamicsNode) -> None:
 def test_in_a_burst_the_newest_is_answered_and_dropped_ones_are_counted(start: Start) -> None:
     node = start()
     node.until_active()
-    node.answer(MOVING)
     key = 'rejected, setpoint: dropped: more came at once than can be answered'
     sent = passed = 0
     while not passed:

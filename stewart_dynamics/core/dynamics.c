@@ -123,6 +123,11 @@ FLAT static void accelerate(
   }
 }
 
+int64_t forward_dynamics_one(const stewart_platform * platform, one_motion * sample) {
+  accelerate(platform, &sample->motion, sample->forces, sample->wrench, &sample->base);
+  return all_finite(&sample->motion, sizeof sample->motion);
+}
+
 void forward_dynamics_many(
   const stewart_platform * platform, int64_t count, stewart_motion * motions,
   const double * forces, int64_t n_wrenches, const double * wrenches, int64_t n_bases,
@@ -246,6 +251,12 @@ FLAT void base_wrenches_many(
     }
     put3(&results[6 * n], rest.force), put3(&results[6 * n + 3], rest.moment);
   }
+}
+
+int64_t base_wrench_one(const stewart_platform * platform, one_motion * sample) {
+  base_wrenches_many(
+    platform, 1, &sample->motion, 1, sample->wrench, 1, &sample->base, sample->base_wrench);
+  return all_finite(sample->base_wrench, sizeof sample->base_wrench);
 }
 
 /* ---- regressor ------------------------------------------------------------------------------ */

@@ -25,6 +25,12 @@ FLAT void forward_kinematics_many(
   }
 }
 
+FLAT int64_t forward_kinematics_one(const stewart_platform * platform, one_pose * sample) {
+  int steps, code = find_pose(platform, sample->lengths, &sample->pose, &steps, &sample->residual);
+  sample->steps = steps;
+  return code;
+}
+
 /* Write the inverse of the scaled J_inv; return its determinant. */
 static double scaled_jacobian(
   const stewart_platform * platform, const double position[3], const double rotation[9],

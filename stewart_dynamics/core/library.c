@@ -7,8 +7,6 @@
 
 #include "stewart_dynamics.c"
 
-#include <string.h>
-
 #include "library.h"
 
 /* A function into which all that it calls is inlined: twice as fast. */
@@ -71,10 +69,9 @@ FLAT static void solve_sample(
   solve(platform, motion, external, 1, result);
 }
 
-int64_t solve_one(
-  const stewart_platform * platform, const stewart_motion * motion, const double * wrench,
-  const stewart_base * base, stewart_result * result) {
-  solve_sample(platform, motion, wrench, base, result);
+int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
+  const stewart_result * result = &sample->result;
+  solve_sample(platform, &sample->motion, sample->wrench, &sample->base, &sample->result);
   return all_finite(result, sizeof *result) && result->condition_number < UNSOLVABLE_CONDITION;
 }
 

@@ -62,6 +62,18 @@ typedef struct {
   motor_row drives;
 } checked_motors;
 
+/* A motion under loads, and what a call of one sample gives. */
+typedef struct {
+  stewart_motion motion;
+  double forces[6], wrench[6]; /* of the drives; on the platform [N, N m] */
+  stewart_base base;
+  stewart_result result;
+  double base_wrench[6];
+} one_motion;
+
+/* A pose that is searched from a guess, and how the search ended: its steps and residual [m]. */
+typedef struct { stewart_pose pose; double lengths[6], steps, residual; } one_pose;
+
 /* A measurement of the legs, and the external wrench that it gives: see external_wrench/. */
 typedef struct {
   double lengths[6], rates[6], forces[6];
@@ -105,10 +117,12 @@ void solve_many(
   int64_t n_wrenches, const double * wrenches, int64_t n_bases, const stewart_base * bases,
   int64_t conditioned, stewart_result * results);
 
-/* Inverse dynamics of one sample; returns whether J_inv can be solved and all is finite. */
-int64_t solve_one(
-  const stewart_platform * platform, const stewart_motion * motion, const double * wrench,
-  const stewart_base * base, stewart_result * result);
+/* One sample: results; accelerations into the motion; the wrench on the base. They return whether
+   all is finite and, of the first, J_inv can be solved. The last returns a code. */
+int64_t solve_one(const stewart_platform * platform, one_motion * sample);
+int64_t forward_dynamics_one(const stewart_platform * platform, one_motion * sample);
+int64_t base_wrench_one(const stewart_platform * platform, one_motion * sample);
+int64_t forward_kinematics_one(const stewart_platform * platform, one_pose * sample);
 
 /* The kind of processor for which solve_many computes: 0 baseline, 1 AVX2, 2 AVX-512. */
 int64_t processor_kind(void);
@@ -210,10 +224,5 @@ void plant_advance(
 void scan_records(
   int64_t size, const uint8_t * data, const int64_t * numbers, int64_t room, int64_t * found,
   int64_t * totals);
-
-/* Copy count parts of data, one after the other. */
-void gather_bytes(
-  const uint8_t * data, int64_t count, const int64_t * starts, const int64_t * sizes,
-  uint8_t * out);
 
 #endif

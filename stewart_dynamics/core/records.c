@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * Records of MCAP files: bags/mcap_file.py; parts of bytes: bags/blocks.py.
+ * Records of MCAP files: bags/mcap_file.py.
  */
 
 enum {
@@ -46,13 +46,4 @@ void scan_records(
     at = begin + length;
   }
   totals[0] = count, totals[1] = at;
-}
-
-void gather_bytes(
-  const uint8_t * data, int64_t count, const int64_t * starts, const int64_t * sizes,
-  uint8_t * out) {
-  for (int64_t n = 0; n < count; n++) {
-    memcpy(out, data + starts[n], (size_t)sizes[n]);
-    out += sizes[n];
-  }
 }

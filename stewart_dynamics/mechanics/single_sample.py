@@ -16,15 +16,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.core.binding import function
+from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
-from stewart_dynamics.mechanics.rows import (
-    ACCELERATION, MOTION, NO_BASE, POSE, RESULT, WRENCH)
+from stewart_dynamics.mechanics.rows import NO_BASE, POSE, WRENCH
 
 _NO_WRENCH = np.zeros(WRENCH)
 _POSE = POSE.stop
@@ -42,59 +40,38 @@ class SingleSample:
     """
 
     def __init__(self, hexapod: Records) -> None:
-        def solve(motion: Array, wrench: Array, base: Array, result: Array) -> Callable[[], Any]:
-            return function('solve_one').bound(hexapod, motion, wrench, base, result)
-
-        def accelerate(motion: Array, forces: Array, wrench: Array, base: Array,
-                       ) -> Callable[[], Any]:
-            return function('forward_dynamics_many').bound(
-                hexapod, 1, motion, forces, 1, wrench, 1, base)
-
-        def base_wrench(motion: Array, wrench: Array, base: Array, result: Array,
-                        ) -> Callable[[], Any]:
-            return function('base_wrenches_many').bound(
-                hexapod, 1, motion, 1, wrench, 1, base, result)
-
-        def pose(lengths: Array, motion: Array, code: Any, steps: Any, residual: Array,
-                 ) -> Callable[[], Any]:
-            return function('forward_kinematics_many').bound(
-                hexapod, 1, lengths, motion, code, steps, residual)
-
-        motion, six, base = np.zeros(MOTION), np.empty(6), np.array(NO_BASE)
-        self.inverse_dynamics = _Dynamics(
-            solve, motion=motion, wrench=six, base=base, result=np.empty(RESULT)).call
-        self.forward_dynamics = _Dynamics(
-            accelerate, motion=motion, forces=six, wrench=six, base=base).call
-        self.base_wrench = _Dynamics(
-            base_wrench, motion=motion, wrench=six, base=base, result=six).call
-        self.forward_kinematics = _ForwardKinematics(
-            pose, lengths=six, motion=motion, code=np.empty(1, np.int64),
-            steps=np.empty(1, np.int64), residual=np.empty(1)).call
+        self.inverse_dynamics = _Dynamics(hexapod, 'solve_one', 'result').call
+        self.forward_dynamics = _Dynamics(hexapod, 'forward_dynamics_one', 'motion').call
+        self.base_wrench = _Dynamics(hexapod, 'base_wrench_one', 'base_wrench').call
+        self.forward_kinematics = _ForwardKinematics(hexapod).call
 
 
 class _Memories:
     """The memory of calls of a function: as much as there are calls at the same time."""
 
-    def __init__(self, bound: Callable[..., Callable[[], Any]], **arrays: NDArray[Any]) -> None:
-        self._bound, self._arrays = bound, arrays
+    def __init__(self, hexapod: Records, name: str, sample: str) -> None:
+        self._hexapod, self._function, self._sample = hexapod, function(name), sample
+        self._places = places(sample)
         self._free: list[tuple[Any, ...]] = []  # its pop and append are atomic
 
-    def _new(self) -> tuple[Any, ...]:
-        """Return the function bound to new arrays, the arrays, and a memoryview of each."""
-        arrays = {name: array.copy() for name, array in self._arrays.items()}
-        return (self._bound(*arrays.values()), arrays,
-                {name: array.data for name, array in arrays.items()})
+    def _bound(self) -> tuple[Callable[[], Any], Array]:
+        """Return the function bound to new memory, and the memory as numbers."""
+        numbers = np.zeros(record(self._sample).itemsize // 8)
+        return self._function.bound(self._hexapod, numbers), numbers
 
 
 class _Dynamics(_Memories):
     """A call of a function of motion, forces, wrench and base."""
 
+    def __init__(self, hexapod: Records, name: str, result: str) -> None:
+        super().__init__(hexapod, name, 'one_motion')
+        self._result = result
+
     def _new(self) -> tuple[Any, ...]:
-        solve, arrays, views = super()._new()
-        motion = arrays['motion']
-        result = arrays.get('result', motion)
-        return (solve, views['motion'], views.get('forces'), views['wrench'], views['base'],
-                result, motion[ACCELERATION] if result is motion else result)
+        solve, numbers = self._bound()
+        numbers[self._places['base']] = NO_BASE
+        return (solve, *(numbers[self._places[name]].data for name in (
+            'motion', 'forces', 'wrench', 'base')), numbers[self._places[self._result]])
 
     def call(self, motion: Motion, forces: Any, wrench: Any, base: BaseMotion | None,
              ) -> Array | None:
@@ -105,20 +82,17 @@ class _Dynamics(_Memories):
             memory = self._free.pop()
         except IndexError:
             memory = self._new()
-        solve, of_motion, of_forces, of_wrench, of_base, result, checked = memory
+        solve, of_motion, of_forces, of_wrench, of_base, result = memory
         try:
             of_motion[:] = motion.rows
-            if of_forces is not None:
+            if self._result == 'motion':
                 of_forces[:] = forces
             of_wrench[:] = _NO_WRENCH if wrench is None else wrench
             if base is not None:
                 of_base[:] = base.rows
                 if of_base[0] != of_base[0]:
                     return None  # nan would be a still base
-            sound = solve()
-            if sound is None:
-                sound = math.isfinite(sum(checked.tolist()))
-            return result.copy() if sound else None
+            return result.copy() if solve() else None
         except _NO_FLOATS:
             return None
         finally:
@@ -130,6 +104,9 @@ class _Dynamics(_Memories):
 class _ForwardKinematics(_Memories):
     """The call of the forward kinematics."""
 
+    def __init__(self, hexapod: Records) -> None:
+        super().__init__(hexapod, 'forward_kinematics_one', 'one_pose')
+
     def call(self, lengths: Any, guess: Pose | Motion) -> Array | None:
         """Return the row of the pose (12,) of leg lengths (6,), from a guess."""
         if type(guess) is not Pose and type(guess) is not Motion:
@@ -137,14 +114,14 @@ class _ForwardKinematics(_Memories):
         try:
             memory = self._free.pop()
         except IndexError:
-            memory = self._new()
-        solve, arrays, views = memory
+            solve, numbers = self._bound()
+            pose = numbers[self._places['pose']]
+            memory = solve, numbers[self._places['lengths']].data, pose.data, pose
+        solve, of_lengths, of_pose, pose = memory
         try:
-            views['lengths'][:] = lengths
-            views['motion'][:_POSE] = guess.rows[..., :_POSE]
-            solve()
-            return (arrays['motion'][:_POSE].copy()
-                    if views['code'][0] == forward_kinematics.FOUND else None)
+            of_lengths[:] = lengths
+            of_pose[:] = guess.rows[..., :_POSE]
+            return pose.copy() if solve() == forward_kinematics.FOUND else None
         except _NO_FLOATS:
             return None
         finally:

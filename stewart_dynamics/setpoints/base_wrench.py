@@ -10,17 +10,14 @@ bit-identical for single setpoints and for batches.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
-import math
 from struct import Struct
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Six
-from stewart_dynamics.core.binding import function
+from stewart_dynamics.arrays import Array, NO_WRENCH, Six
+from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, WRENCH
+from stewart_dynamics.mechanics.rows import WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Batch, Setpoint
@@ -29,8 +26,8 @@ from stewart_dynamics.setpoints.step import Batch, Setpoint
 BASE_WRENCH = 'base_wrench'
 
 # Layout of one setpoint in memory, inputs and result: packing is faster than passing arrays.
-_MOTION, _WRENCH, _BASE, _RESULT = consecutive(MOTION, WRENCH, BASE, WRENCH)
-_GIVEN = Struct(f'{_RESULT.start}d')
+_PLACES = places('one_motion')
+_GIVEN = Struct(f'{_PLACES["base"].stop}d')
 _GIVES = Struct(f'{WRENCH}d')
 
 
@@ -48,17 +45,19 @@ class BaseWrench:
     def __init__(self, parameters: Parameters) -> None:
         self._platform = StewartPlatform(parameters)
         self._still = tuple(BaseMotion(parameters['gravity']).rows.tolist())
-        self._numbers = np.zeros(_RESULT.stop)
-        self._memory = self._numbers.data  # the same as bytes
+        numbers = np.zeros(_PLACES['base_wrench'].stop)
+        self._memory = numbers.data  # the same as bytes
+        self._solve = function('base_wrench_one').bound(self._platform.structure, numbers)
 
     def __call__(self, setpoint: Setpoint) -> Six | None:
         """Return the base wrench; None if the base's motion is unknown or numbers overflow."""
         base = setpoint.base
-        _GIVEN.pack_into(self._memory, 0, *setpoint.motion, *setpoint.wrench,
+        _GIVEN.pack_into(self._memory, 0, *setpoint.motion, *NO_WRENCH, *setpoint.wrench,
                          *(self._still if base is None else base))
-        self._bound()
-        wrench: Six = _GIVES.unpack_from(self._memory, 8 * _RESULT.start)
-        return wrench if all(map(math.isfinite, wrench)) else None
+        if not self._solve():
+            return None
+        wrench: Six = _GIVES.unpack_from(self._memory, 8 * _PLACES['base_wrench'].start)
+        return wrench
 
     def many(self, setpoints: Batch) -> Array:
         """Return base wrenches (N, 6); rows of nan where a call for one setpoint gives None."""
@@ -68,10 +67,3 @@ class BaseWrench:
         if not finite.all():
             wrenches[~finite.all(axis=1)] = np.nan
         return wrenches
-
-    @cached_property
-    def _bound(self) -> Callable[[], object]:
-        motion, wrench, base, result = (
-            self._numbers[part] for part in (_MOTION, _WRENCH, _BASE, _RESULT))
-        return function('base_wrenches_many').bound(
-            self._platform.structure, 1, motion, 1, wrench, 1, base, result)
