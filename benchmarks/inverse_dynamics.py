@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import ctypes
-from importlib.metadata import version
 import os
 from pathlib import Path
 import platform

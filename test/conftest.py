@@ -15,9 +15,6 @@ from pathlib import Path
 import re
 import shutil
 import signal
-import subprocess
-from subprocess import DEVNULL
-import sys
 from typing import Any, TYPE_CHECKING
 
 from hypothesis import settings

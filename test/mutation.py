@@ -7,8 +7,9 @@ Mutation testing: how many wrong lines of the package the tests notice.
 ``python test/mutation.py`` draws a random sample of small changes (an operator, a comparison, a
 constant, a condition, a call) in the modules named, makes each in a copy of the package, and runs
 the test modules that name the module, quick tests first, until one fails. It prints the share
-killed, every survivor, and the mutants killed only by the time limit. Tests that need ROS or take long are left out, and of each property few examples are tried (``mutation_plugin``): the
-share killed is a lower bound.
+killed, every survivor, and the mutants killed only by the time limit. Tests that need ROS or take
+long are left out, and of each property few examples are tried (``mutation_plugin``): the share
+killed is a lower bound.
 """
 
 from __future__ import annotations

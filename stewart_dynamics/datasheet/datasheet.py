@@ -65,7 +65,6 @@ _SLOWEST = 1.0
 STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
 
 
-
 def write_datasheet(parameters: Parameters, order: Order, folder: Path, options: Options,
                     progress: Progress) -> dict[str, Any]:
     """

@@ -23,7 +23,6 @@ the polygon is nearest, or an edge is.
 from __future__ import annotations
 
 from collections.abc import Callable
-import math
 
 import numpy as np
 
