@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 import math
 import sys
 import time
@@ -17,6 +18,7 @@ from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.capability.travel import LIMITS
 from stewart_dynamics.errors import MotionError
@@ -36,6 +38,7 @@ _READ = LEG_STATES, LEG_FORCES
 _DIRECTIONS = np.stack([-np.eye(6), np.eye(6)], axis=1).reshape(12, 6)
 # Values where nothing limits, since no output is infinite: the largest number [m]; one turn [rad].
 _UNLIMITED = np.repeat([sys.float_info.max, 2.0 * math.pi], 6)
+_SWITCH = 2e-4  # after which another thread of Python may go on [s]
 _LAYOUT = MultiArrayLayout(dim=[
     MultiArrayDimension(label='x y z rx ry rz', size=6, stride=12),
     MultiArrayDimension(label='minus plus', size=2, stride=2)])
@@ -84,13 +87,18 @@ class TravelPublisher(PublisherAtRate):
 
     def __init__(self, parameters: Parameters, publisher: Any) -> None:
         super().__init__(publisher, TRAVEL_RATE, self._message)
+        # It takes as long as some setpoints; the thread of these has the processor again soon.
+        self._thread = ThreadPoolExecutor(1)
+        sys.setswitchinterval(_SWITCH)
         self._read = self._said = False
         self.use(parameters)
 
     def use(self, parameters: Parameters) -> None:
         """Use other parameters from now on."""
         self._parameters = parameters
-        self._capability: Capability | None = None
+        self._capability = self._thread.submit(
+            lambda: Capability(StewartPlatform(parameters)))
+        self._values: Future[Array] | None = None
 
     def look(self) -> str:
         """Check whether there is a subscriber; return a notice where no limit is set, once."""
@@ -106,15 +114,29 @@ class TravelPublisher(PublisherAtRate):
         if self._read:
             super().note(*data)
 
-    def _message(self, motion: Sequence[float]) -> Float64MultiArray:
-        if self._capability is None:
-            self._capability = Capability(StewartPlatform(self._parameters))
-        try:
-            values = self._capability.travel(Motion.of_rows(np.array(motion)), _DIRECTIONS).value
-        except MotionError:  # not decided within the largest number of steps
-            values = np.zeros(12)
-        values = np.where(np.isposinf(values), _UNLIMITED, values)
+    def publish_due(self, now: float) -> None:
+        """Publish a travel that is computed; begin with that of the last motion if it is due."""
+        if self._values is not None and self._values.done():
+            values, self._values = self._values.result(), None
+            if self._publisher.get_subscription_count():
+                self._publisher.publish(self.write(values))
+        if self._values is None and self._unpublished is not None and now >= self._due:
+            (motion,), self._unpublished = self._unpublished, None
+            self._due = now + self._period
+            self._values = self._thread.submit(_travel, self._capability, motion)
+
+    @staticmethod
+    def _message(values: Array) -> Float64MultiArray:
         return Float64MultiArray(layout=_LAYOUT, data=values.tolist())
+
+
+def _travel(capability: Future[Capability], motion: Sequence[float]) -> Array:
+    """Return the travel (12,) in all directions from a row of motion."""
+    try:
+        values = capability.result().travel(Motion.of_rows(np.array(motion)), _DIRECTIONS).value
+    except MotionError:  # not decided within the largest number of steps
+        values = np.zeros(12)
+    return np.where(np.isposinf(values), _UNLIMITED, values)
 
 
 class DiagnosticsPublisher:
