@@ -134,7 +134,8 @@ class BuildCore(build_ext):
         folder = Path(self.build_temp)
         folder.mkdir(parents=True, exist_ok=True)
         path.parent.mkdir(parents=True, exist_ok=True)
-        commands = {'library': [str(CORE / 'library.c')]} | {
+        # Single samples: vectors of two numbers would only cost moves.
+        commands = {'library': ['-fno-tree-vectorize', str(CORE / 'library.c')]} | {
             suffix: [*processor, f'-DLANES={lanes}', f'-DSUFFIX={suffix}', str(CORE / 'lanes.c')]
             for suffix, (lanes, processor) in VERSIONS.items()}
         objects = [str(folder / f'{name}.o') for name in commands]

@@ -42,7 +42,6 @@ from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.messages import StateMessages
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
-from stewart_dynamics.simulator.plant_dynamics import STATE_TWIST
 
 sys.path.append(str(HERE.parent / 'test'))
 from referees import energies, rng, smooth_motion  # noqa: E402, I100, I202
@@ -221,7 +220,7 @@ def balance_of_a_tumble(step: float) -> float:
     """Return the change of energy of a hexapod that tumbles freely, of all that it has."""
     plant = Plant(SimulatorParameters({
         **GIVEN, **IDEAL, 'rate': RATE, 'step': step, 'gravity': [0.0, 0.0, 0.0]}))
-    plant._state[STATE_TWIST] = 0.5, -0.3, 1.0, 8.0, -5.0, 12.0
+    plant._plant['state']['twist'][:] = 0.5, -0.3, 1.0, 8.0, -5.0, 12.0
     plant.state = plant._run(0)
     before = energy_of(plant)
     for _ in range(200):

@@ -88,8 +88,8 @@ class Samples:
         """Return them as the step gives them."""
         many = len(self.seconds)
         results = np.concatenate([
-            self.lengths, self.rates, self.demanded, self.unit_load, self.det[:, None],
-            np.zeros((many, 1)), self.condition[:, None]], axis=1)
+            self.lengths, self.rates, self.demanded, self.det[:, None],
+            np.zeros((many, 1)), self.condition[:, None], self.unit_load], axis=1)
         assert results.shape == (many, RESULT)
         states = np.zeros((many, STATE))
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing

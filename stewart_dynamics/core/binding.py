@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import ctypes
 from functools import cache, partial
-from importlib.resources import files
 from pathlib import Path
 import re
 from typing import Any, cast, NamedTuple
@@ -33,7 +32,7 @@ _NUMBERS: dict[str, tuple[np.dtype[Any], Any]] = {
 
 def header(name: str) -> str:
     """Return the text of a header or source file of the library."""
-    return files(__package__).joinpath(name).read_text(encoding='utf-8')
+    return (Path(__file__).parent / name).read_text(encoding='utf-8')
 
 
 def _declarations() -> str:

@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * The simulated hexapod: motion under leg forces or motor torques, integrated at a fixed step.
- * Method and equations: simulator/plant_dynamics.py.
+ * Method and equations: simulator/plant.py.
  */
 
 #define MOST_ATTEMPTS 64   /* solutions until one is taken as it is; one or two are usual */

@@ -57,7 +57,7 @@ static void exchange(choice wanted, real * a, real * b, int step) {
 
 #endif
 
-/* ---- vectors, frames/rotation --------------------------------------------------------------- */
+/* ---- vectors and rotations ------------------------------------------------------------------ */
 
 typedef struct { real x, y, z; } vector;
 
@@ -97,7 +97,7 @@ static void put3(real to[3], vector a) {to[0] = a.x, to[1] = a.y, to[2] = a.z;}
 static void put_matrix(real to[9], vector row0, vector row1, vector row2)
 {put3(to, row0), put3(to + 3, row1), put3(to + 6, row2);}
 
-/* ---- dynamics/bodies: the forces that move each leg and the platform ------------------------ */
+/* ---- the forces that move each leg and the platform ----------------------------------------- */
 
 typedef struct {
   vector arm, direction;      /* a = R p, and s from base joint to platform joint */
@@ -178,7 +178,7 @@ static load move_leg(
   return moved;
 }
 
-/* ---- drives/screws: screws that turn with their legs ---------------------------------------- */
+/* ---- screws that turn with their legs ------------------------------------------------------- */
 
 /* Write the first and return the second derivative of a vector that turns with the platform. */
 static vector turned(vector a, const stewart_motion * motion, vector * rate) {
@@ -262,7 +262,7 @@ static load move_platform(const stewart_platform * platform, const stewart_motio
   return moved;
 }
 
-/* ---- dynamics/base_load: the load of a moving base, as a wrench on the platform ------------- */
+/* ---- the load of a moving base, as a wrench on the platform --------------------------------- */
 
 typedef struct {
   vector felt;             /* the origin's acceleration, less the gravity not in g [m/s^2] */
@@ -283,6 +283,10 @@ static moving_base base_of(const stewart_platform * platform, const stewart_base
   return b;
 }
 
+/* With q = W x s, y the velocity of the platform joint across the leg, and A_b the acceleration of
+   the base joint, less the gravity that is not in g, the force at the platform joint is
+   m_ge A_b + (m2 - m_ge) (s . A_b) s + (I_e / L^2 + m_ce) L (W' x s + W x q + |q|^2 s)
+   - m2 c2 |q|^2 s + 2 m2 c2 / L (L' q - (y . q) s) + 2 (I_e / L^2 + m_ce) (W . s) s x y. */
 static load carry_leg(
   const stewart_leg * leg, const stewart_motion * motion, const moving_base * base) {
   load carried;
@@ -338,7 +342,7 @@ static load carry(
   return carried;
 }
 
-/* ---- matrix6: inverse, determinant, largest eigenvalue -------------------------------------- */
+/* ---- inverse, determinant, condition number ------------------------------------------------- */
 
 
 /* Replace a by its inverse (Gauss-Jordan, partial pivoting); return det(a). Rows are near 1. */
@@ -447,7 +451,7 @@ static real condition_of(real a[6][6], real inverse[6][6]) {
   return root(trace) * root(inverse_trace) * (root(x) * root(y));
 }
 
-/* ---- dynamics/inverse_dynamics -------------------------------------------------------------- */
+/* ---- inverse dynamics ----------------------------------------------------------------------- */
 
 /* Write the result of a motion under a wrench, unchecked; the condition number, half of the work,
    only if it is wanted. */
@@ -500,7 +504,7 @@ static void solve(
 
 #ifndef STEWART_LANES
 
-/* ---- one sample: checks -------------------------------------------------------------------- */
+/* ---- one sample: checks --------------------------------------------------------------------- */
 
 static double least(double a, double b) {return b < a ? b : a;}
 static double largest(double a, double b) {return b > a ? b : a;}
@@ -535,7 +539,7 @@ int stewart_rotation(const double quaternion[4], double rotation[9]) {
   return STEWART_OK;
 }
 
-/* ---- inverse dynamics --------------------------------------------------------------------- */
+/* ---- one sample: inverse dynamics ----------------------------------------------------------- */
 
 int stewart_inverse_dynamics(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
@@ -562,7 +566,7 @@ int stewart_inverse_dynamics(
   return STEWART_SINGULAR;
 }
 
-/* ---- kinematics/joint_angles, kinematics/leg_clearance -------------------------------------- */
+/* ---- angles of the joints, clearance of the legs -------------------------------------------- */
 
 /* Angle between a joint's axis and its leg [rad]. */
 static double joint_angle(const double axis[3], vector direction) {
@@ -628,7 +632,7 @@ static void check_joints(
   }
 }
 
-/* ---- singularity_warning, limits; setpoints/published_forces -------------------------------- */
+/* ---- singularity warning, limits, the step -------------------------------------------------- */
 
 static void advance_warning(
   const stewart_platform * platform, const stewart_result * result, stewart_state * state) {
@@ -698,7 +702,7 @@ int stewart_step(
   return code;
 }
 
-/* ---- drives/motors -------------------------------------------------------------------------- */
+/* ---- motors --------------------------------------------------------------------------------- */
 
 int stewart_motor_torques(
   const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
@@ -724,7 +728,7 @@ int stewart_motor_torques(
   return STEWART_OK;
 }
 
-/* ---- kinematics/forward_kinematics ---------------------------------------------------------- */
+/* ---- forward kinematics --------------------------------------------------------------------- */
 
 /* The rotation nearest to a matrix close to one: R (3 - R^T R) / 2, a step of Newton's. */
 static void orthonormalize(double r[9]) {
