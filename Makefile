@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
-  bench-replay clean demo demo-calibrate demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment export-demo installed \
+  bench-replay clean demo demo-calibrate demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
   lint lint-flake8 lint-layers lint-mypy lint-ruff test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
@@ -174,8 +174,6 @@ docs-site: $(INSTALLED)
 	@echo 'file://$(CURDIR)/docs/_build/html/index.html'
 
 installed: $(INSTALLED)
-
-environment: $(INSTALLED)
 
 $(PREPARED): $(REQUIREMENTS)
 	@for python in $(PYTHONS); do \

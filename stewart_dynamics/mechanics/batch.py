@@ -102,24 +102,21 @@ def leg_lengths(hexapod: Records, poses: Array) -> Array:
 
 
 def in_parts(compute: Callable[..., object], constants: tuple[Any, ...], *arrays: NDArray[Any],
-             scratch: tuple[int, ...] = ()) -> None:
+             ) -> None:
     """
     Call a function with constants and rows of arrays; large batches in parts on all processors.
 
     The first array has as many rows as there are samples. One with a single row is for all parts.
-    Each call gets scratch memory of a shape as its last argument, if it needs any.
     """
-    def call(*rows: NDArray[Any]) -> None:
-        compute(*constants, *rows, *([np.empty(scratch)] if scratch else []))
-
     samples = len(arrays[0])
     threads = min(_CPUS, samples // _SAMPLES_FOR_A_THREAD)
     if threads < 2:
-        call(*arrays)
+        compute(*constants, *arrays)
         return
 
     def part(begin: int, end: int) -> None:
-        call(*(array if len(array) == 1 else array[begin:end] for array in arrays))
+        compute(*constants, *(
+            array if len(array) == 1 else array[begin:end] for array in arrays))
 
     # More parts than threads: if one thread is slow, the others take more parts.
     edges = np.linspace(0, samples, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
