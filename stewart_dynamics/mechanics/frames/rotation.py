@@ -38,11 +38,18 @@ def to_euler(rotation: ArrayLike) -> Array:
     computed with gamma as it is found, so that the rotation is exact everywhere.
     """
     r = np.asarray(rotation, dtype=float)
-    gamma = np.arctan2(r[..., 1, 0], r[..., 0, 0])
-    beta = np.arctan2(-r[..., 2, 0], np.hypot(r[..., 0, 0], r[..., 1, 0]))
-    c, s = np.cos(gamma), np.sin(gamma)
-    alpha = np.arctan2(s * r[..., 0, 2] - c * r[..., 1, 2], c * r[..., 1, 1] - s * r[..., 0, 1])
-    return np.stack([alpha, beta, gamma], axis=-1)
+    # One by one: bits of numpy 1.26's arctan2 depend on where its arguments are in memory.
+    found = [euler_of(each) for each in r.reshape(-1, 9).tolist()]
+    return np.array(found).reshape(*r.shape[:-2], 3)
+
+
+def euler_of(rotation: Sequence[float]) -> tuple[float, float, float]:
+    """Return the same for the nine numbers of one matrix."""
+    r00, r01, r02, r10, r11, r12, r20, _, _ = rotation
+    gamma = math.atan2(r10, r00)
+    c, s = math.cos(gamma), math.sin(gamma)
+    return (math.atan2(s * r02 - c * r12, c * r11 - s * r01),
+            math.atan2(-r20, math.hypot(r00, r10)), gamma)
 
 
 def euler_rate_matrix(angles: ArrayLike) -> Array:

@@ -27,7 +27,7 @@ The second angle is computed with the first as it is, so that the loops are clos
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, sin
+from math import atan2, hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.mechanics.frames.rotation import to_euler
+from stewart_dynamics.mechanics.frames.rotation import euler_of, to_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import homes, level_axes
 from stewart_dynamics.parameters.table import Parameters
 
@@ -104,10 +104,7 @@ class TreeJoints:
             ignored.
         """
         x, y, z, r00, r01, r02, r10, r11, r12, r20, r21, r22 = pose[:12]
-        gamma = atan2(r10, r00)
-        c, s = cos(gamma), sin(gamma)
-        found = [x, y, z, gamma, atan2(-r20, hypot(r00, r10)),
-                 atan2(s * r02 - c * r12, c * r11 - s * r01)]
+        found = [x, y, z, *reversed(euler_of(pose[3:12]))]
         for (bx, by, bz, px, py, pz, m00, m01, m02, m10, m11, m12, m20, m21, m22,
              zero) in self._legs:
             lx = x - bx + r00 * px + r01 * py + r02 * pz
