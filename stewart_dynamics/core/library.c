@@ -80,4 +80,6 @@ int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
 #include "dynamics.c"
 #include "motors.c"
 #include "plant.c"
+#include "governor.c"
+#include "cueing.c"
 #include "records.c"

@@ -111,6 +111,65 @@ typedef struct {
   motor_row motors;
 } one_plant;
 
+/* Coordinates of a governed motion, with their derivatives: displacement of the head, and angles of
+   R = Rz Ry Rx, both from home and in its axes [m, rad]. */
+typedef struct { double value[6], rate[6], acceleration[6]; } coordinates;
+
+/* The limits that a governor keeps, in the order of governor_state.held. */
+enum {
+  GOVERNED_LENGTH_MIN = 0, GOVERNED_LENGTH_MAX = 1, GOVERNED_VELOCITY_MAX = 2,
+  GOVERNED_FORCE_MAX = 3, GOVERNED_BASE_JOINT_ANGLE_MAX = 4, GOVERNED_PLATFORM_JOINT_ANGLE_MAX = 5,
+  GOVERNED_LEG_CLEARANCE_MIN = 6, GOVERNED_TORQUE_MAX = 7, GOVERNED_SPEED_MAX = 8,
+  GOVERNED_SINGULARITY = 9
+};
+
+/* What a governor keeps: see mechanics/governor.py. Bounds have its margins; flags are 0 or 1. */
+typedef struct {
+  stewart_pose home;
+  double head[3];                     /* platform frame [m] */
+  double stop_rate, return_rate;      /* of the stop, and of the return to the demand [1/s] */
+  double length_min[6], length_max[6], velocity_max[6], force_max[6];
+  double base_joint_angle_max[6], platform_joint_angle_max[6], joint_axes[36], clearance_min[6];
+  double speed_max[6], load_share;    /* of motors; part of the available torque that is used */
+  double condition_max, side;         /* side: sign of det(J) at home */
+  double with_angles, with_clearance, with_motors;
+} governor_limits;
+
+/* A governed motion; following: it is the demand. All zero at rest at home, but following. */
+typedef struct {
+  coordinates now;
+  double share[6];                    /* of the demand, at last */
+  double held[10];                    /* time in which each limit held the demand back [s] */
+  double following;
+} governor_state;
+
+/* Washout filters; surge sway heave, or roll pitch yaw: see cueing/motion_cueing.py. */
+typedef struct {
+  double translation_gain[3], translation_frequency[3], translation_damping[3];
+  double washout_frequency[3];
+  double tilt_gain[2], tilt_frequency[2], tilt_damping[2], tilt_rate_max;
+  double rotation_gain[3], rotation_frequency[3];
+} washout_filters;
+
+/* States of the filters, with their last input: acceleration, and angular velocity. */
+typedef struct {
+  double time, input[6], slope[6];
+  double surge[3], sway[3], heave[3]; /* z, z', z'' */
+  double tilt[4];                     /* sine of the pitch down and its rate, and of the roll */
+  double rotation[3];
+  governor_state governor;
+} cueing_state;
+
+/* Motions (count,) at times [s] of inputs (count, 6), acceleration and angular velocity of the
+   vehicle, linear between the times; the state is the one before, of an earlier time, and then the
+   last. Governed where `limited`. Arguments between are as in clearances_many, motors_many. */
+void cue_many(
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
+  const governor_limits * limits, int64_t limited, const washout_filters * filters,
+  int64_t count, const double * times, const double * inputs, cueing_state * state,
+  stewart_motion * motions);
+
 /* Inverse dynamics; without `conditioned` the condition numbers, half of the work, are zero. */
 void solve_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,

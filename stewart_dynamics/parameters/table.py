@@ -97,6 +97,48 @@ def _drives() -> Iterator[Parameter]:
                         'pose, in the plane of the base joints', '', (), sizes=(18,))
 
 
+def _cueing() -> Iterator[Parameter]:
+    def three(name: str, text: str, unit: str, default: tuple[float, ...], **rule: Any,
+              ) -> Parameter:
+        return Parameter(f'cueing.{name}', 'double', text, unit, default, sizes=(len(default),),
+                         while_active=True, **rule)
+
+    of_head, tilt = 'surge, sway, heave', 'surge, sway'
+    frequency = {'minimum': 0.0, 'above': True, 'maximum': 100.0}
+    damping = {'minimum': 0.5, 'maximum': 10.0}
+    yield three('head', "position of the pilot's head, platform frame", 'm', (0.0, 0.0, 0.0))
+    yield Parameter('cueing.input', 'string', 'linear acceleration of the vehicle at the head: '
+                    'specific_force, with gravity, as an accelerometer measures it; acceleration: '
+                    'without', '', SPECIFIC_FORCE, choices=(SPECIFIC_FORCE, ACCELERATION),
+                    while_active=True)
+    yield three('translation.gain', f'share of the acceleration that translation gives, {of_head}',
+                '', (0.5,) * 3, minimum=0.0, maximum=10.0)
+    yield three('translation.natural_frequency', 'natural frequency of the high-pass filter of '
+                f'second order, {of_head}', 'rad/s', (2.5, 4.0, 4.0), **frequency)
+    yield three('translation.damping', f'damping ratio of this filter, {of_head}', '', (1.0,) * 3,
+                **damping)
+    yield three('translation.washout_frequency', 'frequency of the high-pass filter of first '
+                f'order that returns the head to its place, {of_head}', 'rad/s',
+                (0.25, 0.4, 0.4), **frequency)
+    yield three('tilt.gain', f'share of the acceleration that tilt gives, {tilt}', '',
+                (0.5,) * 2, minimum=0.0, maximum=10.0)
+    yield three('tilt.natural_frequency', 'natural frequency of the low-pass filter of second '
+                f'order, {tilt}', 'rad/s', (5.0, 8.0), **frequency)
+    yield three('tilt.damping', f'damping ratio of this filter, {tilt}', '', (1.0,) * 2,
+                **damping)
+    yield Parameter('cueing.tilt.rate_max', 'double', 'maximum rate of the tilt: below it, it is '
+                    'not felt as rotation', 'rad/s', 0.0524, minimum=0.0, above=True,
+                    maximum=100.0, while_active=True)
+    yield three('rotation.gain', 'share of the angular velocity that rotation gives, roll, pitch, '
+                'yaw', '', (0.5,) * 3, minimum=0.0, maximum=10.0)
+    yield three('rotation.natural_frequency', 'frequency of the high-pass filter of first order, '
+                'roll, pitch, yaw', 'rad/s', (1.0,) * 3, **frequency)
+    yield Parameter('cueing.rate', 'double', 'rate of the setpoints of stewart_cueing', 'Hz',
+                    250.0, minimum=10.0, maximum=1e4)
+    yield Parameter('cueing.govern', 'bool', 'keep every setpoint within the limits of this file, '
+                    'with a stop from it within them', default=True, while_active=True)
+
+
 def _uncertainties() -> Iterator[Parameter]:
     for name, text, unit, default in (
             ('platform_mass', 'platform.mass, relative to it', '', 0.5),
@@ -121,6 +163,7 @@ MOTOR_INERTIA, SCREW_INERTIA = DRIVE_INERTIAS = 'drive.motor_inertia', 'drive.sc
 AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'  # values of geometry.platform_side
 IGNORE, CHECK, PREPEND = 'ignore', 'check', 'prepend'  # values of trajectory.approach
 OF_SETPOINTS, AS_MEASURED = 'setpoint', 'measured'  # values of joint_states.source
+SPECIFIC_FORCE, ACCELERATION = 'specific_force', 'acceleration'  # values of cueing.input
 WARN, SUPPRESS_FORCES = ACTIONS = 'warn', 'suppress_forces'  # of singularity.action, limits.action
 SEPARATE, COMBINED, POSES_ALONE = 'separate', 'combined', 'pose'  # values of setpoint.source
 FIXED, AT_REST, MOVING, BY_IMU = 'fixed', 'pose', 'motion', 'imu'  # values of base.source
@@ -298,6 +341,7 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               above=True, while_active=True),
     Parameter('payload.window', 'double', 'time of the measurements that ~/identify_payload uses, '
               'the last ones', 's', 10.0, minimum=2.0, maximum=60.0),
+    *_cueing(),
     *_uncertainties(),
     *_meshes(),
     Parameter('visualization_rate', 'double', 'maximum rate of ~/markers and ~/joint_states; 0: '

@@ -1,0 +1,265 @@
+/* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The governor: the next state of a motion that follows a demand, from which a stop within all
+ * limits exists. Method and equations: mechanics/governor.py.
+ */
+
+#include <string.h>
+
+#define STOP_SAMPLES 12    /* of a stop that are checked */
+#define HALVINGS 5         /* of the share of the demand */
+#define RECOVERY 0.25      /* time in which a share grows from 0 to 1 [s] */
+#define SETTLED 1e-12      /* a smaller deviation from the demand is none [m, rad; times rates] */
+#define LONGEST_STEP 0.01  /* a longer one is divided [s] */
+
+/* Times of the samples of a stop, times its rate; the last is at rest. */
+static const double stop_times[STOP_SAMPLES] = {
+  0.0, 0.2, 0.45, 0.75, 1.1, 1.5, 2.0, 2.6, 3.3, 4.2, 5.5, HUGE_VAL};
+
+/* A machine and its limits: arguments of the functions that Python calls. */
+typedef struct {
+  const stewart_platform * platform;
+  const leg_drives * drives;
+  int64_t n_curve;
+  const double * curve;
+  int64_t n_base;
+  const double * base;
+  int64_t n_moving;
+  const double * moving;
+  const governor_limits * limits;
+} governed;
+
+/* The state after a time of the stop v'' + 2 k v' + k^2 v = 0 from a state. */
+static coordinates stopped(const coordinates * from, double k, double time) {
+  coordinates to;
+  double kt = k * time, left = exp(-kt), gone = isinf(kt) ? 0.0 : kt * left;
+  for (int i = 0; i < 6; i++) {
+    double v = from->rate[i], b = from->acceleration[i] + k * v;
+    to.value[i] = from->value[i] + v * (1.0 - left) / k + b * (1.0 - left - gone) / (k * k);
+    to.rate[i] = v * left + b * gone / k;
+    to.acceleration[i] = from->acceleration[i] * left - b * gone;
+  }
+  return to;
+}
+
+/* The state after a time of the return e''' + 3 k e'' + 3 k^2 e' + k^3 e = 0 to zero. */
+static coordinates rerotate(const coordinates * from, double k, double time) {
+  coordinates to;
+  double left = exp(-k * time);
+  for (int i = 0; i < 6; i++) {
+    /* e = (c0 + c1 t + c2 t^2 / 2) exp(-k t) */
+    double c0 = from->value[i], c1 = from->rate[i] + k * c0;
+    double c2 = from->acceleration[i] + 2.0 * k * c1 - k * k * c0;
+    double p = c0 + time * (c1 + 0.5 * time * c2), q = c1 + time * c2;
+    to.value[i] = left * p;
+    to.rate[i] = left * (q - k * p);
+    to.acceleration[i] = left * (c2 - 2.0 * k * q + k * k * p);
+  }
+  return to;
+}
+
+/* The motion of the platform in the base frame at coordinates: displacement of the head and
+   angles of R = Rz Ry Rx, both from home and in its axes. */
+static void put_motion(
+  const governor_limits * g, const coordinates * at, stewart_motion * motion) {
+  double sa = sin(at->value[3]), ca = cos(at->value[3]);
+  double sb = sin(at->value[4]), cb = cos(at->value[4]);
+  double sc = sin(at->value[5]), cc = cos(at->value[5]);
+  double da = at->rate[3], db = at->rate[4], dc = at->rate[5];
+  double dda = at->acceleration[3], ddb = at->acceleration[4], ddc = at->acceleration[5];
+  double r[9] = {
+    cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa,
+    sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa,
+    -sb, cb * sa, cb * ca};
+  /* w = E angles', w' = E angles'' + E' angles' */
+  vector w = {cc * cb * da - sc * db, sc * cb * da + cc * db, dc - sb * da};
+  vector wd = {
+    cc * cb * dda - sc * ddb - (sc * cb * dc + cc * sb * db) * da - cc * dc * db,
+    sc * cb * dda + cc * ddb + (cc * cb * dc - sc * sb * db) * da - sc * dc * db,
+    ddc - sb * dda - cb * db * da};
+  const double * home = g->home.rotation;
+  vector head = read3(g->head), arm = rotate(r, head), turning = cross(w, arm);
+  put3(motion->position, add(read3(g->home.position), rotate(
+    home, add(head, subtract(read3(at->value), arm)))));
+  put3(motion->linear_velocity, rotate(home, subtract(read3(at->rate), turning)));
+  put3(motion->linear_acceleration, rotate(home, subtract(
+    read3(at->acceleration), add(cross(wd, arm), cross(w, turning)))));
+  put3(motion->angular_velocity, rotate(home, w));
+  put3(motion->angular_acceleration, rotate(home, wd));
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) {
+      motion->rotation[3 * i + j] =
+        home[3 * i] * r[j] + home[3 * i + 1] * r[3 + j] + home[3 * i + 2] * r[6 + j];
+    }
+  }
+}
+
+/* The first of the limits, counted from 1, that six values exceed; nan exceeds. */
+static int above(int limit, const double * values, const double * most) {
+  for (int i = 0; i < 6; i++) {
+    if (!(fabs(values[i]) <= most[i])) {return limit + 1;}
+  }
+  return 0;
+}
+
+static int below(int limit, const double * values, const double * least_values) {
+  for (int i = 0; i < 6; i++) {
+    if (!(values[i] >= least_values[i])) {return limit + 1;}
+  }
+  return 0;
+}
+
+/* The limit, counted from 1, that a motion exceeds, 0 if none. */
+static int exceeded_by(
+  const governed * on, const stewart_motion * motion, const stewart_result * result) {
+  const governor_limits * g = on->limits;
+  int found = 0;
+  if ((found = below(GOVERNED_LENGTH_MIN, result->lengths, g->length_min))) {return found;}
+  if ((found = above(GOVERNED_LENGTH_MAX, result->lengths, g->length_max))) {return found;}
+  if ((found = above(GOVERNED_VELOCITY_MAX, result->rates, g->velocity_max))) {return found;}
+  if (!(result->condition_number < g->condition_max && result->determinant * g->side > 0.0)) {
+    return GOVERNED_SINGULARITY + 1;
+  }
+  if ((found = above(GOVERNED_FORCE_MAX, result->forces, g->force_max))) {return found;}
+  if (g->with_angles != 0.0) {
+    double angles[12];
+    joint_angles_many(on->platform, g->joint_axes, 1, motion, angles);
+    if ((found = above(GOVERNED_BASE_JOINT_ANGLE_MAX, angles, g->base_joint_angle_max)) ||
+        (found = above(GOVERNED_PLATFORM_JOINT_ANGLE_MAX, angles + 6,
+                       g->platform_joint_angle_max))) {return found;}
+  }
+  if (g->with_clearance != 0.0) {
+    double clearances[6];
+    int64_t nearest[6];
+    clearances_many(on->platform, on->n_base, on->base, on->n_moving, on->moving, 1, motion,
+                    clearances, nearest);
+    if ((found = below(GOVERNED_LEG_CLEARANCE_MIN, clearances, g->clearance_min))) {return found;}
+  }
+  if (g->with_motors != 0.0) {
+    motor_row row;
+    put_motors(on->platform, on->drives, on->n_curve, on->curve, motion, result->forces,
+               result->forces, &row);
+    for (int i = 0; i < 6; i++) {row.available_torques[i] *= g->load_share;}
+    if ((found = above(GOVERNED_SPEED_MAX, row.speeds, g->speed_max)) ||
+        (found = above(GOVERNED_TORQUE_MAX, row.breakaway_torques, row.available_torques))) {
+      return found;
+    }
+  }
+  return 0;
+}
+
+/* The limit, counted from 1, that a state or the stop from it exceeds, 0 if none. */
+static int inadmissible(const governed * on, const coordinates * state) {
+  static const double no_wrench[6] = {0.0};
+  static const stewart_base still = {{NAN, NAN, NAN}, {0.0}, {0.0}, {0.0}};
+  stewart_motion motions[STOP_SAMPLES];
+  stewart_result results[STOP_SAMPLES];
+  for (int n = 0; n < STOP_SAMPLES; n++) {
+    coordinates at = stopped(state, on->limits->stop_rate, stop_times[n] / on->limits->stop_rate);
+    put_motion(on->limits, &at, &motions[n]);
+  }
+  solve_many(on->platform, STOP_SAMPLES, motions, 1, no_wrench, 1, &still, 1, results);
+  for (int n = 0; n < STOP_SAMPLES; n++) {
+    int found = exceeded_by(on, &motions[n], &results[n]);
+    if (found) {return found;}
+  }
+  return 0;
+}
+
+/* Each coordinate between stop and demand, by its share of the demand. */
+static coordinates toward(
+  const coordinates * stop, const coordinates * demand, const double share[6]) {
+  coordinates at;
+  for (int i = 0; i < 6; i++) {
+    double s = share[i];
+    at.value[i] = stop->value[i] + s * (demand->value[i] - stop->value[i]);
+    at.rate[i] = stop->rate[i] + s * (demand->rate[i] - stop->rate[i]);
+    at.acceleration[i] =
+      stop->acceleration[i] + s * (demand->acceleration[i] - stop->acceleration[i]);
+  }
+  return at;
+}
+
+/* Write the largest shares found, none above `most`, with which the next state is admissible;
+   zero, the stop, always is. Returns the limit that `most` exceeds, 0 if none. */
+static int find_shares(
+  const governed * on, const coordinates * stop, const coordinates * demand,
+  const double most[6], double share[6]) {
+  coordinates at = toward(stop, demand, most);
+  int limit = inadmissible(on, &at);
+  memcpy(share, most, 6 * sizeof *share);
+  if (!limit) {return 0;}
+  /* One share of all first: the demand keeps its direction. */
+  double low = 0.0, high = 1.0, tried[6];
+  for (int n = 0; n < HALVINGS; n++) {
+    double middle = 0.5 * (low + high);
+    for (int i = 0; i < 6; i++) {tried[i] = middle * most[i];}
+    at = toward(stop, demand, tried);
+    *(inadmissible(on, &at) ? &high : &low) = middle;
+  }
+  for (int i = 0; i < 6; i++) {share[i] = low * most[i];}
+  /* Then each coordinate alone: those that the limit does not concern go on. */
+  for (int i = 0; i < 6; i++) {
+    double kept = share[i];
+    for (int n = 0; n < 2; n++) {
+      share[i] = n == 0 ? most[i] : 0.5 * (kept + most[i]);
+      at = toward(stop, demand, share);
+      if (!inadmissible(on, &at)) {break;}
+      share[i] = kept;
+    }
+  }
+  return limit;
+}
+
+/* Advance a governed motion by a time, toward a demand whose states at begin and end are given. */
+static void govern(
+  const governed * on, int limited, const coordinates * begin, const coordinates * end,
+  double time, governor_state * state) {
+  if (state->following != 0.0) {
+    if (!limited || !inadmissible(on, end)) {
+      state->now = *end;
+      return;
+    }
+    state->following = 0.0;
+  }
+  const double zero[6] = {0.0};
+  coordinates deviation = toward(begin, &state->now, zero);
+  double far = 0.0, k = on->limits->return_rate;
+  for (int i = 0; i < 6; i++) {
+    deviation.value[i] = state->now.value[i] - begin->value[i];
+    deviation.rate[i] = state->now.rate[i] - begin->rate[i];
+    deviation.acceleration[i] = state->now.acceleration[i] - begin->acceleration[i];
+  }
+  deviation = rerotate(&deviation, k, time);
+  coordinates demand = *end;
+  for (int i = 0; i < 6; i++) {
+    demand.value[i] += deviation.value[i];
+    demand.rate[i] += deviation.rate[i];
+    demand.acceleration[i] += deviation.acceleration[i];
+    far = largest(far, largest(fabs(deviation.value[i]), largest(
+      fabs(deviation.rate[i]) / k, fabs(deviation.acceleration[i]) / (k * k))));
+  }
+  double most[6], whole = 1.0;
+  for (int i = 0; i < 6; i++) {
+    most[i] = least(1.0, state->share[i] + time / RECOVERY);
+    whole = least(whole, most[i]);
+  }
+  if (limited) {
+    coordinates stop = stopped(&state->now, on->limits->stop_rate, time);
+    int limit = find_shares(on, &stop, &demand, most, state->share);
+    state->now = whole == 1.0 && !limit ? demand : toward(&stop, &demand, state->share);
+    for (int i = 0; limit && i < 6; i++) {
+      state->held[limit - 1] += time * (1.0 - state->share[i]) / 6.0;
+    }
+    whole = limit ? 0.0 : whole;
+  } else {
+    state->now = demand;
+    for (int i = 0; i < 6; i++) {state->share[i] = 1.0;}
+    whole = 1.0;
+  }
+  if (whole == 1.0 && far < SETTLED) {
+    state->following = 1.0;
+    state->now = *end;
+  }
+}

@@ -1,0 +1,236 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Motion cueing: the classical washout, at the head, within the limits of the hexapod.
+
+For each axis, f the specific force of the vehicle at the head, g = (0, 0, -9.80665) m/s^2, all in
+the axes of the platform at rest (x forward, y left, z up); see L. D. Reid, M. A. Nahon, Flight
+simulation motion-base drive algorithms, UTIAS Report 296, 1985:
+
+    translation    p'' = K_t H_t (f + g)
+                   H_t = s^3 / ((s^2 + 2 zeta w s + w^2) (s + w_b))      p: displacement of the head
+    tilt           pitch = -asin(K_l L f_x / 9.80665), roll = asin(K_l L f_y / 9.80665)
+                   L = w_l^2 / (s^2 + 2 zeta w_l s + w_l^2)
+    rotation       angle = K_r / (s + w_r) rate                                   added to the tilt
+
+Between samples the input is linear, and the filters are exact: Taylor series to rounding, so that
+samples may be any time apart. Velocities and accelerations are the derivatives of the filters'
+states. Near ``tilt.rate_max`` the acceleration of the tilt is limited to 10 w_l times the rate
+that is left; the sine of the tilt that is demanded is at most 0.6. The computation is
+``core/cueing.c``; the governor is ``mechanics/governor.py``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import function, record
+from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.arguments import as_array, wrong_type
+from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
+from stewart_dynamics.mechanics.governor import Governor, KEPT
+from stewart_dynamics.mechanics.rows import MOTION
+from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE, STANDARD_GRAVITY
+
+GRAVITY = -STANDARD_GRAVITY[2]
+AXES = 'surge', 'sway', 'heave', 'roll', 'pitch', 'yaw'
+OMCT_FREQUENCIES: Array = 10.0 ** (-1.0 + 0.2 * np.arange(12))
+"""Frequencies of the objective motion cueing test, ICAO 9625 [rad/s]."""
+# Larger inputs are no motion of a vehicle [m/s^2, rad/s].
+_LARGEST_INPUT = 1e4
+
+_FILTERS = {
+    f'{part}_{c_name}': f'cueing.{part}.{name}'
+    for part, names in {
+        'translation': {'gain': 'gain', 'frequency': 'natural_frequency', 'damping': 'damping'},
+        'tilt': {'gain': 'gain', 'frequency': 'natural_frequency', 'damping': 'damping',
+                 'rate_max': 'rate_max'},
+        'rotation': {'gain': 'gain', 'frequency': 'natural_frequency'}}.items()
+    for c_name, name in names.items()} | {
+        'washout_frequency': 'cueing.translation.washout_frequency'}
+
+
+class Felt(NamedTuple):
+    """What a pilot feels at the head, platform axes."""
+
+    specific_force: Array  # (N, 3) [m/s^2]
+    angular_velocity: Array  # (N, 3) [rad/s]
+
+
+class MotionCueing:
+    """
+    Motions of the platform that let a pilot feel the motion of a vehicle.
+
+    Parameters
+    ----------
+    parameters : Parameters or path
+        Parameters of the hexapod, with ``cueing.*``.
+
+    Raises
+    ------
+    ParameterError
+        There is no home pose, or with ``cueing.govern`` a limit is exceeded at home.
+
+    """
+
+    def __init__(self, parameters: Parameters | str | Path) -> None:
+        if isinstance(parameters, str | Path):
+            parameters = Parameters.from_yaml(parameters)
+        if not isinstance(parameters, Parameters):
+            raise wrong_type('parameters', parameters, 'Parameters or the path of their file')
+        self.parameters = parameters
+        self.governed: bool = parameters['cueing.govern']
+        self.governor = Governor(parameters, parameters['cueing.head'])
+        if self.governed:
+            self.governor.check_home(parameters)
+        filters: Any = np.zeros((), record('washout_filters'))
+        for field, name in _FILTERS.items():
+            filters[field] = parameters[name]
+        self._filters: Records = filters
+        # The input that is rest.
+        self.at_rest: Array = np.zeros(3)
+        if parameters['cueing.input'] == SPECIFIC_FORCE:
+            self.at_rest[2] = GRAVITY
+
+    def run(self, times: ArrayLike, specific_force: ArrayLike,
+            angular_velocity: ArrayLike | None = None) -> Motion:
+        """
+        Return the motion of the platform, from rest at home.
+
+        Parameters
+        ----------
+        times : (N,)
+            Strictly increasing [s].
+        specific_force : (N, 3)
+            Of the vehicle at the head, x forward, y left, z up [m/s^2]; with ``cueing.input:
+            acceleration`` without gravity.
+        angular_velocity : (N, 3), optional
+            Of the vehicle, the same axes [rad/s]; zero by default.
+
+        Returns
+        -------
+        Motion
+            In the base frame, of shape (N,).
+
+        Raises
+        ------
+        MotionError
+            A shape does not fit, a number is not finite or out of range, or times are not
+            strictly increasing.
+
+        """
+        return CueingStream(self).advance(times, specific_force, angular_velocity)
+
+    def stream(self) -> CueingStream:
+        """Return a motion that is computed in pieces, with the same bits as by ``run``."""
+        return CueingStream(self)
+
+    def felt(self, motion: Motion) -> Felt:
+        """Return specific force and angular velocity at the head in motions of the platform."""
+        check_kind(motion, Motion)
+        rotation, head = motion.rotation, self.parameters['cueing.head']
+        arm, omega = rotation @ head, motion.angular_velocity
+        acceleration = (motion.linear_acceleration + np.cross(motion.angular_acceleration, arm)
+                        + np.cross(omega, np.cross(omega, arm)))
+
+        def in_platform_axes(vectors: Array) -> Array:
+            turned: Array = (np.swapaxes(rotation, -1, -2) @ vectors[..., None])[..., 0]
+            return turned
+
+        return Felt(in_platform_axes(acceleration - np.array(STANDARD_GRAVITY)),
+                    in_platform_axes(omega))
+
+    def response(self, frequencies: ArrayLike) -> dict[str, Array]:
+        """
+        Return the felt by the wanted, complex, at frequencies (N,) [rad/s], for small motions.
+
+        Of the specific force for surge, sway and heave, of the angular velocity for roll, pitch
+        and yaw; the governor and the limit of the rate of tilt are idle.
+        """
+        s = 1j * np.asarray(frequencies, dtype=float)
+        p = {name.removeprefix('cueing.'): value for name, value in self.parameters.items()
+             if name.startswith('cueing.')}
+        found: dict[str, Array] = {}
+        for n, axis in enumerate(AXES[:3]):
+            w, zeta, slow, gain = (p[f'translation.{name}'][n] for name in (
+                'natural_frequency', 'damping', 'washout_frequency', 'gain'))
+            found[axis] = gain * s ** 3 / ((s ** 2 + 2.0 * zeta * w * s + w ** 2) * (s + slow))
+        for n, axis in enumerate(AXES[:2]):
+            w, zeta, gain = (p[f'tilt.{name}'][n] for name in (
+                'natural_frequency', 'damping', 'gain'))
+            found[axis] = found[axis] + gain * w ** 2 / (s ** 2 + 2.0 * zeta * w * s + w ** 2)
+        for n, axis in enumerate(AXES[3:]):
+            found[axis] = p['rotation.gain'][n] * s / (s + p['rotation.natural_frequency'][n])
+        return found
+
+    def inputs(self, specific_force: ArrayLike, angular_velocity: ArrayLike | None) -> Array:
+        """Return accelerations and angular velocities (N, 6), checked."""
+        force = as_array('specific_force', specific_force, (3,))
+        rates = (np.zeros_like(force) if angular_velocity is None
+                 else as_array('angular_velocity', angular_velocity, (3,)))
+        if force.ndim != 2 or rates.shape != force.shape:
+            raise MotionError(f'specific_force {force.shape}, angular_velocity {rates.shape}: '
+                              'must both be (N, 3)')
+        inputs: Array = np.column_stack([force - self.at_rest, rates])
+        if (wrong := np.abs(inputs) > _LARGEST_INPUT).any():
+            n, column = np.argwhere(wrong)[0].tolist()
+            name = 'specific_force' if column < 3 else 'angular_velocity'
+            raise MotionError(f'{name}[{n}]: {inputs[n, column]:.6g}: must be at most '
+                              f'{_LARGEST_INPUT:g}')
+        return inputs
+
+    def advance(self, times: Array, inputs: Array, state: Records) -> Array:
+        """Return rows of motion (N, MOTION) at times (N,) of inputs (N, 6); advance the state."""
+        rows = np.empty((len(times), MOTION))
+        hexapod, drives, *others, limits = self.governor.arguments
+        function('cue_many')(hexapod, drives, *others, limits, self.governed, self._filters,
+                             len(times), times, inputs, state, rows)
+        return rows
+
+
+class CueingStream:
+    """
+    A motion of the platform that is computed piece by piece.
+
+    held: time in which each limit has held the demand back so far [s], by the limit's name.
+    """
+
+    def __init__(self, cueing: MotionCueing) -> None:
+        self.cueing = cueing
+        self._state: Any = np.zeros((), record('cueing_state'))
+        self._state['time'] = np.nan
+
+    def advance(self, times: ArrayLike, specific_force: ArrayLike,
+                angular_velocity: ArrayLike | None = None) -> Motion:
+        """Return the motion (N,) at the next times; arguments and errors are those of ``run``."""
+        inputs = self.cueing.inputs(specific_force, angular_velocity)
+        array = as_array('times', times, inputs.shape[:1])
+        before = np.concatenate([[self._state['time']], array[:-1]])
+        if (stuck := array <= before).any():
+            n = int(np.argmax(stuck))
+            raise MotionError(f'times[{n}]: {array[n]:.9g} s: must be after {before[n]:.9g} s')
+        return Motion.of_rows(self.cueing.advance(
+            np.ascontiguousarray(array, dtype=float), inputs, self._state))
+
+    def use(self, cueing: MotionCueing) -> None:
+        """Go on with other parameters, into which the motion blends without a step."""
+        self.cueing = cueing
+        self._state['governor']['following'] = 0.0
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Return the share of the demand that each axis was given at last."""
+        governor = self._state['governor']
+        shares = np.ones(6) if governor['following'] else governor['share']
+        return dict(zip(AXES, shares.tolist(), strict=True))
+
+    @property
+    def held(self) -> dict[str, float]:
+        """Return the time by which each limit has held the demand back [s], all axes together."""
+        return dict(zip(KEPT, self._state['governor']['held'].tolist(), strict=True))

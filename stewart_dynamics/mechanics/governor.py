@@ -1,0 +1,157 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The governor: a motion that follows a demand as far as the limits of the hexapod let it.
+
+A reference governor (E. G. Gilbert, I. Kolmanovsky, Automatica 38, 2002, 2063-2073). At each step
+the next state lies between two: ``stop``, the next state of a stop that is known to be within all
+limits, and ``demand``, that of the motion which returns to the demand. All derivatives of both
+agree with the present state, and so do those of each state between them:
+
+    next = stop + share (demand - stop)
+    stop      v'' + 2 k v' + k^2 v = 0               of the velocity; the acceleration is continuous
+    demand    w(t) + e, (d/dt + r)^3 e = 0           e: the deviation from the demand w
+
+The share is the largest one found with which the next state, and the stop from it, are within all
+limits: one share of all six coordinates first, then each of them alone. A share of zero goes on
+with the stop that was checked before: there is always a next state. A share falls as it must, and
+grows in a quarter of a second; where the deviation has vanished, the motion is the demand itself.
+
+Between the samples of a stop that are checked, bounds could be exceeded by less than the margins
+with which they are checked. The computation is ``core/governor.c``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import places, record
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics import batch
+from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds
+from stewart_dynamics.mechanics.drives.motors import Drives
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
+from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
+from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
+from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
+from stewart_dynamics.mechanics.limits import (
+    BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, PLATFORM_ANGLE_MAX,
+    SINGULARITY, SPEED_MAX, TORQUE_MAX, VELOCITY_MAX)
+from stewart_dynamics.mechanics.pose_limits import PoseLimits
+from stewart_dynamics.mechanics.rows import DETERMINANT, POSE
+from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
+from stewart_dynamics.parameters.table import Parameters
+
+KEPT = (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX,
+        CLEARANCE_MIN, TORQUE_MAX, SPEED_MAX, SINGULARITY)
+"""The limits that a governor keeps, in the order of ``governor_state.held``."""
+
+# Margins: of lengths a part of the stroke; of forces, torques and the condition number, which
+# change fastest between two samples, and of the other limits, parts of themselves.
+_OF_STROKE, _OF_LOADS, _OF_OTHERS = 0.005, 0.03, 0.01
+# Margin of the clearance of the legs, by the characteristic length.
+_OF_CLEARANCE = 0.003
+# A stop from velocity_max needs this part of the stroke, where its rate is between two bounds
+# [1/s]; the third is the rate without these limits.
+_STOP_IN, _SLOWEST_STOP, _FASTEST_STOP, _USUAL_STOP = 0.15, 5.0, 50.0, 10.0
+_RETURN_RATE = 2.0  # with which the deviation from the demand vanishes [1/s]
+
+
+class Governor:
+    """
+    The limits of a hexapod as the functions in C take them.
+
+    arguments: their first ones: hexapod, motors, plates, limits.
+    limits (): the structure ``governor_limits``.
+    head (3,): point of the platform whose displacement is governed, platform frame [m].
+
+    Raises ParameterError: there is no home pose, or at home a limit is exceeded.
+    """
+
+    def __init__(self, parameters: Parameters, head: Array) -> None:
+        home = home_pose(parameters)
+        hexapod = hexapod_structure(parameters)
+        row = Motion.from_pose(home).rows
+        result = batch.solve(hexapod, row[None])[0]
+        limits: Any = np.zeros((), record('governor_limits'))
+        limits['home'] = np.ascontiguousarray(row[POSE]).view(record('stewart_pose'))[0]
+        limits['head'] = head
+        limits['stop_rate'], limits['return_rate'] = _stop_rate(parameters), _RETURN_RATE
+        limits['condition_max'] = (1.0 - _OF_LOADS) * stop_condition_of(parameters)
+        limits['side'] = math.copysign(1.0, result[DETERMINANT])
+        limits['load_share'] = 1.0 - _OF_LOADS
+        self._put_bounds(parameters, limits)
+        base, platform = self._put_clearance(parameters, limits)
+        drives = Drives(parameters)
+        limits['with_motors'] = bool(parameters.drives)
+        if parameters.drives:
+            limits['speed_max'] = (1.0 - _OF_OTHERS) * largest_speeds(parameters)
+        self.limits: Records = limits
+        self.home = home
+        self.arguments = (*drives.arguments, len(base), base, len(platform), platform, limits)
+        self._at_home = row, result
+
+    def check_home(self, parameters: Parameters) -> None:
+        """Raise ParameterError where a limit is exceeded at home."""
+        found = PoseLimits(parameters).first_exceeded(*self._at_home)
+        if found is not None:
+            raise ParameterError(f'{parameters.source}: cueing.govern: at home '
+                                 f'{found.words(parameters["joints"])}')
+
+    def _put_bounds(self, parameters: Parameters, limits: Any) -> None:
+        known = Limits(parameters)
+        bounds = known.bounds
+        for field, name, part in (
+                ('length_max', LENGTH_MAX, 0.0), ('velocity_max', VELOCITY_MAX, _OF_OTHERS),
+                ('force_max', FORCE_MAX, _OF_LOADS),
+                ('base_joint_angle_max', BASE_ANGLE_MAX, _OF_OTHERS),
+                ('platform_joint_angle_max', PLATFORM_ANGLE_MAX, _OF_OTHERS)):
+            limits[field] = (1.0 - part) * bounds.get(name, np.full(6, math.inf))
+        limits['length_min'] = bounds.get(LENGTH_MIN, 0.0)
+        margin = _OF_STROKE * _stroke(parameters)
+        limits['length_min'] += margin
+        limits['length_max'] -= margin
+        angles = angles_to_check(parameters, known.of_joints)
+        limits['with_angles'] = angles is not None
+        if angles is not None:
+            # Angles that no limit needs have no axes, and are not compared: infinite bounds.
+            limits['joint_axes'] = np.nan_to_num(angles.axes).reshape(36)
+
+    def _put_clearance(self, parameters: Parameters, limits: Any) -> tuple[Array, Array]:
+        """Put the bound of the clearance; return the corners of the plates."""
+        if parameters[CLEARANCE_MIN] is None:
+            return np.empty((0, 3)), np.empty((0, 3))
+        shape = LegClearance(parameters)
+        limits['with_clearance'] = True
+        limits['clearance_min'] = parameters[CLEARANCE_MIN] + _OF_CLEARANCE * parameters[
+            'singularity.characteristic_length']
+        return shape.base, shape.platform
+
+
+def state() -> Records:
+    """Return the state () of a governed motion at rest at home, before its first step."""
+    return np.zeros((), record('governor_state'))
+
+
+HELD = places('governor_state')['held']
+
+
+def _stroke(parameters: Parameters) -> Array:
+    """Return the strokes of the legs (6,) [m]; zero without both limits of length."""
+    low, high = parameters[LENGTH_MIN], parameters[LENGTH_MAX]
+    return np.zeros(6) if low is None or high is None else np.broadcast_to(high - low, 6)
+
+
+def _stop_rate(parameters: Parameters) -> float:
+    """Return the rate of a stop [1/s]."""
+    stroke, fastest = _stroke(parameters), parameters[VELOCITY_MAX]
+    if fastest is None or not stroke.all():
+        return _USUAL_STOP
+    rate = 2.0 * float(np.max(fastest / stroke)) / _STOP_IN
+    return min(max(rate, _SLOWEST_STOP), _FASTEST_STOP)
