@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.calibration.calibrate import calibrate, Calibration
     from stewart_dynamics.capability.capability import Capability, Extent
     from stewart_dynamics.capability.reachable import Reachable
+    from stewart_dynamics.cueing.motion_cueing import CueingStream, Felt, MotionCueing
     from stewart_dynamics.errors import (
         BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
     from stewart_dynamics.mechanics.drives.motors import Motors
@@ -30,9 +31,9 @@ if TYPE_CHECKING:
 __version__ = '0.1.0'
 
 __all__ = [
-    'BagError', 'BaseMotion', 'Calibration', 'Capability', 'Extent', 'ForceBreakdown',
-    'InverseDynamics', 'Motion', 'MotionError', 'Motors', 'NaturalModes', 'ParameterError',
-    'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'Reachable', 'SingularityError',
+    'BagError', 'BaseMotion', 'Calibration', 'Capability', 'CueingStream',
+    'Extent', 'Felt', 'ForceBreakdown', 'InverseDynamics', 'Motion', 'MotionCueing',
+    'MotionError', 'Motors', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'Reachable', 'SingularityError',
     'StewartError', 'StewartPlatform', 'TimedMotion', '__version__', 'approach', 'calibrate',
     'check_planned_trajectory', 'rest_to_rest']
 
@@ -40,6 +41,7 @@ _MODULES = {
     'calibration.calibrate': ('Calibration', 'calibrate'),
     'capability.capability': ('Capability', 'Extent'),
     'capability.reachable': ('Reachable',),
+    'cueing.motion_cueing': ('CueingStream', 'Felt', 'MotionCueing'),
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
                'StewartError'),
     'mechanics.frames.base_motion': ('BaseMotion',),

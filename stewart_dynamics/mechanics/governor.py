@@ -54,7 +54,7 @@ KEPT = (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX, BASE_ANGLE_MAX, PLATFOR
 
 # Margins: of lengths a part of the stroke; of forces, torques and the condition number, which
 # change fastest between two samples, and of the other limits, parts of themselves.
-_OF_STROKE, _OF_LOADS, _OF_OTHERS = 0.005, 0.03, 0.01
+_OF_STROKE, _OF_LOADS, _OF_OTHERS = 0.005, 0.03, 0.02
 # Margin of the clearance of the legs, by the characteristic length.
 _OF_CLEARANCE = 0.003
 # A stop from velocity_max needs this part of the stroke, where its rate is between two bounds
