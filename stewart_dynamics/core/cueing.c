@@ -183,14 +183,14 @@ static void cue(
   int64_t steps = limited ? 1 + (int64_t)(time / LONGEST_STEP) : 1;
   double from[6], next[6], step = time / (double)steps;
   memcpy(from, state->input, sizeof from);
+  coordinates begin, end;
+  put_demand(f, state, &begin);
   for (int i = 0; i < 6; i++) {state->slope[i] = (input[i] - from[i]) / time;}
-  for (int64_t k = 1; k <= steps; k++) {
-    coordinates begin, end;
+  for (int64_t k = 1; k <= steps; k++, begin = end) {
     double part = (double)k / (double)steps;
     for (int i = 0; i < 6; i++) {
       next[i] = k == steps ? input[i] : from[i] + part * (input[i] - from[i]);
     }
-    put_demand(f, state, &begin);
     wash_out(f, next, step, state);
     put_demand(f, state, &end);
     govern(on, limited, &begin, &end, step, &state->governor);

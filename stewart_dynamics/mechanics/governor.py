@@ -6,8 +6,8 @@ The governor: a motion that follows a demand as far as the limits of the hexapod
 
 A reference governor (E. G. Gilbert, I. Kolmanovsky, Automatica 38, 2002, 2063-2073). At each step
 the next state lies between two: ``stop``, the next state of a stop that is known to be within all
-limits, and ``demand``, that of the motion which returns to the demand. All derivatives of both
-agree with the present state, and so do those of each state between them:
+limits, and ``demand``, that of the motion which returns to the demand. Both continue the present
+state, and so does each state between them:
 
     next = stop + share (demand - stop)
     stop      v'' + 2 k v' + k^2 v = 0               of the velocity; the acceleration is continuous
