@@ -114,7 +114,8 @@ static double sine_of_tilt(const washout_filters * f, int i, double u) {
 static tilt_filter tilt_between(
   const washout_filters * f, int i, double from, double to, double time) {
   double begin = sine_of_tilt(f, i, from), end = sine_of_tilt(f, i, to);
-  tilt_filter found = {f->tilt_frequency[i], f->tilt_damping[i], f->tilt_rate_max, begin,
+  tilt_filter found = {f->tilt_frequency[i], f->tilt_damping[i],
+    (1.0 - 1e-12) * f->tilt_rate_max, begin,  /* rounding does not exceed it */
     time > 0.0 ? (end - begin) / time : 0.0};
   return found;
 }
@@ -174,6 +175,7 @@ static void begin_cueing(
   put_demand(f, state, &first);
   state->governor.following = !limited || !inadmissible(on, &first);
   if (state->governor.following != 0.0) {state->governor.now = first;}
+  for (int i = 0; i < 6; i++) {state->governor.share[i] = state->governor.following;}
 }
 
 /* Advance by a time to an input, in steps that the governor can take. */

@@ -144,7 +144,9 @@ static int exceeded_by(
   }
   if (g->with_motors != 0.0) {
     motor_row row;
-    put_motors(on->platform, on->drives, on->n_curve, on->curve, motion, result->forces,
+    leg_drives at_any_rate = *on->drives;  /* breakaway torques, as if each leg could reverse */
+    for (int i = 0; i < 6; i++) {at_any_rate.legs[i].slow = HUGE_VAL;}
+    put_motors(on->platform, &at_any_rate, on->n_curve, on->curve, motion, result->forces,
                result->forces, &row);
     for (int i = 0; i < 6; i++) {row.available_torques[i] *= g->load_share;}
     if ((found = above(GOVERNED_SPEED_MAX, row.speeds, g->speed_max, share)) ||
@@ -235,6 +237,12 @@ static int find_shares(
 static void govern(
   const governed * on, int limited, const coordinates * begin, const coordinates * end,
   double time, governor_state * state) {
+  if (state->stopping != 0.0) {
+    state->now = stopped(&state->now, on->limits->stop_rate, time);
+    state->following = 0.0;
+    memset(state->share, 0, sizeof state->share);
+    return;
+  }
   if (state->following != 0.0) {
     if (!limited || !inadmissible(on, end)) {
       state->now = *end;
@@ -281,4 +289,12 @@ static void govern(
     state->following = 1.0;
     state->now = *end;
   }
+}
+
+int64_t governed_limit(
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
+  const governor_limits * limits, const coordinates * state) {
+  governed on = {platform, drives, n, curve, n_base, base, n_moving, moving, limits};
+  return inadmissible(&on, state);
 }

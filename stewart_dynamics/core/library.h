@@ -135,12 +135,13 @@ typedef struct {
   double with_angles, with_clearance, with_motors;
 } governor_limits;
 
-/* A governed motion; following: it is the demand. All zero at rest at home, but following. */
+/* A governed motion, all zero at rest at home; following: it is the demand. */
 typedef struct {
   coordinates now;
   double share[6];                    /* of the demand, at last */
   double held[10];                    /* time in which each limit held the demand back [s] */
   double following;
+  double stopping;                    /* it is brought to rest, whatever the demand is */
 } governor_state;
 
 /* Washout filters; surge sway heave, or roll pitch yaw: see cueing/motion_cueing.py. */
@@ -159,6 +160,12 @@ typedef struct {
   double rotation[3];
   governor_state governor;
 } cueing_state;
+
+/* The limit, counted from 1, that a governed state or the stop from it exceeds; 0 if none. */
+int64_t governed_limit(
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
+  const governor_limits * limits, const coordinates * state);
 
 /* Motions (count,) at times [s] of inputs (count, 6), acceleration and angular velocity of the
    vehicle, linear between the times; the state is the one before, of an earlier time, and then the

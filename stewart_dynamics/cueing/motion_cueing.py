@@ -188,9 +188,8 @@ class MotionCueing:
     def advance(self, times: Array, inputs: Array, state: Records) -> Array:
         """Return rows of motion (N, MOTION) at times (N,) of inputs (N, 6); advance the state."""
         rows = np.empty((len(times), MOTION))
-        hexapod, drives, *others, limits = self.governor.arguments
-        function('cue_many')(hexapod, drives, *others, limits, self.governed, self._filters,
-                             len(times), times, inputs, state, rows)
+        function('cue_many')(*self.governor.arguments, self.governed, self._filters, len(times),
+                             times, inputs, state, rows)
         return rows
 
 
@@ -222,6 +221,14 @@ class CueingStream:
         """Go on with other parameters, into which the motion blends without a step."""
         self.cueing = cueing
         self._state['governor']['following'] = 0.0
+
+    def stop(self) -> None:
+        """Come to rest, whatever the input is, until ``resume``."""
+        self._state['governor']['stopping'] = 1.0
+
+    def resume(self) -> None:
+        """Blend into the demand again, after ``stop``."""
+        self._state['governor']['stopping'] = 0.0
 
     @property
     def shares(self) -> dict[str, float]:

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.core.binding import places, record
+from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds
@@ -98,11 +98,14 @@ class Governor:
         self._at_home = row, result
 
     def check_home(self, parameters: Parameters) -> None:
-        """Raise ParameterError where a limit is exceeded at home."""
+        """Raise ParameterError where a limit is exceeded at home, at rest."""
         found = PoseLimits(parameters).first_exceeded(*self._at_home)
-        if found is not None:
-            raise ParameterError(f'{parameters.source}: cueing.govern: at home '
-                                 f'{found.words(parameters["joints"])}')
+        limit = function('governed_limit')(*self.arguments, np.zeros((), record('coordinates')))
+        if found is None and limit == 0:
+            return
+        words = (f'{KEPT[limit - 1]} is nearer than the margin of the governor' if found is None
+                 else found.words(parameters['joints']))
+        raise ParameterError(f'{parameters.source}: cueing.govern: at home {words}')
 
     def _put_bounds(self, parameters: Parameters, limits: Any) -> None:
         known = Limits(parameters)
@@ -114,6 +117,8 @@ class Governor:
                 ('platform_joint_angle_max', PLATFORM_ANGLE_MAX, _OF_OTHERS)):
             limits[field] = (1.0 - part) * bounds.get(name, np.full(6, math.inf))
         limits['length_min'] = bounds.get(LENGTH_MIN, 0.0)
+        # Friction changes its sign where a leg reverses between two samples.
+        limits['force_max'] -= 2.0 * parameters['actuator.coulomb_friction']
         margin = _OF_STROKE * _stroke(parameters)
         limits['length_min'] += margin
         limits['length_max'] -= margin
