@@ -205,6 +205,8 @@ setup(
         'console_scripts': [
             'stewart_calibrate = stewart_dynamics.calibration:main',
             'stewart_capability = stewart_dynamics.datasheet:main',
+            'stewart_cueing = stewart_dynamics.ros.console_scripts:cueing',
+            'stewart_cueing_report = stewart_dynamics.cueing.report_command_line:main',
             'stewart_describe = stewart_dynamics.description:main',
             'stewart_dynamics = stewart_dynamics.ros.console_scripts:dynamics',
             'stewart_export = stewart_dynamics.export:main',

@@ -18,7 +18,8 @@ from simulated import simulated
 
 from stewart_dynamics import BaseMotion, Motion, ParameterError
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
-from stewart_dynamics.simulator.imu import ImuWriter, SimulatedImu
+from stewart_dynamics.messages.setpoint import ImuWriter
+from stewart_dynamics.simulator.imu import SimulatedImu
 from stewart_dynamics.simulator.moving_base import GeneratedBase, GeneratedBaseMotion
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 

@@ -103,3 +103,29 @@ class StampedWriter:
     def write(self, stamp: int, values: Sequence[float]) -> bytes:
         """Return the message."""
         return self.layout.write_one(stamp, values)
+
+
+_NUMBERS = 37
+# By convention of the message: the orientation is not measured.
+_NOT_MEASURED = (0.0, 0.0, 0.0, 1.0, -1.0, *(0.0,) * 8)
+
+
+class ImuWriter:
+    """
+    Writes sensor_msgs/Imu of an IMU that does not measure its orientation.
+
+    The covariances are made of the standard deviations of the readings [rad/s, m/s^2].
+    """
+
+    def __init__(self, frame: str, angular_velocity: float, specific_force: float) -> None:
+        self._writer = StampedWriter(frame, _NUMBERS)
+        self._covariances = [
+            [deviation ** 2 * (n % 4 == 0) for n in range(9)]
+            for deviation in (angular_velocity, specific_force)]
+
+    def write(self, stamp: int, angular_velocity: Sequence[float],
+              specific_force: Sequence[float]) -> bytes:
+        """Return the message of readings in IMU axes at a time [ns]."""
+        of_gyro, of_accelerometer = self._covariances
+        return self._writer.write(stamp, (
+            *_NOT_MEASURED, *angular_velocity, *of_gyro, *specific_force, *of_accelerometer))

@@ -147,7 +147,7 @@ class DiagnosticsPublisher:
         self._topics = topics
         self._log = log
         # The first one takes milliseconds: rclpy loads the type support.
-        serialize_message(self._message([Status('', OK, '', [('', '')])]))
+        serialize_message(diagnostic_array(node, [Status('', OK, '', [('', '')])]))
 
     def publish(self, diagnostics: DynamicsDiagnostics) -> None:
         """Count publishers and subscribers; publish and log a report."""
@@ -161,14 +161,16 @@ class DiagnosticsPublisher:
             if namesakes > 1 else '')
         statuses, lines = diagnostics.report(time.monotonic())
         self._log.write(lines)
-        publishers[DIAGNOSTICS].publish(self._message(statuses))
+        publishers[DIAGNOSTICS].publish(diagnostic_array(node, statuses))
 
-    def _message(self, statuses: list[Status]) -> DiagnosticArray:
-        name = self._node.get_fully_qualified_name().lstrip('/')
-        return DiagnosticArray(
-            header=Header(stamp=self._node.get_clock().now().to_msg()),
-            status=[DiagnosticStatus(
-                level=bytes([status.level]), name=f'{name}: {status.name}',
-                message=status.message, hardware_id=name,
-                values=[KeyValue(key=key, value=value) for key, value in status.values])
-                for status in statuses])
+
+def diagnostic_array(node: Node, statuses: list[Status]) -> DiagnosticArray:
+    """Return the message of a node's statuses."""
+    name = node.get_fully_qualified_name().lstrip('/')
+    return DiagnosticArray(
+        header=Header(stamp=node.get_clock().now().to_msg()),
+        status=[DiagnosticStatus(
+            level=bytes([status.level]), name=f'{name}: {status.name}',
+            message=status.message, hardware_id=name,
+            values=[KeyValue(key=key, value=value) for key, value in status.values])
+            for status in statuses])

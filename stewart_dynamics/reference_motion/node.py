@@ -8,26 +8,19 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from geometry_msgs.msg import (
-    Accel, AccelStamped, Point, Pose, PoseStamped, Quaternion, Transform, Twist, TwistStamped,
-    Vector3)
 from rclpy.clock import Clock, ClockType, JumpThreshold
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from rclpy.time import Time
-from std_msgs.msg import Header
 from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.parameters.table import COMBINED
 from stewart_dynamics.reference_motion.motion import motion_at, sample_count, sample_time
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.declared_parameters import declare_parameters
 from stewart_dynamics.ros.run import run
-from stewart_dynamics.setpoints import inputs
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
 
 # Number of samples computed at once: one by one they cost more than publishing.
 _BLOCK = 256
@@ -55,24 +48,13 @@ class TrajectoryNode(Node):
         self._done = done
         self._loop = self._settings['loop']
         self._samples = sample_count(self._settings)
-        self._frame = self._settings['base_frame']
         self._index = 0
         self._block: Any = None
         self._held: list[list[float]] | None = None
         self._row()  # an error in it is raised before anything moves
         target = self._settings['target']
-        qos = QoSProfile(depth=1000)
-        if self._settings['output'] == COMBINED:
-            self._combined = self.create_publisher(
-                MultiDOFJointTrajectory, f'{target}/{inputs.COMBINED}', qos)
-            self._outputs = [self._combined]
-            self._publish = self._publish_combined
-        else:
-            self._pose = self.create_publisher(PoseStamped, f'{target}/{inputs.POSE}', qos)
-            self._twist = self.create_publisher(TwistStamped, f'{target}/{inputs.TWIST}', qos)
-            self._accel = self.create_publisher(AccelStamped, f'{target}/{inputs.ACCEL}', qos)
-            self._outputs = [self._pose, self._twist, self._accel]
-            self._publish = self._publish_separate
+        self._setpoints = SetpointPublisher(
+            self, target, self._settings['output'], self._settings['base_frame'])
         self._begun = self._subscribed = False
         self._start = time.monotonic_ns() + round(self._settings['start_timeout'] * SECOND)
         self._timer = self.create_timer(
@@ -122,7 +104,7 @@ class TrajectoryNode(Node):
             if due > now:
                 return
             row = self._row()
-            self._publish(row, Time(nanoseconds=self._stamp + due).to_msg())
+            self._setpoints.publish(row, Time(nanoseconds=self._stamp + due).to_msg())
             self._index += 1
             if not self._loop and self._index == self._samples:
                 self._end(*row[:2])
@@ -139,7 +121,8 @@ class TrajectoryNode(Node):
 
     def _wait(self, now: int) -> None:
         """Begin when it is time, which comes sooner once all topics have subscribers."""
-        if not self._subscribed and all(p.get_subscription_count() for p in self._outputs):
+        publishers = self._setpoints.publishers
+        if not self._subscribed and all(p.get_subscription_count() for p in publishers):
             self._subscribed = True
             # A subscriber may discover the publisher later than the publisher discovers it.
             if now < -_SETTLE:
@@ -152,7 +135,7 @@ class TrajectoryNode(Node):
             self._begun = True
             if not self._subscribed:
                 self.get_logger().warning('begun, but not every topic has a subscriber: '
-                                          + ', '.join(p.topic_name for p in self._outputs
+                                          + ', '.join(p.topic_name for p in publishers
                                                       if not p.get_subscription_count()))
             self._start += now
             self._stamp = stamp
@@ -173,40 +156,6 @@ class TrajectoryNode(Node):
                     motion.rows.tolist(), quaternions.tolist(), strict=True)]
         row: list[list[float]] = self._block[at]
         return row
-
-    def _publish_separate(self, row: list[list[float]], stamp: Any) -> None:
-        header = Header(stamp=stamp, frame_id=self._frame)
-        position, quaternion, *rates = row
-        linear, angular, linear_rate, angular_rate = map(_vector, rates)
-        self._pose.publish(PoseStamped(header=header, pose=Pose(
-            position=_xyz(Point, position), orientation=_quaternion(quaternion))))
-        self._twist.publish(TwistStamped(
-            header=header, twist=Twist(linear=linear, angular=angular)))
-        self._accel.publish(AccelStamped(
-            header=header, accel=Accel(linear=linear_rate, angular=angular_rate)))
-
-    def _publish_combined(self, row: list[list[float]], stamp: Any) -> None:
-        position, quaternion, *rates = row
-        linear, angular, linear_rate, angular_rate = map(_vector, rates)
-        self._combined.publish(MultiDOFJointTrajectory(
-            header=Header(stamp=stamp, frame_id=self._frame), joint_names=['platform'],
-            points=[MultiDOFJointTrajectoryPoint(
-                transforms=[Transform(
-                    translation=_vector(position), rotation=_quaternion(quaternion))],
-                velocities=[Twist(linear=linear, angular=angular)],
-                accelerations=[Twist(linear=linear_rate, angular=angular_rate)])]))
-
-
-def _xyz(kind: Any, three: list[float]) -> Any:
-    return kind(x=three[0], y=three[1], z=three[2])
-
-
-def _vector(three: list[float]) -> Any:
-    return _xyz(Vector3, three)
-
-
-def _quaternion(four: list[float]) -> Any:
-    return Quaternion(x=four[0], y=four[1], z=four[2], w=four[3])
 
 
 def main() -> int:

@@ -62,6 +62,11 @@ def given_parameters(arguments: Sequence[str], node: str, kind: type[ParameterSe
             if value is not None and not is_of_ros(name)}
 
 
+def cueing() -> int:
+    """Run the node stewart_cueing; return its exit code."""
+    return _run('cueing.parameters', 'CueingParameters', 'cueing.node')
+
+
 def dynamics() -> int:
     """Run the node stewart_dynamics; return its exit code."""
     return _run('parameters.table', 'Parameters', 'node.node')

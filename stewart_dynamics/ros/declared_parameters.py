@@ -208,7 +208,7 @@ def _is_present(node: Node, parameter: RosParameter) -> bool:
         parameter.to_parameter_msg() == node.get_parameter(parameter.name).to_parameter_msg())
 
 
-def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool) -> Parameters:
+def changed(parameters: Kind, changes: Mapping[str, Any], configured: bool) -> Kind:
     """
     Return the parameters with changes applied.
 
@@ -221,7 +221,7 @@ def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool
             raise ParameterError(f'{name}: cannot be unset')
     if configured:
         fixed = [name for name in changes
-                 if name in Parameters.table and not Parameters.table[name].while_active]
+                 if name in parameters.table and not parameters.table[name].while_active]
         if fixed:
             raise ParameterError(
                 f'{", ".join(fixed)}: only changed while the node is unconfigured, because its '

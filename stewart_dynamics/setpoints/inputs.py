@@ -39,6 +39,7 @@ BASE_TWIST = 'base/twist'
 BASE_ACCEL = 'base/accel'
 BASE_IMU = 'base/imu'
 WRENCH = 'wrench'
+VEHICLE = 'vehicle'
 
 INPUT_TYPES = {
     POSE: type_names.POSE_STAMPED,
@@ -50,6 +51,7 @@ INPUT_TYPES = {
     BASE_ACCEL: type_names.ACCEL_STAMPED,
     BASE_IMU: type_names.IMU,
     WRENCH: type_names.WRENCH_STAMPED,
+    VEHICLE: type_names.IMU,
 }
 
 # Topics that are joined, for each value of setpoint.source.
@@ -62,7 +64,9 @@ BASE_SOURCES = {
 
 _READERS: dict[str, Callable[[bytes], Stamped]] = {
     POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: twist,
-    BASE_POSE: pose, BASE_TWIST: twist, BASE_ACCEL: twist, BASE_IMU: imu}
+    BASE_POSE: pose, BASE_TWIST: twist, BASE_ACCEL: twist, BASE_IMU: imu,
+    VEHICLE: imu}
+_IMUS = BASE_IMU, VEHICLE
 
 # Indices of an IMU's angular velocity, specific force, and the first entries of their
 # covariances, which are -1 if a quantity is not measured. Its orientation is not used.
@@ -94,7 +98,7 @@ class SampleReader:
         self._topic = topic
         self._reader = _READERS[topic]
         self._has_pose = topic in (POSE, COMBINED, BASE_POSE)
-        self._bounded = topic in (BASE_POSE, BASE_TWIST, BASE_ACCEL, BASE_IMU)
+        self._bounded = topic in (BASE_POSE, BASE_TWIST, BASE_ACCEL, *_IMUS)
         self._frame = None if frame is None else frame.encode()
         self._rejections = rejections
         self._layout: Layout | None = None
@@ -116,7 +120,7 @@ class SampleReader:
                 return None
         else:
             stamp, values = read
-        if self._topic == BASE_IMU:
+        if self._topic in _IMUS:
             for at, name in _COVARIANCES.items():
                 if values[at] == -1.0:
                     self._rejections.reject(self._topic, NOT_MEASURED, f'{name}[0] is -1')
@@ -158,7 +162,7 @@ class SampleReader:
         if self._layout is None or np.any(sizes != self._layout.size):
             return None
         alike, stamps, values = self._layout.read(data, starts)
-        if self._topic == BASE_IMU:
+        if self._topic in _IMUS:
             if (values[:, list(_COVARIANCES)] == -1.0).any():
                 return None
             values = np.ascontiguousarray(values[:, _OF_IMU])

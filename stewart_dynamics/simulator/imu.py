@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from stewart_dynamics.arrays import Array
@@ -15,7 +13,6 @@ from stewart_dynamics.mechanics.frames.motion import matrix_of_quaternion
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
 from stewart_dynamics.mechanics.vectors import add, subtract, Vector3
-from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 
@@ -52,28 +49,3 @@ class SimulatedImu:
 def _vector(three: Array) -> Vector3:
     x, y, z = three.tolist()
     return x, y, z
-
-
-_NUMBERS = 37
-# By convention of the message: the orientation is not measured.
-_NOT_MEASURED = (0.0, 0.0, 0.0, 1.0, -1.0, *(0.0,) * 8)
-
-
-class ImuWriter:
-    """
-    Writes sensor_msgs/Imu of an IMU that does not measure its orientation.
-
-    The covariances are made of the standard deviations of the readings [rad/s, m/s^2].
-    """
-
-    def __init__(self, frame: str, angular_velocity: float, specific_force: float) -> None:
-        self._writer = StampedWriter(frame, _NUMBERS)
-        self._covariances = [(deviation ** 2 * np.eye(3)).ravel().tolist()
-                             for deviation in (angular_velocity, specific_force)]
-
-    def write(self, stamp: int, angular_velocity: Sequence[float],
-              specific_force: Sequence[float]) -> bytes:
-        """Return the message of readings in IMU axes at a time [ns]."""
-        of_gyro, of_accelerometer = self._covariances
-        return self._writer.write(stamp, (
-            *_NOT_MEASURED, *angular_velocity, *of_gyro, *specific_force, *of_accelerometer))

@@ -10,12 +10,12 @@ from operator import sub
 
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import JointStateWriter
-from stewart_dynamics.messages.setpoint import StampedWriter
+from stewart_dynamics.messages.setpoint import ImuWriter, StampedWriter
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.setpoints.output_messages import (
     LEG_STATES, MOTOR_STATES, motor_states_writer)
-from stewart_dynamics.simulator.imu import ImuWriter, SimulatedImu
+from stewart_dynamics.simulator.imu import SimulatedImu
 from stewart_dynamics.simulator.moving_base import BasePeriod
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import ANGLES, PlantState, SPEEDS, TORQUES

@@ -1,0 +1,361 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The node: the motion of a vehicle in, setpoints of the platform out, at a rate of its own."""
+
+from __future__ import annotations
+
+import gc
+import math
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+import numpy as np
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos import QoSProfile
+from rclpy.time import Time
+from sensor_msgs.msg import Imu, JointState
+
+from stewart_dynamics.arrays import Array, SECOND
+from stewart_dynamics.cueing.motion_cueing import CueingStream, MotionCueing
+from stewart_dynamics.cueing.parameters import CueingParameters
+from stewart_dynamics.cueing.vehicle import Vehicle
+from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.limits import short_name
+from stewart_dynamics.mechanics.rows import MOTION, TWIST
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.messages.cdr import MalformedError
+from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
+from stewart_dynamics.messages.setpoint import ImuWriter
+from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, OK, Status, WARN
+from stewart_dynamics.node.publishers_at_rate import diagnostic_array
+from stewart_dynamics.parameters.yaml_file import is_of_ros
+from stewart_dynamics.planned.approach import approach
+from stewart_dynamics.ros.declared_parameters import changed, declare_parameters, log_changes
+from stewart_dynamics.ros.rclpy_workarounds import answer_impossible_transitions
+from stewart_dynamics.ros.repeated_log import RepeatedLog
+from stewart_dynamics.ros.run import run
+from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
+from stewart_dynamics.setpoints.inputs import VEHICLE
+from stewart_dynamics.setpoints.rejections import MALFORMED, Rejection, Rejections
+
+FELT, DIAGNOSTICS, MEASURED_LEGS = 'felt', '/diagnostics', 'measured_legs'
+_TICK = 0.2  # between two looks at the input [s]
+_TICKS_A_REPORT = 5
+_FADE = 1.0  # in which the motion of the vehicle fades in, or out [s]
+_BACKLOG = 100_000_000  # time that is skipped where it is longer [ns]
+_REST = 1e-4  # velocity of a platform at rest [m/s, rad/s]
+_LONGEST_STOP = 5.0  # [s]
+_AWAY = 1e-3  # legs this near to their lengths at home need no approach [m]
+
+
+class CueingNode(LifecycleNode):
+    """
+    Moves the platform as the motion of the vehicle demands, within its limits.
+
+    Raises ParameterError if the parameters break a rule: then nothing starts.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(
+            CueingParameters.node, automatically_declare_parameters_from_overrides=True,
+            allow_undeclared_parameters=True)
+        self._settings = declare_parameters(self, CueingParameters)
+        self._log = RepeatedLog(self.get_logger())
+        self._rejections = Rejections(self._on_rejection)
+        self._active = self._configured = False
+        self._ours: list[Any] = []  # publishers, subscriptions and timers while configured
+        self._last: Array | None = None  # the last setpoint
+        self.add_on_set_parameters_callback(self._on_set_parameters)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        answer_impossible_transitions(
+            self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
+        self._starting = self._settings['autostart']
+        if self._starting:
+            if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+                raise StewartError(f'cannot be configured: {self._fault}')
+            self._starting = False
+            self.trigger_activate()
+        else:
+            self.get_logger().info('unconfigured: autostart is false')
+
+    # -- lifecycle --------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make the filters and open the topics."""
+        try:
+            self._configure()
+        except Exception as exc:
+            # rclpy turns an exception in a transition into ERROR and logs nothing.
+            self._fault = ' '.join(f'{type(exc).__name__}: {exc}'.split())
+            if not self._starting:  # else the program ends with this text
+                self.get_logger().error(f'cannot be configured: {self._fault}')
+            self._close()
+            return TransitionCallbackReturn.FAILURE
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin with the approach to the home pose."""
+        self._vehicle = Vehicle(self._settings, self._rejections, self._on_notice)
+        self._stream: CueingStream | None = None
+        self._approach: Array = np.empty((0, MOTION))
+        self._presence = 0.0  # of the vehicle's motion, from 0 to 1
+        self._held: dict[str, float] = {}
+        self._ticks = 0
+        self._due = 0  # index of the next setpoint, from the begin
+        self._begin: int | None = None  # by the steady clock [ns]
+        self._activated = time.monotonic()
+        self._active = True
+        if self._last is not None:
+            self._start_from(Motion.of_rows(self._last))
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Bring the platform to rest, and publish no more setpoints."""
+        self._end_motion()
+        self._log.write_last()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the topics."""
+        self._close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Bring the platform to rest and close the topics."""
+        self._end_motion()
+        self._close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def destroy_node(self) -> None:
+        """Bring the platform to rest, and end."""
+        self._end_motion()
+        self._log.write_last()
+        super().destroy_node()
+
+    def _configure(self) -> None:
+        p = self._settings
+        for mistake in likely_mistakes(p):
+            self.get_logger().warning(mistake)
+        self._cueing = MotionCueing(p)
+        self._setpoints = SetpointPublisher(self, p['target'], p['output'], p['base_frame'])
+        qos = QoSProfile(depth=1000)
+        self._felt = self.create_publisher(Imu, f'~/{FELT}', qos)
+        self._felt_writer = ImuWriter(p['platform_frame'], 0.0, 0.0)
+        self._diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS, qos)
+        self._legs = JointStateReader(p['joints'], ('position',))
+        self._ours = [
+            (self.destroy_subscription, self.create_subscription(
+                Imu, f'~/{VEHICLE}', self._on_vehicle, qos, raw=True)),
+            (self.destroy_subscription, self.create_subscription(
+                JointState, f'~/{MEASURED_LEGS}', self._on_legs, qos, raw=True)),
+            (self.destroy_timer, self.create_timer(
+                1.0 / p['cueing.rate'], self._on_time, clock=self._steady)),
+            (self.destroy_timer, self.create_timer(_TICK, self._on_tick, clock=self._steady)),
+            *((self.destroy_publisher, each) for each in (
+                self._felt, self._diagnostics, *self._setpoints.publishers))]
+        self._configured = True
+        self.get_logger().info(
+            f'motion cueing at {p["cueing.rate"]:g} Hz to {p["target"]}, '
+            + ('within the limits of the hexapod' if p['cueing.govern'] else 'not governed'))
+        # The objects that exist now stay: see DynamicsNode.
+        gc.unfreeze()
+        gc.collect()
+        gc.freeze()
+
+    def _close(self) -> None:
+        self._configured = False
+        for destroy, each in self._ours:
+            destroy(each)
+        self._ours = []
+
+    # -- inputs -----------------------------------------------------------------------------
+
+    def _on_vehicle(self, data: bytes) -> None:
+        if self._active:
+            self._vehicle.take(data, time.monotonic())
+
+    def _on_legs(self, data: bytes) -> None:
+        """Start the approach from where the platform stands."""
+        if not self._active or self._begin is not None:
+            return
+        platform = StewartPlatform(self._settings)
+        try:
+            _, positions = self._legs.read_one(data)
+            lengths = np.array(positions) + self._settings['geometry.zero_length']
+            away = np.abs(lengths - platform.inverse_kinematics(self._cueing.governor.home))
+            pose = (self._cueing.governor.home if away.max() < _AWAY
+                    else platform.forward_kinematics(lengths))
+        except (MalformedError, JointStateError, StewartError) as exc:
+            self._rejections.reject(MEASURED_LEGS, MALFORMED, str(exc))
+            return
+        self._start_from(Motion.from_pose(pose))
+
+    def _start_from(self, pose: Motion) -> None:
+        """Begin with the approach from a pose to home."""
+        p, home = self._settings, self._cueing.governor.home
+        try:
+            found = approach(StewartPlatform(p), pose, home, rate=p['cueing.rate'])
+        except StewartError as exc:
+            self._log.write([LogLine(ERROR, f'no approach to the home pose: {exc}', 'approach')])
+            return
+        self._approach = found.motion.rows
+        self.get_logger().info(f'approach to the home pose: {found.times[-1]:.3g} s')
+        self._go()
+
+    def _go(self) -> None:
+        self._begin, self._stamp = time.monotonic_ns(), self.get_clock().now().nanoseconds
+        self._due = 0
+        self._stream = self._cueing.stream()
+
+    # -- setpoints --------------------------------------------------------------------------
+
+    def _on_time(self) -> None:
+        """Publish the setpoints that are due, each with its own stamp."""
+        if not self._active or self._begin is None:
+            return
+        late = time.monotonic_ns() - self._begin - self._time_of(self._due)
+        if late > _BACKLOG:
+            self._begin += late
+            self._stamp += late
+            self._on_notice(f'late: fell behind by {late / SECOND:.3f} s: that time is skipped')
+        while self._time_of(self._due) <= time.monotonic_ns() - self._begin:
+            self._publish_next()
+
+    def _time_of(self, index: int) -> int:
+        """Return the time of a setpoint from the begin on [ns]; rounding does not add up."""
+        return round(index * SECOND / self._settings['cueing.rate'])
+
+    def _publish_next(self) -> None:
+        at = self._due
+        row = self._approach[at] if at < len(self._approach) else self._advance()
+        self._last = row
+        stamp = self._stamp + self._time_of(at)
+        motion = Motion.of_rows(row)
+        numbers = row.tolist()
+        self._setpoints.publish(
+            [numbers[:3], motion.quaternion.tolist(), numbers[12:15], numbers[15:18],
+             numbers[18:21], numbers[21:24]], Time(nanoseconds=stamp).to_msg())
+        felt = self._cueing.felt(motion)
+        self._felt.publish(self._felt_writer.write(
+            stamp, felt.angular_velocity.tolist(), felt.specific_force.tolist()))
+        self._due += 1
+
+    def _advance(self) -> Array:
+        """Return the next row of motion of the cueing."""
+        vehicle, rest = self._vehicle, self._cueing.at_rest
+        heard = (vehicle.reading is not None and not vehicle.mistake
+                 and time.monotonic() - vehicle.heard < self._silence)
+        change = 1.0 / (_FADE * self._settings['cueing.rate'])
+        self._presence = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
+        reading = np.zeros(6) if vehicle.reading is None else np.array(vehicle.reading)
+        reading[:3] = rest + self._presence * (reading[:3] - rest)
+        reading[3:] *= self._presence
+        assert self._stream is not None  # made before the first setpoint
+        return self._stream.advance(
+            [1e-9 * self._time_of(self._due)], reading[None, :3], reading[None, 3:]).rows[0]
+
+    @property
+    def _silence(self) -> float:
+        timeout: float = self._settings['vehicle_timeout']
+        return timeout
+
+    def _end_motion(self) -> None:
+        """Bring the platform to rest within its limits, an approach to its end."""
+        active, self._active = self._active, False
+        if not active or self._begin is None or self._stream is None:
+            return
+        self._stream.stop()
+        end = time.monotonic() + _LONGEST_STOP
+        while time.monotonic() < end and self._last is not None and (
+                self._due < len(self._approach) or np.abs(self._last[TWIST]).max() > _REST):
+            wait = self._time_of(self._due) - (time.monotonic_ns() - self._begin)
+            time.sleep(max(wait, 0) / SECOND)
+            self._publish_next()
+
+    # -- diagnostics ------------------------------------------------------------------------
+
+    def _on_tick(self) -> None:
+        now = time.monotonic()
+        self._log.write_last(now)
+        if not self._active:
+            return
+        mistake = self._vehicle.mistake
+        self._vehicle.check(now)
+        if self._vehicle.mistake and self._vehicle.mistake != mistake:
+            self._log.write([LogLine(WARN, f'vehicle: {self._vehicle.mistake}', 'mistake')])
+        if self._begin is None and now - self._activated > self._settings['start_timeout']:
+            self.get_logger().warning('no ~/measured_legs: starts at the home pose')
+            self._go()
+        self._ticks += 1
+        if self._ticks % _TICKS_A_REPORT == 0:
+            self._diagnostics.publish(diagnostic_array(self, [self._status(now)]))
+
+    def _status(self, now: float) -> Status:
+        level, message = OK, 'follows the vehicle'
+        held: dict[str, float] = {}
+        shares: dict[str, float] = {}
+        if self._stream is not None:
+            total = self._stream.held
+            held = {name: value - self._held.get(name, 0.0) for name, value in total.items()}
+            self._held, shares = total, self._stream.shares
+        period = _TICK * _TICKS_A_REPORT
+        worst = max(held, key=held.__getitem__, default='')
+        if self._begin is None:
+            level, message = WARN, 'waits for ~/measured_legs'
+        elif self._due < len(self._approach):
+            message = 'approaches the home pose'
+        elif self._vehicle.mistake:
+            level, message = ERROR, f'vehicle: {self._vehicle.mistake}'
+        elif now - self._vehicle.heard > self._silence:
+            level, message = WARN, 'no ~/vehicle: ' + (
+                'never heard' if math.isinf(self._vehicle.heard)
+                else f'for {now - self._vehicle.heard:.1f} s') + ': washes out to rest'
+        elif worst and held[worst] > 0.0:
+            level, message = WARN, (f'{worst} holds the demand back by '
+                                    f'{100.0 * held[worst] / period:.0f} %')
+        return Status('cueing', level, message, [
+            ('vehicle rate (Hz)', f'{self._vehicle.rate:.1f}'),
+            ('demand given (%)', f'{100.0 * (1.0 - sum(held.values()) / period):.1f}'),
+            *((f'{axis}: demand given (%)', f'{100.0 * share:.1f}')
+              for axis, share in shares.items()),
+            *((f'held back by {short_name(name)} (%)', f'{100.0 * value / period:.1f}')
+              for name, value in held.items() if value > 0.0),
+            *((str(each.words('')), str(count)) for each, count in
+              self._rejections.counts.items())])
+
+    def _on_rejection(self, rejection: Rejection, details: str) -> None:
+        self._log.write([LogLine(WARN, rejection.words(details), rejection)])
+
+    def _on_notice(self, text: str) -> None:
+        self._log.write([LogLine(WARN, text, text[:8])])
+
+    # -- parameters -------------------------------------------------------------------------
+
+    def _on_set_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
+        """Change all of these parameters, blended into the motion, or reject all."""
+        ours = {change.name: change.value for change in changes if not is_of_ros(change.name)}
+        try:
+            parameters = changed(self._settings, ours, self._configured)
+            cueing = MotionCueing(parameters)
+        except ParameterError as exc:
+            return SetParametersResult(
+                successful=False, reason=str(exc).removeprefix('parameters: '))
+        self._log.write(log_changes(self._settings, parameters))
+        self._settings, self._cueing = parameters, cueing
+        if self._active:
+            self._vehicle.kind = parameters['cueing.input']
+            if self._stream is not None:
+                self._stream.use(cueing)
+        return SetParametersResult(successful=True)
+
+
+def main() -> int:
+    """Run the node; exit code 0, or 1 where its parameters break a rule."""
+    return run(CueingNode, CueingParameters)

@@ -1,0 +1,232 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The node of motion cueing, over real topics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped
+import numpy as np
+import pytest
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.serialization import deserialize_message
+from rclpy.time import Time
+from running import Inside, nanoseconds, Peer, PLATFORM
+from sensor_msgs.msg import Imu, JointState
+from stewart_dynamics import Parameters
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.cueing.motion_cueing import GRAVITY, MotionCueing
+from stewart_dynamics.cueing.node import CueingNode
+from stewart_dynamics.cueing.vehicle import vehicle_mistake
+from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+PARAMETERS = Parameters.from_yaml(PLATFORM)
+HOME = home_pose(PARAMETERS)
+RATE = 100.0
+KINDS = {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
+NODE = '/stewart_cueing'
+
+
+class Cueing:
+    """The node in this process, a vehicle and a listener."""
+
+    def __init__(self, domain: int, *overrides: str) -> None:
+        self.peer = Peer(domain)
+        self.raw = {name: self.peer.listen(f'/stewart_dynamics/setpoint/{name}', kind)
+                    for name, kind in KINDS.items()}
+        self.felt = self.peer.listen(f'{NODE}/felt', Imu)
+        self.diagnostics = self.peer.listen('/diagnostics', DiagnosticArray)
+        self.vehicle = self.peer.writer(f'{NODE}/vehicle', Imu)
+        self.legs = self.peer.writer(f'{NODE}/measured_legs', JointState)
+        self.stamp = 1_000_000_000
+        self.read: list[tuple[int, list[float]]] = []
+        nodes: list[CueingNode] = []
+        self.program: Any = Inside(lambda: nodes.append(CueingNode()) or nodes[0], [
+            '--ros-args', '--params-file', PLATFORM, '-p', f'cueing.rate:={RATE}',
+            *(part for each in overrides for part in ('-p', each))], domain)
+        self.node = nodes[0]
+
+    def close(self) -> None:
+        self.program.kill()
+        self.peer.close()
+
+    def send(self, force: Any = (0.0, 0.0, GRAVITY), rates: Any = (0.0, 0.0, 0.0),
+             step: int = 10_000_000) -> None:
+        """Publish a reading of the vehicle."""
+        self.stamp += step
+        message = Imu()
+        message.header.stamp = Time(nanoseconds=self.stamp).to_msg()
+        message.linear_acceleration.x, message.linear_acceleration.y, \
+            message.linear_acceleration.z = map(float, force)
+        message.angular_velocity.x, message.angular_velocity.y, \
+            message.angular_velocity.z = map(float, rates)
+        self.vehicle.publish(message)
+
+    def rows(self) -> tuple[Array, Array]:
+        """Return stamps (N,) [ns], and position, velocity and acceleration (N, 9)."""
+        for n in range(len(self.read), min(map(len, self.raw.values()))):
+            pose, twist, accel = (deserialize_message(self.raw[name][n], kind)
+                                  for name, kind in KINDS.items())
+            self.read.append((nanoseconds(pose.header.stamp), [
+                getattr(three, c) for three in (
+                    pose.pose.position, twist.twist.linear, accel.accel.linear) for c in 'xyz']))
+        return (np.array([stamp for stamp, _ in self.read]),
+                np.array([row for _, row in self.read]).reshape(-1, 9))
+
+    @property
+    def last(self) -> Array:
+        """The last row; far away without one."""
+        self.rows()
+        return np.array(self.read[-1][1]) if self.read else np.full(9, np.inf)
+
+    def until(self, condition: Any, text: str, force: Any = None) -> None:
+        """Wait for a condition, sending the vehicle's motion meanwhile."""
+        def met() -> bool:
+            if force is not None:
+                self.send(force)
+            return bool(condition())
+        self.peer.until(met, text)
+
+    @property
+    def status(self) -> Any:
+        """The last status."""
+        return deserialize_message(self.diagnostics[-1], DiagnosticArray).status[0]
+
+
+@pytest.fixture
+def cueing(domain: int) -> Iterator[Any]:
+    """Give a function that starts the node."""
+    made = []
+
+    def start(*overrides: str) -> Cueing:
+        made.append(Cueing(domain, *overrides))
+        return made[-1]
+
+    yield start
+    for each in made:
+        each.close()
+
+
+def test_vehicle_moves_the_platform_and_silence_brings_it_home(cueing: Any) -> None:
+    """Without legs it begins at home; each setpoint is the derivative of the one before."""
+    node = cueing('start_timeout:=0.1')
+    push = (1.5, 0.0, GRAVITY)
+    node.until(lambda: len(node.raw['accel']) > 10, 'setpoints come')
+    node.until(lambda: node.last[0] > HOME.position[0] + 0.03, 'it moves', push)
+    node.until(lambda: np.abs(node.last[:3] - HOME.position).max() < 1e-4
+               and np.abs(node.last[3:]).max() < 1e-4, 'it is at rest at home')
+    stamps, rows = node.rows()
+    assert np.abs(np.diff(stamps) - 1e9 / RATE).max() <= 1.0
+    step = 1.0 / RATE
+    np.testing.assert_allclose(np.diff(rows[:, :3], axis=0),
+                               step * 0.5 * (rows[1:, 3:6] + rows[:-1, 3:6]), atol=2e-5)
+    assert np.abs(np.diff(rows[:, 6:9], axis=0)).max() < 0.1
+    felt = [deserialize_message(data, Imu) for data in node.felt]
+    assert max(each.linear_acceleration.x for each in felt) > 0.5
+    node.until(lambda: 'no ~/vehicle: for' in node.status.message, 'silence is reported')
+
+
+def test_begins_with_the_approach_from_the_measured_legs(cueing: Any) -> None:
+    node = cueing()
+    low = StewartPlatform(PARAMETERS)
+    pose = HOME.position - [0.0, 0.0, 0.1]
+    lengths = low.inverse_kinematics(type(HOME)(pose, HOME.rotation))
+    legs = JointState(name=list(PARAMETERS['joints']),
+                      position=(lengths - PARAMETERS['geometry.zero_length']).tolist())
+    node.until(lambda: node.legs.publish(legs) or node.raw['accel'], 'setpoints come')
+    node.until(lambda: abs(node.last[2] - HOME.position[2]) < 1e-9, 'it is at home')
+    _, rows = node.rows()
+    np.testing.assert_allclose(rows[0, :3], pose, atol=1e-9)
+    assert np.abs(np.diff(rows[:, 2])).max() < 0.01
+    np.testing.assert_allclose(rows[-1, 3:], 0.0, atol=1e-9)
+
+
+def test_changed_parameters_blend_in_and_wrong_ones_are_rejected(cueing: Any) -> None:
+    node = cueing('start_timeout:=0.1')
+    push = (1.0, 0.0, GRAVITY)
+    node.until(lambda: len(node.raw['accel']) > 150, 'it follows', push)
+    before = len(node.raw['accel'])
+    result = node.node.set_parameters_atomically([
+        RosParameter('cueing.translation.gain', value=[0.9, 0.9, 0.9])])
+    assert result.successful, result.reason
+    rejected = node.node.set_parameters_atomically([
+        RosParameter('cueing.tilt.damping', value=[0.1, 1.0])])
+    assert 'cueing.tilt.damping: 0.1: must be at least 0.5' in rejected.reason
+    fixed = node.node.set_parameters_atomically([RosParameter('cueing.rate', value=50.0)])
+    assert 'cueing.rate: only changed while the node is unconfigured' in fixed.reason
+    node.until(lambda: len(node.raw['accel']) > before + 100, 'it goes on', push)
+    _, rows = node.rows()
+    assert np.abs(np.diff(rows[before - 5:, 6:9], axis=0)).max() < 0.05
+
+
+def test_deactivation_brings_the_platform_to_rest(cueing: Any) -> None:
+    node = cueing('start_timeout:=0.1')
+    node.until(lambda: 0.05 < np.abs(node.last[3:6]).max() < 9.0,
+               'it moves', (2.0, 1.0, GRAVITY))
+    node.node.trigger_deactivate()
+    node.until(lambda: np.abs(node.last[3:6]).max() < 2e-4, 'it is at rest')
+
+
+@pytest.mark.parametrize('force, text', [
+    ((0.0, 0.0, 1.0), 'in g, must be in m/s^2'),
+    ((0.0, 0.0, -GRAVITY), 'gravity is along -z, must be along +z'),
+    ((GRAVITY, 0.0, 0.0), 'gravity is along +x'),
+    ((0.0, 0.0, 0.0), 'without gravity, set acceleration')])
+def test_likely_mistakes_are_named(cueing: Any, force: Any, text: str) -> None:
+    """The platform stays at home meanwhile."""
+    node = cueing('start_timeout:=0.1')
+    node.until(lambda: node.diagnostics and text in node.status.message,
+               'the mistake is reported', force)
+    at = len(node.raw['accel'])
+    node.until(lambda: np.abs(node.last[:3] - HOME.position).max() < 1e-3
+               and len(node.raw['accel']) > at + 50, 'it washes out', force)
+
+
+def test_bad_messages_are_rejected_and_counted(cueing: Any) -> None:
+    node = cueing('start_timeout:=0.1')
+    node.until(lambda: node.diagnostics, 'it reports', (0.0, 0.0, GRAVITY))
+    node.send((np.nan, 0.0, GRAVITY))
+    node.send((0.0, 0.0, np.inf))
+    node.send((2e4, 0.0, 0.0))
+    node.send(step=-500_000_000)
+    wanted = {'vehicle rejected: not finite': '2', 'vehicle rejected: out of range': '1',
+              'vehicle rejected: older than the last used': '1'}
+
+    def counted() -> bool:
+        values = {pair.key: pair.value for pair in node.status.values}
+        return all(values.get(key) == value for key, value in wanted.items())
+
+    node.until(counted, 'they are counted')
+    _, rows = node.rows()
+    assert np.isfinite(rows).all()
+    np.testing.assert_allclose(rows[-1, :3], HOME.position, atol=1e-6)
+
+
+def test_mistakes_of_a_vehicle() -> None:
+    """None where there is no reason for one: slopes, motion, a car at rest."""
+    times = np.arange(200) / 100.0
+    rest, still = np.tile([0.0, 0.0, GRAVITY], (200, 1)), np.zeros((200, 3))
+    for force, kind in ((rest, 'specific_force'), (still, 'acceleration'), (
+            rest @ np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.3, 0.1, 0.95]]),
+            'specific_force'), (rest + np.sin(times[:, None]), 'specific_force')):
+        assert vehicle_mistake(times, force, still, kind) == ''
+    assert 'has gravity in it' in vehicle_mistake(times, rest, still, 'acceleration')
+    assert 'in degrees per second' in vehicle_mistake(
+        times, rest, still + 40.0, 'specific_force')
+    assert vehicle_mistake(times * 100.0, rest, still, 'specific_force').startswith(
+        'comes at 1 Hz')
+    assert 'in mm/s^2' in vehicle_mistake(times, 1e3 * rest, still, 'specific_force')
+
+
+def test_same_bits_as_the_library(cueing: Any) -> None:
+    """At rest the node publishes the home pose of the library."""
+    node = cueing('start_timeout:=0.1')
+    node.until(lambda: len(node.raw['accel']) > 20, 'setpoints come')
+    _, rows = node.rows()
+    at_rest = MotionCueing(PLATFORM).run([0.0], [[0.0, 0.0, GRAVITY]])
+    assert np.array_equal(rows[:, :3], np.tile(at_rest.position, (len(rows), 1)))
