@@ -179,6 +179,7 @@ setup(
         {'bdist_wheel': Wheel} if hasattr(bdist_wheel, 'get_tag') else {}),
     package_data={package_name: ['py.typed'], f'{package_name}.core': ['*.c', '*.h'],
                   f'{package_name}.calibration': ['templates/*'],
+                  f'{package_name}.cueing': ['templates/*'],
                   f'{package_name}.datasheet': ['templates/*'],
                   f'{package_name}.export': ['c/*'],
                   f'{package_name}.identification': ['templates/*'],

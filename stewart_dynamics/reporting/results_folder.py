@@ -29,6 +29,7 @@ from stewart_dynamics.whole_file import Identity, identity, locked, named
 # The files by which folders of results are known, as RESULT is that of a replay.
 IDENTIFICATION, DATASHEET, CALIBRATION = (
     'identification.json', 'datasheet.json', 'calibration.json')
+CUEING, CUEING_PARAMETERS, MOTION_BAG = 'cueing.json', 'cueing.yaml', 'motion'
 DESIGNED_MOTION, DESIGNED_POSES = 'trajectory.yaml', 'poses.csv'  # the same of designs
 
 # Other files that the programs write there.
@@ -74,6 +75,9 @@ _KINDS = {
     DATASHEET: _Kind('a datasheet', _OF_DOCUMENT, {DATASHEET, DATASHEET_PAGE, WORKSPACE}),
     CALIBRATION: _Kind('results of a calibration', _OF_DOCUMENT,
                        {CALIBRATION, CALIBRATED_PARAMETERS, REPORT_PAGE}),
+    CUEING: _Kind('results of motion cueing', _OF_DOCUMENT, {
+        CUEING, CUEING_PARAMETERS, REPORT_PAGE, MOTION_BAG,
+        f'{MOTION_BAG}/{MOTION_BAG}.mcap', f'{MOTION_BAG}/{METADATA}'}),
     DESIGNED_MOTION: _Kind('a designed motion', _OF_DESIGNED_MOTION, {DESIGNED_MOTION}),
     DESIGNED_POSES: _Kind('designed poses', _OF_DESIGNED_POSES,
                           {DESIGNED_POSES, WAY_THROUGH_POSES}, WAY_THROUGH_POSES)}
