@@ -169,6 +169,24 @@ class MotionCueing:
             found[axis] = p['rotation.gain'][n] * s / (s + p['rotation.natural_frequency'][n])
         return found
 
+    def cross_response(self, frequencies: ArrayLike) -> dict[tuple[str, str], Array]:
+        """
+        Return what is felt in another axis than wanted, by both names, as in ``response``.
+
+        Tilt is felt as rotation [rad/s by m/s^2], and rotation tilts gravity [m/s^2 by rad/s].
+        """
+        s = 1j * np.asarray(frequencies, dtype=float)
+        p, found = self.parameters, {}
+        for n, (axis, turn, sign) in enumerate((('surge', 'pitch', -1.0), ('sway', 'roll', 1.0))):
+            w, zeta, gain = (p[f'cueing.tilt.{name}'][n] for name in (
+                'natural_frequency', 'damping', 'gain'))
+            tilt = sign * gain * w ** 2 / (s ** 2 + 2.0 * zeta * w * s + w ** 2) / GRAVITY
+            found[axis, turn] = s * tilt
+            k = AXES.index(turn) - 3
+            found[turn, axis] = sign * GRAVITY * p['cueing.rotation.gain'][k] / (
+                s + p['cueing.rotation.natural_frequency'][k])
+        return found
+
     def inputs(self, specific_force: ArrayLike, angular_velocity: ArrayLike | None) -> Array:
         """Return accelerations and angular velocities (N, 6), checked."""
         force = as_array('specific_force', specific_force, (3,))

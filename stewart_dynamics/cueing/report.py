@@ -87,8 +87,9 @@ def measured_response(cueing: MotionCueing) -> Array:
 
 
 def response_document(cueing: MotionCueing) -> dict[str, Any]:
-    """Return gains and phases, measured and analytic, and the cross terms."""
+    """Return gains and phases, measured and analytic, and gains of the cross terms."""
     measured, analytic = measured_response(cueing), cueing.response(OMCT_FREQUENCIES)
+    cross = cueing.cross_response(OMCT_FREQUENCIES)
     found: dict[str, Any] = {'frequency_rad_s': OMCT_FREQUENCIES.tolist()}
     for n, axis in enumerate(AXES):
         own = measured[:, n, n]
@@ -97,7 +98,9 @@ def response_document(cueing: MotionCueing) -> dict[str, Any]:
             'analytic_gain': np.abs(analytic[axis]).tolist(),
             'analytic_phase_deg': np.degrees(np.angle(analytic[axis])).tolist(),
             'cross': {other: np.abs(measured[:, n, k]).tolist()
-                      for k, other in enumerate(AXES) if k != n}}
+                      for k, other in enumerate(AXES) if k != n},
+            'analytic_cross': {other: np.abs(cross[axis, other]).tolist()
+                               for other in AXES if (axis, other) in cross}}
     return found
 
 

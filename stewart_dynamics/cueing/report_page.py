@@ -33,9 +33,10 @@ def write_page(path: Path, result: Mapping[str, Any], times: Array, found: Cued,
                               f'{axis} [{_UNITS[n]}]') for n, axis in enumerate(AXES)],
                 used=_uses(float(times[-1]), used), response=[
                     _bode(result['response'], axis) for axis in AXES],
-                cross=[(axis, other, max(values)) for axis in AXES for other, values
-                       in result['response'][axis]['cross'].items() if max(values) > 1e-3],
-                frequencies=OMCT_FREQUENCIES.tolist())
+                cross=[(axis, other, max(values), max(
+                    result['response'][axis]['analytic_cross'].get(other, [0.0])))
+                    for axis in AXES for other, values
+                    in result['response'][axis]['cross'].items() if max(values) > 1e-3])
     write_files({path: text})
 
 
