@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
-  bench-replay clean demo demo-calibrate demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
+  bench-replay clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
   lint lint-flake8 lint-layers lint-mypy lint-ruff test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
@@ -104,6 +104,9 @@ lint-ruff: $(INSTALLED)
 demo: $(INSTALLED)
 	@$(VENV)/bin/python demo/demo.py
 
+demo-cueing: $(INSTALLED)
+	@$(VENV)/bin/python demo/cueing.py
+
 demo-loop: $(INSTALLED)
 	@$(VENV)/bin/python demo/loop.py
 
@@ -166,6 +169,7 @@ docs: $(INSTALLED)
 	$(VENV)/bin/python docs/figures/draw.py
 	$(VENV)/bin/python docs/figures/hexapod.py
 	$(VENV)/bin/python docs/figures/tables.py
+	$(VENV)/bin/python demo/cueing.py --output docs/figures/motion_cueing.png
 
 # The pages as a site: docs/_build/html/index.html.
 docs-site: $(INSTALLED)

@@ -16,7 +16,6 @@ import numpy as np
 
 from stewart_dynamics import Motion, MotionCueing, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.cueing.motion_cueing import GRAVITY
 from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
 from stewart_dynamics.mechanics.drives.motors import Drives
 from stewart_dynamics.mechanics.pose_limits import PoseLimits

@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 __version__ = '0.1.0'
 
 __all__ = [
-    'BagError', 'BaseMotion', 'Calibration', 'Capability', 'CueingStream',
-    'Extent', 'Felt', 'ForceBreakdown', 'InverseDynamics', 'Motion', 'MotionCueing',
-    'MotionError', 'Motors', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'Reachable', 'SingularityError',
-    'StewartError', 'StewartPlatform', 'TimedMotion', '__version__', 'approach', 'calibrate',
-    'check_planned_trajectory', 'rest_to_rest']
+    'BagError', 'BaseMotion', 'Calibration', 'Capability', 'CueingStream', 'Extent', 'Felt',
+    'ForceBreakdown', 'InverseDynamics', 'Motion', 'MotionCueing', 'MotionError', 'Motors',
+    'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError',
+    'Reachable', 'SingularityError', 'StewartError', 'StewartPlatform', 'TimedMotion',
+    '__version__', 'approach', 'calibrate', 'check_planned_trajectory', 'rest_to_rest']
 
 _MODULES = {
     'calibration.calibrate': ('Calibration', 'calibrate'),

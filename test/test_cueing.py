@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from referees import PLATFORM
 from scipy.integrate import solve_ivp
-from scipy.signal import lti, lsim
+from scipy.signal import lsim, lti
 from stewart_dynamics import Motion, MotionCueing, MotionError, ParameterError, Parameters
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.cueing.motion_cueing import AXES, GRAVITY, OMCT_FREQUENCIES

@@ -88,7 +88,7 @@ def test_tuned_gains_use_the_machine(town: Path, tmp_path: Path) -> None:
     limited = [each for each in found['tuned'] if each['value'] < 1.0]
     assert limited and all('90% of length at' in each['reason'] for each in limited)
     tuned = Parameters.from_yaml(folder / 'cueing.yaml')
-    assert [tuned[each['name']][each['index']] for each in found['tuned']] == [
+    assert [tuned[each['name']][each['place']] for each in found['tuned']] == [
         each['value'] for each in found['tuned']]
     assert not (folder / 'report.html').exists()
 
@@ -150,7 +150,7 @@ def test_bad_file_is_named(tmp_path: Path, text: str, words: str, capsys: Any) -
     assert not (tmp_path / 'out').exists()
 
 
-def test_strict_ends_with_1_where_limits_hold_back(town: Path, tmp_path: Path, capsys: Any) -> None:
+def test_strict_ends_with_1_where_limits_hold_back(tmp_path: Path, capsys: Any) -> None:
     """And a likely mistake in the recording is a warning."""
     times, forces, rates = drive()
     path = tmp_path / 'wild.csv'

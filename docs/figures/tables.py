@@ -29,6 +29,7 @@ from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.sample_joining import WAITING
+from stewart_dynamics.cueing.parameters import CueingParameters
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 import yaml
 
@@ -77,7 +78,7 @@ def parameters_of(kind: type[ParameterSet]) -> str:
     own = kind is Parameters
     return rows({name: parameter for name, parameter in kind.table.items()
                  if own or name not in Parameters.table
-                 or kind is not SimulatorParameters})
+                 or kind not in (CueingParameters, SimulatorParameters)})
 
 
 def topics(title: str, table: Sequence[Topic], details: bool = True) -> str:
@@ -297,7 +298,12 @@ def pages() -> dict[Path, dict[str, str]]:
         ROOT / 'docs' / 'parameters.md': {
             'parameters of stewart_dynamics': parameters_of(Parameters),
             'parameters of stewart_trajectory': parameters_of(ReferenceMotionParameters),
-            'parameters of stewart_simulator': parameters_of(SimulatorParameters)},
+            'parameters of stewart_simulator': parameters_of(SimulatorParameters),
+            'parameters of stewart_cueing': parameters_of(CueingParameters)},
+        ROOT / 'docs' / 'motion_cueing.md': {
+            'parameters of motion cueing': rows({
+                name: parameter for name, parameter in Parameters.table.items()
+                if name.startswith('cueing.')})},
         ROOT / 'docs' / 'simulator.md': {
             'errors in the loop': loop(figures), 'errors on a ship': ship(on_a_ship)},
         ROOT / 'docs' / 'identify_from_bags.md': {

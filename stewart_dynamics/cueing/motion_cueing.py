@@ -9,7 +9,7 @@ the axes of the platform at rest (x forward, y left, z up); see L. D. Reid, M. A
 simulation motion-base drive algorithms, UTIAS Report 296, 1985:
 
     translation    p'' = K_t H_t (f + g)
-                   H_t = s^3 / ((s^2 + 2 zeta w s + w^2) (s + w_b))      p: displacement of the head
+                   H_t = s^3 / ((s^2 + 2 zeta w s + w^2) (s + w_b))     p: displacement of the head
     tilt           pitch = -asin(K_l L f_x / 9.80665), roll = asin(K_l L f_y / 9.80665)
                    L = w_l^2 / (s^2 + 2 zeta w_l s + w_l^2)
     rotation       angle = K_r / (s + w_r) rate                                   added to the tilt
@@ -40,7 +40,7 @@ from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE, STANDA
 
 GRAVITY = -STANDARD_GRAVITY[2]
 AXES = 'surge', 'sway', 'heave', 'roll', 'pitch', 'yaw'
-OMCT_FREQUENCIES: Array = 10.0 ** (-1.0 + 0.2 * np.arange(12))
+OMCT_FREQUENCIES: Array = np.array([10.0 ** (-1.0 + 0.2 * k) for k in range(12)])
 """Frequencies of the objective motion cueing test, ICAO 9625 [rad/s]."""
 # Larger inputs are no motion of a vehicle [m/s^2, rad/s].
 _LARGEST_INPUT = 1e4

@@ -230,11 +230,12 @@ class CueingNode(LifecycleNode):
 
     def _time_of(self, index: int) -> int:
         """Return the time of a setpoint from the begin on [ns]; rounding does not add up."""
-        return round(index * SECOND / self._settings['cueing.rate'])
+        rate: float = self._settings['cueing.rate']
+        return round(index * SECOND / rate)
 
     def _publish_next(self) -> None:
         at = self._due
-        row = self._approach[at] if at < len(self._approach) else self._advance()
+        row: Array = self._approach[at] if at < len(self._approach) else self._advance()
         self._last = row
         stamp = self._stamp + self._time_of(at)
         motion = Motion.of_rows(row)
@@ -258,8 +259,10 @@ class CueingNode(LifecycleNode):
         reading[:3] = rest + self._presence * (reading[:3] - rest)
         reading[3:] *= self._presence
         assert self._stream is not None  # made before the first setpoint
-        return self._stream.advance(
-            [1e-9 * self._time_of(self._due)], reading[None, :3], reading[None, 3:]).rows[0]
+        motion = self._stream.advance(
+            [1e-9 * self._time_of(self._due)], reading[None, :3], reading[None, 3:])
+        row: Array = motion.rows[0]
+        return row
 
     @property
     def _silence(self) -> float:

@@ -108,7 +108,7 @@ class Gain(NamedTuple):
     """A proposed gain and its reason."""
 
     name: str  # of the parameter
-    index: int
+    place: int  # in its array
     axis: str
     before: float
     value: float
@@ -129,7 +129,7 @@ def tuned(parameters: Parameters, vehicle: RecordedVehicle) -> tuple[Parameters,
     first. None is larger than 1: a motion larger than that of the vehicle is a false cue.
     """
     places = list(_gains(parameters))
-    values = np.zeros(len(places))
+    values: Array = np.zeros(len(places))
     platform_free = parameters.replaced({'cueing.govern': False})
 
     def use_of(gains: Array) -> tuple[float, str]:
@@ -173,8 +173,8 @@ def tuned(parameters: Parameters, vehicle: RecordedVehicle) -> tuple[Parameters,
             reasons[n] = f'{USED:.0%} of {why}' if why else 'full size: more is a false cue'
     values = np.floor(values * 1e3) / 1e3
     return _with(parameters, values), [
-        Gain(name, index, axis, float(parameters[name][index]), float(value), reason)
-        for (name, index, axis), value, reason in zip(places, values, reasons, strict=True)]
+        Gain(name, place, axis, float(parameters[name][place]), float(value), reason)
+        for (name, place, axis), value, reason in zip(places, values, reasons, strict=True)]
 
 
 def _with(parameters: Parameters, gains: Array) -> Parameters:

@@ -76,7 +76,8 @@ def _uses(duration: float, used: Mapping[str, Array]) -> str:
     chart = Chart(picture, (60.0, 26.0, 960.0, 166.0), (0.0, duration), (0.0, top))
     chart.draw_axes('time [s]', 'use of a limit', 8)
     for n, (name, each) in enumerate(used.items()):
-        points = _thinned(np.linspace(0.0, duration, len(each)), np.minimum(each, top))
+        times: Array = np.linspace(0.0, duration, len(each), dtype=float)
+        points = _thinned(times, np.minimum(each, top))
         picture.path(chart.at(points), css=f'edge leg{n % 6}')
         picture.text([1030.0, 40.0 + 17.0 * n], name, css=f'key leg{n % 6}')
     picture.line(*(chart.at([x, 1.0]) for x in chart.x), css='limit')
@@ -96,14 +97,15 @@ def _bode(response: Mapping[str, Any], axis: str) -> str:
         if key == 'phase_deg':
             exact = np.degrees(np.unwrap(np.radians(exact)))
             values = exact + (values - exact + 180.0) % 360.0 - 180.0
-        y = (0.0, max(1.0, 1.08 * values.max())) if key == 'gain' else _range(values, exact)
-        chart = Chart(picture, (54.0, top, 306.0, 96.0), (-1.05, 1.25), y)
-        for value in ticks(*y, 4):
+        low, high = (0.0, max(1.0, 1.08 * float(values.max()))) if key == 'gain' else _range(
+            values, exact)
+        chart = Chart(picture, (54.0, top, 306.0, 96.0), (-1.05, 1.25), (low, high))
+        for value in ticks(low, high, 4):
             (left, at), (right, _) = chart.at([[-1.05, value], [1.25, value]])
             picture.line([left, at], [right, at], css='grid')
             picture.text([left - 5.0, at + 3.5], tick_text(value), 'end', css='tick')
         for decade in (-1.0, 0.0, 1.0):
-            x, bottom = chart.at([decade, y[0]])
+            x, bottom = chart.at([decade, low])
             picture.line([x, top], [x, bottom], css='grid')
             picture.text([x, bottom + 13.0], f'{10.0 ** decade:g}', 'middle', css='tick')
         picture.text([54.0, top - 6.0], title, css='tick')

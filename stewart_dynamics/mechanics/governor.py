@@ -10,8 +10,8 @@ limits, and ``demand``, that of the motion which returns to the demand. Both con
 state, and so does each state between them:
 
     next = stop + share (demand - stop)
-    stop      v'' + 2 k v' + k^2 v = 0               of the velocity; the acceleration is continuous
-    demand    w(t) + e, (d/dt + r)^3 e = 0           e: the deviation from the demand w
+    stop      v'' + 2 k v' + k^2 v = 0              of the velocity; the acceleration is continuous
+    demand    w(t) + e, (d/dt + r)^3 e = 0          e: the deviation from the demand w
 
 The share is the largest one found with which the next state, and the stop from it, are within all
 limits: one share of all six coordinates first, then each of them alone. A share of zero goes on

@@ -360,7 +360,7 @@ class Parameters(ParameterSet):
 
     table = PARAMETERS
     node = 'stewart_dynamics'
-    described = 'drive.', 'actuator.reflected_mass'  # which may follow from drive.*
+    described = 'cueing.', 'drive.', 'actuator.reflected_mass'  # which may follow from drive.*
     drives: tuple[str, ...]  # names of drive.* that are given; without them no motors are computed
 
     def _check_together(self, source: str) -> None:

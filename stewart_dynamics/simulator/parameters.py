@@ -85,9 +85,9 @@ _OWN = (
 
 # Beginnings of names.
 _OF_THE_NODE = ('autostart', 'cueing.', 'drive.resistance', 'drive.speed_max',
-                'drive.temperature_rise_max', 'drive.thermal_', 'drive.torque_constant', 'drive.torque_continuous',
-                'external_wrench.', 'geometry.base_joint_axes', 'geometry.platform_joint_axes',
-                'joint_states.', 'legs.cylinder.length', 'legs.cylinder.radius',
+                'drive.temperature_rise_max', 'drive.thermal_', 'drive.torque_constant',
+                'drive.torque_continuous', 'external_wrench.', 'geometry.base_joint_axes',
+                'geometry.platform_joint_axes', 'joint_states.', 'legs.cylinder.length', 'legs.cylinder.radius',
                 'legs.piston.radius', 'limits.base_joint_angle_max', 'limits.leg_clearance_min',
                 'limits.platform_joint_angle_max', 'limits.velocity_max', 'meshes.',
                 'platform_frame', 'publish_tf', 'setpoint.', 'singularity.', 'trajectory.',
