@@ -35,14 +35,14 @@ from stewart_dynamics.mechanics.frames.rotation import (
 from stewart_dynamics.mechanics.hexapod_structure import (
     FIELDS_BEFORE_LEGS, hexapod_structure, LEG_FIELDS)
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
-from stewart_dynamics.mechanics.limits import JITTER, JUMP, LIMITS, TOLERANCE
+from stewart_dynamics.mechanics.limits import JUMP, LIMITS, TOLERANCE
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, DETERMINANT, FORCES, LENGTHS, MOTION, RESULT, UNIT_LOAD_FORCES,
     WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import OUTLINES
 from stewart_dynamics.parameters.tolerances import HYSTERESIS, QUATERNION_TOLERANCE
-from stewart_dynamics.setpoints.step import Setpoint, Step
+from stewart_dynamics.setpoints.step import JITTER, Setpoint, Step
 from test_drives import driven
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -25,7 +25,7 @@ from stewart_dynamics.identification.lack_of_fit import deviations, LEFT_BY_FILT
 from stewart_dynamics.identification.results import document, result_text
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 import wrong_models

@@ -15,21 +15,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, NANOSECOND, NO_WRENCH, Six, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, NO_WRENCH, Six, Stamps, STAMPS_END
 from stewart_dynamics.core.binding import function, Sample
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    angle_values, ANGLES, CLEARANCE_MIN, Exceedance, JITTER, Limits, result_values)
+    angle_values, ANGLES, CLEARANCE_MIN, Exceedance, Limits, result_values)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, NO_BASE, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
     CAUSE, Singularity, STATE, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
 from stewart_dynamics.setpoints.motor_step import (
     EXCEEDING, MotorStep, RUNNING, times_followed, TORQUES)
+
+
+# Tolerance of the stamps of setpoints [s]: a leg may move at its rate limit for this additional
+# time before a setpoint counts as a jump.
+JITTER = 1e-3
 
 
 class Setpoint(NamedTuple):
