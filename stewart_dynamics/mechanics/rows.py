@@ -35,8 +35,8 @@ NO_BASE: tuple[float, ...] = (math.nan,) * BASE
 
 # A row of a result.
 (LENGTHS, RATES, FORCES, DETERMINANT, DETERMINANT_RATE, CONDITION,
- UNIT_LOAD_FORCES) = places('stewart_result').values()
-RESULT: int = UNIT_LOAD_FORCES.stop
+ UNIT_LOAD_FORCES, JOINT_FORCES) = places('stewart_result').values()
+RESULT: int = JOINT_FORCES.stop
 
 # A row of joint angles, see ``joint_angles``.
 BASE_JOINT_ANGLES, PLATFORM_JOINT_ANGLES = slice(0, 6), slice(6, 12)

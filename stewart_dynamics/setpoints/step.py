@@ -22,7 +22,7 @@ from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_che
 from stewart_dynamics.mechanics.limits import (
     angle_values, ANGLES, CLEARANCE_MIN, Exceedance, Limits, result_values)
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, NO_BASE, RATES, UNIT_LOAD_FORCES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
     CAUSE, Singularity, STATE, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -74,6 +74,8 @@ class Output(NamedTuple):
     """Unclipped [N]; None if J_inv cannot be solved or the base's motion is unknown."""
     forces: Six | None
     """As published [N], clipped to limits.force_max; None if suppressed or not computed."""
+    joint_forces: Six | None
+    """Of rods and joints [N], under the demanded forces; None without these."""
     unit_load_forces: Six
     determinant: float
     determinant_rate: float
@@ -166,6 +168,11 @@ class Outputs(NamedTuple):
         return self.results[:, FORCES]
 
     @property
+    def joint_forces(self) -> Array:
+        """(N, 6) [N]; nan where forces cannot be computed."""
+        return self.results[:, JOINT_FORCES]
+
+    @property
     def unit_load_forces(self) -> Array:
         """(N, 6)."""
         return self.results[:, UNIT_LOAD_FORCES]
@@ -214,8 +221,8 @@ class Step:
         self._limits = Limits(parameters)
         self._sample = sample = Sample(
             'one_setpoint', 'base_known', 'answered', 'exceeding', 'jumped', 'result.lengths',
-            'result.rates', 'result.forces', 'forces', 'result.unit_load_forces',
-            'result.determinant', 'result.determinant_rate', 'result.condition_number', 'after')
+            'result.rates', 'result.forces', 'forces', 'result.joint_forces',
+            'result.unit_load_forces', 'result.determinant', 'result.determinant_rate', 'result.condition_number', 'after')
         self._limits_suppress = parameters['limits.action'] == SUPPRESS_FORCES
         # Margin by which the time between two setpoints may exceed that between their stamps [s].
         self._slack = JITTER + parameters['setpoint.sync_tolerance']
@@ -248,8 +255,8 @@ class Step:
             *(before.singularity or _FIRST), *(before.lengths or _NO_LENGTHS), elapsed,
             setpoint.restart, -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
         self._solve()
-        (answered, exceeding, jumped, lengths, rates, demanded, forces, unit_load_forces,
-         determinant, determinant_rate, condition, after) = self._sample.read()
+        (answered, exceeding, jumped, lengths, rates, demanded, forces, joint_forces,
+         unit_load_forces, determinant, determinant_rate, condition, after) = self._sample.read()
         if not answered:
             return None
         demanded = None if math.isnan(demanded[0]) else demanded
@@ -274,8 +281,8 @@ class Step:
         if self._limits_suppress and (of_pose or of_motors and motors[RUNNING]):
             forces = None
         return Output(
-            stamp, lengths, rates, demanded, forces, unit_load_forces, determinant,
-            determinant_rate, condition, singularity,
+            stamp, lengths, rates, demanded, forces, joint_forces if demanded else None,
+            unit_load_forces, determinant, determinant_rate, condition, singularity,
             before.singularity is None or singularity.warning != before.singularity.warning,
             exceedances + of_pose + of_motors, angles, clearances, motors,
             before._replace(singularity=singularity) if jumped
