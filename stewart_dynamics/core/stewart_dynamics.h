@@ -115,6 +115,7 @@ typedef struct {
   double determinant_rate;     /* its time derivative [m^3/s] */
   double condition_number;     /* of J_inv, at least 1 */
   double unit_load_forces[6];  /* largest force of each leg under a unit load on the platform */
+  double joint_forces[6];      /* along the legs, in joints and rods: without the actuators' own */
 } stewart_result;
 
 /* What stewart_step keeps from call to call: all zero before the first, or to start anew. */
@@ -170,6 +171,12 @@ int stewart_motor_torques(
  * its lengths are within 1e-12 m of those given. */
 int stewart_forward_kinematics(
   const stewart_platform * platform, const double lengths[6], stewart_pose * pose);
+
+/* The twist and the acceleration of the platform that give leg rates [m/s] and their time
+ * derivatives [m/s^2] at the motion's pose; written with STEWART_OK alone. */
+int stewart_motion_of_legs(
+  const stewart_platform * platform, const double rates[6], const double accelerations[6],
+  stewart_motion * motion);
 
 /* The rotation, row by row, of a quaternion x y z w; written with STEWART_OK alone. */
 int stewart_rotation(const double quaternion[4], double rotation[9]);
