@@ -23,7 +23,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'stewart_dynamics'
-EXECUTABLES = ('stewart_calibrate', 'stewart_capability', 'stewart_dynamics', 'stewart_describe',
+EXECUTABLES = ('stewart_calibrate', 'stewart_capability', 'stewart_cueing',
+               'stewart_cueing_report', 'stewart_dynamics', 'stewart_describe',
                'stewart_export', 'stewart_identify', 'stewart_replay', 'stewart_simulator',
                'stewart_trajectory')
 PACKAGED = ('bags', 'config', 'examples', 'launch', 'resource', 'security', NAME, 'LICENSE',

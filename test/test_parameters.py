@@ -368,7 +368,7 @@ def check_any(file: Path) -> None:
         for name, value in (parameters or {}).items():
             known = PARAMETERS[name]
             if known.kind == 'double' and value is not None:
-                assert np.size(value) in (1, 3, 4, 6, 18)
+                assert np.size(value) in (1, 2, 3, 4, 6, 18)
                 assert np.all(np.isfinite(value) & (value <= known.maximum) & (
                     value > known.minimum if known.above else value >= known.minimum))
 

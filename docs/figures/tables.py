@@ -21,6 +21,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from stewart_dynamics.cueing.parameters import CueingParameters
 from stewart_dynamics.mechanics.hexapod_structure import (
     FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
 from stewart_dynamics.node.node import BACKLOG
@@ -29,7 +30,6 @@ from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.sample_joining import WAITING
-from stewart_dynamics.cueing.parameters import CueingParameters
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 import yaml
 
