@@ -188,6 +188,19 @@ def test_pieces_give_the_same_bits(changes: dict[str, Any]) -> None:
     assert (sum(stream.held.values()) > 0.0) == ('cueing.rotation.gain' in changes)
 
 
+def test_one_by_one_gives_the_same_bits() -> None:
+    """As the node computes it, with what is felt."""
+    cueing = cueing_of({'cueing.head': [0.1, 0.2, 0.9]})
+    times = np.arange(200) * 0.004
+    force, rates = vehicle(times)
+    motion, stream = cueing.run(times, force, rates), cueing.stream()
+    felt = np.column_stack(cueing.felt(motion))
+    for n, time in enumerate(times.tolist()):
+        stream.advance_by_one(time, [*force[n].tolist(), *rates[n].tolist()])
+        assert np.array_equal(stream.row, motion.rows[n])
+        assert np.array_equal(stream.felt, felt[n])
+
+
 @pytest.mark.parametrize('changes', [FREE, {'cueing.tilt.rate_max': 100.0}, {
     'cueing.translation.gain': [3.0] * 3, 'cueing.rotation.gain': [3.0] * 3}])
 def test_twist_and_acceleration_are_derivatives(changes: dict[str, Any]) -> None:

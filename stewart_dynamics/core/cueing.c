@@ -216,3 +216,16 @@ void cue_many(
     put_motion(limits, &state->governor.now, &motions[k]);
   }
 }
+
+void felt_many(
+  const double * head, int64_t count, const stewart_motion * motions, double * felt) {
+  for (int64_t k = 0; k < count; k++, felt += 6) {
+    const stewart_motion * m = &motions[k];
+    vector arm = rotate(m->rotation, read3(head)), w = read3(m->angular_velocity);
+    vector carried = add(cross(read3(m->angular_acceleration), arm), cross(w, cross(w, arm)));
+    vector force = add(read3(m->linear_acceleration), carried);
+    force.z += STANDARD_GRAVITY;
+    put3(felt, rotate_back(m->rotation, force));
+    put3(felt + 3, rotate_back(m->rotation, w));
+  }
+}

@@ -184,6 +184,10 @@ void cue_many(
   int64_t count, const double * times, const double * inputs, cueing_state * state,
   stewart_motion * motions);
 
+/* Specific forces and angular velocities (count, 6) at a head of the platform, platform axes. */
+void felt_many(
+  const double * head, int64_t count, const stewart_motion * motions, double * felt);
+
 /* Inverse dynamics; without `conditioned` the condition numbers, half of the work, are zero. */
 void solve_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,

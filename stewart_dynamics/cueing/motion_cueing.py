@@ -23,6 +23,7 @@ that is left; the sine of the tilt that is demanded is at most 0.6. The computat
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -92,7 +93,7 @@ class MotionCueing:
         filters: Any = np.zeros((), record('washout_filters'))
         for field, name in _FILTERS.items():
             filters[field] = parameters[name]
-        self._filters: Records = filters
+        self._constants = *self.governor.arguments, self.governed, filters
         # The input that is rest.
         self.at_rest: Array = np.zeros(3)
         if parameters['cueing.input'] == SPECIFIC_FORCE:
@@ -134,17 +135,11 @@ class MotionCueing:
     def felt(self, motion: Motion) -> Felt:
         """Return specific force and angular velocity at the head in motions of the platform."""
         check_kind(motion, Motion)
-        rotation, head = motion.rotation, self.parameters['cueing.head']
-        arm, omega = rotation @ head, motion.angular_velocity
-        acceleration = (motion.linear_acceleration + np.cross(motion.angular_acceleration, arm)
-                        + np.cross(omega, np.cross(omega, arm)))
-
-        def in_platform_axes(vectors: Array) -> Array:
-            turned: Array = (np.swapaxes(rotation, -1, -2) @ vectors[..., None])[..., 0]
-            return turned
-
-        return Felt(in_platform_axes(acceleration - np.array(STANDARD_GRAVITY)),
-                    in_platform_axes(omega))
+        rows = np.ascontiguousarray(motion.rows.reshape(-1, MOTION))
+        felt = np.empty((len(rows), 6))
+        function('felt_many')(self.parameters['cueing.head'], len(rows), rows, felt)
+        felt = felt.reshape(*motion.shape, 6)
+        return Felt(felt[..., :3], felt[..., 3:])
 
     def response(self, frequencies: ArrayLike) -> dict[str, Array]:
         """
@@ -206,22 +201,48 @@ class MotionCueing:
     def advance(self, times: Array, inputs: Array, state: Records) -> Array:
         """Return rows of motion (N, MOTION) at times (N,) of inputs (N, 6); advance the state."""
         rows = np.empty((len(times), MOTION))
-        function('cue_many')(*self.governor.arguments, self.governed, self._filters, len(times),
-                             times, inputs, state, rows)
+        function('cue_many')(*self._constants, len(times), times, inputs, state, rows)
         return rows
+
+    def bound(self, time: Array, inputs: Array, state: Records, row: Array, felt: Array,
+              ) -> tuple[Callable[[], Any], Callable[[], Any]]:
+        """Return functions that advance by one sample, and that write what is felt then."""
+        return (function('cue_many').bound(*self._constants, 1, time, inputs, state, row),
+                function('felt_many').bound(self.parameters['cueing.head'], 1, row, felt))
 
 
 class CueingStream:
     """
     A motion of the platform that is computed piece by piece.
 
-    held: time in which each limit has held the demand back so far [s], by the limit's name.
+    row (MOTION,), felt (6,): last motion of ``advance_by_one``, and specific force and angular
+        velocity at the head.
     """
 
     def __init__(self, cueing: MotionCueing) -> None:
-        self.cueing = cueing
         self._state: Any = np.zeros((), record('cueing_state'))
         self._state['time'] = np.nan
+        self._time, self._inputs = np.empty(1), np.empty(6)
+        self.row, self.felt = np.zeros(MOTION), np.zeros(6)
+        self._bind(cueing)
+
+    def _bind(self, cueing: MotionCueing) -> None:
+        self.cueing = cueing
+        self._gravity: float = cueing.at_rest[2]
+        self._advance, self._feel = cueing.bound(
+            self._time, self._inputs, self._state, self.row, self.felt)
+
+    def advance_by_one(self, time: float, reading: Sequence[float]) -> None:
+        """
+        Advance to a later time [s], for real time: with the bits of ``advance``, and unchecked.
+
+        reading (6,): specific force [m/s^2] and angular velocity [rad/s] of the vehicle.
+        """
+        x, y, z, *rates = reading
+        self._time[0] = time
+        self._inputs[:] = x, y, z - self._gravity, *rates
+        self._advance()
+        self._feel()
 
     def advance(self, times: ArrayLike, specific_force: ArrayLike,
                 angular_velocity: ArrayLike | None = None) -> Motion:
@@ -237,7 +258,7 @@ class CueingStream:
 
     def use(self, cueing: MotionCueing) -> None:
         """Go on with other parameters, into which the motion blends without a step."""
-        self.cueing = cueing
+        self._bind(cueing)
         self._state['governor']['following'] = 0.0
 
     def stop(self) -> None:

@@ -26,9 +26,10 @@ from stewart_dynamics.cueing.parameters import CueingParameters
 from stewart_dynamics.cueing.vehicle import Vehicle
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.frames.rotation import quaternion_of
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.limits import short_name
-from stewart_dynamics.mechanics.rows import MOTION, TWIST
+from stewart_dynamics.mechanics.rows import MOTION, ROTATION, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
@@ -234,35 +235,34 @@ class CueingNode(LifecycleNode):
         return round(index * SECOND / rate)
 
     def _publish_next(self) -> None:
-        at = self._due
-        row: Array = self._approach[at] if at < len(self._approach) else self._advance()
-        self._last = row
+        at, stream = self._due, self._stream
+        assert stream is not None  # made before the first setpoint
         stamp = self._stamp + self._time_of(at)
-        motion = Motion.of_rows(row)
-        numbers = row.tolist()
+        if at < len(self._approach):
+            self._last = self._approach[at]
+            felt = np.concatenate(self._cueing.felt(Motion.of_rows(self._last))).tolist()
+        else:
+            self._advance(stream)
+            self._last = stream.row
+            felt = stream.felt.tolist()
+        numbers = self._last.tolist()
         self._setpoints.publish(
-            [numbers[:3], motion.quaternion.tolist(), numbers[12:15], numbers[15:18],
+            [numbers[:3], list(quaternion_of(numbers[ROTATION])), numbers[12:15], numbers[15:18],
              numbers[18:21], numbers[21:24]], Time(nanoseconds=stamp).to_msg())
-        felt = self._cueing.felt(motion)
-        self._felt.publish(self._felt_writer.write(
-            stamp, felt.angular_velocity.tolist(), felt.specific_force.tolist()))
+        self._felt.publish(self._felt_writer.write(stamp, felt[3:], felt[:3]))
         self._due += 1
 
-    def _advance(self) -> Array:
-        """Return the next row of motion of the cueing."""
-        vehicle, rest = self._vehicle, self._cueing.at_rest
+    def _advance(self, stream: CueingStream) -> None:
+        """Advance the cueing to the next setpoint."""
+        vehicle, gravity = self._vehicle, float(self._cueing.at_rest[2])
         heard = (vehicle.reading is not None and not vehicle.mistake
                  and time.monotonic() - vehicle.heard < self._silence)
         change = 1.0 / (_FADE * self._settings['cueing.rate'])
-        self._presence = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
-        reading = np.zeros(6) if vehicle.reading is None else np.array(vehicle.reading)
-        reading[:3] = rest + self._presence * (reading[:3] - rest)
-        reading[3:] *= self._presence
-        assert self._stream is not None  # made before the first setpoint
-        motion = self._stream.advance(
-            [1e-9 * self._time_of(self._due)], reading[None, :3], reading[None, 3:])
-        row: Array = motion.rows[0]
-        return row
+        share = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
+        self._presence = share
+        x, y, z, *rates = vehicle.reading or (0.0, 0.0, gravity, 0.0, 0.0, 0.0)
+        stream.advance_by_one(1e-9 * self._time_of(self._due), (
+            share * x, share * y, gravity + share * (z - gravity), *(share * w for w in rates)))
 
     @property
     def _silence(self) -> float:
