@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
     from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
     from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+    from stewart_dynamics.mechanics.governor import GovernedStream
     from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
     from stewart_dynamics.mechanics.stiffness import NaturalModes
     from stewart_dynamics.parameters.table import Parameters
@@ -32,7 +33,7 @@ __version__ = '0.1.0'
 
 __all__ = [
     'BagError', 'BaseMotion', 'Calibration', 'Capability', 'CueingStream', 'Extent', 'Felt',
-    'ForceBreakdown', 'InverseDynamics', 'Motion', 'MotionCueing', 'MotionError', 'Motors',
+    'ForceBreakdown', 'GovernedStream', 'InverseDynamics', 'Motion', 'MotionCueing', 'MotionError', 'Motors',
     'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError',
     'Reachable', 'SingularityError', 'StewartError', 'StewartPlatform', 'TimedMotion',
     '__version__', 'approach', 'calibrate', 'check_planned_trajectory', 'rest_to_rest']
@@ -49,6 +50,7 @@ _MODULES = {
     'mechanics.dynamics.force_breakdown': ('ForceBreakdown',),
     'mechanics.dynamics.result': ('InverseDynamics',),
     'mechanics.frames.motion': ('Motion', 'Pose'),
+    'mechanics.governor': ('GovernedStream',),
     'mechanics.stewart_platform': ('StewartPlatform',),
     'mechanics.stiffness': ('NaturalModes',),
     'parameters.table': ('Parameters',),

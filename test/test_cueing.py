@@ -12,7 +12,8 @@ import pytest
 from referees import PLATFORM
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim, lti
-from stewart_dynamics import Motion, MotionCueing, MotionError, ParameterError, Parameters
+from stewart_dynamics import (
+    GovernedStream, Motion, MotionCueing, MotionError, ParameterError, Parameters)
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.cueing.motion_cueing import AXES, GRAVITY, OMCT_FREQUENCIES
 from stewart_dynamics.mechanics.frames.rotation import to_euler
@@ -189,7 +190,7 @@ def test_pieces_give_the_same_bits(changes: dict[str, Any]) -> None:
 
 
 def test_one_by_one_gives_the_same_bits() -> None:
-    """As the node computes it, with what is felt."""
+    """As the node computes it, with the felt quantities."""
     cueing = cueing_of({'cueing.head': [0.1, 0.2, 0.9]})
     times = np.arange(200) * 0.004
     force, rates = vehicle(times)
@@ -334,7 +335,7 @@ def test_changed_parameters_blend_in() -> None:
     for name in ('position', 'linear_velocity', 'linear_acceleration', 'angular_velocity',
                  'angular_acceleration'):
         steps = np.abs(np.diff(getattr(motion, name), axis=0)).max(axis=1)
-        # What begins to return has a jerk, no step.
+        # The return begins with a jerk, not with a step.
         assert steps[1999] < 5.0 * steps[500:1999].max(), name
     np.testing.assert_allclose(motion.rows[-1], after.run(times, force, rates).rows[-1],
                                atol=1e-4)
@@ -382,3 +383,31 @@ def test_home_must_be_within_the_limits() -> None:
 def test_path_will_do() -> None:
     assert MotionCueing(PLATFORM).parameters == PARAMETERS
     assert MotionCueing(str(PLATFORM)).parameters == PARAMETERS
+
+
+def test_any_stream_can_be_governed() -> None:
+    """A demand within the limits is followed, and one beyond them as far as they let it."""
+    times = np.arange(6000) * 0.004
+    angle = np.outer(times, [0.5, 0.7, 1.1, 0.9, 0.4, 0.6])
+    wave, slope, bend = np.sin(angle), np.cos(angle), -np.sin(angle)
+    w = np.array([0.5, 0.7, 1.1, 0.9, 0.4, 0.6])
+
+    def demanded(size: float) -> Motion:
+        sizes = size * np.array([0.1, 0.1, 0.1, 0.1, 0.1, 0.2])
+        q, v, a = sizes * wave, sizes * w * slope, sizes * w ** 2 * bend
+        return Motion.from_euler(HOME + q[:, :3], q[:, 3:], v[:, :3], v[:, 3:], a[:, :3], a[:, 3:])
+
+    small = demanded(1.0)
+    stream = GovernedStream(PARAMETERS)
+    motion = stream.advance(times, small)
+    np.testing.assert_allclose(motion.rows[0, 12:], 0.0, atol=1e-12)  # it begins at rest at home
+    np.testing.assert_allclose(motion.rows[-100:], small.rows[-100:], atol=1e-10)
+    assert sum(stream.held.values()) == 0.0
+    large, stream = demanded(6.0), GovernedStream(PARAMETERS, small[0])
+    motion = Motion.of_rows(np.concatenate([
+        stream.advance(times[n:n + 1000], large[n:n + 1000]).rows for n in range(0, 6000, 1000)]))
+    assert exceeded(PARAMETERS, motion) == []
+    assert exceeded(PARAMETERS, large) != []
+    assert sum(stream.held.values()) > 1.0
+    with pytest.raises(MotionError, match='must be after'):
+        stream.advance(times[:1], large[:1])

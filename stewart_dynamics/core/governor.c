@@ -301,3 +301,18 @@ int64_t governed_limit(
   governed on = {platform, drives, n, curve, n_base, base, n_moving, moving, limits};
   return inadmissible(&on, state);
 }
+
+void govern_many(
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
+  const governor_limits * limits, int64_t count, const double * times,
+  const coordinates * demands, governed_stream * stream, stewart_motion * motions) {
+  governed on = {platform, drives, n, curve, n_base, base, n_moving, moving, limits};
+  for (int64_t k = 0; k < count; k++) {
+    if (!isnan(stream->time)) {
+      govern(&on, 1, &stream->demand, &demands[k], times[k] - stream->time, &stream->governor);
+    }
+    stream->time = times[k], stream->demand = demands[k];
+    put_motion(limits, &stream->governor.now, &motions[k]);
+  }
+}

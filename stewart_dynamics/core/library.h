@@ -151,6 +151,9 @@ typedef struct {
   double stopping;                    /* it is brought to rest, whatever the demand is */
 } governor_state;
 
+/* A governed stream, with its last demand. */
+typedef struct { double time; coordinates demand; governor_state governor; } governed_stream;
+
 /* Washout filters; surge sway heave, or roll pitch yaw: see cueing/motion_cueing.py. */
 typedef struct {
   double translation_gain[3], translation_frequency[3], translation_damping[3];
@@ -173,6 +176,14 @@ int64_t governed_limit(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
   const governor_limits * limits, const coordinates * state);
+
+/* Motions (count,) that follow demands (count,) at times [s] as far as the limits let them; the
+   first is the state of the stream. */
+void govern_many(
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
+  const governor_limits * limits, int64_t count, const double * times,
+  const coordinates * demands, governed_stream * stream, stewart_motion * motions);
 
 /* Motions (count,) at times [s] of inputs (count, 6), acceleration and angular velocity of the
    vehicle, linear between the times; the state is the one before, of an earlier time, and then the

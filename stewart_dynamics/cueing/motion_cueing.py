@@ -58,7 +58,7 @@ _FILTERS = {
 
 
 class Felt(NamedTuple):
-    """What a pilot feels at the head, platform axes."""
+    """Specific force and angular velocity that a pilot feels at the head, platform axes."""
 
     specific_force: Array  # (N, 3) [m/s^2]
     angular_velocity: Array  # (N, 3) [rad/s]
@@ -109,10 +109,10 @@ class MotionCueing:
         times : (N,)
             Strictly increasing [s].
         specific_force : (N, 3)
-            Of the vehicle at the head, x forward, y left, z up [m/s^2]; with ``cueing.input:
+            At the head in the vehicle, x forward, y left, z up [m/s^2]; with ``cueing.input:
             acceleration`` without gravity.
         angular_velocity : (N, 3), optional
-            Of the vehicle, the same axes [rad/s]; zero by default.
+            The vehicle's, the same axes [rad/s]; zero by default.
 
         Returns
         -------
@@ -145,8 +145,8 @@ class MotionCueing:
         """
         Return the felt by the wanted, complex, at frequencies (N,) [rad/s], for small motions.
 
-        Of the specific force for surge, sway and heave, of the angular velocity for roll, pitch
-        and yaw; the governor and the limit of the rate of tilt are idle.
+        Surge, sway and heave are specific forces, roll, pitch and yaw angular velocities; the
+        governor and the limit of the rate of tilt are idle.
         """
         s = 1j * np.asarray(frequencies, dtype=float)
         p = {name.removeprefix('cueing.'): value for name, value in self.parameters.items()
@@ -166,7 +166,7 @@ class MotionCueing:
 
     def cross_response(self, frequencies: ArrayLike) -> dict[tuple[str, str], Array]:
         """
-        Return what is felt in another axis than wanted, by both names, as in ``response``.
+        Return the responses of other axes than the wanted one, by both names.
 
         Tilt is felt as rotation [rad/s by m/s^2], and rotation tilts gravity [m/s^2 by rad/s].
         """
@@ -206,7 +206,7 @@ class MotionCueing:
 
     def bound(self, time: Array, inputs: Array, state: Records, row: Array, felt: Array,
               ) -> tuple[Callable[[], Any], Callable[[], Any]]:
-        """Return functions that advance by one sample, and that write what is felt then."""
+        """Return functions that advance by one sample, and that write the felt quantities then."""
         return (function('cue_many').bound(*self._constants, 1, time, inputs, state, row),
                 function('felt_many').bound(self.parameters['cueing.head'], 1, row, felt))
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What a set of cueing parameters does with a recorded motion, and gains that use the machine.
+The effect of cueing parameters on a recorded motion, and gains that use the hexapod.
 
 Wanted and felt over time, the share of each limit that is used, the time in which limits hold the
 demand back, and the response at the frequencies of the objective motion cueing test.
@@ -142,7 +142,7 @@ def tuned(parameters: Parameters, vehicle: RecordedVehicle) -> tuple[Parameters,
         return float(found[worst].max()), f'{worst} at {seconds:.1f} s'
 
     def grown(direction: Array) -> tuple[float, str]:
-        """Return how far the gains can grow, at most by 1, and what ends it."""
+        """Return how far the gains can grow, at most by 1, and the limit that ends it."""
         most, why = use_of(values + direction)
         if most <= USED:
             return 1.0, ''

@@ -28,14 +28,17 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.core.binding import function, places, record
-from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.core.binding import function, record
+from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import batch
+from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds
 from stewart_dynamics.mechanics.drives.motors import Drives
-from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.frames import rotation as rotations
+from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, Pose
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
@@ -44,7 +47,7 @@ from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, PLATFORM_ANGLE_MAX,
     SINGULARITY, SPEED_MAX, TORQUE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
-from stewart_dynamics.mechanics.rows import DETERMINANT, POSE
+from stewart_dynamics.mechanics.rows import DETERMINANT, MOTION, POSE
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.parameters.table import Parameters
 
@@ -142,12 +145,75 @@ class Governor:
         return shape.base, shape.platform
 
 
-def state() -> Records:
-    """Return the state () of a governed motion at rest at home, before its first step."""
-    return np.zeros((), record('governor_state'))
+class GovernedStream:
+    """
+    A stream of motions that follows a demand as far as the limits let it, from rest at home.
 
+    Parameters
+    ----------
+    parameters : Parameters
+        Its limits are kept.
+    start : Pose or Motion of one sample, optional
+        Where the platform is at rest at the first sample; by default home.
 
-HELD = places('governor_state')['held']
+    Raises
+    ------
+    ParameterError
+        There is no home pose, or at home a limit is exceeded.
+
+    """
+
+    def __init__(self, parameters: Parameters, start: Pose | Motion | None = None) -> None:
+        self._governor = Governor(parameters, np.zeros(3))
+        self._governor.check_home(parameters)
+        self._stream: Any = np.zeros((), record('governed_stream'))
+        self._stream['time'] = np.nan
+        if start is not None:
+            check_kind(start, Pose, Motion)
+            at_rest = Motion.from_pose(start[None] if not start.shape else start)
+            self._stream['governor']['now'] = self._coordinates(at_rest)[0]
+
+    def advance(self, times: ArrayLike, demand: Motion) -> Motion:
+        """
+        Return the governed motion (N,) at times (N,) [s], which must increase from call to call.
+
+        demand: (N,), with the twist and acceleration that belong to its poses. Setpoints at 100 Hz
+            or more: motions between two of them are not checked.
+        """
+        check_kind(demand, Motion)
+        array = np.ascontiguousarray(as_array('times', times, demand.shape), dtype=float)
+        before = np.concatenate([[self._stream['time']], array[:-1]])
+        if (stuck := array <= before).any():
+            n = int(np.argmax(stuck))
+            raise MotionError(f'times[{n}]: {array[n]:.9g} s: must be after {before[n]:.9g} s')
+        rows = np.empty((len(array), MOTION))
+        function('govern_many')(*self._governor.arguments, len(array), array,
+                                self._coordinates(demand), self._stream, rows)
+        return Motion.of_rows(rows)
+
+    @property
+    def held(self) -> dict[str, float]:
+        """Return the time by which each limit has held the demand back [s], all axes together."""
+        return dict(zip(KEPT, self._stream['governor']['held'].tolist(), strict=True))
+
+    def _coordinates(self, motion: Motion) -> Records:
+        """Return motions (N,) as the structure ``coordinates``."""
+        home = self._governor.home
+        rotation = home.rotation.T @ motion.rotation
+        velocity, acceleration, omega, alpha = (vectors @ home.rotation for vectors in (
+            motion.linear_velocity, motion.linear_acceleration, motion.angular_velocity,
+            motion.angular_acceleration))
+        angles = rotations.to_euler(rotation)
+        matrix = rotations.euler_rate_matrix(angles)
+        rates = np.linalg.solve(matrix, omega[..., None])[..., 0]
+        carried = rotations.euler_rate_matrix_rate(angles, rates) @ rates[..., None]
+        found: Any = np.zeros(len(motion), record('coordinates'))
+        found['value'] = np.column_stack([
+            (motion.position - home.position) @ home.rotation, angles])
+        found['rate'] = np.column_stack([velocity, rates])
+        found['acceleration'] = np.column_stack([
+            acceleration, np.linalg.solve(matrix, alpha[..., None] - carried)[..., 0]])
+        return found  # type: ignore[no-any-return]
 
 
 def _stroke(parameters: Parameters) -> Array:
