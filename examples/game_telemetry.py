@@ -11,9 +11,10 @@ It receives the UDP packets of a game and publishes sensor_msgs/Imu on /stewart_
   xplane11   X-Plane 9 to 11, data output 4 (Mach, VVI, g-load) and 16 (angular velocities), 60 Hz
   xplane12   X-Plane 12: the same, where angular velocities are roll, pitch, yaw in deg/s
 
-Packets have no stamp of a clock that others know: they get the time at which they come. OutSim has accelerations without gravity in axes of
-the world, X-Plane has specific forces in g. Malformed packets, and those that are older than the
-last, are counted and dropped. Its options follow the format: --port 4123 --address 0.0.0.0.
+Packets have no stamp of a clock that others know: they get the time at which they come. OutSim has
+accelerations without gravity in axes of the world, X-Plane has specific forces in g. Malformed
+packets, and those that are older than the last, are counted and dropped.
+Its options follow the format: --port 4123 --address 0.0.0.0.
 """
 
 import argparse

@@ -33,9 +33,10 @@ __version__ = '0.1.0'
 
 __all__ = [
     'BagError', 'BaseMotion', 'Calibration', 'Capability', 'CueingStream', 'Extent', 'Felt',
-    'ForceBreakdown', 'GovernedStream', 'InverseDynamics', 'Motion', 'MotionCueing', 'MotionError', 'Motors',
-    'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError',
-    'Reachable', 'SingularityError', 'StewartError', 'StewartPlatform', 'TimedMotion',
+    'ForceBreakdown', 'GovernedStream', 'InverseDynamics', 'Motion', 'MotionCueing',
+    'MotionError', 'Motors', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory',
+    'Pose', 'PoseError', 'Reachable', 'SingularityError', 'StewartError', 'StewartPlatform',
+    'TimedMotion',
     '__version__', 'approach', 'calibrate', 'check_planned_trajectory', 'rest_to_rest']
 
 _MODULES = {

@@ -121,7 +121,8 @@ def test_vehicle_moves_the_platform_and_silence_brings_it_home(cueing: Any) -> N
     node.until(lambda: np.abs(node.last[:3] - HOME.position).max() < 1e-4
                and np.abs(node.last[3:]).max() < 1e-4, 'it is at rest at home')
     stamps, rows = node.rows()
-    assert np.abs(np.diff(stamps) - 1e9 / RATE).max() <= 1.0
+    # More where the computer is so late that time is skipped.
+    assert (np.diff(stamps) >= 1e9 / RATE - 1.0).all()
     step = 1.0 / RATE
     np.testing.assert_allclose(np.diff(rows[:, :3], axis=0),
                                step * 0.5 * (rows[1:, 3:6] + rows[:-1, 3:6]), atol=2e-5)

@@ -138,8 +138,9 @@ class MotionCueing:
         rows = np.ascontiguousarray(motion.rows.reshape(-1, MOTION))
         felt = np.empty((len(rows), 6))
         function('felt_many')(self.parameters['cueing.head'], len(rows), rows, felt)
-        felt = felt.reshape(*motion.shape, 6)
-        return Felt(felt[..., :3], felt[..., 3:])
+        forces, rates = (felt[:, part].reshape(*motion.shape, 3)
+                         for part in (slice(0, 3), slice(3, 6)))
+        return Felt(forces, rates)
 
     def response(self, frequencies: ArrayLike) -> dict[str, Array]:
         """
