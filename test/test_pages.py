@@ -47,7 +47,7 @@ def tables(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_generated_tables_are_current(tables: ModuleType) -> None:
     pages = tables.pages()
     assert {path.relative_to(ROOT).as_posix() for path in pages} == {
-        'README.md', 'docs/faults.md', 'docs/identify_from_bags.md', 'docs/node.md',
+        'benchmarks/README.md', 'docs/faults.md', 'docs/identify_from_bags.md', 'docs/node.md',
         'docs/parameters.md', 'docs/simulator.md', 'security/policy.xml'}
     for path, own in pages.items():
         text = path.read_text(encoding='utf-8')
@@ -72,13 +72,9 @@ def test_the_example_of_the_readme_runs(
     code, = re.findall(r'```python\n(.*?)```', README, flags=re.DOTALL)
     monkeypatch.chdir(ROOT)
     exec(compile(code, 'README.md', 'exec'), {})
-    mistakes, lengths, *forces, error = capsys.readouterr().out.strip().split('\n')
-    assert mistakes == '()'
-    assert len(lengths.strip('[] ').split()) == 6
-    *six, condition = ' '.join(forces).replace('[', '').replace(']', '').split()
-    assert len(six) == 6
-    assert 1.0 < float(condition) < 20.0
-    assert float(error) < 1e-12
+    lengths, forces = capsys.readouterr().out.replace('\n', ' ').strip(' []').split('] [')
+    assert len(lengths.split()) == len(forces.split()) == 6
+    assert 0.0 < float(forces.split()[0]) < 1e3
 
 
 def test_the_examples_of_the_library_run(
