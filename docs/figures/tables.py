@@ -18,7 +18,6 @@ from itertools import groupby
 import json
 import math
 from pathlib import Path
-import re
 from typing import Any
 
 from stewart_dynamics.mechanics.hexapod_structure import (

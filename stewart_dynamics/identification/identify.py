@@ -178,7 +178,7 @@ class _Bag:
         return len(window.positions) >= fewest + abs(self.lag)
 
     def result(self, last: WindowRead) -> BagRead:
-        """Return what was read, with the noise of the last window."""
+        """Return the data of the bag, with the noise of the last window."""
         of_lengths, of_rates = last.deviations
         return BagRead(
             self.path, self.counts['samples'], (self.end - self.begin) * NANOSECOND, self.period,
@@ -250,7 +250,7 @@ class Identification:
         return self.bags[-1]
 
     def _aligned(self, bag: _Bag, window: Window) -> tuple[Window, WindowRead]:
-        """Return a window with its efforts at the times of its positions, and what it reads."""
+        """Return a window with efforts at the times of its positions, and its extract."""
         scale = 0.0
         if not bag.lag_is_known:
             bag.lag, _, scale = self._lag(bag.extraction, window)
