@@ -152,3 +152,34 @@ def test_without_a_compiler_the_build_says_in_one_line_what_to_install(tmp_path:
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith(
         'stewart_dynamics: found no C compiler: install one (Debian and Ubuntu: apt install gcc ')
+
+
+def test_a_motion_is_found_again_from_its_legs() -> None:
+    parameters = random_parameters(rng(7))
+    structure = StewartPlatform(parameters).structure
+    given = random_motion(parameters, rng(8), 50)
+    arms = parameters['geometry.platform_joints'] @ given.rotation.swapaxes(-1, -2)
+    legs = given.position[:, None] + arms - parameters['geometry.base_joints']
+    lengths = np.linalg.norm(legs, axis=-1)
+    spin, turning = given.angular_velocity[:, None], given.angular_acceleration[:, None]
+    speeds = given.linear_velocity[:, None] + np.cross(spin, arms)
+    changes = given.linear_acceleration[:, None] + np.cross(turning, arms) + np.cross(
+        spin, np.cross(spin, arms))
+    rates = np.sum(legs * speeds, axis=-1) / lengths  # of L^2 = l . l
+    accelerations = (np.sum(speeds ** 2 + legs * changes, axis=-1) - rates ** 2) / lengths
+    call = function('stewart_motion_of_legs')
+    for row, *of_legs in zip(given.rows, rates, accelerations, strict=True):
+        motion = row.copy()
+        motion[POSE.stop:] = np.nan
+        assert call(structure, *of_legs, motion) == CODES['STEWART_OK']
+        assert motion == pytest.approx(row, rel=1e-9, abs=1e-9)
+    for spoilt, code in ((np.inf, 'STEWART_NOT_FINITE'), (1e308, 'STEWART_OUT_OF_RANGE')):
+        assert call(structure, np.full(6, spoilt), np.zeros(6), motion) == CODES[code]
+    motion[:POSE.stop] = [0.0, 0.0, 0.0, *np.eye(3).ravel()]
+    motion[3] = 2.0
+    assert call(structure, rates[0], rates[0], motion) == CODES['STEWART_NOT_A_ROTATION']
+    flat = StewartPlatform(symmetric_parameters()).structure
+    motion[:POSE.stop] = [0.0, 0.0, 1.0, *QUARTER_TURN.ravel()]
+    kept = motion.copy()
+    assert call(flat, rates[0], rates[0], motion) == CODES['STEWART_SINGULAR']
+    assert np.array_equal(motion, kept)

@@ -415,16 +415,18 @@ static void add_end(
 }
 
 void estimate_one(const stewart_platform * platform, one_measurement * m) {
-  double inverse[6][6], dt = m->interval;
+  double rows[6][6], inverse[6][6], dt = m->interval;
+  leg_pose legs[6];
   int steps;
   stewart_motion * before = &m->motion, * now = &m->motion_after;
   *now = *before;
   m->across = scaled_jacobian(
-    platform, before->position, before->rotation, inverse) * m->target < 0.0;
+    platform, before->position, before->rotation, legs, rows, inverse) * m->target < 0.0;
   m->code = find_pose(platform, m->lengths, (stewart_pose *)now, &steps, &m->residual);
   m->steps = steps;
   if (m->code != STEWART_OK) {return;}
-  put_twist(platform, m->rates, now);
+  scaled_jacobian(platform, now->position, now->rotation, legs, rows, inverse);
+  from_legs(platform, inverse, m->rates, now->linear_velocity, now->angular_velocity);
   for (int n = 0; n < 3; n++) {
     now->linear_acceleration[n] = before->linear_acceleration[n] =
       dt > 0.0 ? (now->linear_velocity[n] - before->linear_velocity[n]) / dt : 0.0;

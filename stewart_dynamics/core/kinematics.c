@@ -31,33 +31,16 @@ FLAT int64_t forward_kinematics_one(const stewart_platform * platform, one_pose 
   return code;
 }
 
-/* Write the inverse of the scaled J_inv; return its determinant. */
-static double scaled_jacobian(
-  const stewart_platform * platform, const double position[3], const double rotation[9],
-  double inverse[6][6]) {
-  double per_size = 1.0 / platform->characteristic_length;
-  for (int i = 0; i < 6; i++) {
-    leg_pose leg = pose_of(&platform->legs[i], position, rotation);
-    put3(inverse[i], leg.direction);
-    put3(inverse[i] + 3, scale(per_size, cross(leg.arm, leg.direction)));
-  }
-  return invert(inverse);
-}
-
-static void put_twist(
-  const stewart_platform * platform, const double rates[6], stewart_motion * motion) {
-  double inverse[6][6], per_size = 1.0 / platform->characteristic_length;
-  scaled_jacobian(platform, motion->position, motion->rotation, inverse);
-  for (int n = 0; n < 3; n++) {
-    motion->linear_velocity[n] = dot6(inverse[n], rates);
-    motion->angular_velocity[n] = per_size * dot6(inverse[3 + n], rates);
-  }
-}
-
 void twists_many(
   const stewart_platform * platform, int64_t count, const double * rates,
   stewart_motion * motions) {
-  for (int64_t n = 0; n < count; n++) {put_twist(platform, &rates[6 * n], &motions[n]);}
+  for (int64_t n = 0; n < count; n++) {
+    stewart_motion * at = &motions[n];
+    leg_pose legs[6];
+    double rows[6][6], inverse[6][6];
+    scaled_jacobian(platform, at->position, at->rotation, legs, rows, inverse);
+    from_legs(platform, inverse, &rates[6 * n], at->linear_velocity, at->angular_velocity);
+  }
 }
 
 void joint_angles_many(

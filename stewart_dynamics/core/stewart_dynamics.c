@@ -728,6 +728,73 @@ int stewart_motor_torques(
   return STEWART_OK;
 }
 
+/* ---- twist and acceleration from the legs --------------------------------------------------- */
+
+/* Write the scaled J_inv, its inverse and the legs at a pose; return the determinant. */
+static double scaled_jacobian(
+  const stewart_platform * platform, const double position[3], const double rotation[9],
+  leg_pose legs[6], double rows[6][6], double inverse[6][6]) {
+  double per_size = 1.0 / platform->characteristic_length;
+  for (int i = 0; i < 6; i++) {
+    legs[i] = pose_of(&platform->legs[i], position, rotation);
+    put3(rows[i], legs[i].direction);
+    put3(rows[i] + 3, scale(per_size, cross(legs[i].arm, legs[i].direction)));
+    for (int j = 0; j < 6; j++) {inverse[i][j] = rows[i][j];}
+  }
+  return invert(inverse);
+}
+
+/* Whether J_inv can be solved: by Frobenius norms, which bound the condition number. */
+static int solvable(double rows[6][6], double inverse[6][6]) {
+  double of_rows = 0.0, of_inverse = 0.0;
+  for (int i = 0; i < 6; i++) {
+    of_rows += dot6(rows[i], rows[i]);
+    of_inverse += dot6(inverse[i], inverse[i]);
+  }
+  return sqrt(of_rows * of_inverse) < UNSOLVABLE_CONDITION;
+}
+
+/* Write the linear and the angular part whose product with J_inv is six numbers of the legs. */
+static void from_legs(
+  const stewart_platform * platform, double inverse[6][6], const double of_legs[6],
+  double linear[3], double angular[3]) {
+  double per_size = 1.0 / platform->characteristic_length;
+  for (int n = 0; n < 3; n++) {
+    linear[n] = dot6(inverse[n], of_legs);
+    angular[n] = per_size * dot6(inverse[3 + n], of_legs);
+  }
+}
+
+/* J_inv X' = L', and J_inv X'' = L'' - |x' across the leg|^2 / L - s . (w x (w x a)). */
+int stewart_motion_of_legs(
+  const stewart_platform * platform, const double rates[6], const double accelerations[6],
+  stewart_motion * motion) {
+  if (!platform || !rates || !accelerations || !motion) {return STEWART_NULL;}
+  if (!all_finite(rates, 6 * sizeof *rates) ||
+      !all_finite(accelerations, 6 * sizeof *accelerations) ||
+      !all_finite(motion, sizeof(stewart_pose))) {return STEWART_NOT_FINITE;}
+  int code = check_rotation(motion->rotation);
+  if (code != STEWART_OK) {return code;}
+  leg_pose legs[6];
+  stewart_motion found = *motion;
+  double rows[6][6], inverse[6][6], straight[6];
+  scaled_jacobian(platform, found.position, found.rotation, legs, rows, inverse);
+  if (!solvable(rows, inverse)) {return STEWART_SINGULAR;}
+  from_legs(platform, inverse, rates, found.linear_velocity, found.angular_velocity);
+  vector omega = read3(found.angular_velocity);
+  for (int i = 0; i < 6; i++) {
+    vector of_joint = cross(omega, legs[i].arm);
+    vector x_rate = add(read3(found.linear_velocity), of_joint);
+    double along = dot(legs[i].direction, x_rate);
+    straight[i] = accelerations[i] - (dot(x_rate, x_rate) - along * along) * legs[i].per_length -
+      dot(legs[i].direction, cross(omega, of_joint));
+  }
+  from_legs(platform, inverse, straight, found.linear_acceleration, found.angular_acceleration);
+  if (!all_finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
+  *motion = found;
+  return STEWART_OK;
+}
+
 /* ---- forward kinematics --------------------------------------------------------------------- */
 
 /* The rotation nearest to a matrix close to one: R (3 - R^T R) / 2, a step of Newton's. */
@@ -766,28 +833,22 @@ static int newton(
   *largest_error = residual;
   double step[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   for (int steps = 0; steps < NEWTON_STEPS; steps++, ++*count) {
+    leg_pose legs[6];
     double rows[6][6], inverse[6][6], error[6];
-    for (int i = 0; i < 6; i++) {
-      leg_pose leg = pose_of(&platform->legs[i], at.position, at.rotation);
-      error[i] = lengths[i] - leg.length;
-      put3(rows[i], leg.direction);
-      put3(rows[i] + 3, scale(per_size, cross(leg.arm, leg.direction)));
-      for (int j = 0; j < 6; j++) {inverse[i][j] = rows[i][j];}
-    }
-    double squares = dot6(error, error), determinant = invert(inverse);
+    double determinant = scaled_jacobian(
+      platform, at.position, at.rotation, legs, rows, inverse);
+    for (int i = 0; i < 6; i++) {error[i] = lengths[i] - legs[i].length;}
+    double squares = dot6(error, error);
     /* Rejected: on the other side of a singularity, or much farther from the lengths. A long
        first step may overshoot and still be the fastest. */
     if (squares < 16.0 * before && side * determinant >= 0.0) {
-      double of_rows = 0.0, of_inverse = 0.0;  /* Frobenius norms, squared */
       residual = 0.0;
       for (int i = 0; i < 6; i++) {
-        of_rows += dot6(rows[i], rows[i]);
-        of_inverse += dot6(inverse[i], inverse[i]);
         residual = largest(residual, fabs(error[i]));
         step[i] = dot6(inverse[i], error);
       }
       *largest_error = residual;
-      if (!(sqrt(of_rows * of_inverse) < UNSOLVABLE_CONDITION)) {return STEWART_SINGULAR;}
+      if (!solvable(rows, inverse)) {return STEWART_SINGULAR;}
       from = at, before = squares, side = determinant, part = 1.0;
     } else if (residual > RESIDUAL) {
       part *= 0.5;

@@ -171,6 +171,12 @@ int stewart_motor_torques(
 int stewart_forward_kinematics(
   const stewart_platform * platform, const double lengths[6], stewart_pose * pose);
 
+/* The twist and the acceleration of the platform that give leg rates [m/s] and their time
+ * derivatives [m/s^2] at the motion's pose; written with STEWART_OK alone. */
+int stewart_motion_of_legs(
+  const stewart_platform * platform, const double rates[6], const double accelerations[6],
+  stewart_motion * motion);
+
 /* The rotation, row by row, of a quaternion x y z w; written with STEWART_OK alone. */
 int stewart_rotation(const double quaternion[4], double rotation[9]);
 

@@ -6,75 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
 namespace stewart_dynamics_controller
 {
 
 namespace
 {
-
-using Three = std::array<double, 3>;
-
-double dot(const Three & a, const Three & b) {return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];}
-
-Three cross(const Three & a, const Three & b)
-{
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-/// A leg at a pose: its platform joint from the platform's origin, its direction, its length.
-struct Leg
-{
-  Three arm, direction;
-  double length;
-};
-
-Leg leg_at(const stewart_leg & leg, const stewart_pose & pose)
-{
-  Leg at;
-  for (std::size_t n = 0; n < 3; ++n) {
-    at.arm[n] = 0.0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      at.arm[n] += pose.rotation[3 * n + k] * leg.platform_joint[k];
-    }
-    at.direction[n] = pose.position[n] + at.arm[n] - leg.base_joint[n];
-  }
-  at.length = std::sqrt(dot(at.direction, at.direction));
-  for (double & each : at.direction) {
-    each /= at.length;
-  }
-  return at;
-}
-
-using Matrix = std::array<Six, 6>;
-
-/// Return x of a x = b, by Gauss's elimination with partial pivoting; not finite if singular.
-Six solve(Matrix a, Six b)
-{
-  for (std::size_t n = 0; n < 6; ++n) {
-    std::size_t best = n;
-    for (std::size_t i = n + 1; i < 6; ++i) {
-      best = std::fabs(a[i][n]) > std::fabs(a[best][n]) ? i : best;
-    }
-    std::swap(a[n], a[best]);
-    std::swap(b[n], b[best]);
-    for (std::size_t i = n + 1; i < 6; ++i) {
-      const double k = a[i][n] / a[n][n];
-      for (std::size_t j = n; j < 6; ++j) {
-        a[i][j] -= k * a[n][j];
-      }
-      b[i] -= k * b[n];
-    }
-  }
-  for (std::size_t n = 6; n-- > 0; ) {
-    for (std::size_t j = n + 1; j < 6; ++j) {
-      b[n] -= a[n][j] * b[j];
-    }
-    b[n] /= a[n][n];
-  }
-  return b;
-}
 
 bool finite(const Six & numbers)
 {
@@ -170,8 +107,7 @@ int FeedForward::motion_of(const PlatformReference & reference, stewart_motion &
   return stewart_rotation(reference.orientation.data(), motion.rotation);
 }
 
-/// The pose by forward kinematics from the last one; then J_inv X' = L' and
-/// J_inv X'' = L'' - s' . x' - s . (w x (w x a)), with s' . x' = |x' across the leg|^2 / L.
+/// The pose by forward kinematics from the last one.
 int FeedForward::motion_of(const LegReference & reference, stewart_motion & motion) const
 {
   Six lengths;
@@ -185,36 +121,10 @@ int FeedForward::motion_of(const LegReference & reference, stewart_motion & moti
   if (code != STEWART_OK) {
     return code;
   }
-  std::array<Leg, 6> legs;
-  Matrix inverse_jacobian;
-  for (std::size_t n = 0; n < 6; ++n) {
-    const Leg & leg = legs[n] = leg_at(hexapod_.legs[n], pose);
-    const Three moment = cross(leg.arm, leg.direction);
-    std::copy_n(leg.direction.begin(), 3, inverse_jacobian[n].begin());
-    std::copy_n(moment.begin(), 3, inverse_jacobian[n].begin() + 3);
-  }
-  const Six twist = solve(inverse_jacobian, reference.velocities);
-  const Three omega = {twist[3], twist[4], twist[5]};
-  Six accelerations = reference.accelerations;
-  for (std::size_t n = 0; n < 6; ++n) {
-    const Leg & leg = legs[n];
-    Three joint_rate = cross(omega, leg.arm);
-    const Three centripetal = cross(omega, joint_rate);
-    for (std::size_t k = 0; k < 3; ++k) {
-      joint_rate[k] += twist[k];
-    }
-    const double along = dot(leg.direction, joint_rate);
-    accelerations[n] -= (dot(joint_rate, joint_rate) - along * along) / leg.length +
-      dot(leg.direction, centripetal);
-  }
-  const Six acceleration = solve(inverse_jacobian, accelerations);
   std::copy_n(pose.position, 3, motion.position);
   std::copy_n(pose.rotation, 9, motion.rotation);
-  std::copy_n(twist.begin(), 3, motion.linear_velocity);
-  std::copy_n(twist.begin() + 3, 3, motion.angular_velocity);
-  std::copy_n(acceleration.begin(), 3, motion.linear_acceleration);
-  std::copy_n(acceleration.begin() + 3, 3, motion.angular_acceleration);
-  return STEWART_OK;
+  return stewart_motion_of_legs(
+    &hexapod_, reference.velocities.data(), reference.accelerations.data(), &motion);
 }
 
 int FeedForward::follow(
