@@ -144,9 +144,14 @@ def test_files_in_commands_exist(page: str) -> None:
 
 
 def test_version_is_the_same_everywhere() -> None:
-    version = ElementTree.parse(ROOT / 'package.xml').getroot().findtext('version')
-    assert version
-    assert version == stewart_dynamics.__version__  # which setup.py reads
+    """That of the package, which setup.py reads, of both package.xml and of the changelog."""
+    version = stewart_dynamics.__version__
+    for file in ROOT / 'package.xml', *ROOT.glob('ros2_control/*/package.xml'):
+        assert ElementTree.parse(file).getroot().findtext('version') == version
+    changelog = (ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8')
+    newest = re.findall(r'^(.*)\n-+$', changelog, re.MULTILINE)[0]
+    assert newest == 'Forthcoming' or re.fullmatch(
+        rf'{re.escape(version)} \(\d{{4}}-\d\d-\d\d\)', newest)
 
 
 # docs/faults.md: each row names its tests, and each test of faults has a row
