@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from referees import ROOT, rotation_about
 from scipy.spatial.transform import Rotation
+import snapshot
 import stewart_dynamics
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
@@ -175,6 +176,13 @@ def test_every_fault_has_a_test_and_every_test_of_faults_a_row() -> None:
     found = {name for names in named for name in names}
     assert not found - names_in('test_*.py')
     assert not names_in('test_faults.py') - found
+
+
+def test_every_sentence_belongs_to_a_test() -> None:
+    for file in snapshot.FOLDER.iterdir():
+        for test in snapshot.read(file.stem):
+            module, _, name = test.partition('::')
+            assert name.partition('[')[0] in names_in(module), f'{file.name}: {test}'
 
 
 # The page of the moving base: its programs run, its tables and files are those of the code
