@@ -36,12 +36,18 @@ class Snapshot:
             re.escape(str(FOLDER.parents[1])): '<root>'}
 
     def __call__(self, text: object) -> None:
-        """Compare the next sentences; rows of tables are not compared, paths are shortened."""
+        """
+        Compare the next sentences of the test.
+
+        Paths are shortened. Rows of tables are not compared, nor is a text twice.
+        """
         shown = str(text)
         for pattern, name in self._names.items():
             shown = re.sub(pattern, name, shown)
-        self._said.append('\n  '.join(line.rstrip() for line in shown.splitlines()
-                                      if line.strip() and not TABLE.search(line)))
+        shown = '\n  '.join(line.rstrip() for line in shown.splitlines()
+                            if line.strip() and not TABLE.search(line))
+        if shown not in self._said:
+            self._said.append(shown)
         if not self._update:
             assert self._said == self._known[:len(self._said)]
 
