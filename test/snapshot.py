@@ -32,7 +32,8 @@ class Snapshot:
         self._known, self._said = read(program).get(test, []), list[str]()
         self._names = {
             re.escape(str(temporary)) + r'/[^/\s:,]+': '<tmp>',
-            re.escape(str(FOLDER.parents[1])): '<root>'}
+            re.escape(str(FOLDER.parents[1])): '<root>',
+            r'\Ausage: [^\0]*\n(?=\w+: error: )': ''}  # of argparse, as wide as the terminal
 
     def __call__(self, text: object) -> None:
         """Compare the next sentences of the test, but none twice; paths are shortened."""
