@@ -145,7 +145,7 @@ def test_files_in_commands_exist(page: str) -> None:
 
 
 def test_version_is_the_same_everywhere() -> None:
-    """That of the package, which setup.py reads, of both package.xml and of the changelog."""
+    """Setup.py reads it from the package; package.xml and changelog repeat it."""
     version = stewart_dynamics.__version__
     for file in ROOT / 'package.xml', *ROOT.glob('ros2_control/*/package.xml'):
         assert ElementTree.parse(file).getroot().findtext('version') == version
