@@ -73,7 +73,7 @@ def write_csv(path: Path) -> None:
                comments='')
 
 
-def publish() -> None:
+def publish(parser: argparse.ArgumentParser) -> None:
     """Publish the drive, again and again."""
     import rclpy
     from rclpy.utilities import remove_ros_args
@@ -83,8 +83,7 @@ def publish() -> None:
         rclpy.init()
     except RuntimeError as exc:  # bad ROS arguments
         sys.exit(f'town_drive: {exc}')
-    for stray in remove_ros_args(sys.argv)[1:]:
-        sys.exit(f'town_drive: {stray}: unknown argument; see --help')
+    parser.parse_args(remove_ros_args(sys.argv)[1:])
     node = rclpy.create_node('town_drive')
     publisher = node.create_publisher(Imu, '/stewart_cueing/vehicle', 100)
     times, forces, rates = drive()
@@ -117,7 +116,7 @@ def main() -> None:
     if options.csv:
         write_csv(options.csv)
     else:
-        publish()
+        publish(parser)
 
 
 if __name__ == '__main__':
