@@ -40,6 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.cutoff and not given.differentiate:
         parser.error('--cutoff: needs --differentiate')
+    if given.measured_pose and not given.response:
+        parser.error('--measured-pose: needs --response')
+    if given.measured_pose and given.measured:
+        parser.error('--measured-pose: not with --measured')
     if (given.motor_torque or given.motor_current) and not given.measured:
         parser.error('--motor-torque, --motor-current: need --measured')
     return _PROGRAM.exit_code(lambda: _run(given, _options(given)))
@@ -65,8 +69,15 @@ def _arguments() -> argparse.ArgumentParser:
         topics.add_argument(f'--{name.replace("_", "-")}', metavar='TOPIC',
                             help=f'topic of the {what}')
     topics.add_argument('--measured', metavar='TOPIC',
-                        help='JointState whose efforts are compared with the computed forces')
+                        help='JointState whose efforts are compared with the computed forces, '
+                             'and whose positions are the achieved ones of --response')
     add_motor_efforts(topics)
+    response = parser.add_argument_group('how the platform follows')
+    response.add_argument('--response', action='store_true',
+                          help='frequency responses, delays and bandwidths from commanded and '
+                               'achieved poses; those of the measured legs by default')
+    response.add_argument('--measured-pose', metavar='TOPIC',
+                          help='topic of the achieved poses in the base frame')
     poses = parser.add_argument_group('bags that have only poses')
     poses.add_argument('--differentiate', action='store_true',
                        help='compute twist and acceleration from the poses by smoothing splines')
@@ -94,7 +105,8 @@ def _options(given: argparse.Namespace) -> Options:
         node=given.node,
         topics={name: getattr(given, name) for name in _TOPICS if getattr(given, name)},
         cutoff=(given.cutoff or _CUTOFF) if given.differentiate else None,
-        measured=given.measured or None,
+        measured=given.measured or None, response=given.response,
+        measured_pose=given.measured_pose or None,
         motor_torque=given.motor_torque, motor_current=given.motor_current,
         parquet=given.parquet, report=given.report, force=given.force)
 

@@ -31,6 +31,9 @@ class Options(NamedTuple):
     cutoff: float | None = None
     """Cut-off frequency [Hz]: read only poses, and differentiate them by smoothing splines."""
     measured: str | None = None  # topic of a sensor_msgs/JointState with the measured efforts
+    response: bool = False  # analyze how the platform follows its setpoints
+    measured_pose: str | None = None
+    """Topic of the achieved poses for the response; None: those of the measured legs."""
     motor_torque: bool = False  # measured efforts are motor torques [N m]
     motor_current: bool = False  # measured efforts are motor currents [A]
     parquet: bool = False  # write legs.parquet in place of legs.csv

@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Frequency responses of several outputs to several inputs, with coherence and confidence bands.
+
+The estimator is H = S_yx S_xx^-1 of averaged spectra (J. S. Bendat, A. G. Piersol, Random Data,
+4th ed., 2010, doi:10.1002/9781118032428, chapters 7 and 9): noise on the outputs does not bias it.
+Spectra are those of ``scipy.signal``. Where the inputs repeat, a segment is one period without a
+window, so that nothing leaks between the lines and the response is that of the steady state;
+elsewhere segments are Hann windows that overlap by half.
+
+At each frequency only the inputs with power there are taken. Inputs that move together cannot be
+separated: their responses are nan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.errors import StewartError
+
+Complex = NDArray[np.complex128]
+
+# Power of an input at a frequency, relative to its largest, below which it is not excited there.
+_EXCITED = 1e-5
+# Part of an input's power that the other inputs do not explain; less cannot be separated.
+_SEPARATE = 0.01
+# Largest change of an input from one period to the next, relative to its RMS.
+_REPEATED = 1e-3
+# Longest segment of an input that does not repeat [s], and fewest samples in one.
+_LONGEST, _FEWEST = 20.0, 64
+# Candidates for the period of an input that are tried.
+_CANDIDATES = 30
+# Probability that a value lies outside of its band.
+_OUTSIDE = 0.05
+
+
+class Part(NamedTuple):
+    """Samples that are analyzed together."""
+
+    begin: int
+    end: int
+    period: int | None  # samples after which the inputs repeat; None: they do not
+
+
+class Spectra(NamedTuple):
+    """Averaged cross-spectral densities of C channels at F frequencies."""
+
+    frequencies: Array  # (F,) [Hz]
+    densities: Complex  # (F, C, C), one-sided: mean of y x* at [y, x]
+    averages: float  # number of independent averages
+
+
+class FrequencyResponses(NamedTuple):
+    """Responses of O outputs to I inputs at F frequencies; nan where an input has no power."""
+
+    frequencies: Array  # (F,) [Hz]
+    responses: Complex  # (F, O, I)
+    radii: Array  # (F, O, I): radius of the circle around each that contains it with 95 %
+    coherences: Array  # (F, O, I): part of the power due to the input, of this and noise
+    noise: Array  # (F, O): one-sided density of what is not coherent with any input
+
+
+def signal_module() -> Any:
+    """Return ``scipy.signal``; StewartError where SciPy is not installed."""
+    try:
+        import scipy.signal
+    except ImportError as exc:
+        raise StewartError('frequency responses need SciPy: pip install '
+                           "'stewart_dynamics[response]'") from exc
+    return scipy.signal
+
+
+def periodic_parts(inputs: Array, rate: float, still: float = 1.0) -> list[Part]:
+    """
+    Return the parts of inputs (N, I) in which they repeat at least twice.
+
+    The inputs are split where one of them begins or ends to move. The first period of at least
+    three is left out: in it the output settles.
+
+    rate: samples per second.
+    still: an input that does not move for this time is at rest [s].
+    """
+    found = []
+    for begin, end in _same_inputs_move(inputs, round(still * rate)):
+        if part := _repeated(inputs[begin:end]):
+            first, stop, period = part
+            if stop - first >= 3 * period:
+                first += period
+            periods = (stop - first) // period
+            found.append(Part(begin + first, begin + first + periods * period, period))
+    return found
+
+
+def _same_inputs_move(inputs: Array, still: int) -> list[tuple[int, int]]:
+    """Return begin and end of each part in which the same inputs move."""
+    steps = np.abs(np.diff(inputs, axis=0, prepend=inputs[:1]))
+    moves: Flags = steps > 1e-6 * np.ptp(inputs, axis=0)
+    moves &= np.ptp(inputs, axis=0) > 0.0
+    counts = np.cumsum(np.vstack([np.zeros((1, inputs.shape[1])), moves]), axis=0)
+    at = np.arange(len(inputs))
+    low, high = np.maximum(at - still, 0), np.minimum(at + still + 1, len(inputs))
+    near: Flags = counts[high] > counts[low]
+    codes = near @ (1 << np.arange(inputs.shape[1]))
+    edges = [0, *(np.flatnonzero(np.diff(codes)) + 1).tolist(), len(codes)]
+    return [(begin, end) for begin, end in zip(edges[:-1], edges[1:], strict=True) if codes[begin]]
+
+
+def _repeated(inputs: Array) -> tuple[int, int, int] | None:
+    """Return begin, end and period of the longest part that repeats; None if none does."""
+    spread = inputs - inputs.mean(axis=0)
+    rms = np.sqrt(np.mean(spread ** 2, axis=0))
+    moving = rms > 0.0
+    spread = spread[:, moving] / rms[moving]
+    count = len(spread)
+    power = np.sum(np.abs(np.fft.rfft(spread, 2 * count, axis=0)) ** 2, axis=1)
+    similar = np.fft.irfft(power)[:count // 2] / np.arange(count, count - count // 2, -1)
+    peaks = np.flatnonzero((similar[1:-1] > similar[:-2]) & (similar[1:-1] >= similar[2:])) + 1
+    likely = np.sort(peaks[np.argsort(-similar[peaks])][:_CANDIDATES])
+    for period in likely.tolist():
+        change = np.abs(spread[period:] - spread[:-period]).max(axis=1)
+        begin, end = _longest(change < _REPEATED)
+        if end - begin >= period:
+            return begin, end + period, period
+    return None
+
+
+def _longest(flags: Flags) -> tuple[int, int]:
+    """Return begin and end of the longest run of true flags."""
+    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).reshape(-1, 2)
+    if not len(edges):
+        return 0, 0
+    begin, end = edges[np.argmax(edges[:, 1] - edges[:, 0])].tolist()
+    return begin, end
+
+
+def spectra(runs: Iterable[Array], rate: float, length: int, hann: bool) -> Spectra | None:
+    """
+    Return the mean spectra of runs (N, C) without a gap; None if all are shorter than a segment.
+
+    length: samples in a segment.
+    hann: Hann windows that overlap by half; else segments one after the other, as they are.
+    """
+    signal = signal_module()
+    window = signal.get_window('hann' if hann else 'boxcar', length)
+    step = length - length // 2 if hann else length
+    total: Any = 0.0
+    count = 0
+    frequencies: Array = np.fft.rfftfreq(length, 1.0 / rate)
+    for run in runs:
+        if len(run) < length:
+            continue
+        _, _, parts = signal.stft(
+            run, rate, window, length, length - step, detrend='constant', boundary=None,
+            padded=False, axis=0, scaling='psd')
+        parts = np.moveaxis(parts, 1, -1)  # (F, K, C)
+        total = total + np.swapaxes(parts, 1, 2) @ parts.conj()
+        count += parts.shape[1]
+    if not count:
+        return None
+    # Segments that overlap are not independent (Welch, 1967).
+    shared = np.sum(window[step:] * window[:length - step]) ** 2 / np.sum(window ** 2) ** 2
+    return Spectra(frequencies, 2.0 * total / count,
+                   count / (1.0 + 2.0 * shared * (count - 1) / count))
+
+
+def segment_length(runs: Sequence[Array], rate: float, inputs: int) -> int:
+    """Return the samples of a segment, so that enough of them separate the inputs."""
+    longest = max((len(run) for run in runs), default=0)
+    return min(round(_LONGEST * rate), int(2 * longest / (4 * inputs + 6)))
+
+
+def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int], first: int = 1,
+              ) -> FrequencyResponses:
+    """
+    Return the responses of some channels to others.
+
+    first: the first frequency; 2 with Hann windows, where the one before has a part of the mean.
+
+    Raises StewartError if there are not more averages than inputs.
+    """
+    if found.averages <= len(inputs):
+        raise StewartError(f'{found.averages:.3g} averages: must be more than the inputs')
+    densities = found.densities[first:]
+    every = densities[:, inputs][:, :, inputs]
+    own = np.diagonal(every, axis1=1, axis2=2).real
+    excited: Flags = own > _EXCITED * own.max(axis=0)
+    shape = len(densities), len(outputs), len(inputs)
+    h, radii, coherences = (np.full(shape, np.nan, dtype=kind) for kind in (complex, float, float))
+    noise = np.diagonal(densities, axis1=1, axis2=2).real[:, outputs].copy()
+    for mask in np.unique(excited, axis=0):
+        if not mask.any():
+            continue
+        at = np.flatnonzero((excited == mask).all(axis=1))
+        used = np.flatnonzero(mask)
+        some = _one_set(densities[at], np.asarray(inputs)[used], np.asarray(outputs),
+                        found.averages)
+        for whole, part in zip((h, radii, coherences), some, strict=False):
+            whole[np.ix_(at, np.arange(len(outputs)), used)] = part
+        noise[at] = some[3]
+    return FrequencyResponses(found.frequencies[first:], h, radii, coherences, noise)
+
+
+def _one_set(densities: Complex, inputs: Integers, outputs: Integers, averages: float
+             ) -> tuple[Complex, Array, Array, Array]:
+    """Return responses, radii, coherences and noise where the same inputs have power."""
+    xx = densities[:, inputs][:, :, inputs]
+    yx = densities[:, outputs][:, :, inputs]
+    yy = np.diagonal(densities, axis1=1, axis2=2).real[:, outputs]
+    scale = np.sqrt(np.diagonal(xx, axis1=1, axis2=2).real)
+    normal = xx / (scale[:, :, None] * scale[:, None, :])
+    # Slightly regular, so that inputs that move together disturb no others.
+    inverse = np.linalg.inv(normal + 1e-9 * np.eye(len(inputs)))
+    h = (yx / scale[:, None, :]) @ inverse
+    alone = 1.0 / np.maximum(np.diagonal(inverse, axis1=1, axis2=2).real, 1.0)
+    explained = np.einsum('foi,fij,foj->fo', h, normal, h.conj()).real
+    h = h / scale[:, None, :]
+    free = averages - len(inputs)
+    noise = np.maximum(yy - explained, 0.0) * averages / free
+    conditional = alone * scale ** 2  # power of an input that the others do not explain
+    # |H - H^|^2 is noise over this power: F distribution with 2 and 2 free degrees of freedom.
+    quantile = free * (_OUTSIDE ** (-1.0 / free) - 1.0)
+    radii = np.sqrt(quantile * noise[:, :, None] / (averages * conditional[:, None, :]))
+    due = np.abs(h) ** 2 * conditional[:, None, :]
+    total = due + noise[:, :, None]
+    coherences = np.divide(due, total, out=np.zeros_like(total), where=total > 0.0)
+    lost = np.broadcast_to((alone < _SEPARATE)[:, None, :], h.shape)
+    h, radii, coherences = (np.where(lost, np.nan, each) for each in (h, radii, coherences))
+    return h, radii, coherences, noise
