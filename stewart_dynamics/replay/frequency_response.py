@@ -35,6 +35,8 @@ _SEPARATE = 0.01
 _REPEATED = 1e-3
 # Longest segment of an input that does not repeat [s], and fewest samples in one.
 _LONGEST, _FEWEST = 20.0, 64
+# Frequencies whose noise is averaged where periods are few.
+_NEIGHBORS = 9
 # Candidates for the period of an input that are tried.
 _CANDIDATES = 30
 # Probability that a value lies outside of its band.
@@ -55,6 +57,8 @@ class Spectra(NamedTuple):
     frequencies: Array  # (F,) [Hz]
     densities: Complex  # (F, C, C), one-sided: mean of y x* at [y, x]
     averages: float  # number of independent averages
+    neighbors: int
+    """Number of frequencies whose noise is averaged, independent of each other."""
 
 
 class FrequencyResponses(NamedTuple):
@@ -166,8 +170,11 @@ def spectra(runs: Iterable[Array], rate: float, length: int, hann: bool) -> Spec
         return None
     # Segments that overlap are not independent (Welch, 1967).
     shared = np.sum(window[step:] * window[:length - step]) ** 2 / np.sum(window ** 2) ** 2
-    return Spectra(frequencies, 2.0 * total / count,
-                   count / (1.0 + 2.0 * shared * (count - 1) / count))
+    averages = count / (1.0 + 2.0 * shared * (count - 1) / count)
+    # The mean leaks into the first frequency of Hann windows.
+    first = 2 if hann else 1
+    neighbors = 1 if hann else min(_NEIGHBORS, (length // 2 - 2) // 2 * 2 + 1)
+    return Spectra(frequencies[first:], 2.0 * total[first:] / count, averages, max(neighbors, 1))
 
 
 def segment_length(runs: Sequence[Array], rate: float, inputs: int) -> int:
@@ -176,60 +183,64 @@ def segment_length(runs: Sequence[Array], rate: float, inputs: int) -> int:
     return min(round(_LONGEST * rate), int(2 * longest / (4 * inputs + 6)))
 
 
-def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int], first: int = 1,
+def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int],
               ) -> FrequencyResponses:
     """
     Return the responses of some channels to others.
-
-    first: the first frequency; 2 with Hann windows, where the one before has a part of the mean.
 
     Raises StewartError if there are not more averages than inputs.
     """
     if found.averages <= len(inputs):
         raise StewartError(f'{found.averages:.3g} averages: must be more than the inputs')
-    densities = found.densities[first:]
-    every = densities[:, inputs][:, :, inputs]
-    own = np.diagonal(every, axis1=1, axis2=2).real
+    densities = found.densities
+    own = np.diagonal(densities, axis1=1, axis2=2).real[:, inputs]
     excited: Flags = own > _EXCITED * own.max(axis=0)
     shape = len(densities), len(outputs), len(inputs)
-    h, radii, coherences = (np.full(shape, np.nan, dtype=kind) for kind in (complex, float, float))
+    h = np.full(shape, np.nan, dtype=complex)
+    powers = np.full((len(densities), len(inputs)), np.nan)  # that other inputs do not explain
     noise = np.diagonal(densities, axis1=1, axis2=2).real[:, outputs].copy()
-    for mask in np.unique(excited, axis=0):
-        if not mask.any():
-            continue
+    free = found.averages - len(inputs)
+    for mask in np.unique(excited[excited.any(axis=1)], axis=0):
         at = np.flatnonzero((excited == mask).all(axis=1))
         used = np.flatnonzero(mask)
-        some = _one_set(densities[at], np.asarray(inputs)[used], np.asarray(outputs),
-                        found.averages)
-        for whole, part in zip((h, radii, coherences), some, strict=False):
-            whole[np.ix_(at, np.arange(len(outputs)), used)] = part
-        noise[at] = some[3]
-    return FrequencyResponses(found.frequencies[first:], h, radii, coherences, noise)
+        one_h, one_powers, rest = _one_set(
+            densities[at], np.asarray(inputs)[used], np.asarray(outputs))
+        h[np.ix_(at, np.arange(len(outputs)), used)] = one_h
+        powers[np.ix_(at, used)] = one_powers
+        noise[at] = rest * found.averages / free
+    # |H - H^|^2 is noise over power: F distribution with 2 and 2 free degrees of freedom.
+    smooth, free = _smooth(noise, found.neighbors), free * found.neighbors
+    quantile = free * (_OUTSIDE ** (-1.0 / free) - 1.0)
+    radii = np.sqrt(quantile / found.averages * smooth[:, :, None] / powers[:, None, :])
+    due = np.abs(h) ** 2 * powers[:, None, :]
+    total = due + smooth[:, :, None]
+    coherences = np.divide(due, total, out=np.zeros_like(total), where=total > 0.0)
+    return FrequencyResponses(found.frequencies, h, radii, coherences, noise)
 
 
-def _one_set(densities: Complex, inputs: Integers, outputs: Integers, averages: float
-             ) -> tuple[Complex, Array, Array, Array]:
-    """Return responses, radii, coherences and noise where the same inputs have power."""
+def _one_set(densities: Complex, inputs: Integers, outputs: Integers,
+             ) -> tuple[Complex, Array, Array]:
+    """Return responses, powers of inputs alone, and what is not coherent: of the same inputs."""
     xx = densities[:, inputs][:, :, inputs]
     yx = densities[:, outputs][:, :, inputs]
     yy = np.diagonal(densities, axis1=1, axis2=2).real[:, outputs]
     scale = np.sqrt(np.diagonal(xx, axis1=1, axis2=2).real)
     normal = xx / (scale[:, :, None] * scale[:, None, :])
     # Slightly regular, so that inputs that move together disturb no others.
-    inverse = np.linalg.inv(normal + 1e-9 * np.eye(len(inputs)))
+    inverse = np.linalg.inv(normal + 1e-13 * np.eye(len(inputs)))
     h = (yx / scale[:, None, :]) @ inverse
-    alone = 1.0 / np.maximum(np.diagonal(inverse, axis1=1, axis2=2).real, 1.0)
     explained = np.einsum('foi,fij,foj->fo', h, normal, h.conj()).real
-    h = h / scale[:, None, :]
-    free = averages - len(inputs)
-    noise = np.maximum(yy - explained, 0.0) * averages / free
-    conditional = alone * scale ** 2  # power of an input that the others do not explain
-    # |H - H^|^2 is noise over this power: F distribution with 2 and 2 free degrees of freedom.
-    quantile = free * (_OUTSIDE ** (-1.0 / free) - 1.0)
-    radii = np.sqrt(quantile * noise[:, :, None] / (averages * conditional[:, None, :]))
-    due = np.abs(h) ** 2 * conditional[:, None, :]
-    total = due + noise[:, :, None]
-    coherences = np.divide(due, total, out=np.zeros_like(total), where=total > 0.0)
-    lost = np.broadcast_to((alone < _SEPARATE)[:, None, :], h.shape)
-    h, radii, coherences = (np.where(lost, np.nan, each) for each in (h, radii, coherences))
-    return h, radii, coherences, noise
+    alone = 1.0 / np.maximum(np.diagonal(inverse, axis1=1, axis2=2).real, 1.0)
+    lost = alone < _SEPARATE
+    return (np.where(lost[:, None, :], np.nan, h / scale[:, None, :]),
+            np.where(lost, np.nan, alone * scale ** 2), np.maximum(yy - explained, 0.0))
+
+
+def _smooth(noise: Array, neighbors: int) -> Array:
+    """Return the means of a density (F, O) over a number of neighboring frequencies."""
+    if neighbors == 1:
+        return noise
+    padded = np.pad(noise, ((neighbors // 2, neighbors // 2), (0, 0)), mode='reflect')
+    sums = np.cumsum(np.vstack([np.zeros((1, noise.shape[1])), padded]), axis=0)
+    means: Array = (sums[neighbors:] - sums[:-neighbors]) / neighbors
+    return np.maximum(means, 0.0)

@@ -100,7 +100,8 @@ def replay(
             summary = run.summary() | {'fingerprint': made_of}
             write_json(partial / RESULT, summary)
             if run.report is not None:
-                run.report.write(partial / REPORT_PAGE, summary, options.plotly)
+                run.report.write(
+                    partial / REPORT_PAGE, summary, options.plotly, run.followed)
     return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
 
 
@@ -165,7 +166,7 @@ class _Run:
         self._efforts = Efforts(parameters['joints'])
         self._response = RecordedResponse(
             parameters, topics, self._setpoints.reject) if options.response else None
-        self._followed: Followed | None = None
+        self.followed: Followed | None = None
         self._response_missing = ''
         self._first_measured = True
         self.report: Report | None = None
@@ -205,7 +206,7 @@ class _Run:
             self._compared(self._comparison.finish())
         if self._response is not None:
             try:
-                self._followed = self._response.finish()
+                self.followed = self._response.finish()
             except StewartError as exc:
                 self._response_missing = f'{exc}'
             for notice in self._response.notices:
@@ -257,7 +258,7 @@ class _Run:
                  'first_at_s': _since_first(each.first, values['setpoints'])}
                 for each in mistakes],
             'measured': measured and {'headline': measured_headline(measured), **measured},
-            'response': self._followed and self._followed.values,
+            'response': self.followed and self.followed.values,
             'parameters': self._parameters.plain(),
         }
 

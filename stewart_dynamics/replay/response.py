@@ -75,7 +75,7 @@ class Analysis:
         found = spectra(samples, rate, length, hann=period is None)
         if found is None or found.averages <= len(inputs):
             return None
-        several = responses(found, inputs, range(6, 12), 1 if period else 2)
+        several = responses(found, inputs, range(6, 12))
         return several, rate / length
 
     def legs(self) -> list[tuple[Response, float]]:
@@ -97,7 +97,7 @@ class Analysis:
         found = spectra(samples, rate, length, period is None) if length >= 4 else None
         if found is None or found.averages <= 1:
             return []
-        return [(self.one(responses(found, [leg], [6 + leg], 1 if period else 2), 0, 0),
+        return [(self.one(responses(found, [leg], [6 + leg]), 0, 0),
                  rate / length) for leg in range(6)]
 
     def one(self, several: FrequencyResponses, output: int, number: int) -> Response:

@@ -83,14 +83,18 @@ class Response(NamedTuple):
         return self._crossing(self.phase + np.pi / 2.0)
 
     def _crossing(self, above: Array) -> float | None:
-        """Return where a quantity falls below zero, between two frequencies on a log scale."""
+        """Return where a quantity falls below zero, on the spline over log frequency."""
         f, above = self.frequency[self.coherent], above[self.coherent]
         falls = np.flatnonzero((above[:-1] >= 0.0) & (above[1:] < 0.0))
         if not len(falls) or above[0] < 0.0:
             return None
+        from scipy.interpolate import CubicSpline
+
         n = int(falls[0])
-        part = above[n] / (above[n] - above[n + 1])
-        return float(f[n] * (f[n + 1] / f[n]) ** part)
+        spline = CubicSpline(np.log(f), above)
+        at = [each for each in spline.roots(extrapolate=False)
+              if np.log(f[n]) <= each <= np.log(f[n + 1])]
+        return float(np.exp(at[0])) if at else float(f[n])
 
     def half_bandwidth(self) -> float:
         """Return half the lower bandwidth, or the highest frequency where it has none [Hz]."""
