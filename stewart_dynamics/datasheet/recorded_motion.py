@@ -62,7 +62,9 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
     parameters = options.applied_to(parameters)
     splines = differentiator(parameters, options)
     batches: list[Batch] = []
-    with closing(Recording(bag)) as recording:
+    with closing(Recording(
+            bag, options.reading, parameters['platform_frame'],
+            lambda: StewartPlatform(parameters).home_pose().position)) as recording:
         topics = find_topics(recording, parameters, options)
         setpoints = Setpoints(parameters, lambda rejection, details: None, lambda text: None)
         for messages, size in recording.messages({name: key for key, name in topics.items()}):

@@ -86,7 +86,9 @@ def replay(
     before = check_free(folder, options)
     made_of = fingerprint(bag, parameters, options)
     parameters = options.applied_to(parameters)
-    with closing(Recording(bag)) as recording:
+    with closing(Recording(
+            bag, options.reading, parameters['platform_frame'],
+            lambda: StewartPlatform(parameters).home_pose().position)) as recording:
         topics = find_topics(recording, parameters, options)
         notices = notices_of(recording, topics, parameters, options)
         with whole_folder(folder, options, before=before) as partial, ExitStack() as stack:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.program import DONE, NODE, PARTLY_READ, STRICT
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ class Options(NamedTuple):
 
     node: str = NODE
     """Node name: the prefix of the output topics, and of setpoint topics with usual names."""
+    reading: Reading = Reading()  # of recordings of other sources
     topics: Mapping[str, str] = {}
     """
     Topics in the bag to be read as pose, twist, accel, combined or wrench, or as base_pose,

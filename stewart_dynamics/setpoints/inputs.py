@@ -95,7 +95,7 @@ class SampleReader:
         self._reader = _READERS[topic]
         self._has_pose = topic in (POSE, COMBINED, BASE_POSE)
         self._bounded = topic in (BASE_POSE, BASE_TWIST, BASE_ACCEL, BASE_IMU)
-        self._frame = None if frame is None else frame.encode()
+        self._frame = None if frame is None else _plain(frame.encode())
         self._rejections = rejections
         self._layout: Layout | None = None
         self._frame_of_layout = b''
@@ -181,7 +181,7 @@ class SampleReader:
     def _keep_frame(self, frame: bytes) -> None:
         """Require the frame of this valid message from now on, if no frame was specified."""
         if self._frame is None:
-            self._frame = frame or None
+            self._frame = _plain(frame) or None
 
     def _learn(self, data: bytes) -> None:
         """Learn the layout of a message if the message is well-formed and its frame correct."""
@@ -194,7 +194,12 @@ class SampleReader:
 
     def _is_other(self, frame: bytes) -> bool:
         """Return whether a message has a wrong frame."""
-        return bool(frame) and self._frame is not None and frame != self._frame
+        return bool(frame) and self._frame is not None and _plain(frame) != self._frame
+
+
+def _plain(frame: bytes) -> bytes:
+    """Return a frame_id without the leading slash that ROS 1 has written."""
+    return frame.removeprefix(b'/')
 
 
 def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
