@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from typing import NamedTuple
 
-from stewart_dynamics.program import AXES, EULER
+from stewart_dynamics.program import AXES
 
 
 class Reading(NamedTuple):

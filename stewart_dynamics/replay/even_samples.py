@@ -54,8 +54,8 @@ class Tracks:
 
     def track(self) -> Track:
         """Return the samples; of those whose stamps do not increase, the first ones."""
-        stamps, values, times = (
-            np.concatenate(each) for each in (self._stamps, self._values, self._times))
+        stamps, times = np.concatenate(self._stamps), np.concatenate(self._times)
+        values = np.concatenate(self._values)
         newest = np.maximum.accumulate(stamps)
         rises = np.diff(newest, prepend=newest[:1] - 1) > 0
         self.left_out = int(np.count_nonzero(~rises))

@@ -156,7 +156,7 @@ def spectra(runs: Iterable[Array], rate: float, length: int, hann: bool) -> Spec
     step = length - length // 2 if hann else length
     total: Any = 0.0
     count = 0
-    frequencies: Array = np.fft.rfftfreq(length, 1.0 / rate)
+    frequencies = np.arange(length // 2 + 1, dtype=np.float64) * (rate / length)
     for run in runs:
         if len(run) < length:
             continue
@@ -198,7 +198,7 @@ def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int],
     shape = len(densities), len(outputs), len(inputs)
     h = np.full(shape, np.nan, dtype=complex)
     powers = np.full((len(densities), len(inputs)), np.nan)  # that other inputs do not explain
-    noise = np.diagonal(densities, axis1=1, axis2=2).real[:, outputs].copy()
+    noise: Array = np.diagonal(densities, axis1=1, axis2=2).real[:, outputs].astype(np.float64)
     free = found.averages - len(inputs)
     for mask in np.unique(excited[excited.any(axis=1)], axis=0):
         at = np.flatnonzero((excited == mask).all(axis=1))

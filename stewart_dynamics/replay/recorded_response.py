@@ -106,8 +106,8 @@ class RecordedResponse:
         sound = (np.abs(rows) < NUMBERS_END).all(axis=1)
         if not sound.all():
             self._reject(self.key, OUT_OF_RANGE, '', int(np.count_nonzero(~sound)))
-        self._measured.add(*(each[sound] for each in (
-            np.concatenate(stamps), rows, np.concatenate(times))))
+        self._measured.add(
+            np.concatenate(stamps)[sound], rows[sound], np.concatenate(times)[sound])
 
     def _take_poses(self, messages: Messages) -> None:
         whole = self._poses.read_many(messages.data, messages.starts, messages.sizes)
@@ -147,9 +147,10 @@ class RecordedResponse:
             if lost:
                 self._reject(self.key, NO_POSE, '', lost)
             check_overlap(commanded, measured, self._topic)
-        samples = at_even_times(*(
+        axes_commanded, axes_achieved = (
             each._replace(values=axes_of(each.values, mean_orientation(each.values)))
-            for each in (commanded, measured)), timeout)
+            for each in (commanded, measured))
+        samples = at_even_times(axes_commanded, axes_achieved, timeout)
         if not samples.runs:
             raise StewartError(f'response: setpoints and {self._topic} have no time without a gap '
                                'in common that is long enough')

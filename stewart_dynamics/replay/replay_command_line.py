@@ -60,8 +60,8 @@ def _arguments() -> argparse.ArgumentParser:
               'index.html.',
         more='\nof several bags the most severe: 2, then 3, then 1')
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
-                        help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, CSV file with '
-                             'named columns, or a folder with bags in it')
+                        help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, CSV file '
+                             'with named columns, or a folder with bags in it')
     add_parameters(parser)
     _PROGRAM.add_results(parser, REPLAYS)
     topics = parser.add_argument_group(

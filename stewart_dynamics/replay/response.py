@@ -45,7 +45,9 @@ class Analysis:
 
     def _moving(self, commanded: Array) -> list[int]:
         sizes = commanded.std(axis=0) / self._scales
-        return np.flatnonzero((sizes > _EXCITED * sizes.max()) & (sizes > _STILL)).tolist()
+        moving: list[int] = np.flatnonzero(
+            (sizes > _EXCITED * sizes.max()) & (sizes > _STILL)).tolist()
+        return moving
 
     def axes(self) -> list[tuple[list[int], FrequencyResponses, float]]:
         """
@@ -171,7 +173,7 @@ def axes_response(recorded: Runs, size: float) -> dict[str, Any]:
     return result
 
 
-_NOT_EXCITED = {name: [] for name in (
+_NOT_EXCITED: dict[str, Any] = {name: [] for name in (
     'frequency', 'gain', 'phase', 'coherence', 'gain_low', 'gain_high', 'phase_low', 'phase_high')
     } | dict.fromkeys(('delay', 'bandwidth_3db', 'bandwidth_90deg', 'second_order'))
 

@@ -22,6 +22,8 @@ _GAIN, _PHASE, _COHERENCE = (26.0, 130.0), (206.0, 130.0), (386.0, 50.0)
 _TIME = (26.0, 150.0)
 # Lowest gain and phase that a plot shows [dB, deg].
 _LOWEST_GAIN, _LOWEST_PHASE = -40.0, -540.0
+# Endings of the keys of a value and of its band.
+_BAND = ('', '_low', '_high')
 # Time around a turn-around and after a step that is shown [s], and the same in delays.
 _AROUND, _IN_DELAYS = 0.2, 6.0
 
@@ -75,11 +77,9 @@ def _bode(title: str, several: Sequence[Mapping[str, Any]],
     for n, one in enumerate(several):
         f = np.asarray(one['frequency'])
         css = 'response' if alone else f'response leg{n}'
-        for chart, value, lower, upper in (
-                (gains, _decibels(one['gain']), _decibels(one['gain_low']),
-                 _decibels(one['gain_high'])),
-                (phases, *(np.asarray(one[name]) for name in (
-                    'phase', 'phase_low', 'phase_high')))):
+        for chart, (value, lower, upper) in (
+                (gains, [_decibels(one[f'gain{end}']) for end in _BAND]),
+                (phases, [np.asarray(one[f'phase{end}']) for end in _BAND])):
             least, most = chart.y
             if alone:
                 band = np.column_stack([np.concatenate([f, f[::-1]]), np.concatenate(

@@ -48,7 +48,7 @@ class Response(NamedTuple):
     @property
     def phase(self) -> Array:
         """Return the phase (F,) [rad] without jumps by whole turns, from the lowest one on."""
-        phase = np.angle(self.value)
+        phase: Array = np.angle(self.value).astype(np.float64)
         sure = np.flatnonzero(self.coherent)
         if not len(sure):
             return phase

@@ -77,7 +77,7 @@ class Chart:
     """
 
     def __init__(self, picture: Picture, frame: tuple[float, float, float, float],
-                 x: tuple[float, float], y: tuple[float, float], logarithmic: bool = False,
+                 x: tuple[float, float], y: tuple[float, float], *, logarithmic: bool = False,
                  ) -> None:
         self.picture, self.frame, self.x, self.y = picture, frame, x, y
         self._logarithmic = logarithmic
