@@ -121,8 +121,9 @@ class Recording:
         """Return the topics of other types that are read as poses; transforms with a child."""
         if kind != type_names.POSE_STAMPED:
             return []
-        return [name for other in POSE_TYPES for name in self.topics_of(other, left_out)
-                if other != type_names.TF_MESSAGE or self._reading.child is not None]
+        return sorted(
+            name for other in POSE_TYPES for name in self.topics_of(other, left_out)
+            if other != type_names.TF_MESSAGE or self._reading.child is not None)
 
     def checked_topic(self, name: str, kind: str) -> str:
         """Return a topic; raise BagError if the bag has no such topic, or one of another type."""
@@ -157,7 +158,7 @@ class Recording:
                     self.missing.append(f'{file.name}: more messages than bytes: those after '
                                         f'{count - len(block.times)} are not read')
                     break
-                yield convert(block), size
+                yield block if isinstance(source, CsvMotion) else convert(block), size
             self.missing += [f'{file.name}: {what}' for what in source.missing]
             source.missing.clear()
             if source.unchecked:

@@ -18,7 +18,7 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.frames import rotation as rotations
-from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.motion import listed, Motion, Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.multisine import multisine
@@ -31,7 +31,7 @@ _FADE, _REST = 0.5, 2.5
 _SAMPLES = 16
 # Amplitude from which the largest one is found, of the characteristic length.
 _SMALL = 1e-3
-_AXES = ('X', 'Y', 'Z', 'alpha', 'beta', 'gamma')
+_LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 
 
 def duration(parameters: ReferenceMotionParameters) -> float:
@@ -106,9 +106,12 @@ def _amplitudes_within(path: str, initial: tuple[float, ...], part: float, highe
     """
     Return peaks of the axes [m, rad] that are a part of the largest within the hexapod's limits.
 
-    Raises ParameterError if the hexapod has no limits, or is not within them at the center.
+    Raises ParameterError if the hexapod lacks a limit, or is not within them at the center.
     """
     platform = StewartPlatform(Parameters.from_yaml(path))
+    if missing := [name for name in _LIMITS if platform.parameters[name] is None]:
+        raise ParameterError(f'{path}: {", ".join(missing)}: missing: the motion response needs '
+                             'them, or motion.amplitude in place of motion.response.params_file')
     capability = Capability(platform)
     size = platform.parameters['singularity.characteristic_length']
     center = np.array(initial)
@@ -116,17 +119,14 @@ def _amplitudes_within(path: str, initial: tuple[float, ...], part: float, highe
     samples = np.arange(_SAMPLES * highest) / (_SAMPLES * highest)
     x, dx, ddx = multisine(highest).at(samples)
     found = []
-    for axis, name in enumerate(_AXES):
+    for axis in range(6):
         small = _SMALL * (size if axis < 3 else 1.0)
         unit = small * np.eye(6)[axis]
         motion = _about(center, *(each[:, None] * unit for each in (
             x, dx / period, ddx / period ** 2)))
         factor = float(capability.amplitude_factor(motion, pose).value)
-        if not (0.0 < factor < np.inf):
-            raise ParameterError(
-                f'{path}: motion.response.params_file: ' + (
-                    'motion.initial is not within the limits of the hexapod' if factor <= 0.0 else
-                    f'no limit of the hexapod bounds the motion of {name}: give limits, or '
-                    'motion.amplitude'))
+        if not factor > 0.0:
+            raise ParameterError(f'motion.initial: {listed(center)}: is not within the limits of '
+                                 f'the hexapod in {path}')
         found.append(part * factor * small)
     return tuple(found)
