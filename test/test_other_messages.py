@@ -149,7 +149,7 @@ def test_damaged_messages_are_malformed(name: str, tmp_path: Path) -> None:
         bag.write(to, int(STAMPS[0]) + len(whole), bytes([7]) + whole[1:])
     with pytest.raises(BagError, match='has no valid setpoint|no transform has'):
         found = read_setpoints(tmp_path / 'bag', topics={'pose': '/poses'})
-        # What was cut behind the pose is complete.
+        # A message that was cut behind its pose is complete.
         assert len(found.times) == 1
         np.testing.assert_allclose(found.motion.position[0], POSITIONS[0])
         raise BagError('has no valid setpoint')

@@ -31,7 +31,7 @@ class Integrated(NamedTuple):
     uncorrected: Array  # displacements at the end without the correction (3,) [m]
 
     def words(self) -> str:
-        """Return what was done, for the user."""
+        """Return the correction in words, for the user."""
         x, y, z = np.abs(self.uncorrected).tolist()
         return (
             'only accelerations are given: they are integrated twice from rest in the home pose, '

@@ -44,7 +44,7 @@ _ANGLES = {'rad': 1.0, 'mrad': 1e-3, 'urad': 1e-6, 'µrad': 1e-6, 'μrad': 1e-6,
            'deg': np.pi / 180.0, '°': np.pi / 180.0, 'arcmin': np.pi / 10800.0,
            'arcsec': np.pi / 648000.0}
 _TIMES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'µs': 1e-6, 'μs': 1e-6, 'ns': 1e-9, 'min': 60.0}
-# Of the ways to write m/s^2.
+# Different spellings of m/s^2 become one.
 _PLAIN = str.maketrans({' ': '', '^': '', '*': '', '²': '2'})
 _ACCELERATIONS = {'g': 9.80665, 'mg': 9.80665e-3, 'gal': 1e-2}
 
@@ -73,7 +73,7 @@ _HEADER = re.compile(r'(?P<name>[^\[\]]*?)\s*(\[\s*(?P<unit>[^\[\]]*?)\s*\])?')
 
 
 def _split(cell: str) -> tuple[str, str]:
-    """Return name and unit of a column; an empty unit where it has none."""
+    """Return name and unit of a column; an empty unit if it is not given."""
     found = _HEADER.fullmatch(cell.strip())
     if found is None:
         return cell, ''
@@ -85,7 +85,7 @@ def _is_known(cell: str) -> bool:
 
 
 def factor(group: Group, unit: str) -> float | None:
-    """Return a unit in SI; None if it is none of the group's."""
+    """Return a unit in SI; None if the group does not have it."""
     if not unit:
         return 1.0
     if group.order == 0:

@@ -139,7 +139,7 @@ def _transforms(data: bytes) -> Iterator[tuple[str, Stamped]]:
 
 
 def _with_child(data: bytes, at: int) -> tuple[str, Stamped]:
-    """Return child frame and pose of what begins with header, child_frame_id and seven numbers."""
+    """Return child frame and pose at a header, which child_frame_id and seven numbers follow."""
     sec, nanosec, size = TIME_AND_LENGTH[data[1]].unpack_from(data, at)
     frame = text(data, at + 12, size)
     length, begin = sequence(data, at + 12 + size, COUNT[data[1]], [])

@@ -220,7 +220,7 @@ def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int],
 
 def _one_set(densities: Complex, inputs: Integers, outputs: Integers,
              ) -> tuple[Complex, Array, Array]:
-    """Return responses, powers of inputs alone, and what is not coherent: of the same inputs."""
+    """Return responses, powers of inputs alone, and incoherent power, of the same inputs."""
     xx = densities[:, inputs][:, :, inputs]
     yx = densities[:, outputs][:, :, inputs]
     yy = np.diagonal(densities, axis1=1, axis2=2).real[:, outputs]

@@ -48,7 +48,7 @@ class RecordedSetpoints(NamedTuple):
     wrench : (N, 6)
         External wrench on the platform: force [N] and moment [N m], base axes.
     stamps : (N,)
-        Of the messages [ns].
+        Stamps of the messages [ns].
     missing : tuple of str
         Parts of the recording that could not be read.
 
@@ -83,9 +83,9 @@ class RecordedLegStates(NamedTuple):
     times : (N,)
         Since the first state [s].
     positions, velocities, efforts : (N, 6)
-        As recorded [m, m/s, N]; nan where the messages have none.
+        Recorded values [m, m/s, N]; nan where the messages lack them.
     stamps : (N,)
-        Of the messages [ns].
+        Stamps of the messages [ns].
     missing : tuple of str
         Parts of the recording that could not be read.
 

@@ -97,7 +97,7 @@ class Response(NamedTuple):
         return float(np.exp(at[0])) if at else float(f[n])
 
     def half_bandwidth(self) -> float:
-        """Return half the lower bandwidth, or the highest frequency where it has none [Hz]."""
+        """Return half the lower bandwidth; without one the highest frequency [Hz]."""
         bandwidths = [each for each in (self.bandwidth_3db, self.bandwidth_90deg) if each]
         return 0.5 * min(bandwidths) if bandwidths else float(self.frequency.max(initial=0.0))
 
