@@ -141,6 +141,15 @@ def test_replay_and_capability_read_the_same_file(
     assert 'possible' in capsys.readouterr().out
 
 
+def test_a_file_needs_no_other_source_of_setpoints(tmp_path: Path) -> None:
+    path = write(tmp_path / 'motion.csv', columns(MOTION))
+    params = tmp_path / 'combined.yaml'
+    Parameters.from_yaml(PARAMS).replaced({'setpoint.source': 'combined'}).to_yaml(params)
+    assert replay([str(path), '--params', str(params), '--output', str(tmp_path / 'r'),
+                   '--no-report']) == 0
+    close(read_setpoints(path, Parameters.from_yaml(params)), MOTION)
+
+
 def test_poses_alone_need_to_be_differentiated(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = columns(MOTION)
@@ -290,4 +299,3 @@ def test_every_unit_is_known_in_all_its_spellings() -> None:
                     '/s^2', '/s2', '/s²', '/s/s', '/s**2')}[group.order]:
                 assert factor(group, unit + ending) == si
     assert factor(QUATERNION, 'm') is None
-    assert Parameters.from_yaml(PARAMS)

@@ -13,7 +13,7 @@ import tempfile
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.blocks import of_good_length, Source
 from stewart_dynamics.bags.csv_motion import CsvMotion
-from stewart_dynamics.bags.find import files_of
+from stewart_dynamics.bags.find import files_of, TABLE
 from stewart_dynamics.bags.mcap_file import MAGIC, McapFile
 from stewart_dynamics.bags.other_messages import Converter, POSE_TYPES
 from stewart_dynamics.bags.reading import Reading
@@ -182,7 +182,7 @@ class Recording:
             self._folder.cleanup()
 
     def _opened(self, file: Path) -> Source:
-        if file.suffix.lower() == '.csv':
+        if file.suffix.lower() == TABLE:
             motion = CsvMotion(file, self._reading, self._home)
             self.notices += motion.notices
             return motion

@@ -85,7 +85,7 @@ def replay(
     options = options or Options()
     before = check_free(folder, options)
     made_of = fingerprint(bag, parameters, options)
-    parameters = options.applied_to(parameters)
+    parameters = options.applied_to(parameters, bag)
     with closing(Recording(
             bag, options.reading, parameters['platform_frame'],
             lambda: StewartPlatform(parameters).home_pose().position)) as recording:

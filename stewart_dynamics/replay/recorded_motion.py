@@ -49,7 +49,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
 
     Raises BagError: the bag cannot be read, or has no setpoints.
     """
-    parameters = options.applied_to(parameters)
+    parameters = options.applied_to(parameters, bag)
     splines = differentiator(parameters, options)
     batches: list[Batch] = []
     with closing(Recording(

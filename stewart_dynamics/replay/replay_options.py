@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from stewart_dynamics.bags.find import TABLE
 from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.program import DONE, NODE, PARTLY_READ, STRICT
 
@@ -45,10 +46,12 @@ class Options(NamedTuple):
     force: bool = False  # replace existing results
     run: str = ''  # identifier of a run over many bags, written to summary.json
 
-    def applied_to(self, parameters: Parameters) -> Parameters:
-        """Return the parameters with the source of setpoints that these options demand."""
+    def applied_to(self, parameters: Parameters, bag: Path) -> Parameters:
+        """Return the parameters with the source of setpoints that options and bag demand."""
         source = ('pose' if self.cutoff is not None
-                  else 'combined' if 'combined' in self.topics else None)
+                  else 'combined' if 'combined' in self.topics
+                  else 'separate' if bag.suffix.lower() == TABLE
+                  and parameters['setpoint.source'] == 'combined' else None)
         return parameters.replaced({'setpoint.source': source}) if source else parameters
 
 
