@@ -17,6 +17,7 @@ from referees import rng, ROOT
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from scipy import signal
+from scipy.interpolate import CubicSpline
 
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import (
@@ -217,6 +218,19 @@ def test_clocks_that_differ_are_said(
     assert summary['response'] is None
     assert 'do not overlap; by the times of recording, their clocks differ by -500 s' in (
         summary['missing'][0])
+
+
+def test_clocks_that_drift_are_said(periodic: tuple[Array, Array]) -> None:
+    x, _ = periodic
+    rate = MOTION['rate']
+    times = np.arange(len(x)) / rate
+    for drift in (2e-4, -5e-5):
+        y = CubicSpline(times, x)(times - 0.02 - drift * times)
+        noise = 1e-5 * rng(1).normal(size=x.shape)
+        assert axes_of(x, y + noise, rate)['clock_drift'] == pytest.approx(drift, rel=0.05)
+    for seed in range(5):
+        still = x + 1e-4 * rng(seed).normal(size=x.shape)
+        assert axes_of(x, still, rate)['clock_drift'] is None
 
 
 def axes_of(commanded: Array, achieved: Array, rate: float) -> dict[str, Any]:

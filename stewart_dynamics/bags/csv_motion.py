@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps, STAMPS_END
 from stewart_dynamics.bags.baseline import integrated
 from stewart_dynamics.bags.csv_table import read_table, Table
 from stewart_dynamics.bags.reading import Reading
@@ -27,7 +27,6 @@ from stewart_dynamics.bags.source_axes import axes_matrix, turned
 from stewart_dynamics.errors import BagError, shown_name, StewartError
 from stewart_dynamics.mechanics.frames.rotation import quaternion_product
 from stewart_dynamics.messages import type_names
-from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.tolerances import is_unit, unit_rule

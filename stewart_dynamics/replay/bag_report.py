@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array, RPM, SECOND
+from stewart_dynamics.estimation.confidence_level import PERCENT
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.frames.rotation import to_euler
@@ -152,7 +153,7 @@ class Report:
             date=date(summary['setpoints']['first_stamp_ns']), quantities=QUANTITIES,
             units={name: each.unit or '' for name, each in PARAMETERS.items()},
             most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
-            unit_key=unit_key, **_response_charts(followed),
+            unit_key=unit_key, percent=PERCENT, **_response_charts(followed),
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})
         write_files({path: text})

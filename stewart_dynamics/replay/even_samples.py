@@ -118,7 +118,7 @@ def _segments(times: Array, timeout: float) -> list[slice]:
 
 
 def clock_notices(commanded: Track, achieved: Track, name: str, delays: Sequence[float],
-                  ) -> list[str]:
+                  drift: float | None) -> list[str]:
     """Return notices about clocks that may differ."""
     notices = []
     off = achieved.late - commanded.late
@@ -130,6 +130,9 @@ def clock_notices(commanded: Track, achieved: Track, name: str, delays: Sequence
     if delays and min(delays) < 0.0:
         notices.append(f'{name}: {-1e3 * min(delays):.3g} ms earlier than the setpoints: the '
                        'clocks of their stamps differ, or setpoints are stamped late')
+    if drift is not None:
+        notices.append(f'{name}: the delay changes by {1e6 * drift:.3g} us in a second: the '
+                       'clocks drift, delays are those of the middle of each part')
     return notices
 
 

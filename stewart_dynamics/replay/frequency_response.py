@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.estimation.confidence_level import CONFIDENCE_LEVEL
 
 Complex = NDArray[np.complex128]
 
@@ -39,8 +40,6 @@ _LONGEST, _FEWEST = 20.0, 64
 _NEIGHBORS = 9
 # Candidates for the period of an input that are tried.
 _CANDIDATES = 30
-# Probability that a value lies outside of its band.
-_OUTSIDE = 0.05
 
 
 class Part(NamedTuple):
@@ -66,7 +65,7 @@ class FrequencyResponses(NamedTuple):
 
     frequencies: Array  # (F,) [Hz]
     responses: Complex  # (F, O, I)
-    radii: Array  # (F, O, I): radius of the circle around each that contains it with 95 %
+    radii: Array  # (F, O, I): radius of its confidence circle around each
     coherences: Array  # (F, O, I): part of the power due to the input, of this and noise
     noise: Array  # (F, O): one-sided density of what is not coherent with any input
 
@@ -210,7 +209,7 @@ def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int],
         noise[at] = rest * found.averages / free
     # |H - H^|^2 is noise over power: F distribution with 2 and 2 free degrees of freedom.
     smooth, free = _smooth(noise, found.neighbors), free * found.neighbors
-    quantile = free * (_OUTSIDE ** (-1.0 / free) - 1.0)
+    quantile = free * ((1.0 - CONFIDENCE_LEVEL) ** (-1.0 / free) - 1.0)
     radii = np.sqrt(quantile / found.averages * smooth[:, :, None] / powers[:, None, :])
     due = np.abs(h) ** 2 * powers[:, None, :]
     total = due + smooth[:, :, None]

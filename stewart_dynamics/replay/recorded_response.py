@@ -157,7 +157,8 @@ class RecordedResponse:
         size = self._parameters['singularity.characteristic_length']
         axes = axes_response(samples, size)
         self.notices += clock_notices(commanded, measured, self._topic, [
-            axes[name]['delay'] for name in AXES if axes[name]['delay'] is not None])
+            axes[name]['delay'] for name in AXES if axes[name]['delay'] is not None],
+            axes['clock_drift'])
         return Followed({
             **axes, **legs, 'topic': self._topic, 'samples': len(measured.stamps),
             'rate': samples.rate, 'highest_frequency': samples.highest}, samples)

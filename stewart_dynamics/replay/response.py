@@ -27,6 +27,8 @@ _EXCITED = 1e-3
 _STILL = 1e-9  # [m, rad]
 # A cross term is stated where its gain is larger than this many radii of its band.
 _CERTAIN = 2.0
+# Smallest drift of clocks that is stated, also in standard errors, and the periods it needs.
+_DRIFT, _CERTAIN_DRIFT, _FEWEST_PERIODS = 2e-6, 5.0, 4
 # Time around a reversal of an axis in which the turn-around bump is searched [s].
 _AROUND = 0.1
 
@@ -110,6 +112,35 @@ class Analysis:
                         several.radii[known, output, number],
                         several.coherences[known, output, number])
 
+    def clock_drift(self) -> float | None:
+        """
+        Return how much faster the clock of the achieved samples is, relative; None if not certain.
+
+        By how much later each period is than the mean of its part, up to the highest frequency.
+        """
+        times, lags = [np.empty(0)], [np.empty(0)]
+        for run, part in self.periodic:
+            assert part.period is not None
+            for axis in self._moving(run.commanded[part.begin:part.end]):
+                x, y = (np.fft.rfft(each[part.begin:part.end, axis].reshape(-1, part.period))
+                        for each in (run.commanded, run.achieved))
+                omega = 2.0 * np.pi * self._recorded.rate / part.period * np.arange(x.shape[1])
+                cross = y * x.conj()
+                mean = cross.mean(axis=0)
+                lines = (np.abs(x[0]) > 1e-3 * np.abs(x[0]).max()) & (
+                    omega <= 2.0 * np.pi * self._recorded.highest) & (omega > 0.0)
+                phase = np.angle(cross[:, lines] * mean[lines].conj())
+                weights = np.abs(mean[lines]) * omega[lines]
+                lags.append(-phase @ weights / (weights @ omega[lines]))
+                middle = 0.5 * (len(x) - 1)
+                times.append((np.arange(len(x)) - middle) * part.period / self._recorded.rate)
+        t, late = np.concatenate(times), np.concatenate(lags)
+        if len(t) < _FEWEST_PERIODS:
+            return None
+        slope = float(t @ late / (t @ t))
+        error = float(np.sqrt(np.sum((late - slope * t) ** 2) / (len(t) - 1) / (t @ t)))
+        return slope if abs(slope) > max(_DRIFT, _CERTAIN_DRIFT * error) else None
+
     def deviations(self, axis: int) -> tuple[float, float] | None:
         """
         Return repeatability and turn-around bump of an axis in its periods [m or rad].
@@ -170,7 +201,7 @@ def axes_response(recorded: Runs, size: float) -> dict[str, Any]:
             'reason': None if excited else (
                 'moves only together with other axes' if axis in analysis.excited
                 else 'not excited')}
-    return result
+    return result | {'clock_drift': analysis.clock_drift()}
 
 
 _NOT_EXCITED: dict[str, Any] = {name: [] for name in (

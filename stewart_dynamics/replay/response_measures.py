@@ -36,7 +36,7 @@ class Response(NamedTuple):
 
     frequency: Array  # (F,) [Hz], increasing
     value: Complex  # (F,)
-    radius: Array  # (F,): of the circle around each value that contains the response with 95 %
+    radius: Array  # (F,): of the confidence circle around each value
     coherence: Array  # (F,)
 
     @property
