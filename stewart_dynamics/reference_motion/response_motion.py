@@ -15,7 +15,6 @@ from functools import lru_cache
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import listed, Motion, Pose
@@ -108,6 +107,8 @@ def _amplitudes_within(path: str, initial: tuple[float, ...], part: float, highe
 
     Raises ParameterError if the hexapod lacks a limit, or is not within them at the center.
     """
+    from stewart_dynamics.capability.capability import Capability  # slow, other motions need none
+
     platform = StewartPlatform(Parameters.from_yaml(path))
     if missing := [name for name in _LIMITS if platform.parameters[name] is None]:
         raise ParameterError(f'{path}: {", ".join(missing)}: missing: the motion response needs '

@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.leg_curves import columns, data_frame
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import COMBINED, Parameters, POSES_ALONE, SEPARATE
-from stewart_dynamics.program import AXES, EULER, node_name, NODE
+from stewart_dynamics.program import AXES, EULER, NODE, node_name
 from stewart_dynamics.replay.bag_topics import find_measured_legs, name_of
 from stewart_dynamics.replay.recorded_motion import read_motion
 from stewart_dynamics.replay.replay_options import Options
@@ -239,4 +239,3 @@ def _reading(child: str | None, euler: str | None, axes: str) -> Reading:
         raise StewartError(f'euler: {euler!r}: must be one of {", ".join(EULER)}')
     axes_matrix(axes)
     return Reading(child, euler, axes.replace(' ', ''))
-
