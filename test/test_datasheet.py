@@ -34,8 +34,8 @@ from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, both_ways, box_verdict, down, LINEAR, motion_verdict, numbers,
     rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
-from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
+from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads, stiffness
 from stewart_dynamics.mechanics.likely_mistakes import mistakes_in_options
 from stewart_dynamics.replay import main as replay

@@ -16,8 +16,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import claimed_box, ratings, workspace
 from stewart_dynamics.datasheet.claimed_box import largest_length, LARGEST_RULE
 from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
-from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
+from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import answer, AXES
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose

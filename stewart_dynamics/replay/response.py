@@ -118,7 +118,8 @@ class Analysis:
 
         By how much later each period is than the mean of its part, up to the highest frequency.
         """
-        times, lags = [np.empty(0)], [np.empty(0)]
+        times: list[Array] = [np.empty(0)]
+        lags: list[Array] = [np.empty(0)]
         for run, part in self.periodic:
             assert part.period is not None
             for axis in self._moving(run.commanded[part.begin:part.end]):
@@ -131,7 +132,8 @@ class Analysis:
                     omega <= 2.0 * np.pi * self._recorded.highest) & (omega > 0.0)
                 phase = np.angle(cross[:, lines] * mean[lines].conj())
                 weights = np.abs(mean[lines]) * omega[lines]
-                lags.append(-phase @ weights / (weights @ omega[lines]))
+                lags.append(np.asarray(
+                    -phase @ weights / (weights @ omega[lines]), dtype=np.float64))
                 middle = 0.5 * (len(x) - 1)
                 times.append((np.arange(len(x)) - middle) * part.period / self._recorded.rate)
         t, late = np.concatenate(times), np.concatenate(lags)
