@@ -236,7 +236,7 @@ def axes(text: str) -> str:
     if not re.fullmatch(r'[+-]?[xyz](,[+-]?[xyz]){2}', plain) or (
             len(set(re.findall('[xyz]', plain))) != 3):
         raise argparse.ArgumentTypeError(
-            f'{_shown(text)}: must name each of x, y, z once, as z,-x,y')
+            f'{_shown(text)}: must be x, y and z, each once, as z,-x,y')
     return plain
 
 

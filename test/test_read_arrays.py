@@ -52,7 +52,7 @@ def test_legs_of_a_bag_are_those_that_were_recorded(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(('options', 'words'), [
     ({'euler': 'rpy'}, "euler: 'rpy': must be one of xyz, xzy"),
-    ({'axes': 'x,y'}, "'x,y': must name each of x, y, z once"),
+    ({'axes': 'x,y'}, "'x,y': must be x, y and z, each once"),
     ({'topics': {'position': '/a'}}, "topics: 'position': must be one of pose, twist"),
     ({'topics': {'pose': '/a'}}, 'has no topic /a'),
     ({'cutoff': -1.0}, 'cut-off frequency: -1.0 Hz: must be a positive number')])

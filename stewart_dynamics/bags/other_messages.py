@@ -6,7 +6,8 @@ Messages of other types that contain a pose, and of other axes, as those that ar
 
 geometry_msgs/PoseWithCovarianceStamped, TransformStamped and Pose, nav_msgs/Odometry and
 tf2_msgs/TFMessage become geometry_msgs/PoseStamped, with the stamp and frame of their headers; a
-Pose, which has no header, has the time of recording. Covariances and twists are left out.
+Pose, which has no header, has the time of recording. Covariances and twists are left out. A
+leading slash of a frame_id, as ROS 1 has written it, is removed.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.bags.source_axes import axes_matrix, turned
 from stewart_dynamics.messages import type_names
@@ -42,6 +43,12 @@ _TURNED: Mapping[str, tuple[Callable[[bytes], Stamped], tuple[str, ...]]] = {
     type_names.WRENCH_STAMPED: (twist, ('va',)),
     type_names.MULTI_DOF_JOINT_TRAJECTORY: (combined, ('vq', 'va', 'va'))}
 
+# Types that are a header and numbers.
+_HEADED = (type_names.POSE_STAMPED, type_names.TWIST_STAMPED, type_names.ACCEL_STAMPED,
+           type_names.WRENCH_STAMPED, type_names.IMU)
+# The first byte of a frame_id behind encapsulation, stamp and length.
+_FRAME = 16
+
 
 class Converter:
     """
@@ -57,6 +64,7 @@ class Converter:
         turns = reading.axes != AXES
         self.children: set[str] = set()  # child frames of transforms that were seen
         self.found = False  # whether the platform's was among them
+        self._headed = [name for name, kind in kinds.items() if kind in _HEADED]
         self._of: dict[str, Callable[[bytes, int], list[bytes]]] = {}
         for name, kind in kinds.items():
             if kind in POSE_TYPES:
@@ -66,12 +74,15 @@ class Converter:
 
     def __call__(self, block: Messages) -> Messages:
         """Return a block with the converted messages; malformed ones are as they were."""
-        if not any(name in self._of for name in block.topics):
+        slashes = self._slashes(block)
+        if not (slashes.any() or any(name in self._of for name in block.topics)):
             return block
         numbers, times, messages = [], [], []
-        for number, (name, time, data) in zip(block.of_topic.tolist(), block.each(), strict=True):
+        for number, slash, (name, time, data) in zip(
+                block.of_topic.tolist(), slashes.tolist(), block.each(), strict=True):
             convert = self._of.get(name)
             try:
+                data = _without_slash(data) if slash else data
                 made = [data] if convert is None else convert(data, time)
             except (MalformedError, *READ_ERRORS):
                 made = [b'']  # rejected as malformed
@@ -79,6 +90,13 @@ class Converter:
             times += [time] * len(made)
             messages += made
         return Messages.of(block.topics, numbers, times, messages)
+
+    def _slashes(self, block: Messages) -> Flags:
+        """Return which messages (M,) have a frame_id that begins with a slash."""
+        headed = [n for n, name in enumerate(block.topics) if name in self._headed]
+        long: Flags = np.isin(block.of_topic, headed) & (block.sizes > _FRAME)
+        long[long] = block.data[block.starts[long] + _FRAME] == ord('/')
+        return long
 
     def _pose_of(self, kind: str) -> Callable[[bytes, int], list[bytes]]:
         def convert(data: bytes, time: int) -> list[bytes]:
@@ -103,12 +121,22 @@ class Converter:
 
     def _written(self, one: Stamped) -> bytes:
         values: Array = turned(np.array(one.values), self._matrix, 'vq')
-        return _writer(one.frame.decode(errors='replace')).write(one.stamp, values.tolist())
+        frame = one.frame.removeprefix(b'/').decode(errors='replace')
+        return _writer(frame).write(one.stamp, values.tolist())
 
 
 @lru_cache(maxsize=64)
 def _writer(frame: str) -> StampedWriter:
     return StampedWriter(frame, 7)
+
+
+def _without_slash(data: bytes) -> bytes:
+    """Return a message of a header and numbers without the first character of its frame_id."""
+    size = TIME_AND_LENGTH[data[1]].unpack_from(data, 4)[2]
+    text(data, _FRAME, size)
+    end = _FRAME + size
+    head = data[:12] + COUNT[data[1]].pack(size - 1) + data[_FRAME + 1:end]
+    return head + bytes(aligned8(end - 1) - len(head)) + data[aligned8(end):]
 
 
 def _turning(kind: str, matrix: Array) -> Callable[[bytes, int], list[bytes]]:

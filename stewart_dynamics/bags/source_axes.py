@@ -21,7 +21,7 @@ def axes_matrix(axes: str) -> Array:
     """
     found = re.fullmatch(r'([+-]?)([xyz]),([+-]?)([xyz]),([+-]?)([xyz])', axes.replace(' ', ''))
     if found is None or sorted(found.groups()[1::2]) != ['x', 'y', 'z']:
-        raise StewartError(f'{axes!r}: must name each of x, y, z once, as z,-x,y')
+        raise StewartError(f'{axes!r}: must be x, y and z, each once, as z,-x,y')
     matrix = np.zeros((3, 3))
     for row, (sign, name) in enumerate(zip(*[iter(found.groups())] * 2, strict=True)):
         matrix[row, 'xyz'.index(name)] = -1.0 if sign == '-' else 1.0

@@ -35,8 +35,7 @@ from stewart_dynamics.planned.trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
 from stewart_dynamics.setpoints.inputs import unit_quaternions
 from stewart_dynamics.setpoints.rejections import (
-    BASE_NOT_KNOWN, frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, plain_frame,
-    WRONG_FRAME)
+    BASE_NOT_KNOWN, frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
 
 INPUT, INPUT_TYPE = 'platform_trajectory', type_names.MULTI_DOF_JOINT_TRAJECTORY
 OUTPUT, OUTPUT_TYPE = 'leg_trajectory', type_names.JOINT_TRAJECTORY
@@ -119,7 +118,7 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
 
 def _checked_header(data: bytes, base_frame: str) -> PlatformTrajectory:
     message = PlatformTrajectory(data)
-    if plain_frame(message.frame) not in (b'', plain_frame(base_frame.encode())):
+    if message.frame not in (b'', base_frame.encode()):
         raise _NotCheckableError(WRONG_FRAME, frame_details(message.frame, base_frame.encode()))
     if not 1 <= message.size <= MOST_POINTS:
         raise MalformedError(f'{message.size} points: must be 1 to {MOST_POINTS}')

@@ -132,8 +132,7 @@ class Analysis:
                     omega <= 2.0 * np.pi * self._recorded.highest) & (omega > 0.0)
                 phase = np.angle(cross[:, lines] * mean[lines].conj())
                 weights = np.abs(mean[lines]) * omega[lines]
-                lags.append(np.asarray(
-                    -phase @ weights / (weights @ omega[lines]), dtype=np.float64))
+                lags.append((-phase @ weights / (weights @ omega[lines])).astype(np.float64))
                 middle = 0.5 * (len(x) - 1)
                 times.append((np.arange(len(x)) - middle) * part.period / self._recorded.rate)
         t, late = np.concatenate(times), np.concatenate(lags)

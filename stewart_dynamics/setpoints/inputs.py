@@ -28,7 +28,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
 from stewart_dynamics.setpoints.rejections import (
     frame_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
-    plain_frame, Rejections, WRONG_FRAME)
+    Rejections, WRONG_FRAME)
 
 # Topics, relative to the node's name.
 POSE = 'setpoint/pose'
@@ -96,7 +96,7 @@ class SampleReader:
         self._reader = _READERS[topic]
         self._has_pose = topic in (POSE, COMBINED, BASE_POSE)
         self._bounded = topic in (BASE_POSE, BASE_TWIST, BASE_ACCEL, BASE_IMU)
-        self._frame = None if frame is None else plain_frame(frame.encode())
+        self._frame = None if frame is None else frame.encode()
         self._rejections = rejections
         self._turned = Sample('one_rotation', 'quaternion', 'rotation')
         self._turn = function('stewart_rotation').bound(
@@ -184,7 +184,7 @@ class SampleReader:
     def _keep_frame(self, frame: bytes) -> None:
         """Require the frame of this valid message from now on, if no frame was specified."""
         if self._frame is None:
-            self._frame = plain_frame(frame) or None
+            self._frame = frame or None
 
     def _learn(self, data: bytes) -> None:
         """Learn the layout of a message if the message is well-formed and its frame correct."""
@@ -197,7 +197,7 @@ class SampleReader:
 
     def _is_other(self, frame: bytes) -> bool:
         """Return whether a message has a wrong frame."""
-        return bool(frame) and self._frame is not None and plain_frame(frame) != self._frame
+        return bool(frame) and self._frame is not None and frame != self._frame
 
 
 def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:

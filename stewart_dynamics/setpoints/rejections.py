@@ -86,11 +86,6 @@ class Rejections:
         self._rejected(rejection, details)
 
 
-def plain_frame(frame: bytes) -> bytes:
-    """Return a frame_id without the leading slash that ROS 1 has written."""
-    return frame.removeprefix(b'/')
-
-
 def frame_details(frame: bytes, wanted: bytes) -> str:
     """Return the details for WRONG_FRAME."""
     given, must = (each[:60].decode(errors='replace') for each in (frame, wanted))
