@@ -346,6 +346,36 @@ def test_what_is_not_excited_is_not_stated() -> None:
     assert all(still[name]['reason'] == 'not excited' for name in AXES)
 
 
+def test_a_step_is_late_by_its_delay() -> None:
+    x = np.where(np.arange(3000)[:, None] > 1500, 0.01, 0.0) * np.eye(6)[0]
+    found = axes_of(x, np.roll(x, 2, axis=0), 50.0)['x']
+    assert found['delay'] == pytest.approx(0.04, abs=1e-4)
+
+
+def test_an_axis_that_moves_the_other_way_has_no_delay(periodic: tuple[Array, Array]) -> None:
+    x, y = periodic
+    found = axes_of(x, y * [1.0, -1.0, 1.0, 1.0, 1.0, 1.0], MOTION['rate'])
+    assert found['y']['opposite'] and found['y']['delay'] is None
+    assert not found['x']['opposite']
+    assert found['x']['delay'] == pytest.approx(DRIVE.late, abs=1e-4)
+
+
+@pytest.mark.parametrize('count', [64, 100, 200])
+def test_a_recording_that_is_too_short_is_said(count: int) -> None:
+    x = rng(1).normal(size=(count, 6))
+    found = axes_of(x, x, 50.0)
+    assert {found[name]['reason'] for name in AXES} == {'the recording is too short'}
+
+
+def test_a_platform_that_does_not_follow_has_no_delay(periodic: tuple[Array, Array]) -> None:
+    still = 0.0 * periodic[0]
+    for achieved in (still, still + 0.3, *(
+            1e-3 * rng(seed).normal(size=still.shape) for seed in range(10))):
+        found = axes_of(periodic[0], achieved, MOTION['rate'])
+        assert all(found[name]['delay'] is None for name in AXES)
+        assert {found[name]['reason'] for name in AXES} == {'not coherent with its setpoints'}
+
+
 def test_a_platform_that_follows_at_once_has_no_delay(periodic: tuple[Array, Array]) -> None:
     found = axes_of(periodic[0], periodic[0], MOTION['rate'])
     for name in AXES:

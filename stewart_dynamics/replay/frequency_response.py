@@ -36,8 +36,12 @@ _SEPARATE = 0.01
 _REPEATED = 1e-3
 # Longest segment of an input that does not repeat [s], and fewest samples in one.
 _LONGEST, _FEWEST = 20.0, 64
+# Longest delay by which inputs that do not repeat are aligned with outputs [s].
+_LATEST = 1.0
 # Frequencies whose noise is averaged where periods are few.
 _NEIGHBORS = 9
+# A smaller gain is one of rounding errors.
+_ROUNDING = 1e-9
 # Candidates for the period of an input that are tried.
 _CANDIDATES = 30
 
@@ -176,6 +180,30 @@ def spectra(runs: Iterable[Array], rate: float, length: int, hann: bool) -> Spec
     return Spectra(frequencies[first:], 2.0 * total[first:] / count, averages, max(neighbors, 1))
 
 
+def aligned(runs: Sequence[Array], rate: float) -> tuple[list[Array], int]:
+    """
+    Return runs whose outputs are earlier by the samples by which they are late, and their number.
+
+    Windows at the same time see different parts of inputs and outputs that are late, which biases
+    the response; at the largest correlation of their speeds they see the same.
+
+    runs: (N, 2 C), C inputs and as many outputs.
+    """
+    longest = max(runs, key=len, default=np.empty((0, 0)))
+    speeds = np.diff(longest, axis=0)
+    most = min(round(_LATEST * rate), len(speeds) // 8)
+    sizes = speeds.std(axis=0) if len(speeds) else np.empty(0)
+    half = len(sizes) // 2
+    moving = (sizes[:half] > 0.0) & (sizes[half:] > 0.0)
+    if not most or not moving.any():
+        return list(runs), 0
+    x, y = (np.fft.rfft((speeds / np.where(sizes > 0.0, sizes, 1.0))[:, part][:, moving],
+                        2 * len(speeds), axis=0) for part in (slice(half), slice(half, None)))
+    similar = np.fft.irfft(np.sum(y * x.conj(), axis=1))[:most + 1]
+    late = int(similar.argmax())
+    return [np.hstack([run[:len(run) - late, :half], run[late:, half:]]) for run in runs], late
+
+
 def segment_length(runs: Sequence[Array], rate: float, inputs: int) -> int:
     """Return the samples of a segment, so that enough of them separate the inputs."""
     longest = max((len(run) for run in runs), default=0)
@@ -211,7 +239,7 @@ def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int],
     smooth, free = _smooth(noise, found.neighbors), free * found.neighbors
     quantile = free * ((1.0 - CONFIDENCE_LEVEL) ** (-1.0 / free) - 1.0)
     radii = np.sqrt(quantile / found.averages * smooth[:, :, None] / powers[:, None, :])
-    due = np.abs(h) ** 2 * powers[:, None, :]
+    due = np.where(np.abs(h) > _ROUNDING, np.abs(h) ** 2 * powers[:, None, :], 0.0)
     total = due + smooth[:, :, None]
     coherences = np.divide(due, total, out=np.zeros_like(total), where=total > 0.0)
     return FrequencyResponses(found.frequencies, h, radii, coherences, noise)

@@ -159,6 +159,9 @@ class RecordedResponse:
         self.notices += clock_notices(commanded, measured, self._topic, [
             axes[name]['delay'] for name in AXES if axes[name]['delay'] is not None],
             axes['clock_drift'])
+        self.notices += [
+            f'{self._topic}: {name} moves opposite to its setpoints: the sign of an axis differs'
+            for name in AXES if axes[name]['opposite']]
         return Followed({
             **axes, **legs, 'topic': self._topic, 'samples': len(measured.stamps),
             'rate': samples.rate, 'highest_frequency': samples.highest}, samples)

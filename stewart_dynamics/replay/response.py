@@ -18,15 +18,13 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.replay.even_samples import Run, Runs, SHORTEST
 from stewart_dynamics.replay.frequency_response import (
-    FrequencyResponses, Part, periodic_parts, responses, segment_length, spectra)
-from stewart_dynamics.replay.response_measures import Response
+    aligned, FrequencyResponses, Part, periodic_parts, responses, segment_length, spectra)
+from stewart_dynamics.replay.response_measures import CERTAIN, Response
 
 AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
 # Part of the largest motion of an axis below which another axis is not excited.
 _EXCITED = 1e-3
 _STILL = 1e-9  # [m, rad]
-# A cross term is stated where its gain is larger than this many radii of its band.
-_CERTAIN = 2.0
 # Smallest drift of clocks that is stated, also in standard errors, and the periods it needs.
 _DRIFT, _CERTAIN_DRIFT, _FEWEST_PERIODS = 2e-6, 5.0, 4
 # Time around a reversal of an axis in which the turn-around bump is searched [s].
@@ -73,14 +71,14 @@ class Analysis:
     def _of(self, samples: list[Array], period: int | None, inputs: Sequence[int],
             ) -> tuple[FrequencyResponses, float] | None:
         rate = self._recorded.rate
+        samples, late = (samples, 0) if period else aligned(samples, rate)
         length = period or segment_length(samples, rate, len(inputs))
         if length < (4 if period else SHORTEST):
             return None
         found = spectra(samples, rate, length, hann=period is None)
         if found is None or found.averages <= len(inputs):
             return None
-        several = responses(found, inputs, range(6, 12))
-        return several, rate / length
+        return _later(responses(found, inputs, range(6, 12)), late / rate), rate / length
 
     def legs(self) -> list[tuple[Response, float]]:
         """
@@ -97,11 +95,12 @@ class Analysis:
             samples = lengths[period]
         else:
             period, samples = None, [_both(run) for run in self._recorded.runs]
+        samples, late = (samples, 0) if period else aligned(samples, rate)
         length = period or segment_length(samples, rate, 1)
         found = spectra(samples, rate, length, period is None) if length >= 4 else None
         if found is None or found.averages <= 1:
             return []
-        return [(self.one(responses(found, [leg], [6 + leg]), 0, 0),
+        return [(self.one(_later(responses(found, [leg], [6 + leg]), late / rate), 0, 0),
                  rate / length) for leg in range(6)]
 
     def one(self, several: FrequencyResponses, output: int, number: int) -> Response:
@@ -132,9 +131,12 @@ class Analysis:
                     omega <= 2.0 * np.pi * self._recorded.highest) & (omega > 0.0)
                 phase = np.angle(cross[:, lines] * mean[lines].conj())
                 weights = np.abs(mean[lines]) * omega[lines]
+                if not weights.any():  # it does not follow at all
+                    continue
                 lags.append((-phase @ weights / (weights @ omega[lines])).astype(np.float64))
                 middle = 0.5 * (len(x) - 1)
-                times.append((np.arange(len(x)) - middle) * part.period / self._recorded.rate)
+                numbers: Array = np.arange(len(x), dtype=np.float64)
+                times.append((numbers - middle) * (part.period / self._recorded.rate))
         t, late = np.concatenate(times), np.concatenate(lags)
         if len(t) < _FEWEST_PERIODS:
             return None
@@ -172,6 +174,12 @@ class Analysis:
         return None
 
 
+def _later(several: FrequencyResponses, seconds: float) -> FrequencyResponses:
+    """Return responses of outputs that are later by a time."""
+    turn = np.exp(-2j * np.pi * several.frequencies * seconds)
+    return several._replace(responses=several.responses * turn[:, None, None])
+
+
 def _both(run: Run, part: Part | None = None) -> Array:
     """Return commanded and achieved samples side by side."""
     which = slice(None) if part is None else slice(part.begin, part.end)
@@ -199,15 +207,24 @@ def axes_response(recorded: Runs, size: float) -> dict[str, Any]:
             'cross': _cross(analysis, pieces, axis) if excited else {},
             'noise': None if noise is None else float(np.sqrt(np.sum(noise[0]) * noise[1])),
             'repeatability': repeated and repeated[0], 'turn_around': repeated and repeated[1],
-            'reason': None if excited else (
-                'moves only together with other axes' if axis in analysis.excited
-                else 'not excited')}
+            'reason': None if response.coherent.any() else _reason(
+                analysis, excited, bool(pieces), axis)}
     return result | {'clock_drift': analysis.clock_drift()}
+
+
+def _reason(analysis: Analysis, excited: bool, analyzed: bool, axis: int) -> str:
+    """Return why an axis is not stated."""
+    if excited:
+        return 'not coherent with its setpoints'
+    if axis not in analysis.excited:
+        return 'not excited'
+    return 'moves only together with other axes' if analyzed else 'the recording is too short'
 
 
 _NOT_EXCITED: dict[str, Any] = {name: [] for name in (
     'frequency', 'gain', 'phase', 'coherence', 'gain_low', 'gain_high', 'phase_low', 'phase_high')
-    } | dict.fromkeys(('delay', 'bandwidth_3db', 'bandwidth_90deg', 'second_order'))
+    } | dict.fromkeys(('delay', 'bandwidth_3db', 'bandwidth_90deg', 'second_order')) | {
+        'opposite': False}
 
 
 def _joined(pieces: Sequence[Response]) -> Response:
@@ -231,7 +248,7 @@ def _cross(analysis: Analysis, pieces: Sequence[tuple[FrequencyResponses, int, f
             continue
         all_of = _joined([analysis.one(several, other, number) for several, number, _ in pieces])
         gains = np.abs(all_of.value)
-        sure = gains > _CERTAIN * all_of.radius
+        sure = gains > CERTAIN * all_of.radius
         cross[name] = float(gains[sure].max()) if sure.any() else None
     return cross
 

@@ -19,6 +19,8 @@ from stewart_dynamics.replay.frequency_response import Complex
 
 # Coherence from which on a frequency counts for the measures.
 COHERENT = 0.5
+# A gain that is larger than this many radii of its band is not one of noise.
+CERTAIN = 2.0
 _HALF_POWER = np.sqrt(0.5)
 # Largest power of the frequency in the phase, of odd powers; the first gives the delay.
 _POWERS = (1, 3, 5)
@@ -42,7 +44,8 @@ class Response(NamedTuple):
     @property
     def coherent(self) -> Flags:
         """Return the frequencies (F,) that count for the measures."""
-        found: Flags = self.coherence >= COHERENT
+        found: Flags = (self.coherence >= COHERENT) & (
+            np.abs(self.value) > CERTAIN * self.radius)
         return found
 
     @property
@@ -65,7 +68,7 @@ class Response(NamedTuple):
         angle = np.where(self.radius < gain, angle, 180.0)  # any phase
         model = self.second_order()
         return {
-            'frequency': self.frequency, 'gain': gain, 'phase': phase,
+            'frequency': self.frequency, 'opposite': self.opposite, 'gain': gain, 'phase': phase,
             'coherence': self.coherence,
             'gain_low': np.maximum(gain - self.radius, 0.0), 'gain_high': gain + self.radius,
             'phase_low': phase - angle, 'phase_high': phase + angle,
@@ -75,7 +78,9 @@ class Response(NamedTuple):
     @property
     def bandwidth_3db(self) -> float | None:
         """Return the lowest frequency at which the gain falls below 1/sqrt(2) [Hz]."""
-        return self._crossing(np.log(np.abs(self.value) / _HALF_POWER))
+        with np.errstate(divide='ignore'):
+            above: Array = np.log(np.abs(self.value) / _HALF_POWER)
+        return self._crossing(above)
 
     @property
     def bandwidth_90deg(self) -> float | None:
@@ -101,17 +106,24 @@ class Response(NamedTuple):
         bandwidths = [each for each in (self.bandwidth_3db, self.bandwidth_90deg) if each]
         return 0.5 * min(bandwidths) if bandwidths else float(self.frequency.max(initial=0.0))
 
+    @property
+    def opposite(self) -> bool:
+        """Return whether slow motion has the opposite sign."""
+        lowest = self.value[self.coherent][:1]
+        return bool(lowest.size and lowest[0].real < 0.0 and abs(lowest[0].imag) < -lowest[0].real)
+
     def delay(self) -> float | None:
         """
         Return by how much slow motion is late [s]: -d phase / d omega at zero.
 
-        The phase up to half the bandwidth, as an odd polynomial of the frequency.
+        The phase up to half the bandwidth, as an odd polynomial of the frequency. None if slow
+        motion has the opposite sign.
         """
         used = self.coherent & (self.frequency <= self.half_bandwidth())
         if not used.any():
             used = self.coherent & (self.frequency <= self.frequency[self.coherent].min(initial=0))
         count = int(np.count_nonzero(used))
-        if not count:
+        if not count or self.opposite:
             return None
         omega, phase = 2.0 * np.pi * self.frequency[used], self.phase[used]
         sigma = np.maximum(self.radius[used] / np.abs(self.value[used]), _PHASE_FLOOR)

@@ -98,7 +98,7 @@ def _response_lines(response: Mapping[str, Any]) -> list[str]:
     lines = []
     for axis in AXES:
         each = response[axis]
-        if not len(each['frequency']):
+        if each['reason']:
             lines.append(f'response of {axis:<2}  not stated: {each["reason"]}')
             continue
         delay = '-' if each['delay'] is None else f'{1e3 * each["delay"]:.2f} ms'
