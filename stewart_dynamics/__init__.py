@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.replay.read_arrays import (
         read_legs, read_setpoints, RecordedLegStates, RecordedSetpoints)
 
-__version__ = '0.1.0'
+__version__ = '1.0.0'
 
 __all__ = [
     'BagError', 'BaseMotion', 'Calibration', 'Capability', 'Extent', 'ForceBreakdown',
