@@ -55,7 +55,9 @@ extras_require = {
     ],
     'mujoco': ['mujoco>=3.14'],  # before, inertias have errors of 1e-5
     'parquet': ['pyarrow>=14'],
+    'pandas': ['pandas>=2'],
     'plot': ['matplotlib>=3.7'],  # a legend outside of the axes
+    'response': ['scipy>=1.10'],
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',
         'ros-rclpy[fastrtps]~=7.1.6',
@@ -193,7 +195,7 @@ setup(
           if not bag.startswith('bags/__')],
         (f'{share}/config', sorted(glob('config/*.*'))),
         (f'{share}/config/controllers', sorted(glob('config/controllers/*.*'))),
-        (f'{share}/examples', sorted(glob('examples/*.py'))),
+        (f'{share}/examples', sorted(glob('examples/*.py') + glob('examples/*.ipynb'))),
         # Not launch/*: after a launch file was compiled there is a folder __pycache__.
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),
         (f'{share}/security', sorted(glob('security/*'))),

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.planned.approach import approach, rest_to_rest, TimedMotion
     from stewart_dynamics.planned.trajectory import check_planned_trajectory, PlannedTrajectory
+    from stewart_dynamics.replay.read_arrays import (
+        read_legs, read_setpoints, RecordedLegStates, RecordedSetpoints)
 
 __version__ = '1.0.0'
 
@@ -35,9 +37,10 @@ __all__ = [
     'BagError', 'BaseMotion', 'Calibration', 'Capability', 'CueingStream', 'Extent', 'Felt',
     'ForceBreakdown', 'GovernedStream', 'InverseDynamics', 'Motion', 'MotionCueing',
     'MotionError', 'Motors', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory',
-    'Pose', 'PoseError', 'Reachable', 'SingularityError', 'StewartError', 'StewartPlatform',
-    'TimedMotion',
-    '__version__', 'approach', 'calibrate', 'check_planned_trajectory', 'rest_to_rest']
+    'Pose', 'PoseError', 'Reachable', 'RecordedLegStates', 'RecordedSetpoints',
+    'SingularityError', 'StewartError', 'StewartPlatform', 'TimedMotion', '__version__',
+    'approach', 'calibrate', 'check_planned_trajectory', 'read_legs', 'read_setpoints',
+    'rest_to_rest']
 
 _MODULES = {
     'calibration.calibrate': ('Calibration', 'calibrate'),
@@ -57,6 +60,8 @@ _MODULES = {
     'parameters.table': ('Parameters',),
     'planned.approach': ('TimedMotion', 'approach', 'rest_to_rest'),
     'planned.trajectory': ('PlannedTrajectory', 'check_planned_trajectory'),
+    'replay.read_arrays': ('RecordedLegStates', 'RecordedSetpoints', 'read_legs',
+                           'read_setpoints'),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 
