@@ -18,10 +18,11 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.cueing.motion_cueing import AXES, GRAVITY, MotionCueing, OMCT_FREQUENCIES
 from stewart_dynamics.cueing.recorded_vehicle import RecordedVehicle
-from stewart_dynamics.datasheet.recorded_motion import RecordedMotion, uses
+from stewart_dynamics.datasheet.motion_ratings import uses
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.recorded_motion import RecordedMotion
 
 USED = 0.9  # share of the limits that proposed gains use
 # Samples of a motion of which the use of limits is computed, evenly spaced.
