@@ -211,7 +211,7 @@ def check_order(order: Order, parameters: Parameters) -> None:
 
 def soft_legs(parameters: Parameters, stiffness: float | None) -> Iterator[str]:
     """Yield a likely mistake in the stiffness of the legs [N/m]: its unit."""
-    mass = parameters['platform.mass']
+    mass = parameters.carried.mass
     if stiffness is not None and 6.0 * stiffness < mass * (2.0 * math.pi * _SLOWEST) ** 2:
         yield (f'--leg-stiffness: {stiffness:g} N/m: six such legs and {mass:.3g} kg have a '
                f'natural frequency below {_SLOWEST:g} Hz: in N/um, or in N/mm?')

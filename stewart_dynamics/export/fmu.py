@@ -77,9 +77,10 @@ def variables(parameters: Parameters) -> list[Variable]:
     which the forces can be solved. The last variables are those of the motors, with drives.
     """
     position, rotation = _start_pose(parameters)
+    carried = parameters.carried
     start = [*position, *to_quaternion(rotation), *np.zeros(18), *parameters['gravity'],
-             *np.zeros(9), parameters['platform.mass'], *parameters['platform.center_of_mass'],
-             *parameters['platform.inertia'], parameters['singularity.warn_condition'],
+             *np.zeros(9), carried.mass, *carried.center, *carried.inertia,
+             parameters['singularity.warn_condition'],
              parameters['singularity.stop_condition'], parameters['singularity.warn_time'],
              parameters['singularity.action'] == SUPPRESS_FORCES,
              parameters['limits.action'] == SUPPRESS_FORCES]
