@@ -104,6 +104,14 @@ def _drives() -> Iterator[Parameter]:
                 minimum=0.0, above=True)
     yield _legs('drive.temperature_rise_max', 'maximum temperature of a winding above ambient; '
                 'unlimited if not set', 'K', (), minimum=0.0, above=True)
+    yield _legs('drive.rated_torque', 'torque that the amplifier calls 1000 per mille, object 6076h '
+                'of CiA 402; for stewart_export --drives', 'N m', (), minimum=0.0, above=True)
+    yield _legs('drive.counts_per_turn', 'increments of position in one turn of the motor, as the '
+                'amplifier counts them; for stewart_export --drives', '', (), minimum=0.0,
+                above=True)
+    yield _legs('drive.direction', '1.0 if positive torque and position of the amplifier extend '
+                'the leg, else -1.0; for stewart_export --drives', '', (1.0,), minimum=-1.0,
+                maximum=1.0)
     yield Parameter('drive.screw_rotation', 'string', 'guided: screw and nut cannot turn with the '
                     'leg; universal: the leg turns between its universal joints, and its motor '
                     'makes up for it', '', GUIDED, choices=(GUIDED, UNIVERSAL))
@@ -482,6 +490,10 @@ class Parameters(ParameterSet):
                 raise ParameterError(f'{source}: actuator.reflected_mass: {follows.tolist()} kg '
                                      f'from {MOTOR_INERTIA} and {SCREW_INERTIA}: must be finite')
             self._set('actuator.reflected_mass', follows)
+        direction = self['drive.direction']
+        if np.any(np.abs(direction) != 1.0):
+            raise ParameterError(
+                f'{source}: drive.direction: {direction.tolist()}: must be 1.0 or -1.0')
         curve = self['drive.torque_speed']
         if curve is not None and np.any(np.diff(curve[:, 0]) <= 0.0):
             raise ParameterError(
