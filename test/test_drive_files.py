@@ -20,12 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import random_motion, rng, ROOT
-import yaml
-
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.export import main
 from stewart_dynamics.export.drive_files import drive_files
+import yaml
 
 Array = NDArray[np.float64]
 

@@ -85,87 +85,21 @@ def drive_files(parameters: Parameters, name: str) -> dict[str, str | bytes]:
         each.direction)) + '}' for each in found)
     texts = {'@NAME@': name, '@GUARD@': name.upper(), '@ROWS@': rows, '@VERSION@': __version__}
     header = re.sub('@[A-Z]+@', lambda at: texts[at[0]], source('drives.h.in'))
-    return {f'{name}_drives.h': header, f'{name}_drives.md': _page(parameters, found, name),
+    return {f'{name}_drives.h': header, f'{name}_drives.md': _page(found, name),
             **{f'{name}_ethercat_{n + 1}.yaml': _slave(each) for n, each in enumerate(found)}}
 
 
-_SLAVE = '''\
-# {leg}: an EtherCAT drive (CiA 402) in cyclic synchronous position mode with torque offset, for
-# ethercat_driver_ros2 (plugin ethercat_generic_plugins/EcCiA402Drive). Written by stewart_export
-# {version}. Commands are position [m], velocity [m/s] and effort [N] of the joint, + extends.
-# Fill in what your drive's manual says: vendor, product, the indices of its PDOs.
-vendor_id: 0x00000000
-product_id: 0x00000000
-assign_activate: 0x0300  # distributed clocks
-auto_fault_reset: false  # a fault is acknowledged by a person
-auto_state_transitions: true
-sdo:
-- {{index: 0x6060, sub_index: 0, type: int8, value: 8}}  # cyclic synchronous position
-rpdo:
-- index: 0x1600
-  channels:
-  - {{index: 0x6040, sub_index: 0, type: uint16, default: 0}}  # control word
-  - {{index: 0x607a, sub_index: 0, type: int32, command_interface: position, default: .nan,
-     factor: {counts!r}}}  # increments for a metre
-  - {{index: 0x60b1, sub_index: 0, type: int32, command_interface: velocity, default: 0,
-     factor: {counts!r}}}  # increments/s for 1 m/s
-  - {{index: 0x60b2, sub_index: 0, type: int16, command_interface: effort, default: 0,
-     factor: {per_mille!r}}}  # per mille of {rated:g} N m for 1 N
-tpdo:
-- index: 0x1a00
-  channels:
-  - {{index: 0x6041, sub_index: 0, type: uint16}}  # status word
-  - {{index: 0x6064, sub_index: 0, type: int32, state_interface: position,
-     factor: {metres!r}}}
-  - {{index: 0x606c, sub_index: 0, type: int32, state_interface: velocity,
-     factor: {metres!r}}}
-  - {{index: 0x6077, sub_index: 0, type: int16, state_interface: effort,
-     factor: {newtons!r}}}
-sm:
-- {{index: 0, type: output, pdo: ~, watchdog: disable}}
-- {{index: 1, type: input, pdo: ~, watchdog: disable}}
-- {{index: 2, type: output, pdo: rpdo, watchdog: enable}}
-- {{index: 3, type: input, pdo: tpdo, watchdog: disable}}
-'''
-
-
 def _slave(each: Amplifier) -> str:
-    return _SLAVE.format(
+    return source('ethercat.yaml.in').format(
         leg=each.leg, version=__version__, counts=each.counts_per_metre,
         per_mille=each.per_mille_per_newton, rated=each.rated_torque,
         metres=1.0 / each.counts_per_metre, newtons=1.0 / each.per_mille_per_newton)
 
 
-_PAGE = '''\
-# Drives of {name}
-
-Written by stewart_export {version} from `drive.*`. Inputs are positions [m], rates [m/s] and forces [N] of the legs, or torques
-[N m] of the motors (`~/motor_torques`), + extends; the numbers below have the amplifier's direction.
-
-| leg | direction | motor turns for 1 m | increments for 1 m | torque for 1 kN, ideal screw [N m] | 60B2h for 1 kN [per mille] | 60B2h for 1 N m |
-| --- | --- | --- | --- | --- | --- | --- |
-{rows}
-
-| amplifier | position | torque |
-| --- | --- | --- |
-| EtherCAT, CiA 402, mode 8 (CSP) | 607Ah, increments; 60B1h velocity offset | 60B2h torque offset, per mille of 6076h: `{name}_per_mille`; `{name}_ethercat_1.yaml` .. `_6.yaml` for ethercat_driver_ros2 |
-| CANopen, CiA 402, mode 8 | the same objects; map 607Ah (32 bits), 60B1h (32 bits) and 60B2h (16 bits) into RPDOs with SYNC (80 bits: two RPDOs) | the same |
-| moteus | `position`, turns of the motor where `motor_position.rotor_to_output_ratio` is 1: `{name}_turns` | `feedforward_torque` [N m]: `{name}_torque` |
-| ODrive | `Input_Pos`, turns: `{name}_turns` | `Torque_FF` of Set_Input_Pos, 0.001 N m: `{name}_odrive_torque` |
-
-- Torques of `~/motor_torques` have the losses of screw and gear; forces of `~/leg_forces` divided by the ratio have not.
-- If the amplifier has a feed-forward of its own for its rotor, leave one of both out: set `drive.motor_inertia` and `actuator.reflected_mass` to zero here, or that feed-forward.
-- An offset is no limit: set the amplifier's torque limit (6072h) to `drive.torque_max`.
-- Try the sign before anything carries a load: with the brake on, 60B2h of {small} per mille must press in the direction that extends
-  the leg, and 6077h must show it with the same sign.
-- Positions are zero where `~/leg_states` is zero; add the amplifier's offset of home (607Ch), see homing.
-'''
-
-
-def _page(parameters: Parameters, found: list[Amplifier], name: str) -> str:
+def _page(found: list[Amplifier], name: str) -> str:
     rows = '\n'.join(
         f'| {each.leg} | {each.direction:+g} | {each.ratio / (2.0 * math.pi):.8g} | '
         f'{each.counts_per_metre:.8g} | {1e3 / each.ratio:.6g} | '
         f'{1e3 * each.per_mille_per_newton:.6g} | '
         f'{each.direction * 1e3 / each.rated_torque:.6g} |' for each in found)
-    return _PAGE.format(name=name, version=__version__, rows=rows, small=20)
+    return source('drives.md.in').format(name=name, version=__version__, rows=rows)
