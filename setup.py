@@ -192,6 +192,7 @@ setup(
           if not bag.startswith('bags/__')],
         (f'{share}/config', sorted(glob('config/*.*'))),
         (f'{share}/config/controllers', sorted(glob('config/controllers/*.*'))),
+        (f'{share}/deploy', sorted(glob('deploy/*'))),
         (f'{share}/examples', sorted(glob('examples/*.py'))),
         # Not launch/*: after a launch file was compiled there is a folder __pycache__.
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),

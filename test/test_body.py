@@ -141,7 +141,7 @@ def test_capability_counts_the_payload() -> None:
         direction = DRIVER.center if name == 'payload' else np.eye(6)
         assert relative(getattr(one, name)(pose, direction).value,
                         getattr(two, name)(pose, direction).value) < EXACT
-    # What can be added is less by the mass that is there already.
+    # A mass that is there already takes its part of the payload.
     empty = Capability(StewartPlatform(FILE)).payload(pose, DRIVER.center).value
     there = Capability(StewartPlatform(with_point_mass(FILE, 50.0, DRIVER.center)))
     assert there.payload(pose, DRIVER.center).value == pytest.approx(empty - 50.0, rel=1e-9)
@@ -196,7 +196,7 @@ def test_a_payload_that_is_no_body_is_rejected() -> None:
         FILE.replaced({'payload.inertia': [1.0, 2.0, 0.0, 1.0, 0.0, 1.0]})
     with pytest.raises(ParameterError, match=r'payload\.mass: -1\.0 kg: must be at least 0'):
         FILE.replaced({'payload.mass': -1.0})
-    # That of a rod has a moment of zero, which rounding may make negative.
+    # A rod has a moment of zero, which rounding may make negative.
     rod = np.diag([2.0, 2.0, 0.0])
     turn = rotation_about(random_direction(rng(1)), 0.7)
     turned = (turn @ rod @ turn.T)[np.triu_indices(3)]

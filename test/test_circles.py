@@ -38,7 +38,7 @@ def test_a_circle_is_the_points_on_it() -> None:
     by_points = Parameters({**OTHERS, **expected})
     assert StewartPlatform(by_points).structure == StewartPlatform(ON_CIRCLES).structure
     assert by_points['geometry.base_radius'] is None
-    # Those of the example, whose coordinates are rounded to 0.1 mm.
+    # The example has the same joints, rounded to 0.1 mm.
     assert np.abs(ON_CIRCLES['geometry.base_joints'] - FILE['geometry.base_joints']).max() < 6e-5
     again = ON_CIRCLES.with_points()
     assert again == by_points and not any('radius' in name for name in again.given)

@@ -133,7 +133,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         dashes={name: charts.DASHES[name] for name in pictures.limits()},
         payloads=payloads_in_words(sheet),
         stuck=stuck_rows(sheet['stuck_leg']) if sheet['stuck_leg'] else None,
-        limit_name=limit_name, possible=possible, setpoints_used=setpoints_used, down=down, span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
+        limit_name=limit_name, possible=possible, setpoints_used=setpoints_used, down=down,
+        span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 

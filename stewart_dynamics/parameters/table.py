@@ -105,7 +105,8 @@ def _drives() -> Iterator[Parameter]:
     yield _legs('drive.temperature_rise_max', 'maximum temperature of a winding above ambient; '
                 'unlimited if not set', 'K', (), minimum=0.0, above=True)
     yield _legs('drive.rated_torque', 'torque that the amplifier calls 1000 per mille, object '
-                '6076h of CiA 402; for stewart_export --drives', 'N m', (), minimum=0.0, above=True)
+                '6076h of CiA 402; for stewart_export --drives', 'N m', (), minimum=0.0,
+                above=True)
     yield _legs('drive.counts_per_turn', 'increments of position in one turn of the motor, as the '
                 'amplifier counts them; for stewart_export --drives', '', (), minimum=0.0,
                 above=True)
