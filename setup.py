@@ -64,6 +64,7 @@ extras_require = {
         'ros-kilted-common-interfaces~=5.5',
         'ros-rclpy[fastrtps]~=9.1.2',
     ],
+    'usd': ['usd-core>=24.8'],
     'test': [
         'cmake',
         'colcon-common-extensions',
