@@ -22,7 +22,8 @@ from rosgraph_msgs.msg import Clock
 from running import Sample, wrench_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, MultiArrayDimension
-from stewart_dynamics.messages.cdr import MalformedError, STAMPS_END
+from stewart_dynamics.arrays import STAMPS_END
+from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import (
     JointStateError, JointStateReader, JointStateWriter)
 from stewart_dynamics.messages.setpoint import (

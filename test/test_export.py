@@ -35,14 +35,14 @@ from stewart_dynamics.mechanics.frames.rotation import (
 from stewart_dynamics.mechanics.hexapod_structure import (
     FIELDS_BEFORE_LEGS, hexapod_structure, LEG_FIELDS)
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
-from stewart_dynamics.mechanics.limits import JITTER, JUMP, LIMITS, TOLERANCE
+from stewart_dynamics.mechanics.limits import JUMP, LIMITS, TOLERANCE
 from stewart_dynamics.mechanics.rows import (
-    BASE, CONDITION, DETERMINANT, FORCES, LENGTHS, MOTION, RESULT, UNIT_LOAD_FORCES,
-    WRENCH)
+    BASE, CONDITION, DETERMINANT, FORCES, JOINT_FORCES, LENGTHS, MOTION, RESULT,
+    UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import OUTLINES
 from stewart_dynamics.parameters.tolerances import HYSTERESIS, QUATERNION_TOLERANCE
-from stewart_dynamics.setpoints.step import Setpoint, Step
+from stewart_dynamics.setpoints.step import JITTER, Setpoint, Step
 from test_drives import driven
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -60,7 +60,7 @@ OK, OUT_OF_RANGE, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = 0, 5, 6, 7, 8, 9
 # The structures of the C source.
 HEXAPOD, STATE = record('stewart_platform'), record('stewart_state')
 RESULTS = np.dtype([('moving', 'f8', 12), ('forces', 'f8', 6), ('scalars', 'f8', 3),
-                    ('unit_load_forces', 'f8', 6)])
+                    ('unit_load_forces', 'f8', 6), ('joint_forces', 'f8', 6)])
 OUTPUT = np.dtype([('result', RESULTS), ('forces', 'f8', 6), ('exceeded', 'u4', 6)], align=True)
 MOTORS = np.dtype([('all', 'f8', 24)])
 
@@ -170,8 +170,10 @@ def test_inverse_dynamics_have_the_bits_of_the_library(samples: dict[str, Any]) 
 
 def check_results(found: Any, expected: Array, codes: Any) -> None:
     """Check that results have the same numbers as rows (N, RESULT), 0 ulp apart."""
-    forces = np.where((codes == SINGULAR)[:, None], 0.0, expected[:, FORCES])
+    forces, of_joints = (np.where((codes == SINGULAR)[:, None], 0.0, expected[:, which])
+                         for which in (FORCES, JOINT_FORCES))
     for name, columns in (('moving', expected[:, :FORCES.start]), ('forces', forces),
+                          ('joint_forces', of_joints),
                           ('scalars', expected[:, DETERMINANT:UNIT_LOAD_FORCES.start]),
                           ('unit_load_forces', expected[:, UNIT_LOAD_FORCES])):
         np.testing.assert_array_equal(found[name], columns, err_msg=name)
@@ -265,7 +267,7 @@ def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
             state = output.state
             results[n] = [*output.lengths, *output.rates, *(output.demanded_forces or [0.0] * 6),
                           output.determinant, output.determinant_rate, output.condition,
-                          *output.unit_load_forces]
+                          *output.unit_load_forces, *(output.joint_forces or [0.0] * 6)]
             code = SINGULAR if not output.solvable else OK if output.forces else SUPPRESSED
             warned = output.singularity
             exceeded = [0] * 6

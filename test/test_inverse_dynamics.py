@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 import pytest
 from referees import (
     derivative, each_relative, energies, friction, moved,
-    PinocchioReferee, QUARTER_TURN, random_motion, random_parameters,
+    PinocchioReferee, QUARTER_TURN, random_base_motion, random_motion, random_parameters,
     random_wrench, relative, rng, rotation_about, smooth_motion, symmetric_parameters)
 
 import stewart_dynamics
@@ -408,3 +408,20 @@ def test_any_hexapod_gives_finite_results_or_an_error_of_the_package(values: Any
         return
     assert np.all(np.isfinite(result.rows))
     assert result.condition_number >= 1.0
+
+
+def test_joints_carry_what_actuators_without_mass_and_friction_give() -> None:
+    """The force along the leg is the same, whatever the actuator adds at its own side."""
+    for n in range(20):
+        parameters = random_parameters(rng(n))
+        motion = random_motion(parameters, rng(n + 1), 10)
+        base = random_base_motion(parameters, rng(n + 2), 10)
+        wrench = random_wrench(parameters, rng(n + 3), 10)
+        without = StewartPlatform(parameters.replaced(dict.fromkeys((
+            'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'),
+            0.0)))
+        result = StewartPlatform(parameters).inverse_dynamics(motion, wrench, base)
+        ideal = without.inverse_dynamics(motion, wrench, base)
+        assert np.abs(result.forces - result.joint_forces).max() > 1.0
+        assert np.array_equal(result.joint_forces, ideal.forces)
+        assert np.array_equal(ideal.joint_forces, ideal.forces)

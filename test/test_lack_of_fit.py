@@ -18,6 +18,7 @@ from recorded import about, at_rest, fourier, HOME, MotionAt, Noise, Recorded, r
 from referees import rng
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import Identification, Identified
 from stewart_dynamics.identification.kinematics import pose_near
@@ -25,7 +26,6 @@ from stewart_dynamics.identification.lack_of_fit import deviations, LEFT_BY_FILT
 from stewart_dynamics.identification.results import document, result_text
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 import wrong_models

@@ -21,14 +21,14 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import (
-    angle_values, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JITTER, JUMP,
+    angle_values, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JUMP,
     LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA, OF_RESULTS, PLATFORM_ANGLE_MAX, result_values,
     TOLERANCE, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, NO_BASE, RATES, RESULT
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import LEG_SHAPE
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
-from stewart_dynamics.setpoints.step import Batch, Output, Setpoint, State, Step
+from stewart_dynamics.setpoints.step import Batch, JITTER, Output, Setpoint, State, Step
 
 PARAMETERS = symmetric_parameters()
 STEP = Step(PARAMETERS)

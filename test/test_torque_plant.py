@@ -41,8 +41,9 @@ def test_under_torques_it_moves_as_under_the_forces() -> None:
         one = by_forces.advance(tuple(forces.tolist()), ZERO)
         other = by_torques.advance(tuple((forces / ratio).tolist()), ZERO)
         assert relative(numbers(one), numbers(other)) < 1e-9
-        assert one.motors[:12] == pytest.approx(other.motors[:12], rel=1e-9, abs=1e-7)
-        assert one.motors[12:] == pytest.approx(tuple(forces / ratio), rel=1e-9)
+        assert one.motors.angles + one.motors.speeds == pytest.approx(
+            other.motors.angles + other.motors.speeds, rel=1e-9, abs=1e-7)
+        assert one.motors.torques == pytest.approx(tuple(forces / ratio), rel=1e-9)
     assert max(np.abs(one.rates)) > 0.1 and not by_torques.fault
 
 
@@ -70,8 +71,8 @@ def test_with_losses_torques_give_the_acceleration_and_forces_that_need_them(see
         # A hexapod whose rotors dominate has little acceleration for a lot of torque.
         assert relative(state.acceleration, motion.rows[18:24]) < 1e-9
         assert relative(state.forces, forces) < 1e-9
-        assert state.motors[:6] == pytest.approx(tuple(motors.angles), rel=1e-12)
-        assert state.motors[12:] == tuple(motors.torques)
+        assert state.motors.angles == pytest.approx(tuple(motors.angles), rel=1e-12)
+        assert state.motors.torques == tuple(motors.torques)
 
 
 @pytest.mark.parametrize('efficiency', [1.0, 0.85])
@@ -118,7 +119,7 @@ def test_torques_saturate_at_what_is_available() -> None:
         drive__torque_max=1.5, drive__torque_speed=[0.0, 2.0, 50.0, 0.5])
     plant = Plant(given)
     state = plant.advance((9.0, -9.0, 1.0, 0.0, 0.0, 0.0), ZERO)
-    assert state.motors[12:15] == pytest.approx((1.5, -1.5, 1.0), rel=1e-2)
+    assert state.motors.torques[:3] == pytest.approx((1.5, -1.5, 1.0), rel=1e-2)
     for _ in range(60):
         state = plant.advance((0.2,) * 6, ZERO)
     assert motion_of(state).position[2] < 1.1

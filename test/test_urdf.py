@@ -17,13 +17,13 @@ import pytest
 from referees import (
     Array, each_relative, friction, random_motion, random_parameters, rng, rotation_about,
     smooth_motion)
-import yaml
 
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.loops import loops_yaml
 from stewart_dynamics.description.urdf import Ros2Control, urdf
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
+import yaml
 
 pin = pytest.importorskip('pinocchio')
 

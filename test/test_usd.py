@@ -16,8 +16,9 @@ from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.usd import usd
 
-pxr = pytest.importorskip('pxr', reason='needs usd-core')
-from pxr import Gf, Usd, UsdGeom, UsdPhysics  # noqa: E402
+pytest.importorskip('pxr', reason='needs usd-core')
+
+from pxr import Gf, Usd, UsdGeom, UsdPhysics  # noqa: E402, I100
 
 Array = NDArray[np.float64]
 FILE = Parameters.from_yaml(Path(__file__).parents[1] / 'config' / 'platform.yaml')

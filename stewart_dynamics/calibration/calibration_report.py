@@ -16,7 +16,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.calibrate import Calibration
 from stewart_dynamics.calibration.equations import BASE, PLATFORM, ZERO
 from stewart_dynamics.calibration.results import outlier_text, validation_text
-from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+from stewart_dynamics.estimation.confidence_level import INTERVAL, TWO_SIDED
 from stewart_dynamics.reporting.estimates import FIXED, page_values
 from stewart_dynamics.reporting.pages import digits, page
 from stewart_dynamics.reporting.vector_picture import Chart, Picture, tick_text, ticks
@@ -53,8 +53,8 @@ def _changes(found: Calibration) -> str:
                                         found.errors)
     shown = np.abs(moved) + np.minimum(halves, np.abs(moved).max() + 1e-9)
     end = max(float(shown.max()) * 1.08, 1e-9)
-    picture = Picture(1160, 350, 'Change of each joint coordinate and zero length [mm], with its '
-                      '95 % interval')
+    picture = Picture(1160, 350, f'Change of each joint coordinate and zero length [mm], with its '
+                      f'{INTERVAL}')
     left = 60.0
     for part, width, title, axes in (
             (BASE, 410.0, 'base joints', 'xyz'), (PLATFORM, 410.0, 'platform joints', 'xyz'),

@@ -25,10 +25,11 @@ from stewart_dynamics.calibration.fit import Unknowns
 from stewart_dynamics.calibration.measured_poses import POSITION, QUATERNION
 from stewart_dynamics.calibration.noise import covariances, Noise, whitening
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
+from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.frames.motion import Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR, TWO_SIDED
+from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform

@@ -9,6 +9,7 @@ import argparse
 from pathlib import Path
 
 from stewart_dynamics.calibration.measured_poses import FEWEST
+from stewart_dynamics.estimation.confidence_level import INTERVAL
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import between, whole
 from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_POSES, WAY_THROUGH_POSES
@@ -54,7 +55,7 @@ def run(given: argparse.Namespace, parameters: Parameters, folder: Path) -> str:
             partial / DESIGNED_POSES: poses_csv(
                 parameters['joints'], found.lengths, found.poses),
             partial / WAY_THROUGH_POSES: trajectory_csv(motion)})
-    lines = ['predicted 95 % intervals, widest of the legs, for noise of '
+    lines = [f'predicted {INTERVAL}s, widest of the legs, for noise of '
              f'{1e6 * noise.length:.3g} um, {1e6 * noise.position:.3g} um and '
              f'{1e6 * noise.rotation:.3g} urad:',
              f'  {"":28}{"designed":>10}  random poses']

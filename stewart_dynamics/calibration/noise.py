@@ -19,7 +19,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.equations import Linearization
-from stewart_dynamics.mechanics.least_squares import normal, TWO_SIDED
+from stewart_dynamics.estimation.confidence_level import CONFIDENCE_LEVEL, TWO_SIDED
+from stewart_dynamics.mechanics.least_squares import normal
 
 # Lower bounds of standard deviations of the lengths: by the estimated noise of the poses, without
 # which some combinations of lengths could be exact; by the size of the hexapod, for exact data.
@@ -123,6 +124,6 @@ class VarianceComponents(NamedTuple):
         slopes = np.einsum('pa,iab,pb->pi', self.known, inner, self.known)
         spread = np.einsum('pi,ij,pj->p', slopes, of_variances, slopes)
         freedom = 2.0 * np.sum(self.known ** 2, axis=1) ** 2 / np.maximum(spread, 1e-300)
-        wider = t.ppf(0.975, np.maximum(freedom, 1.0)) / TWO_SIDED
+        wider = t.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, np.maximum(freedom, 1.0)) / TWO_SIDED
         return np.asarray(wider[:, None] * (
             self.known @ (np.eye(len(more)) + 2.0 * more) @ self.known.T) * wider)

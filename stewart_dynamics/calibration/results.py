@@ -14,8 +14,8 @@ from stewart_dynamics.calibration.calibrate import Calibration
 from stewart_dynamics.calibration.equations import inverse
 from stewart_dynamics.calibration.frames import PoseErrors
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
+from stewart_dynamics.estimation.confidence_level import PERCENT, TWO_SIDED
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.estimates import (
@@ -126,7 +126,7 @@ def comments(result: Mapping[str, Any]) -> dict[str, str]:
         kept = sum(row['state'] in (FIXED, NOT_IDENTIFIABLE) for row in each)
         texts[name] = ', '.join([
             f'calibrated {result["date"][:10]}' if kept < len(each) else 'kept',
-            *([f'95 %: within +-{max(halves):.2g} m'] if halves else []),
+            *([f'{PERCENT}: within +-{max(halves):.2g} m'] if halves else []),
             *([f'{len(each) - len(halves) - kept} without an interval of its own']
               if 0 < len(halves) < len(each) - kept else []),
             *([f'{kept} kept'] if 0 < kept < len(each) else [])])

@@ -14,8 +14,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import ctypes
 from functools import cache, partial
+from operator import itemgetter
 from pathlib import Path
 import re
+from struct import Struct
 from typing import Any, cast, NamedTuple
 
 import numpy as np
@@ -64,11 +66,71 @@ def _fields(text: str) -> Iterator[tuple[str, np.dtype[Any], tuple[int, ...]]]:
             yield name, record(kind), (int(count),) if count else ()
 
 
-def places(name: str) -> dict[str, slice]:
-    """Return where each field of a structure of doubles is in a row of its numbers."""
-    fields: Any = record(name).fields
-    return {field: slice(offset // 8, (offset + kind.itemsize) // 8)
-            for field, (kind, offset, *_) in fields.items()}
+def places(name: str) -> dict[str, Any]:
+    """
+    Return where the fields of a structure of doubles are in a row of its numbers.
+
+    Numbers have an index, arrays and structures a slice; the fields of a structure in it follow
+    it, as ``result.forces``.
+    """
+    return {field: begin if kind.base.fields is None and not kind.shape
+            else slice(begin, begin + kind.itemsize // 8)
+            for field, kind, begin in _numbered(record(name))}
+
+
+def _numbered(structure: np.dtype[Any], first: int = 0, prefix: str = '',
+              ) -> Iterator[tuple[str, np.dtype[Any], int]]:
+    fields: Any = structure.fields
+    for field, (kind, offset, *_) in fields.items():
+        begin = first + offset // 8
+        yield prefix + field, kind, begin
+        if kind.fields is not None:
+            yield from _numbered(kind, begin, f'{prefix}{field}.')
+
+
+class Sample:
+    """
+    The memory of a structure of doubles, for calls of one sample.
+
+    given: the last field that ``write`` takes; it takes the numbers of all up to it.
+    found: the fields that ``read`` returns.
+    numbers: all of them, as a row.
+
+    It takes a tenth of the time that setting and reading fields of an array of records takes.
+    """
+
+    def __init__(self, name: str, given: str, *found: str) -> None:
+        self._where = where = places(name)
+        self.numbers: Any = np.zeros(1, record(name)).view(np.float64)
+        self._memory = self.numbers.data  # the same as bytes
+        self._given = Struct(f'{_end(where[given])}d')
+        read = [where[each] for each in found]
+        first, end = min(map(_begin, read)), max(map(_end, read))
+        self._at, self._found = 8 * first, Struct(f'{end - first}d')
+        self._parts = itemgetter(*(
+            each - first if isinstance(each, int) else slice(each.start - first, each.stop - first)
+            for each in read))
+
+    def __getitem__(self, field: str) -> Any:
+        """Return the numbers of a field, as an array that stays."""
+        place = self._where[field]
+        return self.numbers[_begin(place):_end(place)]
+
+    def write(self, *numbers: float) -> None:
+        """Set the numbers of the fields that are given."""
+        self._given.pack_into(self._memory, 0, *numbers)
+
+    def read(self) -> Any:
+        """Return a tuple of the fields that are found, or the only one: numbers, and tuples."""
+        return self._parts(self._found.unpack_from(self._memory, self._at))
+
+
+def _begin(place: int | slice) -> int:
+    return place if isinstance(place, int) else place.start
+
+
+def _end(place: int | slice) -> int:
+    return place + 1 if isinstance(place, int) else place.stop
 
 
 class _Argument(NamedTuple):

@@ -68,7 +68,7 @@ typedef struct {
 
 typedef struct {
   real lengths[6], rates[6], forces[6];
-  real determinant, determinant_rate, condition_number, unit_load_forces[6];
+  real determinant, determinant_rate, condition_number, unit_load_forces[6], joint_forces[6];
 } results;
 
 #define stewart_motion motions

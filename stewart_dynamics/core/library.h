@@ -62,6 +62,10 @@ typedef struct {
   motor_row drives;
 } checked_motors;
 
+/* The motors of one setpoint: the time since the last one [s], and the state of the windings before
+   and after it: temperature rises [K] and copper heat [W]. */
+typedef struct { double elapsed, windings[12]; checked_motors motors; } one_motors;
+
 /* A motion under loads, and what a call of one sample gives. */
 typedef struct {
   stewart_motion motion;
@@ -70,6 +74,9 @@ typedef struct {
   stewart_result result;
   double base_wrench[6];
 } one_motion;
+
+/* A quaternion x y z w and its rotation. */
+typedef struct { double quaternion[4], rotation[9]; } one_rotation;
 
 /* A pose that is searched from a guess, and how the search ended: its steps and residual [m]. */
 typedef struct { stewart_pose pose; double lengths[6], steps, residual; } one_pose;

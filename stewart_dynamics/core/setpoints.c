@@ -34,7 +34,7 @@ static int check_setpoint(
   advance_warning(platform, result, state);
   int solved = result->condition_number < UNSOLVABLE_CONDITION && base_known;
   for (int i = 0; i < 6; i++) {
-    if (!solved) {result->forces[i] = NAN;}
+    if (!solved) {result->forces[i] = result->joint_forces[i] = NAN;}
     any_limit |= check_leg(
       &platform->legs[i], result->lengths[i], result->rates[i], result->forces[i],
       result->lengths[i] - followed[i], elapsed);

@@ -476,7 +476,8 @@ static void solve(
   real determinant = invert(inverse), change = number(0.0);
   put3(balanced, moved.force), put3(balanced + 3, times(1.0 / size, moved.moment));
   for (int i = 0; i < 6; i++) {
-    result->forces[i] = dot6(inverse[i], balanced) + actuators[i];
+    result->joint_forces[i] = dot6(inverse[i], balanced);
+    result->forces[i] = result->joint_forces[i] + actuators[i];
     change += dot6(inverse[i], row_rates[i]);
   }
   determinant *= size * size * size;
@@ -496,7 +497,8 @@ static void solve(
   invert(inverse);
   for (int i = 0; i < 6; i++) {
     drive_motion drive = move_drive(&platform->legs[i], motion);
-    result->forces[i] = dot6(inverse[i], balanced) +
+    result->joint_forces[i] = dot6(inverse[i], balanced);
+    result->forces[i] = result->joint_forces[i] +
       move_actuator(&platform->legs[i], drive.rate, drive.acceleration);
     result->unit_load_forces[i] = root(dot6(inverse[i], inverse[i]));
   }
@@ -584,7 +586,7 @@ int stewart_inverse_dynamics(
   if (!all_finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
   *result = found;
   if (found.condition_number < UNSOLVABLE_CONDITION) {return STEWART_OK;}
-  for (int i = 0; i < 6; i++) {result->forces[i] = 0.0;}
+  for (int i = 0; i < 6; i++) {result->forces[i] = result->joint_forces[i] = 0.0;}
   return STEWART_SINGULAR;
 }
 

@@ -115,6 +115,7 @@ typedef struct {
   double determinant_rate;     /* its time derivative [m^3/s] */
   double condition_number;     /* of J_inv, at least 1 */
   double unit_load_forces[6];  /* largest force of each leg under a unit load on the platform */
+  double joint_forces[6];      /* along the legs, in joints and rods: without the actuators' own */
 } stewart_result;
 
 /* What stewart_step keeps from call to call: all zero before the first, or to start anew. */

@@ -127,8 +127,8 @@ def _leg(base: ET.Element, hexapod: Hexapod, leg: LegDescription,
 
 
 def _platform(world: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) -> None:
-    platform = add(world, 'body', name=hexapod.platform, childclass=_CLASS, pos=numbers(hexapod.position),
-                   quat=_quaternion(hexapod.rotation))
+    platform = add(world, 'body', name=hexapod.platform, childclass=_CLASS,
+                   pos=numbers(hexapod.position), quat=_quaternion(hexapod.rotation))
     add(platform, 'freejoint', name=hexapod.platform)
     _inertial(platform, hexapod.platform_body)
     _geoms(platform, looks)

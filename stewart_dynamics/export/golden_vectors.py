@@ -54,7 +54,8 @@ PARTS: dict[str, list[str]] = {
     'BASE': [f'base_{part}_{axis}' for part in ('g', 'dv', 'w', 'dw') for axis in _XYZ],
     'CODE': ['code'],
     'RESULT': [*_legs('length'), *_legs('rate'), *_legs('demanded_force'), 'determinant',
-               'determinant_rate', 'condition_number', *_legs('unit_load_force')],
+               'determinant_rate', 'condition_number', *_legs('unit_load_force'),
+               *_legs('joint_force')],
     'FORCES': _legs('force'),
     'EXCEEDED': _legs('exceeded'),
     'WARNING': ['warning', 'stopped', 'crossings'],
@@ -131,7 +132,7 @@ def _results(output: Output) -> list[float]:
     state = output.singularity
     return [code, *output.lengths, *output.rates, *(output.demanded_forces or (0.0,) * 6),
             output.determinant, output.determinant_rate, output.condition,
-            *output.unit_load_forces, *(output.forces or (0.0,) * 6), *exceeded,
+            *output.unit_load_forces, *(output.joint_forces or (0.0,) * 6), *(output.forces or (0.0,) * 6), *exceeded,
             state.cause, state.stopped, state.crossings]
 
 

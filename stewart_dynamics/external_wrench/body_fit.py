@@ -24,12 +24,12 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.estimation.posterior import IDENTIFIABLE, Posterior, posterior
 from stewart_dynamics.estimation.whitening import (
     covariance_of_scores, gram_of, spectra_of, Weights, weights_of)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import FIRST_MOMENT, INERTIA, MASS
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import is_consistent
-from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.parameters.body import Body
 
 TEN = 10

@@ -40,13 +40,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 import math
-from struct import Struct
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
-from stewart_dynamics.core.binding import CODES, function, places
+from stewart_dynamics.core.binding import CODES, function, Sample
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
@@ -60,16 +59,6 @@ from stewart_dynamics.parameters.table import Parameters
 # Under the node's name.
 EXTERNAL_WRENCH = 'external_wrench'
 WRENCH_LIMITS = {f'{EXTERNAL_WRENCH}.{part}_max': part for part in PARTS_OF_WRENCH}
-
-# One measurement as numbers, since an array costs time to pass: inputs, then results. The motion
-# given is the previous one, or the guess.
-_PLACES = places('one_measurement')
-_WRITTEN = _PLACES['motion_after'].start
-_MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _ACROSS, _CODE = (
-    slice(part.start - _WRITTEN, part.stop - _WRITTEN) for part in (_PLACES[name] for name in (
-        'motion_after', 'after', 'differences', 'steps', 'residual', 'across', 'code')))
-_GIVEN = Struct(f'{_WRITTEN}d')
-_GIVES = Struct(f'{_CODE.stop}d')
 
 
 class Measurement(NamedTuple):
@@ -125,6 +114,18 @@ class Estimate(NamedTuple):
         return math.hypot(*self.wrench[3:]) if self.wrench else 0.0
 
 
+class _Result(NamedTuple):
+    """What the library computes of a measurement: fields of its structure."""
+
+    motion_after: tuple[float, ...]
+    after: Six  # external wrench [N, N m]
+    differences: Six  # [N]
+    steps: float  # of the forward kinematics
+    residual: float  # [m]
+    across: float  # the last setpoint is on the other side of a singularity
+    code: float
+
+
 def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: Array,
                       measured_forces: Array) -> Array:
     """
@@ -148,9 +149,9 @@ class ExternalWrench:
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
-        numbers = np.zeros(_WRITTEN + _CODE.stop)
-        self._memory = numbers.data  # the same as bytes
-        self._bound = function('estimate_one').bound(hexapod_structure(parameters), numbers)
+        self._sample = Sample('one_measurement', 'target', *_Result._fields)
+        self._bound = function('estimate_one').bound(
+            hexapod_structure(parameters), self._sample.numbers)
         self._size = parameters['singularity.characteristic_length']
         self._longest_gap = round(parameters['setpoint.timeout'] * SECOND)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
@@ -178,40 +179,37 @@ class ExternalWrench:
             seconds = interval * NANOSECOND
             result = self._solve(given, before.wrench or NO_WRENCH, seconds, before.motion,
                                  before.base, base, target)
-            if target is not None and result[_ACROSS.start] == 1.0:
+            if target is not None and result.across == 1.0:
                 other = self._solve(given, NO_WRENCH, 0.0, target.motion, base, base)
-                if other[_CODE.start] == forward_kinematics.FOUND and (
-                        result[_CODE.start] != forward_kinematics.FOUND
-                        or 2.0 * self._distance(other, target.motion)
-                        < self._distance(other, result)):
+                if other.code == forward_kinematics.FOUND and (
+                        result.code != forward_kinematics.FOUND
+                        or 2.0 * self._distance(other.motion_after, target.motion)
+                        < self._distance(other.motion_after, result.motion_after)):
                     result, interval = other, 0
         else:
             for guess in self._guesses(before, target):
                 result = self._solve(given, NO_WRENCH, 0.0, guess, base, base)
-                if result[_CODE.start] == forward_kinematics.FOUND:
+                if result.code == forward_kinematics.FOUND:
                     break
-        if result[_CODE.start] != forward_kinematics.FOUND:
+        if result.code != forward_kinematics.FOUND:
             raise _error(measurement, result)
-        motion = result[_MOTION_AFTER]
+        motion = result.motion_after
         if not 0 < interval <= self._longest_gap:
             return Estimate(measurement.stamp, motion, None, None, base)
-        fx, fy, fz, tx, ty, tz = result[_AFTER]
-        d0, d1, d2, d3, d4, d5 = result[_DIFFERENCES]
-        estimate = Estimate(measurement.stamp, motion, (fx, fy, fz, tx, ty, tz),
-                            (d0, d1, d2, d3, d4, d5), base)
+        estimate = Estimate(measurement.stamp, motion, result.after, result.differences, base)
         overloads = tuple(self._overloads(estimate))
         return estimate._replace(overloads=overloads) if overloads else estimate
 
     def _solve(self, given: tuple[float, ...], before: Six, interval: float,
                motion: Sequence[float], base_before: tuple[float, ...],
                base: tuple[float, ...], target: Target | None = None,
-               ) -> tuple[float, ...]:
+               ) -> _Result:
         gain = -math.expm1(-self._rate * interval)
-        _GIVEN.pack_into(
-            self._memory, 0, *given, *before, gain, interval, *motion,
-            *base_before, *base, math.nan if target is None else target.determinant)
+        self._sample.write(
+            *given, *before, gain, interval, *motion, *base_before, *base,
+            math.nan if target is None else target.determinant)
         self._bound()
-        return _GIVES.unpack_from(self._memory, _GIVEN.size)
+        return _Result._make(self._sample.read())
 
     def _distance(self, one: Sequence[float], other: Sequence[float]) -> float:
         """Return how far two poses are apart [m], turns by the characteristic length."""
@@ -239,13 +237,13 @@ class ExternalWrench:
                 yield Overload(limit, value, bound)
 
 
-def _error(measurement: Measurement, result: tuple[float, ...],
+def _error(measurement: Measurement, result: _Result,
            ) -> PoseError | SingularityError | MotionError:
-    code, lengths = result[_CODE.start], ', '.join(f'{x:.6g}' for x in measurement.lengths)
+    code, lengths = result.code, ', '.join(f'{x:.6g}' for x in measurement.lengths)
     if code == CODES['STEWART_OUT_OF_RANGE']:
         return MotionError(f'stamp {measurement.stamp} ns')
     if code == forward_kinematics.SINGULAR:
         return SingularityError(f'lengths [{lengths}] m')
-    residual, steps = result[_RESIDUAL.start], result[_STEPS.start]
+    residual, steps = result.residual, result.steps
     return PoseError(f'lengths [{lengths}] m: did not converge: residual {residual:.3g} m after '
                      f'{steps:.0f} iterations')

@@ -24,12 +24,12 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.identification.identification_options import DesignOptions
 from stewart_dynamics.identification.unknowns import (
     LINEAR_UNKNOWNS, regressor_of, Unknowns)
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.mechanics.limits import (
     CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, MINIMA, OF_JOINTS, OF_RESULTS,
     VELOCITY_MAX)

@@ -12,6 +12,7 @@ import time
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.estimation.confidence_level import INTERVAL
 from stewart_dynamics.identification.identification_options import (
     CUTOFF, DesignOptions, IdentificationOptions)
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS, LINEAR_UNKNOWNS, PLATFORM
@@ -193,7 +194,7 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
 
 def _design_lines(designed: Design, asked: DesignOptions) -> Iterator[str]:
     """Yield predicted intervals, of the six legs the widest, and the use of the limits."""
-    yield (f'predicted 95 % intervals: {asked.duration:g} s, white noise of {asked.noise:g} N in '
+    yield (f'predicted {INTERVAL}s: {asked.duration:g} s, white noise of {asked.noise:g} N in '
            f'efforts at {asked.rate:g} Hz')
     unknowns = designed.unknowns
     of_legs: dict[str, tuple[float, str]] = {}

@@ -21,6 +21,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.estimation.confidence_level import PERCENT, TWO_SIDED
 from stewart_dynamics.estimation.posterior import IDENTIFIABLE
 from stewart_dynamics.identification.extraction import Extracts
 from stewart_dynamics.identification.fit import residual_of, shifted_by
@@ -29,8 +30,7 @@ from stewart_dynamics.identification.identify import (
     Identification, Identified, Residuals)
 from stewart_dynamics.identification.lack_of_fit import PIECE, WHOLE
 from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.mechanics.least_squares import (
-    Identifiability, identifiability, TWO_SIDED)
+from stewart_dynamics.mechanics.least_squares import Identifiability, identifiability
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
@@ -190,7 +190,7 @@ def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
         texts.setdefault(name, []).append(text)
     kept = WITHOUT_VALUE[NOT_IDENTIFIABLE]
     return {name: f'{kept} from the motion' if set(each) == {kept} else
-            f'identified {result["date"][:10]}, 95 %: '
+            f'identified {result["date"][:10]}, {PERCENT}: '
             + ', '.join(each if len(set(each)) > 1 else each[:1])
             for name, each in texts.items()}
 

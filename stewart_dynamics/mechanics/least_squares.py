@@ -25,8 +25,6 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
 
-# Standard deviations on either side of the mean that include 95 % of a normal distribution.
-TWO_SIDED = 1.959964
 # Standard deviation of a normal distribution, by the median of its deviations' magnitudes.
 BY_MEDIAN = 1.482602218505602
 

@@ -31,10 +31,6 @@ JUMP = 'jump'
 # Relative tolerance of limit checks, above rounding errors.
 TOLERANCE = 1e-9
 
-# Tolerance of the stamps of setpoints [s]: a leg may move at its rate limit for this additional
-# time before a setpoint counts as a jump.
-JITTER = 1e-3
-
 
 class Quantity(NamedTuple):
     """A quantity that a limit bounds."""

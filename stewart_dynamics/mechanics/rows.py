@@ -34,11 +34,9 @@ BASE: int = BASE_ANGULAR_ACCELERATION.stop
 NO_BASE: tuple[float, ...] = (math.nan,) * BASE
 
 # A row of a result.
-LENGTHS, RATES, FORCES, _DETERMINANT, _RATE, _CONDITION, UNIT_LOAD_FORCES = places(
-    'stewart_result').values()
-DETERMINANT, DETERMINANT_RATE, CONDITION = (
-    part.start for part in (_DETERMINANT, _RATE, _CONDITION))
-RESULT: int = UNIT_LOAD_FORCES.stop
+(LENGTHS, RATES, FORCES, DETERMINANT, DETERMINANT_RATE, CONDITION,
+ UNIT_LOAD_FORCES, JOINT_FORCES) = places('stewart_result').values()
+RESULT: int = JOINT_FORCES.stop
 
 # A row of joint angles, see ``joint_angles``.
 BASE_JOINT_ANGLES, PLATFORM_JOINT_ANGLES = slice(0, 6), slice(6, 12)

@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
-    FORCES, GRAVITY, JOINT_ANGLES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
+    FORCES, GRAVITY, JOINT_ANGLES, JOINT_FORCES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
     RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
@@ -143,7 +143,8 @@ class StewartPlatform:
         if result is not None:
             return InverseDynamics(result)
         _, _, results, unsolvable, shape = self._solved(motion, wrench, base, singular)
-        results[unsolvable, FORCES] = np.nan
+        for forces in FORCES, JOINT_FORCES:
+            results[unsolvable, forces] = np.nan
         return InverseDynamics(results.reshape(*shape, RESULT))
 
     def _solved(

@@ -21,8 +21,6 @@ from typing import NamedTuple
 from stewart_dynamics.arrays import SECOND
 
 LITTLE_ENDIAN = b'\x00\x01\x00\x00'
-# A builtin_interfaces/Time holds stamps below it [ns].
-STAMPS_END = 2 ** 31 * SECOND
 
 _TIME = Struct('<iI')
 # By the second byte of a message: 0 is big-endian, 1 little-endian.

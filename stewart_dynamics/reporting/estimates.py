@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.mechanics.least_squares import (
-    combinations, Identifiability, LEAST_SHARE, TWO_SIDED)
+from stewart_dynamics.estimation.confidence_level import INTERVAL, TWO_SIDED
+from stewart_dynamics.mechanics.least_squares import combinations, Identifiability, LEAST_SHARE
 
 IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE = 'identified', 'in_combination', 'not_identifiable'
 FIXED = 'fixed'  # held at the file's value by an option
@@ -101,7 +101,7 @@ def in_words(coefficients: Array, names: Sequence[str]) -> str:
 def table_lines(parameters: Sequence[Mapping[str, Any]], column: str) -> list[str]:
     """Return the table of estimates for the terminal; ``column`` is the heading of the values."""
     name_width = max([len(each['name']) for each in parameters] + [9])
-    lines = [f'{"parameter":<{name_width}} {"file":>10} {column:>12} {"95 % interval":>28}'
+    lines = [f'{"parameter":<{name_width}} {"file":>10} {column:>12} {INTERVAL:>28}'
              '  unit']
     for each in parameters:
         if each['state'] == IDENTIFIED:

@@ -10,25 +10,17 @@ bit-identical for single setpoints and for batches.
 
 from __future__ import annotations
 
-from struct import Struct
-
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
-from stewart_dynamics.core.binding import function, places
+from stewart_dynamics.core.binding import function, Sample
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.rows import WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Batch, Setpoint
 
 # Topic, relative to the node's name.
 BASE_WRENCH = 'base_wrench'
-
-# Layout of one setpoint in memory, inputs and result: packing is faster than passing arrays.
-_PLACES = places('one_motion')
-_GIVEN = Struct(f'{_PLACES["base"].stop}d')
-_GIVES = Struct(f'{WRENCH}d')
 
 
 class BaseWrench:
@@ -45,18 +37,18 @@ class BaseWrench:
     def __init__(self, parameters: Parameters) -> None:
         self._platform = StewartPlatform(parameters)
         self._still = tuple(BaseMotion(parameters['gravity']).rows.tolist())
-        numbers = np.zeros(_PLACES['base_wrench'].stop)
-        self._memory = numbers.data  # the same as bytes
-        self._solve = function('base_wrench_one').bound(self._platform.structure, numbers)
+        self._sample = Sample('one_motion', 'base', 'base_wrench')
+        self._solve = function('base_wrench_one').bound(
+            self._platform.structure, self._sample.numbers)
 
     def __call__(self, setpoint: Setpoint) -> Six | None:
         """Return the base wrench; None if the base's motion is unknown or numbers overflow."""
         base = setpoint.base
-        _GIVEN.pack_into(self._memory, 0, *setpoint.motion, *NO_WRENCH, *setpoint.wrench,
-                         *(self._still if base is None else base))
+        self._sample.write(*setpoint.motion, *NO_WRENCH, *setpoint.wrench,
+                           *(self._still if base is None else base))
         if not self._solve():
             return None
-        wrench: Six = _GIVES.unpack_from(self._memory, 8 * _PLACES['base_wrench'].start)
+        wrench: Six = self._sample.read()
         return wrench
 
     def many(self, setpoints: Batch) -> Array:

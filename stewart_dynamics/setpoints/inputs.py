@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, NO_WRENCH, Six, Stamps
+from stewart_dynamics.core.binding import CODES, function, Sample
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, quaternion_length
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError, Stamped
@@ -97,6 +98,9 @@ class SampleReader:
         self._bounded = topic in (BASE_POSE, BASE_TWIST, BASE_ACCEL, BASE_IMU)
         self._frame = None if frame is None else frame.encode()
         self._rejections = rejections
+        self._turned = Sample('one_rotation', 'quaternion', 'rotation')
+        self._turn = function('stewart_rotation').bound(
+            self._turned['quaternion'], self._turned['rotation'])
         self._layout: Layout | None = None
         self._frame_of_layout = b''
 
@@ -130,13 +134,12 @@ class SampleReader:
                 self._topic, OUT_OF_RANGE, f'{values}: must be at most {LARGEST:g}')
             return None
         if self._has_pose:
-            x, y, z, w = values[3:7]
-            length = quaternion_length(x, y, z, w)
-            if not is_unit(length):
-                self._rejections.reject(self._topic, NOT_UNIT, unit_rule(length))
+            self._turned.write(*values[3:7])
+            if self._turn() != CODES['STEWART_OK']:
+                self._rejections.reject(
+                    self._topic, NOT_UNIT, unit_rule(quaternion_length(*values[3:7])))
                 return None
-            values = values[:3] + from_quaternion(
-                x / length, y / length, z / length, w / length) + values[7:]
+            values = values[:3] + self._turned.read() + values[7:]
         if frame is not None:
             if self._layout is None:
                 self._layout, self._frame_of_layout = layout_of(self._reader, data), frame

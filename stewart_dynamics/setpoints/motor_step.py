@@ -13,36 +13,27 @@ suppressed force does not hide a limit.
 
 from __future__ import annotations
 
-from struct import Struct
-
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, Stamps
-from stewart_dynamics.core.binding import function, places
-from stewart_dynamics.mechanics.drives import motors
+from stewart_dynamics.core.binding import function, places, Sample
 from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
 from stewart_dynamics.mechanics.drives.motors import Drives
 from stewart_dynamics.mechanics.limits import Exceedance
-from stewart_dynamics.mechanics.rows import consecutive
 from stewart_dynamics.parameters.table import Parameters
 
 # A row of the motors of a setpoint: temperature rises of the windings [K]; whether all numbers to
 # publish are finite, a limit is exceeded, and one of speed or temperature; the row of
 # ``mechanics.drives``: angles, speeds, torques as published and as demanded, then the rest.
-RISES, SOUND, EXCEEDING, RUNNING, OF_DRIVES = places('checked_motors').values()
+_PLACES = places('checked_motors')
+RISES, SOUND, EXCEEDING, RUNNING, OF_DRIVES = (
+    _PLACES[name] for name in ('rises', 'sound', 'exceeding', 'running', 'drives'))
 MOTOR_ROW = OF_DRIVES.stop
 ANGLES, SPEEDS, TORQUES, DEMANDED_TORQUES = (
-    slice(OF_DRIVES.start + part.start, OF_DRIVES.start + part.stop) for part in (
-        motors.ANGLES, motors.SPEEDS, motors.COMMANDS, motors.BREAKAWAY_TORQUES))
+    _PLACES[f'drives.{name}'] for name in ('angles', 'speeds', 'commands', 'breakaway_torques'))
 # State of the windings: temperature rises [K], and copper heat since the last setpoint [W].
 _WINDINGS = 12
 _COLD = (0.0,) * _WINDINGS
-
-
-# Layout of one setpoint's motors in memory.
-_ELAPSED, _STATE, _ROW = consecutive(1, _WINDINGS, MOTOR_ROW)
-_GIVEN = Struct(f'{_STATE.stop}d')
-_GIVES = Struct(f'{_WINDINGS + DEMANDED_TORQUES.stop}d')
 
 
 class MotorStep:
@@ -53,30 +44,29 @@ class MotorStep:
         self._arguments = Drives(parameters).arguments
         self._limits = MotorLimits(parameters)
         self._warms = parameters['drive.thermal_resistance'] is not None
-        numbers = np.zeros(_ROW.stop)
-        self._memory, self._row = numbers.data, numbers[_ROW]
+        self._sample = sample = Sample('one_motors', 'windings', 'windings', 'motors')
+        self._motors = sample['motors']
         self._solve = function('check_motors_many').bound(
-            *self._arguments, 1, motion, result, forces, numbers[_ELAPSED],
-            np.zeros(1, dtype=bool), numbers[_STATE], self._row)
+            *self._arguments, 1, motion, result, forces, sample['elapsed'],
+            np.zeros(1, dtype=bool), sample['windings'], self._motors)
 
     def __call__(self, elapsed: float, before: tuple[float, ...] | None,
                  ) -> tuple[tuple[float, ...], tuple[Exceedance, ...], tuple[float, ...] | None]:
         """
-        Return the row of motors up to DEMANDED_TORQUES, exceedances, and state of the windings.
+        Return the row of motors (MOTOR_ROW,), exceedances, and the state of the windings.
 
         The row is empty if numbers overflow; rises are nan, and there is no state of the windings,
         without ``drive.thermal_resistance``. ``elapsed`` [s] is the time since the
         setpoint of the state before.
         """
-        _GIVEN.pack_into(self._memory, 0, elapsed, *(before or _COLD))
+        self._sample.write(elapsed, *(before or _COLD))
         self._solve()
-        numbers = _GIVES.unpack_from(self._memory, 8 * _STATE.start)
-        row = numbers[_WINDINGS:]
-        if not row[SOUND.start]:
+        windings, row = self._sample.read()
+        if not row[SOUND]:
             return (), (), before
         exceedances = self._limits.exceeded(
-            self._row[OF_DRIVES], self._row[RISES]) if row[EXCEEDING.start] else ()
-        return row, exceedances, numbers[:_WINDINGS] if self._warms else None
+            self._motors[OF_DRIVES], self._motors[RISES]) if row[EXCEEDING] else ()
+        return row, exceedances, windings if self._warms else None
 
     def many(self, elapsed: Array, jumped: Flags, motions: Array, results: Array, forces: Array,
              before: tuple[float, ...] | None) -> tuple[Array, tuple[float, ...] | None]:

@@ -117,7 +117,7 @@ class OutputMessages:
         rows = outputs.motors
         having = np.isfinite(rows[:, TORQUES.start])
         for effort, which in ((True, having), (False, ~having)):
-            at = np.flatnonzero(which & (rows[:, SOUND.start] > 0.0))
+            at = np.flatnonzero(which & (rows[:, SOUND] > 0.0))
             parts = [ANGLES, SPEEDS, TORQUES][:3 if effort else 2]
             yield MOTOR_STATES, at, writer.layout(effort).write(
                 outputs.stamps[at], *(rows[at, part] for part in parts))

@@ -11,26 +11,29 @@ setpoints and for batches.
 from __future__ import annotations
 
 import math
-from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, NANOSECOND, NO_WRENCH, Six, Stamps
-from stewart_dynamics.core.binding import function, places
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, NO_WRENCH, Six, Stamps, STAMPS_END
+from stewart_dynamics.core.binding import function, Sample
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    angle_values, ANGLES, CLEARANCE_MIN, Exceedance, JITTER, Limits, result_values)
+    angle_values, ANGLES, CLEARANCE_MIN, Exceedance, Limits, result_values)
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, NO_BASE, RATES, UNIT_LOAD_FORCES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
     CAUSE, Singularity, STATE, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
 from stewart_dynamics.setpoints.motor_step import (
     EXCEEDING, MotorStep, RUNNING, times_followed, TORQUES)
+
+
+# Tolerance of the stamps of setpoints [s]: a leg may move at its rate limit for this additional
+# time before a setpoint counts as a jump.
+JITTER = 1e-3
 
 
 class Setpoint(NamedTuple):
@@ -71,6 +74,8 @@ class Output(NamedTuple):
     """Unclipped [N]; None if J_inv cannot be solved or the base's motion is unknown."""
     forces: Six | None
     """As published [N], clipped to limits.force_max; None if suppressed or not computed."""
+    joint_forces: Six | None
+    """Of rods and joints [N], under the demanded forces; None without these."""
     unit_load_forces: Six
     determinant: float
     determinant_rate: float
@@ -163,6 +168,11 @@ class Outputs(NamedTuple):
         return self.results[:, FORCES]
 
     @property
+    def joint_forces(self) -> Array:
+        """(N, 6) [N]; nan where forces cannot be computed."""
+        return self.results[:, JOINT_FORCES]
+
+    @property
     def unit_load_forces(self) -> Array:
         """(N, 6)."""
         return self.results[:, UNIT_LOAD_FORCES]
@@ -193,15 +203,6 @@ class Outputs(NamedTuple):
         return self.states[:, CAUSE] > 0.0
 
 
-# Layout of one setpoint in memory, inputs and results: packing is faster than passing arrays.
-_PLACES = places('one_setpoint')
-_MOTION, _RESULT = _PLACES['motion'], _PLACES['result']
-_FORCES, _AFTER, _ANSWERED, _EXCEEDING, _JUMPED = (
-    slice(part.start - _RESULT.start, part.stop - _RESULT.start) for part in (
-        _PLACES[name] for name in ('forces', 'after', 'answered', 'exceeding', 'jumped')))
-_GIVEN = Struct(f'{_RESULT.start}d')
-_GIVES = Struct(f'{_JUMPED.stop}d')
-
 _FIRST = Singularity()
 _NO_LENGTHS = (math.nan,) * 6  # no setpoint is a jump from these
 
@@ -218,22 +219,24 @@ class Step:
         self.parameters = parameters
         self._platform = StewartPlatform(parameters)
         self._limits = Limits(parameters)
-        self._numbers = np.zeros(_RESULT.start + _JUMPED.stop)
-        self._memory = self._numbers.data  # the same as bytes
+        self._sample = sample = Sample(
+            'one_setpoint', 'base_known', 'answered', 'exceeding', 'jumped', 'result.lengths',
+            'result.rates', 'result.forces', 'forces', 'result.joint_forces',
+            'result.unit_load_forces', 'result.determinant', 'result.determinant_rate', 'result.condition_number', 'after')
         self._limits_suppress = parameters['limits.action'] == SUPPRESS_FORCES
         # Margin by which the time between two setpoints may exceed that between their stamps [s].
         self._slack = JITTER + parameters['setpoint.sync_tolerance']
         self._slack_of_arrival = JITTER + parameters['setpoint.timeout']
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._angles_of_one = (
-            None if self._angles is None else self._angles.of_one(self._numbers[_MOTION]))
+            None if self._angles is None else self._angles.of_one(sample['motion']))
         self._clearance = clearance_to_check(parameters)
         self._clearance_of_one = (
-            None if self._clearance is None else self._clearance.of_one(self._numbers[_MOTION]))
+            None if self._clearance is None else self._clearance.of_one(sample['motion']))
         self._motors = MotorStep(
-            parameters, self._numbers[_MOTION], self._numbers[_RESULT],
-            self._numbers[_PLACES['forces']]) if parameters.drives else None
-        self._solve = function('step_one').bound(self._platform.structure, self._numbers)
+            parameters, sample['motion'], sample['result'], sample['forces'],
+            ) if parameters.drives else None
+        self._solve = function('step_one').bound(self._platform.structure, sample.numbers)
 
     def __call__(self, setpoint: Setpoint, before: State | None) -> Output | None:
         """
@@ -247,21 +250,20 @@ class Step:
         if stamp > before.stamp and not setpoint.restart:
             since = (stamp - before.stamp) * NANOSECOND
             elapsed = since + (self._slack if setpoint.stamped else self._slack_of_arrival)
-        _GIVEN.pack_into(
-            self._memory, 0, *setpoint.motion, *setpoint.wrench,
-            *(setpoint.base or NO_BASE), *(before.singularity or _FIRST),
-            *(before.lengths or _NO_LENGTHS), elapsed, setpoint.restart,
-            -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
+        self._sample.write(
+            *setpoint.motion, *setpoint.wrench, *(setpoint.base or NO_BASE),
+            *(before.singularity or _FIRST), *(before.lengths or _NO_LENGTHS), elapsed,
+            setpoint.restart, -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
         self._solve()
-        written = _GIVES.unpack_from(self._memory, _GIVEN.size)
-        if not written[_ANSWERED.start]:
+        (answered, exceeding, jumped, lengths, rates, demanded, forces, joint_forces,
+         unit_load_forces, determinant, determinant_rate, condition, after) = self._sample.read()
+        if not answered:
             return None
-        lengths, rates = written[LENGTHS], written[RATES]
-        demanded = None if math.isnan(written[FORCES.start]) else written[FORCES]
-        forces = None if math.isnan(written[_FORCES.start]) else written[_FORCES]
-        singularity, jumped = Singularity.of(written[_AFTER]), written[_JUMPED.start] > 0.0
+        demanded = None if math.isnan(demanded[0]) else demanded
+        forces = None if math.isnan(forces[0]) else forces
+        singularity = Singularity.of(after)
         exceedances = (self._limits.exceeded(result_values(lengths, rates, demanded))
-                       if written[_EXCEEDING.start] else ())
+                       if exceeding else ())
         if jumped and before.lengths:
             exceedances += self._limits.jumps(lengths, before.lengths, elapsed)
         # Limits that are not checked in C.
@@ -276,11 +278,11 @@ class Step:
             of_pose += self._limits.exceeded({CLEARANCE_MIN: clearances}, nearest)
         motors, of_motors, windings = self._motors(since, before.windings) if (
             self._motors is not None) else ((), (), before.windings)
-        if self._limits_suppress and (of_pose or of_motors and motors[RUNNING.start]):
+        if self._limits_suppress and (of_pose or of_motors and motors[RUNNING]):
             forces = None
         return Output(
-            stamp, lengths, rates, demanded, forces, written[UNIT_LOAD_FORCES],
-            written[DETERMINANT], written[DETERMINANT_RATE], written[CONDITION], singularity,
+            stamp, lengths, rates, demanded, forces, joint_forces if demanded else None,
+            unit_load_forces, determinant, determinant_rate, condition, singularity,
             before.singularity is None or singularity.warning != before.singularity.warning,
             exceedances + of_pose + of_motors, angles, clearances, motors,
             before._replace(singularity=singularity) if jumped
@@ -311,9 +313,9 @@ class Step:
             motors, windings = self._motors.many(
                 times_followed(outputs.stamps, restarts, outputs.jumped, before.stamp),
                 outputs.jumped, motions, outputs.results, forces, windings)
-            exceeding |= motors[:, EXCEEDING.start] > 0.0
+            exceeding |= motors[:, EXCEEDING] > 0.0
             if self._limits_suppress:
-                forces[motors[:, RUNNING.start] > 0.0] = np.nan
+                forces[motors[:, RUNNING] > 0.0] = np.nan
             motors[np.isnan(forces[:, 0]), TORQUES] = np.nan
         return outputs._replace(joint_angles=angles, clearances=clearances, motors=motors,
                                 state=outputs.state._replace(windings=windings))

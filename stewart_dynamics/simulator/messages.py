@@ -18,7 +18,7 @@ from stewart_dynamics.setpoints.output_messages import (
 from stewart_dynamics.simulator.imu import ImuWriter, SimulatedImu
 from stewart_dynamics.simulator.moving_base import BasePeriod
 from stewart_dynamics.simulator.parameters import SimulatorParameters
-from stewart_dynamics.simulator.plant import ANGLES, PlantState, SPEEDS, TORQUES
+from stewart_dynamics.simulator.plant import PlantState
 
 # Under the node's name; those that it publishes in their order.
 INPUT_TYPES = {
@@ -52,8 +52,7 @@ class StateMessages:
         yield LEG_STATES, self._joint_state.write(
             stamp, map(sub, state.lengths, self._zero_lengths), state.rates, state.forces)
         if state.motors and self._motors is not None:
-            yield MOTOR_STATES, self._motors.write(
-                stamp, *(state.motors[part] for part in (ANGLES, SPEEDS, TORQUES)))
+            yield MOTOR_STATES, self._motors.write(stamp, *state.motors)
         yield 'pose', self._pose.write(stamp, state.pose)
         yield 'twist', self._six.write(stamp, state.twist)
         yield 'accel', self._six.write(stamp, state.acceleration)

@@ -37,7 +37,7 @@ from stewart_dynamics.simulator.messages import (
     BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)
 from stewart_dynamics.simulator.moving_base import BaseOfTopics, BasePeriod, GeneratedBase
 from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
-from stewart_dynamics.simulator.plant import Plant, PlantState, TORQUES
+from stewart_dynamics.simulator.plant import Plant, PlantState
 
 _TYPES: dict[str, Any] = {
     type_names.POSE_STAMPED: PoseStamped,
@@ -208,7 +208,7 @@ class SimulatorNode(Node):
         self._publish()
 
     def _applied(self, state: PlantState) -> tuple[float, ...]:
-        return state.motors[TORQUES] if self._torques else state.forces
+        return state.motors.torques if self._torques and state.motors else state.forces
 
     def _brake(self) -> None:
         if not self._braked:

@@ -34,19 +34,18 @@ most the larger of d and sqrt(k) made of these, and h is chosen so that h |s| <=
 from __future__ import annotations
 
 import math
-from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
-from stewart_dynamics.core.binding import function, places, record
+from stewart_dynamics.core.binding import function, record, Sample
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.limits import Limits, result_values
-from stewart_dynamics.mechanics.rows import consecutive, NO_BASE
+
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 from stewart_dynamics.simulator.end_stops import stiffness_and_damping, stops_of
 from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
@@ -124,20 +123,6 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
     return float(1.0 / (by_actuators + 1.0 / (of_legs @ mobility)))
 
 
-# In the numbers of the motors.
-ANGLES, SPEEDS, TORQUES = consecutive(6, 6, 6)
-
-# The plant as numbers: commands and loads; from the state on, what a call returns.
-_PLACES = places('one_plant')
-_COMMANDS, _BASES, _STATE = _PLACES['commands'], _PLACES['bases'], _PLACES['state']
-_LENGTHS, _RATES, _FORCES, _ACCELERATION, _SOUND, _MOTORS = (
-    slice(part.start - _STATE.start, part.stop - _STATE.start) for part in (
-        _PLACES[name] for name in (
-            'lengths', 'rates', 'forces', 'acceleration', 'sound', 'motors')))
-_POSITION, _QUATERNION, _TWIST = places('plant_state').values()
-_OF_MOTORS = slice(_MOTORS.start, _MOTORS.start + TORQUES.stop)
-_NUMBERS = Struct(f'{_OF_MOTORS.stop}d')
-
 # In one step the platform may turn by at most this [rad], and a platform joint move by at most
 # this part of its leg's length: a larger move would not be resolved.
 LARGEST_MOVE = 0.5
@@ -155,8 +140,16 @@ class PlantState(NamedTuple):
     """Position and quaternion x y z w of the platform frame in the base frame."""
     twist: Six  # base axes [m/s, rad/s]
     acceleration: Six  # base axes [m/s^2, rad/s^2]
-    motors: tuple[float, ...] = ()
-    """Angles [rad], speeds [rad/s] and torques [N m] (18,); empty without ``drive.*``."""
+    motors: MotorState | tuple[()] = ()
+    """Empty without ``drive.*``."""
+
+
+class MotorState(NamedTuple):
+    """The motors at the end of a period."""
+
+    angles: Six  # [rad]
+    speeds: Six  # [rad/s]
+    torques: Six  # [N m]
 
 
 class Plant:
@@ -180,18 +173,20 @@ class Plant:
         self.steps = round(period / parameters['step']) * self.substeps  # steps in a period
         self._step = period / self.steps
         self._limits = Limits(parameters)
-        plant = np.zeros(1, record('one_plant'))
+        self._sample = Sample(
+            'one_plant', 'by_torques', 'lengths', 'rates', 'forces', 'state.position',
+            'state.quaternion', 'state.twist', 'acceleration', 'sound', 'motors.angles',
+            'motors.speeds', 'motors.commands')
+        plant = self._sample.numbers.view(record('one_plant'))
         self._plant = plant[0]
-        self._numbers = plant.view(np.float64)
-        self._memory = self._numbers.data  # the same as bytes
         self._driven = bool(parameters.drives)
         plant['by_torques'] = parameters['commands'] == TORQUE
         plant['driven'], plant['step'] = self._driven, self._step
         plant['stops'], plant['force_max'] = stops_of(parameters), self._limits.force_max
-        self._numbers[_BASES] = NO_BASE * 3
+        self._sample['bases'][:] = math.nan
         pose = parameters['initial_pose']
-        state = self._numbers[_STATE]
-        state[_POSITION], state[_QUATERNION] = pose[:3], to_quaternion(from_euler(pose[3:]))
+        plant['state']['position'] = pose[:3]
+        plant['state']['quaternion'] = to_quaternion(from_euler(pose[3:]))
         drives = Drives(parameters).arguments if self._driven else (
             hexapod_structure(parameters), np.zeros((), record('leg_drives')), 0, np.empty((0, 2)))
         self._take_steps = function('plant_advance').bound(*drives, plant)
@@ -211,16 +206,17 @@ class Plant:
         of its motion at begin, middle and end of the period; by default it is still.
         """
         if not self.fault:
-            self._numbers[_COMMANDS.start:_BASES.start] = commands + wrench
-            self._numbers[_BASES] = math.nan if base is None else base.ravel()
+            self._plant['commands'], self._plant['wrench'] = commands, wrench
+            self._sample['bases'][:] = math.nan if base is None else base.ravel()
             self.state = self._run(self.steps)
         return self.state
 
     def brake(self) -> PlantState:
         """Return the state at rest in the present pose: the brakes take all speed at once."""
         if not self.fault:
-            self._numbers[_STATE][_TWIST] = 0.0
-            self._numbers[_COMMANDS.start:_BASES.stop] = NO_WRENCH + NO_WRENCH + 3 * NO_BASE
+            self._sample['state.twist'][:] = 0.0
+            self._plant['commands'] = self._plant['wrench'] = 0.0
+            self._sample['bases'][:] = math.nan
             self.state = self._run(0)._replace(acceleration=NO_WRENCH)
         return self.state
 
@@ -241,18 +237,18 @@ class Plant:
     def _run(self, steps: int) -> PlantState:
         self._plant['steps'] = steps
         self._take_steps()
-        numbers = _NUMBERS.unpack_from(self._memory, 8 * _STATE.start)
-        lengths = numbers[_LENGTHS]
-        if not numbers[_SOUND.start]:
+        (lengths, rates, forces, position, quaternion, twist, acceleration, sound,
+         *of_motors) = self._sample.read()
+        if not sound:
             self.fault = (
-                f'held at rest permanently: after position {list(numbers[_POSITION])} m the '
+                f'held at rest permanently: after position {list(position)} m the '
                 'motion cannot be computed: numbers overflow, or within a step of '
                 f'{self._step:.3g} s the platform turns by more than {LARGEST_MOVE} rad or a '
                 'joint moves by more than that part of its leg; shortest leg '
                 f'{min(lengths):.3g} m')
         return PlantState(
-            lengths, numbers[_RATES], numbers[_FORCES], numbers[:_TWIST.start], numbers[_TWIST],
-            numbers[_ACCELERATION], numbers[_OF_MOTORS] if self._driven else ())
+            lengths, rates, forces, position + quaternion, twist, acceleration,
+            MotorState(*of_motors) if self._driven else ())
 
     def _check_lengths(self) -> None:
         """Raise ParameterError where the hexapod does not fit between its end stops."""

@@ -15,7 +15,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.leg_curves import columns, figure, LEGS
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, RESULT, UNIT_LOAD_FORCES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, RATES, RESULT,
+    UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
 if TYPE_CHECKING:
@@ -42,6 +43,10 @@ class InverseDynamics:
         Time derivatives of the lengths [m/s], + extends.
     forces : (..., 6)
         Forces of the actuators [N], + pushes.
+    joint_forces : (..., 6)
+        Forces that rods and joints carry along the legs [N], + pushes: ``forces`` without
+        reflected mass and friction of the actuators. A thrust rating of a cylinder bounds these;
+        the drive gives ``forces``.
     unit_load_forces : (..., 6)
         Largest force of each leg under a unit load on the platform: any force F and moment M
         with F^2 + (M / l)^2 = 1, l the characteristic length.
@@ -66,6 +71,7 @@ class InverseDynamics:
     lengths: Array = _column(LENGTHS, 'Lengths [m], (..., 6).')
     rates: Array = _column(RATES, 'Time derivatives of the lengths [m/s], (..., 6).')
     forces: Array = _column(FORCES, 'Forces of the actuators [N], (..., 6).')
+    joint_forces: Array = _column(JOINT_FORCES, 'Forces of rods and joints [N], (..., 6).')
     unit_load_forces: Array = _column(
         UNIT_LOAD_FORCES, 'Largest forces under a unit load, (..., 6).')
     determinant: Array = _column(DETERMINANT, 'det(J) [m^3], (...).')
@@ -92,7 +98,7 @@ class InverseDynamics:
         Leading shapes are flattened; SI units. The columns of the legs end in _1 to _6.
         """
         rows = self.rows.reshape(-1, RESULT)
-        legs = columns({'length': self.lengths, 'rate': self.rates, 'force': self.forces,
+        legs = columns({'length': self.lengths, 'rate': self.rates, 'force': self.forces, 'joint_force': self.joint_forces,
                         'unit_load_force': self.unit_load_forces})
         return {**legs, 'determinant': rows[:, DETERMINANT],
                 'determinant_rate': rows[:, DETERMINANT_RATE],

@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Sequence
 import math
 
+from stewart_dynamics.estimation.confidence_level import INTERVAL
 from stewart_dynamics.external_wrench.estimate import Estimate, Overload, WRENCH_LIMITS
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome, rows_of
@@ -209,7 +210,7 @@ def _values_of(payload: Payload) -> Values:
     fitted, values = payload.fitted, []
     for name, unit, value, half, known in rows_of(fitted):
         values.append((f'{name} ({unit})', f'{value:.6g}'))
-        values.append((f'{name}, half of the 95 % interval ({unit})',
+        values.append((f'{name}, half of the {INTERVAL} ({unit})',
                        f'{half:.3g}' if known else 'not identified'))
     return [*values,
             ('mass less platform.mass (kg)', f'{fitted.body.mass - payload.given.mass:.6g}'),
