@@ -66,12 +66,12 @@ def _view(root: ET.Element, left: float, title: str, base: Array, platform: Arra
     _text(root, left + 20.0, 24.0, title, font_weight='bold')
     for joints, color in ((base, '#d5d8db'), (platform, '#9fb6c6')):
         around = np.argsort(np.arctan2(*(joints - joints.mean(axis=0)).T[::-1]))
-        _draw(root, 'polygon', points=' '.join(f'{x:.1f},{y:.1f}' for x, y in joints[around]),
-              fill=color, fill_opacity=0.5, stroke=color)
+        corners = ' '.join(f'{x:.1f},{y:.1f}' for x, y in joints[around])
+        _draw(root, 'polygon', None, points=corners, fill=color, fill_opacity=0.5, stroke=color)
     for n, (color, begin, end) in enumerate(zip(_COLORS, base, platform, strict=True)):
         _line(root, begin, end, stroke=color, stroke_width=3)
-        _draw(root, 'circle', cx=begin[0], cy=begin[1], r=6, fill=color)
-        _draw(root, 'circle', cx=end[0], cy=end[1], r=6, fill='white', stroke=color,
+        _draw(root, 'circle', None, cx=begin[0], cy=begin[1], r=6, fill=color)
+        _draw(root, 'circle', None, cx=end[0], cy=end[1], r=6, fill='white', stroke=color,
               stroke_width=3)
     _numbers(root, base)
     _numbers(root, platform)
@@ -123,10 +123,10 @@ def _text(root: ET.Element, x: float, y: float, text: str, **look: object) -> No
 
 
 def _line(root: ET.Element, begin: Array, end: Array, **look: object) -> None:
-    _draw(root, 'line', x1=begin[0], y1=begin[1], x2=end[0], y2=end[1], **look)
+    _draw(root, 'line', None, x1=begin[0], y1=begin[1], x2=end[0], y2=end[1], **look)
 
 
-def _draw(root: ET.Element, tag: str, text: str | None = None, **look: object) -> None:
+def _draw(root: ET.Element, tag: str, text: str | None, /, **look: object) -> None:
     add(root, tag, text, **{
         name.replace('_', '-'): f'{value:.1f}' if isinstance(value, float) else str(value)
         for name, value in look.items()})
