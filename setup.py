@@ -53,6 +53,7 @@ extras_require = {
         'numpydoc>=1.6',
         'sphinx>=7.3.7',  # for this docutils; 7.3.0 warns of any type of a setting
     ],
+    'live': ['websockets>=13'],  # for examples/live_view.py
     'mujoco': ['mujoco>=3.14'],  # before, inertias have errors of 1e-5
     'parquet': ['pyarrow>=14'],
     'plot': ['matplotlib>=3.7'],  # a legend outside of the axes
@@ -194,7 +195,7 @@ setup(
         (f'{share}/config', sorted(glob('config/*.*'))),
         (f'{share}/config/controllers', sorted(glob('config/controllers/*.*'))),
         (f'{share}/deploy', sorted(glob('deploy/*'))),
-        (f'{share}/examples', sorted(glob('examples/*.py'))),
+        (f'{share}/examples', sorted(glob('examples/*.*'))),
         # Not launch/*: after a launch file was compiled there is a folder __pycache__.
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),
         (f'{share}/security', sorted(glob('security/*'))),
