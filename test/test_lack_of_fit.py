@@ -394,3 +394,10 @@ def test_deviations_have_the_probability_of_chi_squared() -> None:
     # 99.865 % quantiles: three standard deviations
     for freedom, quantile in ((1, 10.27), (6, 21.85), (18, 40.59)):
         assert deviations(quantile, freedom) == pytest.approx(3.0, abs=0.1)
+
+
+def test_masses_of_legs_are_not_named_for_a_constant_force_that_explains_the_same() -> None:
+    truth = drawn(3)
+    bag = estimate_cases.recorded(truth, 'roll', 3)
+    efforts = bag.efforts + 40.0 * np.eye(6)[3]
+    assert identified([bag._replace(efforts=efforts)], truth).causes == ('unknown',)

@@ -132,8 +132,9 @@ def _results(output: Output) -> list[float]:
     state = output.singularity
     return [code, *output.lengths, *output.rates, *(output.demanded_forces or (0.0,) * 6),
             output.determinant, output.determinant_rate, output.condition,
-            *output.unit_load_forces, *(output.joint_forces or (0.0,) * 6), *(output.forces or (0.0,) * 6), *exceeded,
-            state.cause, state.stopped, state.crossings]
+            *output.unit_load_forces, *(output.joint_forces or (0.0,) * 6),
+            *(output.forces or (0.0,) * 6), *exceeded, state.cause, state.stopped,
+            state.crossings]
 
 
 def _motors(drives: Drives | None, motion: Array, output: Output) -> list[float]:

@@ -28,7 +28,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
-from stewart_dynamics.estimation.posterior import posterior
+from stewart_dynamics.estimation.posterior import Posterior, posterior
 from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
 from stewart_dynamics.identification.causes import Cause, Causes, SAME
 from stewart_dynamics.identification.extraction import Extract, Extracts, SAMPLES
@@ -46,6 +46,8 @@ WHOLE, PIECE = 80, 28
 # Smaller residuals, relative to the efforts, are no lack of fit: without any noise the filters
 # leave 2e-5 to 5e-4 in motions below an eighth of the cut-off frequency.
 LEFT_BY_FILTERS = 5e-4
+# Deviation of any amount of a cause, in terms of one that noise would hide.
+_ANY = 1e4
 # Significance for a notice, in standard deviations of a normal distribution: of a force that the
 # model lacks, and of a number that is more uncertain than the file says.
 _NOTICE, _UNCERTAIN = 7.0, 4.0
@@ -70,6 +72,7 @@ _PENALTY = 4.0
 # residuals there to all that is worth a word.
 _REVERSES, _FAST, _WORTH = 0.2, 1.3, 1.3
 UNKNOWN = 'unknown'
+_NONE: Integers = np.zeros(0, dtype=np.int64)
 
 
 class Found(NamedTuple):
@@ -138,11 +141,14 @@ class _Scores(NamedTuple):
     sizes: Array  # (m,)
     follow: Array  # (n, m) change of the model by the columns
     squares: float  # sum of squared residuals
+    sums: Array  # of model, columns and residuals
+    noise: Array  # the part of them that is noise of lengths and rates
+    at: Array  # (n,) the model's numbers at the residuals
 
     @classmethod
     def of(cls, sums: Array, of_noise: Array, at: Array) -> _Scores:
         """Return them from sums of the model's n directions, m columns and the residuals."""
-        n = len(at)
+        n, sums_of_noise = len(at), of_noise
         model = posterior((sums - of_noise)[:n, :n], (sums - of_noise)[:n, -1], at,
                           of_noise[:n, :n])
         follow = -model.covariance @ (sums - of_noise)[:n, n:-1]
@@ -153,7 +159,8 @@ class _Scores(NamedTuple):
         sizes = np.sqrt(np.diag(sums)[n:-1])
         scale = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
         normal, of_noise = (scale[:, None] * each * scale for each in (left, noise))
-        return cls(normal, of_noise, scale * scores, scale, follow, float(sums[-1, -1]))
+        return cls(normal, of_noise, scale * scores, scale, follow, float(sums[-1, -1]), sums,
+                   sums_of_noise, at)
 
     def explained(self, places: Integers) -> _Explained:
         """Return the part of the residuals that some columns explain."""
@@ -161,6 +168,16 @@ class _Scores(NamedTuple):
         amounts = inverse @ self.scores[places]
         return _Explained(self.sizes[places] * amounts, float(self.scores[places] @ amounts),
                           freedom)
+
+    def model_with(self, places: Integers) -> Posterior:
+        """Return the model's numbers after the data, with any amount of some columns."""
+        n = len(self.at)
+        which = np.concatenate([np.arange(n), n + places])
+        scale = np.concatenate([np.ones(n), _ANY * self.sizes[places]])
+        scaled, noise = (scale[:, None] * each[np.ix_(which, which)] * scale
+                         for each in (self.sums - self.noise, self.noise))
+        vector = scale * (self.sums - self.noise)[which, -1]
+        return posterior(scaled, vector, np.concatenate([self.at, np.zeros(len(places))]), noise)
 
     def without(self, places: Integers) -> _Scores:
         """Return the sums with some columns added to the fit."""
@@ -206,15 +223,18 @@ def lack_of_fit(platform: StewartPlatform, extracts: Extracts, noisy: Noisy, unk
     if not ranked:
         return None
     best, *others = ranked
-    for each, shifts in contradicted:
-        if each is best and all(best.gain - other.gain > _CLEARLY for other in others):
-            return LackOfFit(best.what, best.text, tuple(ranked), shifts, 1.0)
-    rest = _ranked(of_all, scores.without(best.places), _NOTICE)
-    rivals = [each for each in others if SAME.get(each.what, each.what) != SAME.get(
-        best.what, best.what) and best.gain - each.gain < _CLEARLY]
+    rivals = any(SAME.get(each.what, each.what) != SAME.get(best.what, best.what)
+                 and best.gain - each.gain < _CLEARLY for each in others)
+    if len(best.places):
+        rest = _ranked(of_all, scores.without(best.places), _NOTICE)
+    else:  # numbers that are far from the file's
+        rest, rivals = [], rivals or any(_rivals(best, of_all, scores, unknowns))
     if rivals or any(each.statistic > _LEAVES * best.statistic for each in rest):
         return LackOfFit(UNKNOWN, _largest_part(platform, _of(extracts, chosen), unknowns, fit),
                          tuple(ranked), np.zeros(len(unknowns.start)), 1.0)
+    for each, shifts in contradicted:
+        if each is best:
+            return LackOfFit(best.what, best.text, tuple(ranked), shifts, 1.0)
     explained = scores.explained(best.places)
     shifts = np.abs(unknowns.root @ scores.follow[:len(unknowns.start), best.places]
                     @ explained.amounts)
@@ -229,19 +249,49 @@ def _contradicted(unknowns: Unknowns, fit: Fit) -> Iterator[tuple[Found, Array]]
     If the model is right, their means after the data have the covariance 1 - C, with C the
     covariance after the data. The second is what their prior shifts each unknown by (k,).
     """
-    count = len(unknowns.start)
-    z, covariance = fit.posterior.values[:count], fit.posterior.covariance[:count, :count]
     for what in TAKEN_BY:
-        of = np.flatnonzero(unknowns.origins == ORIGINS.index(what))
-        values, vectors = np.linalg.eigh(np.eye(len(of)) - covariance[np.ix_(of, of)])
+        found = _Contradiction.of(unknowns, what, fit.posterior)
+        if found.significance > _UNCERTAIN:
+            change = unknowns.root[:, found.places] @ found.true
+            shift = fit.posterior.covariance[:len(unknowns.start), found.places] @ found.true
+            yield Found(what, _in_words(unknowns, what, change), found.statistic, found.freedom,
+                        found.significance, _NONE), np.abs(unknowns.root @ shift)
+
+
+class _Contradiction(NamedTuple):
+    """How far a kind of numbers is from the file's."""
+
+    places: Integers  # (p,) of the numbers
+    true: Array  # (p,) what they are, in terms of their deviations before the data
+    statistic: float
+    freedom: int
+
+    @classmethod
+    def of(cls, unknowns: Unknowns, what: str, after: Posterior) -> _Contradiction:
+        """Return it for numbers after the data."""
+        places = np.flatnonzero(unknowns.origins == ORIGINS.index(what))
+        values, vectors = np.linalg.eigh(
+            np.eye(len(places)) - after.covariance[np.ix_(places, places)])
         known = values > _TOLD
-        along = (vectors.T @ z[of])[known]
-        statistic, freedom = float(np.sum(along ** 2 / values[known])), int(known.sum())
-        if freedom and deviations(statistic, freedom) > _UNCERTAIN:
-            true = vectors[:, known] @ (along / values[known])
-            yield Found(what, _in_words(unknowns, what, unknowns.root[:, of] @ true), statistic,
-                        freedom, deviations(statistic, freedom), np.zeros(0, dtype=np.int64)), (
-                            np.abs(unknowns.root @ covariance[:, of] @ true))
+        along = (vectors.T @ after.values[places])[known]
+        return cls(places, vectors[:, known] @ (along / values[known]),
+                   float(np.sum(along ** 2 / values[known])), int(known.sum()))
+
+    @property
+    def significance(self) -> float:
+        """Return it as standard deviations of a normal distribution."""
+        return deviations(self.statistic, self.freedom) if self.freedom else 0.0
+
+
+def _rivals(best: Found, causes: Iterable[Cause], scores: _Scores, unknowns: Unknowns,
+            ) -> Iterator[Cause]:
+    """Yield causes that, too, explain why a kind of numbers is far from the file's."""
+    statistic = _Contradiction.of(unknowns, best.what, scores.model_with(_NONE)).statistic
+    for cause in causes:
+        left = _Contradiction.of(unknowns, best.what, scores.model_with(cause.places))
+        gain = statistic - left.statistic - _PENALTY * len(cause.places)
+        if left.significance < _UNCERTAIN and best.gain - gain < _CLEARLY:
+            yield cause
 
 
 def _in_words(unknowns: Unknowns, what: str, change: Array) -> str:

@@ -36,8 +36,8 @@ from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
-    FORCES, GRAVITY, JOINT_ANGLES, JOINT_FORCES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
-    RESULT, TWIST, WRENCH)
+    FORCES, GRAVITY, JOINT_ANGLES, JOINT_FORCES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE,
+    POSITION, RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
 from stewart_dynamics.parameters.table import mean_radius, Parameters

@@ -22,7 +22,8 @@ from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_che
 from stewart_dynamics.mechanics.limits import (
     angle_values, ANGLES, CLEARANCE_MIN, Exceedance, Limits, result_values)
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES, UNIT_LOAD_FORCES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES,
+    UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
     CAUSE, Singularity, STATE, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -222,7 +223,8 @@ class Step:
         self._sample = sample = Sample(
             'one_setpoint', 'base_known', 'answered', 'exceeding', 'jumped', 'result.lengths',
             'result.rates', 'result.forces', 'forces', 'result.joint_forces',
-            'result.unit_load_forces', 'result.determinant', 'result.determinant_rate', 'result.condition_number', 'after')
+            'result.unit_load_forces', 'result.determinant', 'result.determinant_rate',
+            'result.condition_number', 'after')
         self._limits_suppress = parameters['limits.action'] == SUPPRESS_FORCES
         # Margin by which the time between two setpoints may exceed that between their stamps [s].
         self._slack = JITTER + parameters['setpoint.sync_tolerance']

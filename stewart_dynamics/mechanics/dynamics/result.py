@@ -98,7 +98,8 @@ class InverseDynamics:
         Leading shapes are flattened; SI units. The columns of the legs end in _1 to _6.
         """
         rows = self.rows.reshape(-1, RESULT)
-        legs = columns({'length': self.lengths, 'rate': self.rates, 'force': self.forces, 'joint_force': self.joint_forces,
+        legs = columns({'length': self.lengths, 'rate': self.rates, 'force': self.forces,
+                        'joint_force': self.joint_forces,
                         'unit_load_force': self.unit_load_forces})
         return {**legs, 'determinant': rows[:, DETERMINANT],
                 'determinant_rate': rows[:, DETERMINANT_RATE],
