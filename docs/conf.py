@@ -91,12 +91,12 @@ def label_cells(app: Sphinx, doctree: nodes.document, docname: str) -> None:
 # Links lead to the files that GitHub shows; on the site these are included in pages.
 
 def lead_to_pages(*arguments: Any) -> None:
-    """Replace links to README files in the text of a page, or of a file that it includes."""
+    """Replace links to files outside docs/ in a page, or in a file that it includes."""
     content = arguments[-1]
-    if (ROOT / 'docs' / arguments[1]).resolve() == ROOT / 'README.md':
-        content[0] = content[0].replace('[Contributing](CONTRIBUTING.md)', '`CONTRIBUTING.md`')
-        content[0] = re.sub(r'\]\((?!docs/|\w+:)', '](../', content[0])
+    if (ROOT / 'docs' / arguments[1]).resolve().parent == ROOT:
+        content[0] = re.sub(r'\]\((?!docs/|#|\w+:)', '](../', content[0])
         content[0] = content[0].replace('](docs/', '](')
+    content[0] = content[0].replace('](../CONTRIBUTING.md', '](contributing.md')
     content[0] = re.sub(r'\]\(\.\./benchmarks/README\.md', '](performance.md', content[0])
     content[0] = re.sub(r'\]\(\.\./security/README\.md', '](security.md', content[0])
 

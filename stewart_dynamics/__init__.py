@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.planned.approach import approach, rest_to_rest, TimedMotion
     from stewart_dynamics.planned.trajectory import check_planned_trajectory, PlannedTrajectory
 
-__version__ = '0.1.0'
+__version__ = '1.0.0'
 
 __all__ = [
     'BagError', 'BaseMotion', 'Calibration', 'Capability', 'Extent', 'ForceBreakdown',

@@ -19,6 +19,7 @@ from typing import Any, TYPE_CHECKING
 
 from hypothesis import settings
 import pytest
+from snapshot import Snapshot
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -41,6 +42,25 @@ FLAGS = ('--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
 # The same examples in every run, which may take long on a loaded computer: few.
 settings.register_profile('repeatable', deadline=None, derandomize=True, max_examples=30)
 settings.load_profile('repeatable')
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that writes the sentences of programs."""
+    parser.addoption('--update-snapshots', action='store_true',
+                     help='write test/snapshots/ instead of comparing with it; one process')
+
+
+@pytest.fixture
+def snapshot(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory,
+             ) -> Iterator[Snapshot]:
+    """Return the known sentences of this test, in the file of the module's PROGRAM."""
+    each = Snapshot(request.module.PROGRAM, f'{request.path.name}::{request.node.name}',
+                    tmp_path_factory.getbasetemp(), request.config.getoption('update_snapshots'))
+    failed = request.session.testsfailed
+    yield each
+    if request.session.testsfailed == failed:
+        each.close()
+
 
 # The module running needs ROS; the tests of the library do not, so it is imported where used.
 

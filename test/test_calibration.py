@@ -9,6 +9,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 import pytest
 from referees import PLATFORM
+from snapshot import Snapshot
 from stewart_dynamics import (
     calibrate, Motion, MotionError, ParameterError, Parameters, Pose, StewartError,
     StewartPlatform)
@@ -19,6 +20,8 @@ from stewart_dynamics.calibration.frames import find_frames
 from stewart_dynamics.calibration.noise import covariances, Noise
 from stewart_dynamics.mechanics.drives.screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.rotation import from_euler
+
+PROGRAM = 'stewart_calibrate'
 
 # M. J. Nategh, M. M. Agheli, "A total solution to kinematic calibration of hexapod machine tools
 # with a minimum number of measurement configurations and superior accuracies", Int. J. Machine
@@ -180,20 +183,19 @@ def test_unknown_frames_of_an_exact_file_are_found_exactly() -> None:
         assert_allclose(each.rows, wanted.rows, atol=1e-12)
 
 
-@pytest.mark.parametrize(('tilt', 'rank', 'words'), [
-    ((0.0, 0.0, 0.0), 4, 'translations only: base joints and platform joints cannot'),
-    ((0.0, 0.0, 0.5), 6, 'yaw only: heights (z) of the base joints and heights (z) of the '
-     'platform joints cannot be distinguished; add poses that are turned about another axis'),
-    ((0.3, 0.3, 0.0), 7, '')])
+@pytest.mark.parametrize(('tilt', 'rank'), [
+    ((0.0, 0.0, 0.0), 4),
+    ((0.0, 0.0, 0.5), 6),
+    ((0.3, 0.3, 0.0), 7)])
 @pytest.mark.parametrize('noise', [EXACT, Noise(2e-6, 1e-5, 1e-5)])
 def test_the_kind_of_motion_gives_what_is_identifiable(
-        tilt: tuple[float, float, float], rank: int, words: str, noise: Noise) -> None:
+        tilt: tuple[float, float, float], rank: int, noise: Noise, snapshot: Snapshot) -> None:
     rng = np.random.default_rng(5)
     values = true_values(rng)
     lengths, seen = measured(rng, values, random_poses(rng, 60, tilt=tilt), noise)
     found = calibrate(HEXAPOD, lengths, seen)
     assert found.identifiability.rank == 6 * rank
-    assert (found.not_identified or '').startswith(words)
+    snapshot(found.not_identified)
     assert (found.not_identified is None) == (rank == 7)
     # Poses of this kind are predicted as well as if all numbers were known.
     assert found.validation is not None
@@ -369,13 +371,15 @@ def test_exact_poses_of_the_drawing_have_no_lack_of_fit() -> None:
     assert calibrate(HEXAPOD, lengths, poses).lack_of_fit == ()
 
 
-def test_all_poses_are_used_where_none_is_held_out_and_some_noise_is_needed() -> None:
+def test_all_poses_are_used_where_none_is_held_out_and_some_noise_is_needed(
+        snapshot: Snapshot) -> None:
     rng = np.random.default_rng(9)
     lengths, seen = measured(rng, true_values(rng), random_poses(rng, 30), Noise(1e-5, 1e-5, 1e-5))
     assert calibrate(HEXAPOD, lengths, seen, hold_out=0.0).validation is None
     assert calibrate(HEXAPOD, lengths, seen).validation is not None
-    with pytest.raises(StewartError, match='^noise: 0, 0, 0: one of them must be above 0$'):
+    with pytest.raises(StewartError) as caught:
         calibrate(HEXAPOD, lengths, seen, noise=(0.0, 0.0, 0.0))
+    snapshot(caught.value)
 
 
 @pytest.mark.parametrize(('what', 'words'), [
@@ -501,7 +505,8 @@ def test_derivatives_of_drive_positions_are_those_of_finite_differences() -> Non
 
 
 @pytest.mark.parametrize('frames', ['known', 'unknown'])
-def test_positions_of_drives_whose_screws_turn_with_their_legs(frames: str) -> None:
+def test_positions_of_drives_whose_screws_turn_with_their_legs(
+        frames: str, snapshot: Snapshot) -> None:
     """By the motors' angles; taken for positions of the legs they are named."""
     rng = np.random.default_rng(2)
     platform = StewartPlatform(HEXAPOD.parameters.replaced(UNIVERSAL))
@@ -524,22 +529,27 @@ def test_positions_of_drives_whose_screws_turn_with_their_legs(frames: str) -> N
         assert [each.what for each in wrong.lack_of_fit] == ['turns']
     # A file that does not say that the screws turn.
     assert calibrate(HEXAPOD, drives, seen, frames=frames).lack_of_fit[0].what == 'turns'
-    with pytest.raises(ParameterError, match='drive.screw_rotation: guided'):
+    with pytest.raises(ParameterError) as caught:
         calibrate(HEXAPOD, drives, seen, drive_positions=True)
+    snapshot(caught.value)
 
 
-def test_too_little_is_rejected() -> None:
+def test_too_little_is_rejected(snapshot: Snapshot) -> None:
     rng = np.random.default_rng(9)
     lengths, seen = measured(rng, true_values(rng), random_poses(rng, 40), Noise(2e-6, 1e-5, 1e-5))
-    with pytest.raises(StewartError, match='7 poses: at least 8 are needed'):
+    with pytest.raises(StewartError) as caught:
         calibrate(HEXAPOD, lengths[:7], seen[:7])
-    with pytest.raises(MotionError, match=r'lengths \(40, 6\), poses \(7,\)'):
+    snapshot(caught.value)
+    with pytest.raises(MotionError) as caught:
         calibrate(HEXAPOD, lengths, seen[:7])
-    with pytest.raises(ParameterError, match='joint_7: not a part of the geometry'):
+    snapshot(caught.value)
+    with pytest.raises(ParameterError) as caught:
         calibrate(HEXAPOD, lengths, seen, fixed=['joint_7'])
-    with pytest.raises(ParameterError, match='nothing is left'):
+    snapshot(caught.value)
+    with pytest.raises(ParameterError) as caught:
         calibrate(HEXAPOD, lengths, seen,
                   fixed=['base_joints', 'platform_joints', 'geometry.zero_length'])
+    snapshot(caught.value)
     with pytest.raises(StewartError, match='residuals of .* mm: one and the same pose'):
         same = np.zeros(40, dtype=int)
         calibrate(HEXAPOD, lengths[same] + rng.normal(0.0, 1e-6, (40, 6)), Pose(
@@ -549,9 +559,10 @@ def test_too_little_is_rejected() -> None:
     with pytest.raises(StewartError, match='the poses do not support a better geometry'):
         calibrate(HEXAPOD, *rough)
     for tilt in ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5)):
-        with pytest.raises(StewartError, match='^poses must be turned about two axes or more'):
+        with pytest.raises(StewartError) as caught:
             calibrate(HEXAPOD, *measured(rng, true_values(rng), random_poses(rng, 40, tilt=tilt)),
                       frames='unknown')
+        snapshot(caught.value)
     assert calibrate(HEXAPOD, lengths, seen, noise=(0.0, 1e-5, 0.0)).noise.length == 0.0
 
 

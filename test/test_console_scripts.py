@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-import re
 import subprocess
 import sys
 
 import pytest
 from referees import ROOT
+from snapshot import Snapshot
 from stewart_dynamics import StewartError
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.executables import executable
@@ -22,6 +22,8 @@ from stewart_dynamics.reference_motion.parameters import ReferenceMotionParamete
 from stewart_dynamics.ros.console_scripts import check_arguments, usage
 from stewart_dynamics.ros.launch_arguments import check_launch_arguments
 from stewart_dynamics.simulator.parameters import SimulatorParameters
+
+PROGRAM = 'stewart_dynamics'
 
 PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,
             'trajectory': ReferenceMotionParameters}
@@ -96,31 +98,31 @@ def test_a_program_that_lacks_ros_reports_it_in_one_line() -> None:
         assert line.startswith(f'{kind.node}: needs ROS 2: ')
 
 
-def test_a_bad_file_is_rejected_before_libraries_are_loaded(tmp_path: Path) -> None:
+def test_a_bad_file_is_rejected_before_libraries_are_loaded(
+        tmp_path: Path, snapshot: Snapshot) -> None:
     file = tmp_path / 'bad.yaml'
     file.write_text('/**: {ros__parameters: {rat: 1.0}}\n')
     out, lines = run(f'--ros-args --params-file {file}')
     assert out == '[1, 1, 1] []\n'
     for line, kind in zip(lines, PROGRAMS.values(), strict=True):
-        assert line.startswith(f'{kind.node}: {file}: rat: unknown parameter')
+        assert line.startswith(f'{kind.node}: {file}: ')
+        snapshot(line)
 
 
-@pytest.mark.parametrize('arguments, text', [
-    (['-p', 'platform.mass=200.0'], 'command line: -p platform.mass=200.0: must be NAME:=VALUE'),
-    (['--params-file', str(PLATFORM), '-p'], 'command line: -p : must be NAME:=VALUE')])
-def test_malformed_ros_arguments_are_named(arguments: list[str], text: str) -> None:
+@pytest.mark.parametrize('arguments', [
+    ['-p', 'platform.mass=200.0'], ['--params-file', str(PLATFORM), '-p']])
+def test_malformed_ros_arguments_are_named(arguments: list[str], snapshot: Snapshot) -> None:
     with pytest.raises(ParameterError) as caught:
         check_arguments(['--ros-args', *arguments], Parameters)
-    assert str(caught.value) == text
+    snapshot(str(caught.value))
 
 
-def test_a_file_without_the_lines_of_ros_is_named(tmp_path: Path) -> None:
+def test_a_file_without_the_lines_of_ros_is_named(tmp_path: Path, snapshot: Snapshot) -> None:
     file = tmp_path / 'bare.yaml'
     file.write_text('platform:\n  mass: 1.0\n')
     with pytest.raises(ParameterError) as caught:
         check_arguments(['--ros-args', '--params-file', str(file)], Parameters)
-    assert str(caught.value) == (f"{file}: holds platform, but no parameters under '/**:' or "
-                                 "'stewart_dynamics:', 'ros__parameters:'")
+    snapshot(str(caught.value))
 
 
 # Where executables are looked for: beside Python, and in workspaces that are sourced
@@ -178,13 +180,14 @@ def test_a_missing_one_is_an_error_with_the_folders(workspaces: list[Path]) -> N
         assert str(path.parent) in str(error.value)
 
 
-@pytest.mark.parametrize('name, hint', [
-    ('param_file', 'did you mean params_file?'), ('hexapod', 'known are params_file, namespace')])
-def test_an_argument_that_a_launch_file_does_not_have_is_rejected(name: str, hint: str) -> None:
+@pytest.mark.parametrize('name', ['param_file', 'hexapod'])
+def test_an_argument_that_a_launch_file_does_not_have_is_rejected(
+        name: str, snapshot: Snapshot) -> None:
     known = 'params_file', 'namespace'
     line = ['ros2', 'launch', 'stewart_dynamics', 'demo.launch.py', f'{name}:=mine.yaml']
-    with pytest.raises(StewartError, match=f'^{name}: unknown argument; {re.escape(hint)}$'):
+    with pytest.raises(StewartError) as caught:
         check_launch_arguments('/share/launch/demo.launch.py', line, known)
+    snapshot(caught.value)
     # included by a launch file that has this argument
     check_launch_arguments('/share/launch/stewart_dynamics.launch.py', line, known)
     check_launch_arguments('/share/launch/demo.launch.py', [*line[:-1], 'namespace:=cell'], known)

@@ -16,6 +16,8 @@ from stewart_dynamics import Parameters
 from stewart_dynamics.description import main
 from test_circles import ON_CIRCLES
 
+PROGRAM = 'stewart_describe'
+
 PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
 
 
@@ -34,13 +36,12 @@ def test_all_files_are_written_and_nothing_is_said(tmp_path, capsys):
     assert printed.err == ''
 
 
-def test_existing_files_are_kept_unless_replacement_is_requested(tmp_path, capsys):
+def test_existing_files_are_kept_unless_replacement_is_requested(tmp_path, capsys, snapshot):
     (tmp_path / 'a.sdf').write_text('mine')
     given = '--params', PLATFORM, '--output', tmp_path, '--name', 'a'
     assert run(*given) == 2
     assert [path.name for path in tmp_path.iterdir()] == ['a.sdf']
-    assert capsys.readouterr().err == (
-        f'stewart_describe: {tmp_path / "a.sdf"}: exists; --force replaces it\n')
+    snapshot(capsys.readouterr().err)
     assert run(*given, '--force') == 0
     assert (tmp_path / 'a.sdf').read_text() != 'mine'
 
@@ -63,19 +64,19 @@ def test_each_file_is_read_into_a_parameter_file_that_the_node_takes(kind, tmp_p
     assert capsys.readouterr().err == ''
 
 
-def test_likely_mistakes_are_warnings_and_exit_code_1_with_strict(tmp_path, capsys):
+def test_likely_mistakes_are_warnings_and_exit_code_1_with_strict(tmp_path, capsys, snapshot):
     p = Parameters.from_yaml(PLATFORM)
     joints = p['geometry.base_joints'].copy()
     joints[0, 1] *= -1.0
     p.replaced({'geometry.base_joints': joints}).to_yaml(tmp_path / 'wrong.yaml')
     given = '--params', tmp_path / 'wrong.yaml', '--output', tmp_path
     assert run(*given) == 0
-    assert 'stewart_describe: warning: geometry.base_joints: leg_' in capsys.readouterr().err
+    snapshot(capsys.readouterr().err)
     assert run(*given, '--force', '--strict') == 1
     assert run('--from', tmp_path / 'wrong.sdf', '--output', tmp_path / 'read', '--strict') == 1
 
 
-def test_zero_gravity_of_a_file_is_said_once(tmp_path, capsys):
+def test_zero_gravity_of_a_file_is_said_once(tmp_path, capsys, snapshot):
     pytest.importorskip('mujoco')
     Parameters.from_yaml(PLATFORM).replaced({'gravity': [0.0, 0.0, 0.0]}).to_yaml(
         tmp_path / 'orbit.yaml')
@@ -83,7 +84,7 @@ def test_zero_gravity_of_a_file_is_said_once(tmp_path, capsys):
     capsys.readouterr()
     assert run('--from', tmp_path / 'orbit.xml', '--output', tmp_path / 'read') == 0
     (said,) = [line for line in capsys.readouterr().err.splitlines() if 'gravity' in line]
-    assert said.startswith('stewart_describe: warning: gravity: 0 m/s^2: none, as in orbit?')
+    snapshot(said)
 
 
 def test_the_block_of_ros2_control_is_written_by_option(tmp_path):
@@ -94,17 +95,14 @@ def test_the_block_of_ros2_control_is_written_by_option(tmp_path):
     assert text.count('<command_interface name="effort" />') == 6
 
 
-@pytest.mark.parametrize(('arguments', 'error'), [
-    (['--params', 'none.yaml'], 'none.yaml: cannot be read'),
-    (['--from', 'none.urdf'], 'none.urdf: cannot be read'),
-    (['--from', str(PLATFORM)], 'not XML'),
-    (['--from', 'none.urdf', '--ros2-control', 'effort'], '--ros2-control: not with --from'),
-])
-def test_bad_input_is_exit_code_2_and_one_line(arguments, error, tmp_path, capsys):
+@pytest.mark.parametrize('arguments', [
+    ['--params', 'none.yaml'], ['--from', 'none.urdf'], ['--from', str(PLATFORM)],
+    ['--from', 'none.urdf', '--ros2-control', 'effort']])
+def test_bad_input_is_exit_code_2_and_one_line(arguments, tmp_path, capsys, snapshot):
     assert run(*arguments, '--output', tmp_path) == 2
     printed = capsys.readouterr()
     assert printed.err.startswith('stewart_describe: ')
-    assert error in printed.err
+    snapshot(printed.err)
     assert printed.err.count('\n') == 1
     assert not [*tmp_path.iterdir()]
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import ROOT
+from snapshot import Snapshot
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
 from stewart_dynamics.identification.design import (
     columns_of, Design, design, predicted_half_widths)
@@ -19,6 +20,8 @@ from stewart_dynamics.identification.identify_command_line import main
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from sweeps import sweep
+
+PROGRAM = 'stewart_identify'
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 HEXAPOD = Parameters.from_yaml(PLATFORM)
@@ -105,11 +108,11 @@ def test_the_predicted_intervals_are_those_of_a_fit(small: Design) -> None:
     np.testing.assert_allclose(spread / predicted, 1.0, atol=0.15)
 
 
-def test_missing_limits_are_named_and_an_amplitude_takes_their_place() -> None:
+def test_missing_limits_are_named_and_an_amplitude_takes_their_place(snapshot: Snapshot) -> None:
     without = HEXAPOD.replaced(dict.fromkeys(LIMITS[1:]))
-    with pytest.raises(ParameterError, match=r'^limits.length_max, limits.velocity_max, '
-                       r'limits.force_max: missing: .* or with --amplitude$'):
+    with pytest.raises(ParameterError) as caught:
         design(without, SMALL)
+    snapshot(caught.value)
     designed = design(without, SMALL._replace(
         amplitude=0.02, generations=2, center=(0.0, 0.0, 1.1, 0.0, 0.0, 0.1)))
     motion = at_1_khz(designed.trajectory)
@@ -131,21 +134,22 @@ def test_angles_of_joints_are_limits_as_well() -> None:
     assert base.max() > 0.04 or platform.max() > 0.08
 
 
-def test_a_center_beyond_a_limit_is_named() -> None:
+def test_a_center_beyond_a_limit_is_named(snapshot: Snapshot) -> None:
     weak = HEXAPOD.replaced({'limits.force_max': 300.0})
-    with pytest.raises(ParameterError, match='^limits.force_max: at the center of the motion '):
+    with pytest.raises(ParameterError) as caught:
         design(weak, SMALL)
-    with pytest.raises(ParameterError, match='^limits.length_max: at the center of the motion '):
+    snapshot(caught.value)
+    with pytest.raises(ParameterError) as caught:
         design(HEXAPOD, SMALL._replace(center=(0.0, 0.0, 2.0, 0.0, 0.0, 0.0)))
+    snapshot(caught.value)
 
 
 def test_a_center_in_degrees_or_millimetres_is_a_likely_mistake(
-        capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+        capsys: pytest.CaptureFixture[str], tmp_path: Path, snapshot: Snapshot) -> None:
     code, _, err = run(capsys, *QUICK, '--output', tmp_path / 'out', '--center',
                        0, 0, 990, 5, 0, 0)
     assert code == 2
-    assert ('warning: --center: [0, 0, 990, 5, 0, 0]: likely mistake: position in mm and angles '
-            'in degrees') in err
+    snapshot(err)
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
@@ -192,31 +196,27 @@ def test_a_motion_may_be_designed_for_the_tilt_as_well(
         assert unit == 'rad' and 1e-6 < half < 1e-3
 
 
-@pytest.mark.parametrize(('arguments', 'said'), [
-    ((*QUICK, '--highest-frequency', 20), '--highest-frequency 20 Hz: must be at most --cutoff'),
-    ((*QUICK[:-1], 'cylinder,piston'), 'no motion within the limits identifies cylinder, '
-     'piston: legs.cylinder.second_moment.leg_1 is not identifiable; ask for less'),
-    (('--params', 'missing.yaml'), 'missing.yaml: '),
-])
+@pytest.mark.parametrize('arguments', [
+    (*QUICK, '--highest-frequency', 20), (*QUICK[:-1], 'cylinder,piston'),
+    ('--params', 'missing.yaml')])
 def test_a_failed_design_is_reported_in_one_line(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: Any, said: str) -> None:
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: Any,
+        snapshot: Snapshot) -> None:
     code, out, err = run(capsys, *arguments, '--output', tmp_path / 'designed')
     assert (code, out) == (2, '')
     *progress, line = err.splitlines()
     assert all(each.startswith('stewart_identify: design') for each in progress)
-    assert said in line
+    snapshot(line)
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(('arguments', 'said'), [
-    (('--params', 'x', '--design', 'a_bag'), '--design takes no BAG'),
-    (('--params', 'x'), 'the following arguments are required: BAG'),
-    (('--params', 'x', '--design', '--duration', '0'), 'must be at least 2'),
-    (('--params', 'x', '--design', '--harmonics', '2.5'), '2.5: must be a whole number'),
-])
+@pytest.mark.parametrize('arguments', [
+    ('--params', 'x', '--design', 'a_bag'), ('--params', 'x'),
+    ('--params', 'x', '--design', '--duration', '0'),
+    ('--params', 'x', '--design', '--harmonics', '2.5')])
 def test_arguments_that_do_not_fit_are_named(
-        capsys: pytest.CaptureFixture[str], arguments: Any, said: str) -> None:
+        capsys: pytest.CaptureFixture[str], arguments: Any, snapshot: Snapshot) -> None:
     with pytest.raises(SystemExit) as ended:
         main(list(arguments))
     assert ended.value.code == 2
-    assert said in capsys.readouterr().err
+    snapshot(capsys.readouterr().err)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from itertools import combinations, product
-import re
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from referees import (
     Array, random_motion, random_parameters, rng, rotation_about, size_of, symmetric_parameters)
 from scipy.optimize import lsq_linear, nnls
 
+from snapshot import Snapshot
 from stewart_dynamics import Capability, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE, LegClearance, PLATFORM
@@ -26,6 +26,8 @@ from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
 from test_capability import limited, moved, random_travel
 from test_capability_boxes import poses_in, some_ranges
 from test_capability_workspace import inside
+
+PROGRAM = 'library'
 
 SHAPE = dict(zip(LEG_SHAPE, (0.04, 0.7, 0.02), strict=True))
 SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1, **SHAPE})
@@ -92,17 +94,16 @@ def test_legs_that_cross_overlap_by_both_radii() -> None:
         [-0.04, -0.04], abs=1e-15)
 
 
-@pytest.mark.parametrize(('changes', 'words'), [
-    ({CLEARANCE_MIN: 0.01}, 'legs.cylinder.radius, legs.cylinder.length, legs.piston.radius: not '
-     'set: needed by limits.leg_clearance_min'),
-    ({**SHAPE, CLEARANCE_MIN: -1.0}, 'limits.leg_clearance_min: -1.0 m: must be at least 0'),
-    ({**SHAPE, 'legs.piston.radius': 0.05}, 'legs.piston.radius: [0.05, 0.05, 0.05, 0.05, 0.05, '
-     '0.05]: must be at most legs.cylinder.radius, [0.04')])
-def test_parameters_that_do_not_fit_are_rejected(changes: dict[str, Any], words: str) -> None:
-    with pytest.raises(ParameterError, match=re.escape(words)):
+@pytest.mark.parametrize('changes', [
+    {CLEARANCE_MIN: 0.01}, {**SHAPE, CLEARANCE_MIN: -1.0}, {**SHAPE, 'legs.piston.radius': 0.05}])
+def test_parameters_that_do_not_fit_are_rejected(
+        changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with pytest.raises(ParameterError) as caught:
         symmetric_parameters().replaced(changes)
-    with pytest.raises(ParameterError, match=r'legs\.piston\.radius: not set'):
+    snapshot(caught.value)
+    with pytest.raises(ParameterError) as caught:
         LegClearance(symmetric_parameters())
+    snapshot(caught.value)
 
 
 # Plates
@@ -165,21 +166,18 @@ def test_a_leg_that_pierces_a_plate_overlaps_by_its_radius() -> None:
         assert (nearest == (BASE if name == OUTLINES[0] else PLATFORM)).all()
 
 
-@pytest.mark.parametrize(('corners', 'words'), [
-    ([0.0] * 6, 'must have three corners or more'),
-    ([0.0] * 4, 'must have 3 n entries, has 4'),
-    ([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0], 'the corners are on one line'),
-    ([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.01, 0.0, 1.0, 0.0],
-     'the corners must be in one plane, to 1e-06 of its size'),
-    ([0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 'on one line'),
-    ([0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 2.0, 0.0],
-     'must be convex, its corners in order around it'),
-    ([f(4.0 * np.pi * n / 5.0) for n in range(5) for f in (np.cos, np.sin, lambda _: 0.0)],
-     'must be convex, its corners in order around it')])
-def test_a_plate_that_is_none_is_rejected(corners: list[float], words: str) -> None:
+@pytest.mark.parametrize('corners', [
+    [0.0] * 6, [0.0] * 4, [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0],
+    [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.01, 0.0, 1.0, 0.0],
+    [0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+    [0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 2.0, 0.0],
+    [round(float(f(4.0 * np.pi * n / 5.0)), 3)
+     for n in range(5) for f in (np.cos, np.sin, lambda _: 0.0)]])
+def test_a_plate_that_is_none_is_rejected(corners: list[float], snapshot: Snapshot) -> None:
     for name in OUTLINES:
-        with pytest.raises(ParameterError, match=re.escape(words)):
+        with pytest.raises(ParameterError) as caught:
             symmetric_parameters().replaced({name: corners})
+        snapshot(caught.value)
 
 
 def test_a_message_names_what_a_leg_is_near_to() -> None:

@@ -27,14 +27,16 @@ EXECUTABLES = ('stewart_calibrate', 'stewart_capability', 'stewart_dynamics', 's
                'stewart_export', 'stewart_identify', 'stewart_replay', 'stewart_simulator',
                'stewart_trajectory')
 PACKAGED = ('bags', 'config', 'examples', 'launch', 'resource', 'security', NAME, 'LICENSE',
-            'package.xml', 'pyproject.toml', 'setup.cfg', 'setup.py')
+            'CHANGELOG.rst', 'CONTRIBUTING.md', 'MANIFEST.in', 'README.md', 'package.xml',
+            'pyproject.toml', 'setup.cfg', 'setup.py')
 SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', NAME)
 
-# Modules whose rosdep key is not their own name; '' where rosdep has no key.
+# Modules whose rosdep key is not their own name; '' where rosdep has no key, as in package.xml.
 KEYS = {
     'dask': '', 'distributed': '', 'docutils': 'python3-docutils',
     'hypothesis': 'python3-hypothesis', 'jinja2': 'python3-jinja2', 'lz4': '',
-    'matplotlib': 'python3-matplotlib', 'mcap': '', 'mcap_ros2': '', 'mujoco': '',
+    'matplotlib': 'python3-matplotlib', 'mcap': 'mcap-ros2-support',
+    'mcap_ros2': 'mcap-ros2-support', 'mujoco': 'python3-mujoco-pip',
     'numba': 'python3-numba',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
     'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '', 'pyarrow': '',
@@ -218,6 +220,21 @@ def test_wheel_has_entry_points_and_no_scripts(
     assert not [name for name in names if '/scripts/' in name or '/lib/' in name]
     modules = {path.relative_to(ROOT).as_posix() for path in python_files(NAME)}
     assert {name for name in names if name.endswith('.py') and '.data/' not in name} == modules
+
+
+@pytest.mark.slow
+def test_a_wheel_is_built_from_the_sdist_alone(
+        source: Path, wheel: Path, tmp_path: Path) -> None:
+    call([sys.executable, 'setup.py', '-q', 'sdist', '--dist-dir', tmp_path], cwd=source)
+    archive = next(tmp_path.glob('*.tar.gz'))
+    shutil.unpack_archive(archive, tmp_path)
+    folder = tmp_path / archive.name.removesuffix('.tar.gz')
+    assert not (folder / 'test').exists()
+    call([sys.executable, '-m', 'pip', 'wheel', '--no-deps', '--no-build-isolation',
+          '--wheel-dir', tmp_path, folder])
+    again = next(tmp_path.glob('*.whl'))
+    assert again.name == wheel.name
+    assert set(zipfile.ZipFile(again).namelist()) == set(zipfile.ZipFile(wheel).namelist())
 
 
 def test_pip_puts_executables_on_the_path(wheel: Path, tmp_path: Path) -> None:

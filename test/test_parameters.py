@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 import pickle
-import re
 from typing import Any
 
 from hypothesis import given, HealthCheck, settings
@@ -17,6 +16,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 from referees import ROOT
+from snapshot import Snapshot
 from stewart_dynamics import (
     MotionError, ParameterError, Parameters, PoseError, StewartError)
 from stewart_dynamics.parameters.table import PARAMETERS
@@ -24,6 +24,8 @@ from stewart_dynamics.parameters.yaml_file import flat, other_nodes, read_yaml
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 import yaml
+
+PROGRAM = 'library'
 
 GOOD = """\
 /**:
@@ -117,16 +119,19 @@ def test_the_characteristic_length_is_the_mean_distance_of_the_platform_joints(
     assert given_one['singularity.characteristic_length'] == 0.25
 
 
-def test_replaced_changes_these_alone_and_checks_the_whole(p: Parameters) -> None:
+def test_replaced_changes_these_alone_and_checks_the_whole(
+        p: Parameters, snapshot: Snapshot) -> None:
     heavier = p.replaced({'platform.mass': 200.0})
     assert heavier['platform.mass'] == 200.0
     assert p['platform.mass'] == 150.0
     for name in set(p) - {'platform.mass'}:
         assert np.array_equal(heavier[name], p[name])
-    with pytest.raises(ParameterError, match=r'limits\.length_min.*less than'):
+    with pytest.raises(ParameterError) as caught:
         p.replaced({'limits.length_max': 0.7})
-    with pytest.raises(ParameterError, match=r'^a node: platform\.mass: -1\.0 kg: '):
+    snapshot(caught.value)
+    with pytest.raises(ParameterError) as caught:
         p.replaced({'platform.mass': -1.0}, 'a node')
+    snapshot(caught.value)
     read = Parameters(GIVEN, 'a file')
     for same in (read.replaced({}), pickle.loads(pickle.dumps(read))):
         assert same.source == 'a file'
@@ -239,30 +244,30 @@ def test_the_error_of_a_bad_file_names_parameter_value_and_rule(
     assert_rejected(tmp_path, GOOD.replace(old, new), said)
 
 
-@pytest.mark.parametrize(('name', 'value', 'rule'), [
-    ('platform.mass', -150.0, '-150.0 kg: must be more than 0'),
-    ('platform.mass', 0.0, '0.0 kg: must be more than 0'),
-    ('platform.mass', True, 'True: must be a double'),
-    ('platform.center_of_mass', [-np.inf, 0.0, 0.0], '-inf m: must be finite'),
-    ('platform.inertia', [20.0, 20.0, 35.0, 0.0, 0.0, 0.0], 'positive definite'),
-    ('geometry.zero_length', -0.9, '-0.9 m: must be at least 0'),
-    ('limits.length_min', -0.8, '-0.8 m: must be at least 0'),
-    ('limits.length_max', 0.0, '0.0 m: must be more than 0'),
-    ('limits.base_joint_angle_max', 3.2, '3.2 rad: must be more than 0, at most 3.14159'),
-    ('legs.piston.inertia', -1e-3, '-0.001 kg m^2: must be at least 0'),
-    ('legs.piston.mass', [6.0] * 5, 'must have 1 or 6 entries, has 5'),
-    ('legs.piston.mass', [6.0, 6.0, 6.0, 6.0, 6.0, -6.4], '-6.4 kg: must be at least 0'),
-    ('singularity.warn_condition', 0.5, '0.5: must be at least 1'),
-    ('setpoint.timeout', 2e9, '2000000000.0 s: must be more than 0, at most 1e+09'),
-    ('payload.window', 61.0, '61.0 s: must be at least 2, at most 60'),
-    ('joints', list('abcde') + [''], 'six different names'),
-    ('base.imu.orientation', [0.0, 0.0, 0.0, 1.002], 'length 1.002, must be within 0.001 of 1'),
-    ('geometry.base_joint_axes', [0.0] * 18, 'a direction must not be 0, 0, 0')])
-def test_a_value_that_breaks_a_rule_is_rejected(name: str, value: Any, rule: str) -> None:
+@pytest.mark.parametrize(('name', 'value'), [
+    ('platform.mass', -150.0),
+    ('platform.mass', 0.0),
+    ('platform.mass', True),
+    ('platform.center_of_mass', [-np.inf, 0.0, 0.0]),
+    ('platform.inertia', [20.0, 20.0, 35.0, 0.0, 0.0, 0.0]),
+    ('geometry.zero_length', -0.9),
+    ('limits.length_min', -0.8),
+    ('limits.length_max', 0.0),
+    ('limits.base_joint_angle_max', 3.2),
+    ('legs.piston.inertia', -1e-3),
+    ('legs.piston.mass', [6.0] * 5),
+    ('legs.piston.mass', [6.0, 6.0, 6.0, 6.0, 6.0, -6.4]),
+    ('singularity.warn_condition', 0.5),
+    ('setpoint.timeout', 2e9),
+    ('payload.window', 61.0),
+    ('joints', list('abcde') + ['']),
+    ('base.imu.orientation', [0.0, 0.0, 0.0, 1.002]),
+    ('geometry.base_joint_axes', [0.0] * 18)])
+def test_a_value_that_breaks_a_rule_is_rejected(name: str, value: Any, snapshot: Snapshot) -> None:
     with pytest.raises(ParameterError) as caught:
         Parameters({**GIVEN, name: value})
     assert str(caught.value).startswith(f'parameters: {name}: ')
-    assert rule in str(caught.value)
+    snapshot(caught.value)
 
 
 @pytest.mark.parametrize(('name', 'meant'), [
@@ -270,18 +275,21 @@ def test_a_value_that_breaks_a_rule_is_rejected(name: str, value: Any, rule: str
     ('geometry.base_joint', 'geometry.base_joints'), ('platfrom.mass', 'platform.mass'),
     ('limits.max_force', 'limits.force_max'), ('base_joints', 'geometry.base_joints'),
     ('platform.cog', None), ('legs.cylinder.com', None)])
-def test_the_nearest_name_is_suggested_for_an_unknown_one(name: str, meant: str | None) -> None:
+def test_the_nearest_name_is_suggested_for_an_unknown_one(
+        name: str, meant: str | None, snapshot: Snapshot) -> None:
     with pytest.raises(ParameterError) as caught:
         Parameters.declared(name)
-    hint = f'; do you mean {meant}?' if meant else ''
-    assert str(caught.value) == f'parameters: {name}: unknown parameter{hint}'
+    assert meant is None or str(caught.value).endswith(f' {meant}?')
+    snapshot(caught.value)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r'nowhere\.yaml: cannot be read: No such file'):
+def test_a_missing_file_is_named(tmp_path: Path, snapshot: Snapshot) -> None:
+    with pytest.raises(ParameterError) as caught:
         Parameters.from_yaml(tmp_path / 'nowhere.yaml')
-    with pytest.raises(ParameterError, match='cannot be read: embedded null byte'):
+    snapshot(caught.value)
+    with pytest.raises(ParameterError) as caught:
         Parameters.from_yaml('a\0b')
+    snapshot(caught.value)
 
 
 @pytest.mark.parametrize('change', [
@@ -429,29 +437,32 @@ def test_parameters_that_ros_declares_are_ignored(tmp_path: Path, name: str) -> 
     Parameters.check_file(path)
 
 
-@pytest.mark.parametrize('name, text, said', [
-    ('platform.mass', '150', 'platform.mass: 150: is an integer, must be a double: write 150.0'),
-    ('platform.mass', '0,5', "platform.mass: '0,5': must be a double"),
-    ('gravity', '[]', 'gravity: []: ROS accepts no empty list'),
-    ('gravity', '', 'gravity: has no value'), ('gravity', '~', 'gravity: has no value'),
-    ('gravity', '[', 'gravity: not YAML: line '), ('gravity', '\udcff', 'gravity: not YAML'),
-    ('use_sim_time', '1', 'use_sim_time: 1: must be a bool')])
-def test_a_bad_value_on_a_command_line_is_rejected(name: str, text: str, said: str) -> None:
+@pytest.mark.parametrize(('name', 'text'), [
+    ('platform.mass', '150'),
+    ('platform.mass', '0,5'),
+    ('gravity', '[]'),
+    ('gravity', ''),
+    ('gravity', '~'),
+    ('gravity', '['),
+    ('gravity', '\udcff'),
+    ('use_sim_time', '1')])
+def test_a_bad_value_on_a_command_line_is_rejected(
+        name: str, text: str, snapshot: Snapshot) -> None:
     Parameters.read_value('platform.mass', '150.0', 'command line')
     Parameters.read_value('use_sim_time', 'true', 'command line')
     with pytest.raises(ParameterError) as caught:
         Parameters.read_value(name, text, 'command line')
-    assert str(caught.value).startswith(f'command line: {said}')
+    snapshot(caught.value)
     assert str(caught.value).isprintable()
 
 
-@pytest.mark.parametrize('value, rule', [
-    ('5', 'must be a bool'), ("'true'", 'must be a bool'), ('[]', 'ROS accepts no empty list'),
-    ('~', 'None: must be a bool'), ('', 'has no value')])
-def test_a_value_that_ros_would_ignore_is_rejected(tmp_path: Path, value: str, rule: str) -> None:
+@pytest.mark.parametrize('value', ['5', "'true'", '[]', '~', ''])
+def test_a_value_that_ros_would_ignore_is_rejected(
+        tmp_path: Path, value: str, snapshot: Snapshot) -> None:
     path = written(tmp_path, f'/**: {{ros__parameters: {{use_sim_time: {value}}}}}\n')
-    with pytest.raises(ParameterError, match=f'use_sim_time: .*{rule}'):
+    with pytest.raises(ParameterError) as caught:
         Parameters.check_file(path)
+    snapshot(caught.value)
 
 
 @pytest.mark.parametrize('section, node, meant', [
@@ -462,22 +473,24 @@ def test_a_value_that_ros_would_ignore_is_rejected(tmp_path: Path, value: str, r
     ('/**/**/*', '/b', True), ('stewart_*', '', False), ('/*/*', '/b', False),
     ('/**' * 10000 + '/x', '/a/b', False)])
 def test_sections_are_matched_as_ros_matches_them(
-        tmp_path: Path, section: str, node: str, meant: bool) -> None:
+        tmp_path: Path, section: str, node: str, meant: bool, snapshot: Snapshot) -> None:
     path = written(
         tmp_path, f"? '{section}'\n: {{ros__parameters: {{platform: {{mass: 7.0}}}}}}\n")
     if meant:
         assert read_yaml(path, node or Parameters.node) == {'platform.mass': 7.0}
     else:
-        with pytest.raises(ParameterError, match='no parameters under'):
+        with pytest.raises(ParameterError) as caught:
             read_yaml(path, node or Parameters.node)
+        snapshot(caught.value)
 
 
-def test_namespaces_may_nest_in_the_file(tmp_path: Path) -> None:
+def test_namespaces_may_nest_in_the_file(tmp_path: Path, snapshot: Snapshot) -> None:
     path = written(tmp_path, 'a:\n  ros__parameters: {x: 1.0}\n  b: {ros__parameters: {y: 2.0}}\n')
     assert read_yaml(path, '/a/b') == {'y': 2.0}
     assert read_yaml(path, 'a') == {'x': 1.0}
-    with pytest.raises(ParameterError, match='no parameters under'):
+    with pytest.raises(ParameterError) as caught:
         read_yaml(path, 'b')
+    snapshot(caught.value)
 
 
 def test_many_other_sections_are_named_in_short(tmp_path: Path) -> None:
@@ -487,7 +500,7 @@ def test_many_other_sections_are_named_in_short(tmp_path: Path) -> None:
     assert len(str(caught.value)) < 400 + len(str(path))
 
 
-def test_parameters_are_taken_from_numpy_and_from_parameters() -> None:
+def test_parameters_are_taken_from_numpy_and_from_parameters(snapshot: Snapshot) -> None:
     parameters = Parameters({name: np.array(value) if isinstance(value, list) else value
                              for name, value in GIVEN.items()})
     assert parameters == Parameters(GIVEN)
@@ -497,12 +510,13 @@ def test_parameters_are_taken_from_numpy_and_from_parameters() -> None:
     rows = parameters['geometry.base_joints'].tolist()
     for same in (rows, [tuple(row) for row in rows], [np.array(row) for row in rows]):
         assert parameters.replaced({'geometry.base_joints': same}) == parameters
-    with pytest.raises(ParameterError, match='must have 18 entries, has 17'):
+    with pytest.raises(ParameterError) as caught:
         parameters.replaced({'geometry.base_joints': [*rows[:5], rows[5][:2]]})
+    snapshot(caught.value)
     assert parameters != 1
 
 
-def test_an_integer_is_a_double_from_python_alone(tmp_path: Path) -> None:
+def test_an_integer_is_a_double_from_python_alone(tmp_path: Path, snapshot: Snapshot) -> None:
     parameters = Parameters(GIVEN).replaced({
         'platform.mass': 70, 'gravity': [0, 0, -10], 'limits.force_max': np.full(6, 5)})
     assert repr(parameters['platform.mass']) == '70.0'
@@ -510,21 +524,25 @@ def test_an_integer_is_a_double_from_python_alone(tmp_path: Path) -> None:
     assert parameters.given['gravity'] == (0.0, 0.0, -10.0)
     assert parameters['limits.force_max'].tolist() == [5.0] * 6
     for wrong in (True, 10 ** 400, 1j, '70'):
-        with pytest.raises(ParameterError, match='must be a double'):
+        with pytest.raises(ParameterError) as caught:
             parameters.replaced({'platform.mass': wrong})
+        snapshot(caught.value)
     for read in (lambda: parameters.replaced({'platform.mass': 70}, exact_types=True),
                  lambda: Parameters({**GIVEN, 'platform.mass': 70}, exact_types=True)):
-        with pytest.raises(ParameterError, match='70: is an integer, .*: write 70.0'):
+        with pytest.raises(ParameterError) as caught:
             read()
+        snapshot(caught.value)
 
 
 @pytest.mark.parametrize('wrong', [None, [1.0], 'no.yaml', 3, {1: 2.0}, {None: 1}])
-def test_a_wrong_object_in_place_of_parameters_is_named(wrong: Any) -> None:
+def test_a_wrong_object_in_place_of_parameters_is_named(wrong: Any, snapshot: Snapshot) -> None:
     for use in (Parameters, Parameters(GIVEN).replaced):
-        with pytest.raises(ParameterError, match='must be a mapping|unknown parameter'):
+        with pytest.raises(ParameterError) as caught:
             use(wrong)
-    with pytest.raises(ParameterError, match='cannot be read'):
+        snapshot(caught.value)
+    with pytest.raises(ParameterError) as caught:
         Parameters.from_yaml(wrong)
+    snapshot(caught.value)
 
 
 def test_an_error_about_an_argument_is_a_value_error() -> None:
@@ -553,7 +571,8 @@ def test_a_whole_file_is_written_that_reads_back_equal(tmp_path: Path, file: str
     assert read == parameters
 
 
-def test_a_written_file_has_units_and_short_lines(tmp_path: Path, p: Parameters) -> None:
+def test_a_written_file_has_units_and_short_lines(
+        tmp_path: Path, p: Parameters, snapshot: Snapshot) -> None:
     parameters = p.replaced({
         'platform.mass': 1e-5, 'base_frame': "on 'deck'", 'platform_frame': 'y',
         'legs.cylinder.inertia': 1e17})
@@ -569,8 +588,9 @@ def test_a_written_file_has_units_and_short_lines(tmp_path: Path, p: Parameters)
         assert lines in text
     assert Parameters.from_yaml(tmp_path / 'out.yaml') == parameters
     assert 'force_max' not in text  # not given, and none by default
-    with pytest.raises(ParameterError, match='cannot be written: Is a directory'):
+    with pytest.raises(ParameterError) as caught:
         parameters.to_yaml(tmp_path)
+    snapshot(caught.value)
 
 
 TEXTS = st.text(st.characters(codec='utf-8'), min_size=1, max_size=8).filter(str.isprintable)
@@ -606,24 +626,25 @@ def test_the_given_values_cannot_be_changed() -> None:
         parameters.given['platform.mass'] = 3.0  # type: ignore[index]
 
 
-@pytest.mark.parametrize(('name', 'shape', 'said'), [
-    ('geometry.base_joints', (3, 6), 'must be (18,) or (6, 3): transposed?'),
-    ('geometry.platform_joints', (2, 9), 'must be (18,) or (6, 3)'),
-    ('geometry.base_joints', (1, 18), 'must be (18,) or (6, 3)'),
-    ('drive.base_universal_axes', (3, 3, 2), 'must be (18,) or (6, 3)'),
-    ('platform.inertia', (2, 3), 'must be (6,)'),
-    ('platform.inertia', (3, 3), 'must be (6,)'),
-    ('platform.center_of_mass', (3, 1), 'must be (3,): transposed?'),
-    ('platform.mass', (1, 1), 'must be a single value'),
-    ('legs.piston.mass', (2, 3), 'must be (1,) or (6,)'),
-    ('geometry.base_outline', (3, 4), 'must be (N, 3)'),
-    ('drive.torque_speed', (2, 3), 'must be (N, 2)')])
+@pytest.mark.parametrize(('name', 'shape'), [
+    ('geometry.base_joints', (3, 6)),
+    ('geometry.platform_joints', (2, 9)),
+    ('geometry.base_joints', (1, 18)),
+    ('drive.base_universal_axes', (3, 3, 2)),
+    ('platform.inertia', (2, 3)),
+    ('platform.inertia', (3, 3)),
+    ('platform.center_of_mass', (3, 1)),
+    ('platform.mass', (1, 1)),
+    ('legs.piston.mass', (2, 3)),
+    ('geometry.base_outline', (3, 4)),
+    ('drive.torque_speed', (2, 3))])
 def test_rows_that_are_not_those_of_the_parameter_are_rejected(
-        p: Parameters, name: str, shape: tuple[int, ...], said: str) -> None:
+        p: Parameters, name: str, shape: tuple[int, ...], snapshot: Snapshot) -> None:
     values = np.arange(1.0, 1.0 + np.prod(shape)).reshape(shape)
     for each in (values, values.tolist()):
-        with pytest.raises(ParameterError, match=re.escape(f'{name}: shape {shape}: {said}')):
+        with pytest.raises(ParameterError) as caught:
             p.replaced({name: each})
+        snapshot(caught.value)
 
 
 def test_joints_are_taken_as_rows_and_flat(p: Parameters) -> None:

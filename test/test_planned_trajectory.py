@@ -15,6 +15,7 @@ from referees import (
     derivative, random_direction, random_parameters, rng, rotation_about, scaled, size_of)
 from scipy.interpolate import CubicHermiteSpline
 from simulated import simulated, UNLIMITED
+from snapshot import Snapshot
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
@@ -27,6 +28,8 @@ from stewart_dynamics.setpoints.step import Setpoint, Step
 from stewart_dynamics.simulator.plant import Plant
 from trajectories import (
     Array, counted, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
+
+PROGRAM = 'library'
 
 Trajectory = tuple[Sequence[int], Array]  # times [ns], and rows as in trajectories
 
@@ -228,7 +231,7 @@ def test_a_force_exceeded_between_points_alone_is_found(duration: int) -> None:
         {'limits.force_max': [1.001 * forces.max()]})).accepted
 
 
-def test_a_limit_at_a_point_is_found_with_its_leg() -> None:
+def test_a_limit_at_a_point_is_found_with_its_leg(snapshot: Snapshot) -> None:
     times, rows = some(500)
     lengths = StewartPlatform(FREE).inverse_dynamics(motion_of(rows)).lengths
     bounds = np.full(6, 2.0)
@@ -237,17 +240,17 @@ def test_a_limit_at_a_point_is_found_with_its_leg() -> None:
     first = int(np.argmax(lengths[:, 3] > bounds[3]))
     assert result.leg == 3
     assert result.limit == 'limits.length_max'
-    assert ' leg_4: length ' in result.message
+    snapshot(result.message)
     assert times[first - 1] * 1e-9 < result.time <= times[first] * 1e-9 + 1e-5
 
 
-def test_a_trajectory_in_millimetres_is_named() -> None:
+def test_a_trajectory_in_millimetres_is_named(snapshot: Snapshot) -> None:
     times, rows = np.array([0, 2 * SECOND]), heave(0.02)
     assert check((times, rows)).accepted
     rows[:, POSITION] *= 1e3
     result = check((times, rows))
     assert not result.accepted
-    assert result.message.endswith('; likely mistake: position in mm')
+    snapshot(result.message)
 
 
 def test_the_first_of_two_violations_is_reported() -> None:
@@ -306,7 +309,7 @@ def parabola(start: float, top: float, duration: int, ways: int) -> tuple[list[i
     (80.0, 90.5, SECOND), (80.0, 90.05, SECOND), (85.0, 90.01, SECOND), (30.0, 90.1, SECOND),
     (89.9, 90.02, SECOND // 100), (89.5, 90.001, SECOND // 10)])
 def test_a_double_crossing_between_two_points_is_found(
-        start: float, highest: float, duration: int) -> None:
+        start: float, highest: float, duration: int, snapshot: Snapshot) -> None:
     """There and back: det(J) has the same sign, and the same value, at both points."""
     seconds = duration * 1e-9
 
@@ -322,7 +325,7 @@ def test_a_double_crossing_between_two_points_is_found(
     assert crossed.any()
     result = check(data, UNBOUND)
     assert result.reason == SINGULAR
-    assert 'det(J) crosses zero' in result.message
+    snapshot(result.message)
     assert result.time == pytest.approx(dense[np.argmax(crossed)], abs=1e-3 * seconds)
     short_of = 90.0 - 2.0 * (highest - 90.0)
     data, _, det = leap(short_of)
@@ -357,7 +360,8 @@ def test_a_hexapod_on_its_end_stops_may_leave_them() -> None:
         assert result.accepted == accepted, result.message
 
 
-def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded() -> None:
+def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded(
+        snapshot: Snapshot) -> None:
     """By any of those who check it: the planned trajectory, the step and the plant."""
     rows = np.array([[*HOME, *REST, *REST]])
     lengths = StewartPlatform(FREE).inverse_dynamics(motion_of(rows)).lengths[0]
@@ -373,8 +377,9 @@ def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded() -> Non
             assert bool(output.exceedances) == exceeded
             simulated_parameters = simulated(**{**UNLIMITED, **changes})
             if exceeded:
-                with pytest.raises(ParameterError, match=f'is 1.* {limit}$'):
+                with pytest.raises(ParameterError) as caught:
                     Plant(simulated_parameters)
+                snapshot(caught.value)
             else:
                 assert Plant(simulated_parameters).state.lengths == tuple(lengths.tolist())
 
@@ -383,7 +388,7 @@ def test_a_singularity_is_reported_before_exceeded_limits() -> None:
     assert check(([0], np.array([[0.0, 0.0, 0.0, *HOME[3:], *REST, *REST]]))).reason == SINGULAR
 
 
-def test_a_singularity_on_the_way_of_the_legs_is_found() -> None:
+def test_a_singularity_on_the_way_of_the_legs_is_found(snapshot: Snapshot) -> None:
     """
     A second from point to point, the platform turns up to 89 degrees and back, short of 90.
 
@@ -400,11 +405,11 @@ def test_a_singularity_on_the_way_of_the_legs_is_found() -> None:
     assert apart.max() > abs(limit[::2].sum() - limit[1::2].sum())
     result = check((times, rows), UNBOUND)
     assert result.reason == SINGULAR
-    assert "the legs' cubics lead to" in result.message
+    snapshot(result.message)
     assert check(parabola(80.0, 89.0, SECOND, 20), UNBOUND).accepted
 
 
-def test_stop_condition_met_between_two_points_alone_is_found() -> None:
+def test_stop_condition_met_between_two_points_alone_is_found(snapshot: Snapshot) -> None:
     times, rows = parabola(80.0, 89.0, SECOND, 20)
     dense, results = between_points(times, rows)
     condition = results[:, CONDITION]
@@ -418,7 +423,7 @@ def test_stop_condition_met_between_two_points_alone_is_found() -> None:
         if rejected:
             inside = dense[condition >= stop]
             assert inside[0] <= result.time <= inside[-1]
-            assert 'reaches singularity.stop_condition' in result.message
+            snapshot(result.message)
         else:
             assert result.warning
 
@@ -436,7 +441,7 @@ def dipping(gap: float, depth: float, extra: float) -> Trajectory:
         yaw(90.0 - gap, rate, acceleration), yaw(90.0 - gap, -rate, acceleration)])
 
 
-def test_a_crossing_within_a_dip_of_the_determinant_is_found() -> None:
+def test_a_crossing_within_a_dip_of_the_determinant_is_found(snapshot: Snapshot) -> None:
     """No sample is needed between the two points, and their cubic of det(J) stays clear."""
     trajectory = dipping(0.1, 0.5, 0.6)
     dense, results = between_points(*trajectory)
@@ -448,7 +453,7 @@ def test_a_crossing_within_a_dip_of_the_determinant_is_found() -> None:
     assert np.all(by_cubic / determinants[0] > 0.4)
     result = check(trajectory, UNBOUND)
     assert result.reason == SINGULAR
-    assert 'det(J) crosses zero' in result.message
+    snapshot(result.message)
     assert result.time == pytest.approx(dense[np.argmax(crossed)], abs=1e-3)
 
 

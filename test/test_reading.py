@@ -24,6 +24,8 @@ from stewart_dynamics.description.sdf import sdf, upright
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 
+PROGRAM = 'stewart_describe'
+
 PLATFORM = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 WRITERS = {'urdf': urdf, 'sdf': sdf, 'xml': mjcf}
 EXACT = 1e-12
@@ -73,7 +75,7 @@ def test_written_files_read_back_with_the_same_numbers(kind, machine, tmp_path):
 
 
 @pytest.mark.parametrize('kind', ['sdf', 'xml'])
-def test_closed_files_of_others_are_read_by_how_bodies_are_connected(kind, tmp_path):
+def test_closed_files_of_others_are_read_by_how_bodies_are_connected(kind, tmp_path, snapshot):
     p = PLATFORM
     found = read_hexapod(written(p, kind, tmp_path, foreign))
     for name in ('geometry.base_joints', 'geometry.platform_joints', 'platform.inertia',
@@ -81,11 +83,10 @@ def test_closed_files_of_others_are_read_by_how_bodies_are_connected(kind, tmp_p
         assert found.parameters[name] == pytest.approx(p[name], rel=1e-6, abs=1e-12), name
     said = '\n'.join(found.remarks)
     if kind == 'sdf':  # which counts positions from the file's own
-        assert 'gravity: not in the file: 9.80665' in said
-        assert 'actuator.reflected_mass: not in the file: 0 kg' in said
+        snapshot(said)
         assert found.parameters['geometry.zero_length'] == pytest.approx(1.3, abs=1e-4)
     else:
-        assert 'limits.velocity_max: not in the file: unlimited' in said
+        snapshot(said)
 
 
 @pytest.mark.parametrize('kind', WRITERS)
@@ -226,42 +227,40 @@ def test_an_mjcf_that_mujoco_rejects_is_rejected_with_the_reason_of_mujoco(tmp_p
         read_hexapod(path)
 
 
-def test_a_prismatic_joint_across_its_leg_is_rejected(tmp_path):
+def test_a_prismatic_joint_across_its_leg_is_rejected(tmp_path, snapshot):
     path = written(PLATFORM, 'xml', tmp_path, lambda text: changed(
         text, '(<joint name="leg_5" type="slide" axis)="0 0 1"', r'\1="1 0 0"'))
-    with pytest.raises(StewartError, match='leg_5: the axis of this prismatic joint is inclined '
-                       'to the line between the joints of its leg by 90 degrees: must be along'):
+    with pytest.raises(StewartError) as caught:
         read_hexapod(path)
+    snapshot(caught.value)
 
 
-def test_a_negative_gear_is_reported(tmp_path):
+def test_a_negative_gear_is_reported(tmp_path, snapshot):
     path = written(PLATFORM, 'xml', tmp_path, lambda text: changed(
         text, '<motor name="leg_6"', '<motor name="leg_6" gear="-1"'))
     found = read_hexapod(path)
-    assert 'leg_6: the gear of its actuator is negative: forces are along its joint here' in (
-        found.remarks)
+    snapshot('\n'.join(found.remarks))
     assert found.parameters['limits.force_max'] == pytest.approx(6000.0)
 
 
-def test_a_leg_without_a_joint_at_one_end_is_rejected(tmp_path):
+def test_a_leg_without_a_joint_at_one_end_is_rejected(tmp_path, snapshot):
     path = written(PLATFORM, 'sdf', tmp_path, lambda text: re.sub(
         '(<joint name="[^"]*") type="ball"', r'\1 type="fixed"', foreign(text)))
-    with pytest.raises(StewartError, match="leg_1: no joint between it and 'platform': a leg of "
-                       'this model turns at both of its ends'):
+    with pytest.raises(StewartError) as caught:
         read_hexapod(path)
+    snapshot(caught.value)
 
 
-def test_legs_that_are_cut_in_two_are_rejected(tmp_path):
+def test_legs_that_are_cut_in_two_are_rejected(tmp_path, snapshot):
     """As CAD programs cut loops: one part hangs from the platform."""
     def cut(text):
         return changed(changed(
             text, '<child>leg_2_piston</child>', '<child>leg_2_end</child>'),
             '<joint name="leg_2"', '<link name="leg_2_end"/><joint name="leg_2"')
 
-    with pytest.raises(StewartError, match=(
-            "no hexapod: legs with one prismatic joint each between 'base' and 'platform': 5; "
-            "there must be six. 2 bodies have one joint alone, as '.*': joints or constraints")):
+    with pytest.raises(StewartError) as caught:
         read_hexapod(written(PLATFORM, 'sdf', tmp_path, cut))
+    snapshot(caught.value)
 
 
 @pytest.mark.parametrize('kind', ['urdf', 'sdf'])
@@ -295,12 +294,13 @@ def links(count, kind, parent):
     chain_of_frames(20_000), links(20_000, 'fixed', lambda n: n - 1),
     links(20_000, 'continuous', lambda n: n - 1), links(20_000, 'continuous', lambda n: 0)],
     ids=['frames', 'fixed links', 'hinged links', 'star'])
-def test_large_models_take_time_in_proportion_to_their_size(text, tmp_path):
+def test_large_models_take_time_in_proportion_to_their_size(text, tmp_path, snapshot):
     path = tmp_path / 'large.xml'
     path.write_text(text)
     begun = time.process_time()
-    with pytest.raises(StewartError, match='no hexapod'):
+    with pytest.raises(StewartError) as caught:
         read_hexapod(path)
+    snapshot(caught.value)
     assert time.process_time() - begun < 20.0  # quadratic: minutes
 
 
@@ -334,16 +334,16 @@ def test_mujoco_writes_its_warnings_nowhere(tmp_path, monkeypatch):
 # The SDFormat file: accepted by libsdformat where it is installed, its frames and gravity
 
 # The program of libsdformat: gz of new releases, ign of old ones.
-PROGRAM = next((name for name in ('gz', 'ign') if shutil.which(name)), '')
+GAZEBO = next((name for name in ('gz', 'ign') if shutil.which(name)), '')
 
 
-@pytest.mark.skipif(not PROGRAM, reason='needs gz sdf or ign sdf')
+@pytest.mark.skipif(not GAZEBO, reason='needs gz sdf or ign sdf')
 @pytest.mark.parametrize('seed', [None, 0])
 def test_libsdformat_finds_the_file_valid(seed, tmp_path):
     p = PLATFORM if seed is None else random_parameters(rng(seed))
     file = tmp_path / 'hexapod.sdf'
     file.write_text(sdf(Hexapod(p), 'hexapod'), encoding='utf-8')
-    done = subprocess.run([PROGRAM, 'sdf', '-k', str(file)], capture_output=True, text=True,
+    done = subprocess.run([GAZEBO, 'sdf', '-k', str(file)], capture_output=True, text=True,
                           timeout=300)
     assert done.returncode == 0, done.stderr
     assert 'Valid' in done.stdout
@@ -428,14 +428,14 @@ def test_forces_of_an_mjcf_at_rest_are_warnings(changes, said, tmp_path):
     assert any(said in each for each in found.warnings)
 
 
-def test_limits_of_an_mjcf_are_taken_both_ways_or_named(tmp_path):
+def test_limits_of_an_mjcf_are_taken_both_ways_or_named(tmp_path, snapshot):
     without = (r' ctrlrange="[^"]*"| ctrllimited="[^"]*"', '')
     found = read_changed('xml', tmp_path, without,
                          (SLIDE, r'\1 actuatorfrclimited="true" actuatorfrcrange="-250 250"\2'))
     assert found.parameters['limits.force_max'] == pytest.approx(250.0)
     found = read_changed('xml', tmp_path, without, (
         '<motor ', '<motor ctrllimited="true" ctrlrange="0 400" '))
-    assert 'each leg: ctrlrange 0 400 is one-sided: left out' in found.remarks
+    snapshot('\n'.join(found.remarks))
     assert found.parameters['limits.force_max'] is None
     assert not any('limits.force_max' in each for each in found.remarks)
 
@@ -504,12 +504,11 @@ def test_the_platform_frame_does_not_depend_on_masses(platform, tmp_path):
     assert (missing in found.warnings) == (platform is not HEAVY)
 
 
-def test_limits_of_zero_are_left_out_and_not_listed_as_missing(tmp_path):
+def test_limits_of_zero_are_left_out_and_not_listed_as_missing(tmp_path, snapshot):
     found = from_text(cad_urdf(HEAVY, 'lower="0" upper="0" effort="0" velocity="0"'), tmp_path)
     assert all(found.parameters[name] is None for name in (
         'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max'))
-    assert ('each leg: limits.length_min, limits.length_max: lower and upper are both 0: no '
-            'travel: left out') in found.remarks
+    snapshot('\n'.join(found.remarks))
     assert not any('not in the file: unlimited' in each for each in found.remarks)
 
 
@@ -525,10 +524,11 @@ def test_what_gazebo_and_ros2_control_add_in_a_urdf_is_named_or_taken(tmp_path):
     assert any(each.startswith('each leg: stiffness 40 N/m about 0 m') for each in found.warnings)
 
 
-def test_geometry_alone_is_read_without_masses(tmp_path):
+def test_geometry_alone_is_read_without_masses(tmp_path, snapshot):
     text = cad_urdf('<link name="platform"/>', mass=0.0)
-    with pytest.raises(StewartError, match='has no mass; --geometry-only reads the geometry'):
+    with pytest.raises(StewartError) as caught:
         from_text(text, tmp_path)
+    snapshot(caught.value)
     p = from_text(text, tmp_path, True).parameters
     assert p['geometry.base_joints'] == pytest.approx(PLATFORM['geometry.base_joints'], abs=1e-9)
     machine = StewartPlatform(p)

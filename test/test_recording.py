@@ -35,6 +35,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
+from snapshot import Snapshot
 from stewart_dynamics import BagError, Parameters
 from stewart_dynamics.bags import mcap_file
 from stewart_dynamics.bags.blocks import LARGEST_CHUNK, LARGEST_MESSAGE
@@ -44,6 +45,8 @@ from stewart_dynamics.replay.one_bag import replay as replay_one
 from stewart_dynamics.replay.replay_options import NODE, Options
 from stewart_dynamics.setpoints.inputs import INPUT_TYPES, POSE, TWIST
 import zstandard
+
+PROGRAM = 'stewart_replay'
 
 PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 MAGIC = b'\x89MCAP0\r\n'
@@ -305,7 +308,7 @@ def test_records_that_are_used_and_records_that_are_damage(
 
 # Files as recorders write them
 
-def test_unchunked_bags_are_read_with_a_notice(file: Path) -> None:
+def test_unchunked_bags_are_read_with_a_notice(file: Path, snapshot: Snapshot) -> None:
     given_ = motion(30)
     for options in ({}, WITHOUT_INDEX):  # the latter is rosbag2's preset fastwrite
         content = mcap(given_, use_chunking=False, **options)
@@ -319,7 +322,7 @@ def test_unchunked_bags_are_read_with_a_notice(file: Path) -> None:
         assert 30 < len(found.messages) < 60
         assert found.messages == given_[:len(found.messages)]
         assert found.missing
-        assert 'no checksums' in found.notices[0]
+        snapshot(found.notices[0])
 
 
 def test_a_checksum_of_the_file_covers_messages_outside_of_chunks(file: Path) -> None:
@@ -337,11 +340,11 @@ def test_a_checksum_of_the_file_covers_messages_outside_of_chunks(file: Path) ->
         assert found.messages == given_ or found.missing
 
 
-def test_chunks_without_checksums_are_read_with_a_notice(file: Path) -> None:
+def test_chunks_without_checksums_are_read_with_a_notice(file: Path, snapshot: Snapshot) -> None:
     file.write_bytes(file_of(DECLARED, chunk(message(2, 5), 5, checksum=0)))
     found = read(file)
     assert (len(found.messages), found.missing) == (1, [])
-    assert 'no checksums' in found.notices[0]
+    snapshot(found.notices[0])
 
 
 def test_attachments_and_metadata_between_chunks_are_skipped(file: Path) -> None:
@@ -378,14 +381,15 @@ def test_bags_without_definitions_have_their_types_by_name(file: Path) -> None:
         '/mixed': 'a/msg/A and a/msg/A encoded as json'}
 
 
-def test_empty_bags(file: Path) -> None:
+def test_empty_bags(file: Path, snapshot: Snapshot) -> None:
     for content in (mcap([]), file_of(), file_of(chunk(b''))):
         file.write_bytes(content)
         assert read(file) == ([], [], [])
     for content in (b'', MAGIC[:4], b'\0' * 100, b'MCAP'):
         file.write_bytes(content)
-        with pytest.raises(BagError, match='not a bag'):
+        with pytest.raises(BagError) as caught:
             Recording(file)
+        snapshot(caught.value)
     for content in (MAGIC, mcap([])[:30]):
         file.write_bytes(content)
         assert read(file).missing
@@ -522,14 +526,13 @@ def bomb(*contents: bytes, start: int = 5) -> bytes:
     [empty_messages(1_000_000, 5)], [empty_messages(200_000, time) for time in range(5, 10)],
     [empty_messages(300_000, 5)] * 4])
 def test_of_a_file_with_more_messages_than_bytes_the_first_are_read(
-        contents: list[bytes], file: Path) -> None:
+        contents: list[bytes], file: Path, snapshot: Snapshot) -> None:
     file.write_bytes(bomb(*contents))
     size = file.stat().st_size
     assert size < 20_000
     found = read(file)
     assert 80_000 < len(found.messages) < 100_000 + size
-    assert found.missing == ['bag.mcap: more messages than bytes: those after '
-                             f'{len(found.messages)} are not read']
+    snapshot('\n'.join(found.missing))
     found.messages.clear()
     assert peak_of(file) < 200_000_000
     # a few are no bomb, however well they are compressed
@@ -538,7 +541,7 @@ def test_of_a_file_with_more_messages_than_bytes_the_first_are_read(
 
 
 def test_chunks_that_overlap_wait_in_limited_memory(
-        file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        file: Path, monkeypatch: pytest.MonkeyPatch, snapshot: Snapshot) -> None:
     contents = [message(1, 7, bytes(1 << 20)) + message(1, 8 + n, bytes(1 << 20))
                 for n in range(20)]
     file.write_bytes(bomb(*contents))
@@ -551,7 +554,7 @@ def test_chunks_that_overlap_wait_in_limited_memory(
     times = [when for _, when, _ in found.messages]
     assert times == sorted(times)
     assert len(times) < 40
-    assert 'overlap in time by more than 8 MB' in found.missing[0]
+    snapshot(found.missing[0])
     found.messages.clear()
     assert peak_of(file) < 40_000_000
 
@@ -570,7 +573,7 @@ def test_many_small_chunks_of_equal_times(file: Path) -> None:
 
 
 def test_a_compressed_file_is_unpacked_up_to_a_limit(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, snapshot: Snapshot) -> None:
     monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
     packer = zstandard.ZstdCompressor().compressobj()
     packed = packer.compress(mcap(motion(5)))
@@ -584,7 +587,7 @@ def test_a_compressed_file_is_unpacked_up_to_a_limit(
     assert sum(path.stat().st_size for path in unpacked) <= 1 << 26
     recording.close()
     assert list(tmp_path.iterdir()) == [file]
-    assert 'unpacks to more than 1000 times its size' in recording.missing[0]
+    snapshot(recording.missing[0])
 
 
 # Whatever bytes
@@ -691,7 +694,7 @@ def test_lost_rows_of_sqlite3_are_reported(tmp_path: Path) -> None:
     assert 0 < rejected < 10
 
 
-def test_rows_that_are_not_messages_are_missing(tmp_path: Path) -> None:
+def test_rows_that_are_not_messages_are_missing(tmp_path: Path, snapshot: Snapshot) -> None:
     given_ = motion(2)
     file = storage(write_bag(tmp_path / 'bag', given_))
     execute(file, *(
@@ -701,7 +704,7 @@ def test_rows_that_are_not_messages_are_missing(tmp_path: Path) -> None:
                       "data = 'text'")))
     found = read(file)
     assert found.messages == given_
-    assert found.missing == [f'{file.name}: 4 rows that are not messages']
+    snapshot('\n'.join(found.missing))
 
 
 ENDLESS = 'WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) '
@@ -715,11 +718,13 @@ ENDLESS = 'WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) '
     'DROP TABLE topics; CREATE TABLE topics (id, name, type, serialization_format AS '
     '(hex(zeroblob(500000000))))',
     'DROP TABLE messages; CREATE TABLE messages (id, topic_id, timestamp)'])
-def test_tables_that_may_never_end_are_rejected(changes: str, tmp_path: Path) -> None:
+def test_tables_that_may_never_end_are_rejected(
+        changes: str, tmp_path: Path, snapshot: Snapshot) -> None:
     file = storage(write_bag(tmp_path / 'bag', motion(1)))
     execute(file, changes)
-    with pytest.raises(BagError, match='has no table (messages|topics) with the columns'):
+    with pytest.raises(BagError) as caught:
         Recording(file)
+    snapshot(caught.value)
 
 
 def test_definitions_that_never_end_are_not_read(tmp_path: Path) -> None:
@@ -849,7 +854,7 @@ def listed(folder: Path, names: Iterable[str]) -> None:
         + ''.join(f'  - "{name}"\n' for name in names))
 
 
-def test_a_bag_of_several_files_is_read_in_their_order(tmp_path: Path) -> None:
+def test_a_bag_of_several_files_is_read_in_their_order(tmp_path: Path, snapshot: Snapshot) -> None:
     bag = tmp_path / 'bag'
     given_ = split_bag(bag, 12, lambda n: f'bag_{n}.mcap')
     assert read(bag) == (given_, [], [])
@@ -857,8 +862,7 @@ def test_a_bag_of_several_files_is_read_in_their_order(tmp_path: Path) -> None:
     (bag / 'metadata.yaml').unlink()
     found = read(bag)
     assert found[:2] == (given_, [])
-    assert found.notices == [
-        'metadata.yaml is missing or damaged: the files in the folder are read']
+    snapshot('\n'.join(found.notices))
 
 
 def test_a_listed_file_that_does_not_exist_is_missing(tmp_path: Path) -> None:
@@ -878,18 +882,19 @@ def test_a_listed_file_that_does_not_exist_is_missing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('name', [
     'bag_1.mcap', 'bag_1.db3', 'bag_1.mcap.zstd', 'bag_1.db3.zstd', 'bag_12.mcap'])
-def test_a_part_that_metadata_does_not_list_is_missing(name: str, tmp_path: Path) -> None:
+def test_a_part_that_metadata_does_not_list_is_missing(
+        name: str, tmp_path: Path, snapshot: Snapshot) -> None:
     bag = tmp_path / 'bag'
     given_ = split_bag(bag, 1, lambda n: f'bag_{n}.mcap')
     (bag / name).write_bytes(b'not read')
     found = read(bag)
     assert found.messages == given_
-    assert found.missing == [f'{name} is in the folder but not in metadata.yaml: it is not read '
-                             '(ros2 bag reindex lists it)']
+    snapshot('\n'.join(found.missing))
     assert not found.notices
 
 
-def test_other_files_beside_a_recording_are_no_part_of_it(tmp_path: Path) -> None:
+def test_other_files_beside_a_recording_are_no_part_of_it(
+        tmp_path: Path, snapshot: Snapshot) -> None:
     bag = tmp_path / 'bag'
     given_ = split_bag(bag, 1, lambda n: f'bag_{n}.mcap')
     # the same part compressed, a file of the Finder, and files that are no bags
@@ -899,7 +904,7 @@ def test_other_files_beside_a_recording_are_no_part_of_it(tmp_path: Path) -> Non
     (bag / 'other_0.mcap').write_bytes(b'not read')
     messages, missing, notices = read(bag)
     assert (messages, missing, len(notices)) == (given_, [], 1)
-    assert notices[0].startswith('other_0.mcap is in the folder but not in metadata.yaml')
+    snapshot(notices[0])
     (bag / 'bag.mcap').write_bytes(b'not read')  # the parts merged
     messages, missing, notices = read(bag)
     assert (messages, missing, len(notices)) == (given_, [], 2)
@@ -945,7 +950,7 @@ def test_a_bag_with_damaged_metadata_is_read_by_its_files(text: str, tmp_path: P
     assert '\n' not in str(caught.value)
 
 
-def test_no_file_outside_of_the_folder_is_read(tmp_path: Path) -> None:
+def test_no_file_outside_of_the_folder_is_read(tmp_path: Path, snapshot: Snapshot) -> None:
     bag, outside = tmp_path / 'bag', tmp_path / 'outside.mcap'
     given_ = split_bag(bag, 2, lambda n: f'bag_{n}.mcap')
     outside.write_bytes(mcap(motion(1)))
@@ -957,8 +962,9 @@ def test_no_file_outside_of_the_folder_is_read(tmp_path: Path) -> None:
     for name in ('../outside.mcap', str(outside), 'link.mcap', 'sub/bag.mcap', 'sub', '.',
                  'pipe.mcap'):
         listed(bag, ['bag_0.mcap', name])
-        with pytest.raises(BagError, match='metadata.yaml lists .*, which is not a file in'):
+        with pytest.raises(BagError) as caught:
             Recording(bag)
+        snapshot(caught.value)
     for name in ('circle.mcap', 'x' * 300, 'x/' * 3000):
         listed(bag, ['bag_0.mcap', name])
         try:

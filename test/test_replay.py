@@ -35,6 +35,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 from scipy.spatial.transform import Rotation
 
+from snapshot import Snapshot
 import stewart_dynamics
 from stewart_dynamics import BagError, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.model import JOINT_STATES, TF
@@ -53,6 +54,8 @@ from stewart_dynamics.setpoints.inputs import ACCEL, COMBINED, INPUT_TYPES, POSE
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
 from test_recording import write_ros_1
+
+PROGRAM = 'stewart_replay'
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
@@ -570,7 +573,7 @@ def test_strict_exits_with_1_at_a_limit_without_a_warning(tmp_path: Path) -> Non
 
 
 def test_twists_that_are_not_those_of_the_poses_are_no_motion_that_holds_all_limits(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
     """Twists and accelerations that are never filled."""
     empty = {TWIST: messages.twist, ACCEL: messages.accel}
     given = [(topic.removeprefix(f'{NODE}/'), when, message)
@@ -588,7 +591,7 @@ def test_twists_that_are_not_those_of_the_poses_are_no_motion_that_holds_all_lim
     # accelerations are too small to matter
     assert {each['topic'] for each in found} == {TWIST}
     for each in found:
-        assert each['text'].endswith('likely mistake: it is zero, never filled?')
+        snapshot(each['text'])
         assert f'{each["topic"]}: {each["text"]}' in printed
 
 
@@ -644,25 +647,25 @@ def test_bad_arguments(
     assert text in capsys.readouterr().err
 
 
-def test_a_missing_topic_lists_the_topics_of_the_bag(tmp_path: Path, rejected: Rejected) -> None:
+def test_a_missing_topic_lists_the_topics_of_the_bag(
+        tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     bag = write_bag(tmp_path / 'bag', motion(3)[:2])
     text = rejected(bag)
-    assert f'has no topic {NODE}/{ACCEL}' in text
-    assert f'{NODE}/{POSE} (geometry_msgs/msg/PoseStamped)' in text
-    assert f'{NODE}/{TWIST} (geometry_msgs/msg/TwistStamped)' in text
-    assert f'has no topic /x/{ACCEL}' in rejected(bag, '--node', 'x')
+    snapshot(text)
+    snapshot(rejected(bag, '--node', 'x'))
 
 
 @pytest.mark.parametrize('topic', [*TOPICS, WRENCH])
-def test_a_topic_of_another_type(topic: str, tmp_path: Path, rejected: Rejected) -> None:
+def test_a_topic_of_another_type(
+        topic: str, tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     of = [*motion(1), (WRENCH, RECORDED + SECOND, messages.wrench(0))]
     bag = write_bag(tmp_path / 'bag', of, **{
         topic.rpartition('/')[2]: 'geometry_msgs/msg/PointStamped'})
-    assert (f'{NODE}/{topic}: is a geometry_msgs/msg/PointStamped, must be a '
-            f'{INPUT_TYPES[topic]}') in rejected(bag)
+    snapshot(rejected(bag))
 
 
-def test_a_bag_of_ros_1_gives_the_same(tmp_path: Path, rejected: Rejected) -> None:
+def test_a_bag_of_ros_1_gives_the_same(
+        tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     of = motion(30)
     assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
     write_ros_1(tmp_path / 'old.bag', [
@@ -671,26 +674,24 @@ def test_a_bag_of_ros_1_gives_the_same(tmp_path: Path, rejected: Rejected) -> No
     old, new = rows_of(tmp_path / 'out' / 'old'), rows_of(tmp_path / 'out' / 'bag')
     assert len(new) == 30
     assert old == new
-    assert 'has no topic /none' in rejected(tmp_path / 'old.bag', '--pose', '/none')
+    snapshot(rejected(tmp_path / 'old.bag', '--pose', '/none'))
 
 
 def test_where_results_cannot_be_written_the_folder_is_named(
-        tmp_path: Path, rejected: Rejected) -> None:
+        tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     bag, file = write_bag(tmp_path / 'bag', motion(3)), tmp_path / 'file'
     file.touch()
-    assert rejected(bag, output=file / 'out') == (
-        f'stewart_replay: {file / "out"}: cannot be written: Not a directory\n')
-    assert f'{file}' in rejected(bag, output=file)
+    snapshot(rejected(bag, output=file / 'out'))
+    snapshot(rejected(bag, output=file))
 
 
 # Several bags
 
 def test_bags_of_one_name_are_rejected_before_anything_is_written(
-        tmp_path: Path, rejected: Rejected) -> None:
+        tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     a, b = (write_bag(tmp_path / folder / 'x', motion(3)) for folder in ('a', 'b'))
     for second in (b, a, tmp_path / 'a' / '..' / 'a' / 'x', a / 'x.mcap'):
-        assert (f'{a}, {second}: the results of both would be {tmp_path / "out" / "x"}'
-                in rejected(a, second, output=tmp_path / 'out'))
+        snapshot(rejected(a, second, output=tmp_path / 'out'))
 
 
 def test_a_point_in_a_name_is_no_suffix(tmp_path: Path) -> None:
@@ -745,12 +746,11 @@ def damaged_bag(file: Path) -> Path:
 
 
 def test_the_rest_of_a_damaged_bag_is_replayed(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
     bag = damaged_bag(tmp_path / 'damaged.mcap')
     assert run(bag, tmp_path / 'out') == PARTLY_READ
     printed = capsys.readouterr()
-    assert f'{bag}: part of it could not be read: damaged.mcap: the chunk at byte ' in printed.err
-    assert 'its checksum is wrong' in printed.err
+    snapshot(printed.err)
     rows = rows_of(tmp_path / 'out' / 'damaged')
     assert 80 < len(rows) < 95
     assert run(write_bag(tmp_path / 'whole', motion(100)), tmp_path / 'out') == DONE
@@ -845,14 +845,14 @@ def test_a_killed_replay_leaves_nothing_under_the_final_name(
 @pytest.mark.slow
 @pytest.mark.parametrize('sent', [signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_replay_leaves_nothing(
-        long_bag: Path, tmp_path: Path, sent: signal.Signals) -> None:
+        long_bag: Path, tmp_path: Path, sent: signal.Signals, snapshot: Snapshot) -> None:
     """By SIGINT in test_fleet.py."""
     with begun(long_bag, tmp_path / 'out') as process:
         process.send_signal(sent)
         _, text = process.communicate(timeout=300)
         # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
         assert process.returncode in (130, -signal.SIGINT)
-    assert text == 'stewart_replay: interrupted\n'
+    snapshot(text)
     assert not list((tmp_path / 'out').iterdir())
 
 
@@ -880,12 +880,14 @@ def test_unexpected_errors_are_one_line_and_leave_nothing(
 
 # As a library
 
-def test_the_library_raises_what_the_program_prints(tmp_path: Path) -> None:
-    with pytest.raises(BagError, match='none'):
+def test_the_library_raises_what_the_program_prints(tmp_path: Path, snapshot: Snapshot) -> None:
+    with pytest.raises(BagError) as caught:
         replay(tmp_path / 'none', PARAMETERS, tmp_path / 'out')
+    snapshot(caught.value)
     (tmp_path / 'there').mkdir()
-    with pytest.raises(BagError, match='exists already'):
+    with pytest.raises(BagError) as caught:
         replay(ROOT / 'bags' / 'clear', PARAMETERS, tmp_path / 'there')
+    snapshot(caught.value)
     result = replay(ROOT / 'bags' / 'clear', PARAMETERS, tmp_path / 'out')
     assert (result.bag, result.code) == (ROOT / 'bags' / 'clear', DONE)
     assert result.summary['complete']
@@ -954,13 +956,13 @@ def test_a_namespace_is_found_by_the_end_of_the_name(tmp_path: Path) -> None:
 
 
 def test_ambiguous_topics_are_listed_and_can_be_selected(
-        tmp_path: Path, rejected: Rejected) -> None:
+        tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     of = [('/a/where' if topic == POSE else topic, when, data)
           for topic, when, data in motion(20)]
     bag = write_bag(
         tmp_path / 'bag', [*of, ('/b/where', RECORDED, messages.pose(0, (0.0, 0.0, 1.2)))],
         where=INPUT_TYPES[POSE])
-    assert '/a/where, /b/where: select one by --pose' in rejected(bag)
+    snapshot(rejected(bag))
     assert run(bag, tmp_path / 'out', '--pose', '/a/where') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
     for topic, words in (('/none', 'has no topic /none; it contains /a/where (geometry'),
@@ -978,12 +980,12 @@ def test_a_wrench_is_never_found_by_its_type(tmp_path: Path) -> None:
     assert float(loaded) > float(free) + 100.0
 
 
-def test_combined_by_its_option(tmp_path: Path, rejected: Rejected) -> None:
+def test_combined_by_its_option(tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     bag = write_bag(tmp_path / 'bag', [
         ('/cmd/all', RECORDED + n * MS, messages.combined(n * MS)) for n in range(1, 9)],
         all=INPUT_TYPES[COMBINED])
-    assert '--combined reads' in rejected(bag)
-    assert '--combined: is not read' in rejected(bag, '--differentiate', '--combined', '/all')
+    snapshot(rejected(bag))
+    snapshot(rejected(bag, '--differentiate', '--combined', '/all'))
     assert run(bag, tmp_path / 'out', '--combined', '/cmd/all') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 8
 
@@ -1026,7 +1028,8 @@ def test_parquet_has_the_columns_and_numbers_of_csv(
                           for row in rows]
 
 
-def test_force_replaces_results_and_nothing_else(tmp_path: Path, rejected: Rejected) -> None:
+def test_force_replaces_results_and_nothing_else(
+        tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     clear = ROOT / 'bags' / 'clear'
     assert run(clear, tmp_path, report=True) == DONE
     for words in (f'{tmp_path / "clear"}: exists already', '--force replaces results'):
@@ -1039,7 +1042,7 @@ def test_force_replaces_results_and_nothing_else(tmp_path: Path, rejected: Rejec
     other = tmp_path / 'other' / 'clear'
     other.mkdir(parents=True)
     (other / 'thesis.tex').touch()
-    assert 'not a folder of replay results' in rejected(clear, '--force', output=other.parent)
+    snapshot(rejected(clear, '--force', output=other.parent))
 
 
 def test_force_keeps_old_results_where_new_ones_fail(tmp_path: Path) -> None:
@@ -1073,13 +1076,14 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
     ('SIGHUP', "sys.meta_path.insert(0, type('Finder', (), {'find_spec': staticmethod(lambda "
      "name, *_: end() if name == 'argparse' else None)}))", 130, 'interrupted')])
 def test_a_signal_at_the_start_or_end_is_no_traceback(
-        sent: str, when: str, code: int, text: str) -> None:
+        sent: str, when: str, code: int, text: str, snapshot: Snapshot) -> None:
     done = subprocess.run(
         [sys.executable, '-c', 'import atexit, signal, sys\n'
          f'def end():\n    signal.raise_signal(signal.{sent})\n'
          f'from stewart_dynamics.replay import main\n{when}\nsys.exit(main())',
          'nowhere', '--params', str(PARAMS)], capture_output=True, text=True, timeout=300)
-    assert (done.returncode, done.stderr) == (code, f'stewart_replay: {text}\n')
+    assert done.returncode == code
+    snapshot(done.stderr)
 
 
 def test_an_interrupt_while_results_are_replaced_keeps_some(
@@ -1110,10 +1114,11 @@ def test_names_that_the_terminal_cannot_encode(
 # Bags that have only poses
 
 def test_poses_are_differentiated(
-        tmp_path: Path, rejected: Rejected, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, rejected: Rejected, capsys: pytest.CaptureFixture[str],
+        snapshot: Snapshot) -> None:
     of = motion(400)
     bag = write_bag(tmp_path / 'bag', of[::3])
-    assert '--differentiate computes' in rejected(bag)
+    snapshot(rejected(bag))
     assert run(bag, tmp_path / 'out', '--differentiate', '--cutoff', '5') == DONE
     printed = capsys.readouterr().out
     assert 'smoothing splines through the poses, cut-off frequency 5 Hz' in printed

@@ -19,12 +19,15 @@ from referees import (
     QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, relative,
     rng, ROOT, rotation_about, symmetric_parameters)
 
+from snapshot import Snapshot
 from stewart_dynamics import (
     BaseMotion, check_planned_trajectory, ForceBreakdown, InverseDynamics, Motion, MotionError,
     ParameterError, Parameters, Pose, SingularityError, StewartError, StewartPlatform)
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+
+PROGRAM = 'library'
 
 Array = NDArray[np.float64]
 
@@ -87,16 +90,17 @@ def test_other_types_in_place_of_a_platform_are_rejected(given: Any) -> None:
 
 
 def test_the_error_about_a_pose_in_place_of_a_motion_says_how_to_make_one(
-        platform: StewartPlatform) -> None:
+        platform: StewartPlatform, snapshot: Snapshot) -> None:
     pose = Pose([0.0, 0.0, 1.0], np.eye(3))
     for call in (platform.inverse_dynamics, platform.inverse_jacobian_rate, platform.motors):
-        with pytest.raises(MotionError, match='be a Motion; Motion.from_pose makes one at rest'):
+        with pytest.raises(MotionError) as caught:
             call(pose)
+        snapshot(caught.value)
 
 
 # Singular samples
 
-def test_a_singular_sample_is_named_or_marked() -> None:
+def test_a_singular_sample_is_named_or_marked(snapshot: Snapshot) -> None:
     platform = StewartPlatform(symmetric_parameters())
     motion = passing_a_singularity()
     for call in (platform.inverse_dynamics, platform.force_breakdown):
@@ -104,8 +108,9 @@ def test_a_singular_sample_is_named_or_marked() -> None:
             call(motion)
         with pytest.raises(SingularityError, match='^sample 1: '):
             call(motion[1])
-        with pytest.raises(MotionError, match="singular: 'skip': must be 'raise' or 'nan'"):
+        with pytest.raises(MotionError) as caught:
             call(motion, singular='skip')
+        snapshot(caught.value)
     bad = np.zeros((2, 3), dtype=bool)
     bad[1, 1] = True
     result = platform.inverse_dynamics(motion, singular='nan')
@@ -123,7 +128,7 @@ def test_a_singular_sample_is_named_or_marked() -> None:
 # Force breakdown
 
 def test_the_force_breakdown_names_its_sources_and_sums_to_the_forces(
-        platform: StewartPlatform) -> None:
+        platform: StewartPlatform, snapshot: Snapshot) -> None:
     motion = Motion.of_rows(random_motion(platform.parameters, rng(), 12).rows.reshape(3, 4, -1))
     wrench = random_wrench(platform.parameters, rng(), 4)
     by = platform.force_breakdown(motion, wrench)
@@ -137,7 +142,7 @@ def test_the_force_breakdown_names_its_sources_and_sums_to_the_forces(
     one = platform.force_breakdown(motion[1, 2], wrench[2])
     assert np.array_equal(one.wrench, by.wrench[1, 2])
     assert one.total.shape == (6,)
-    assert repr(by).startswith('<ForceBreakdown of shape (3, 4): gravity, platform_inertia')
+    snapshot(repr(by))
 
 
 # Stiffness and natural modes
@@ -225,27 +230,26 @@ def test_home_has_the_mean_leg_halfway_between_its_limits() -> None:
     assert np.mean(lower.inverse_kinematics(lower.home_pose())) == pytest.approx(1.2, abs=1e-9)
 
 
-@pytest.mark.parametrize(('changes', 'text'), [
-    ({'limits.length_min': (), 'limits.length_max': (), 'geometry.zero_length': 0.0},
-     'or geometry.zero_length, must give a length'),
-    ({'limits.length_min': 0.01, 'limits.length_max': 0.02}, 'no level pose has all legs')])
-def test_an_unknown_home_is_an_error(changes: dict[str, Any], text: str) -> None:
-    with pytest.raises(ParameterError, match=f'^a.yaml: home pose: .*{text}'):
+@pytest.mark.parametrize('changes', [
+    {'limits.length_min': (), 'limits.length_max': (), 'geometry.zero_length': 0.0},
+    {'limits.length_min': 0.01, 'limits.length_max': 0.02}])
+def test_an_unknown_home_is_an_error(changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with pytest.raises(ParameterError) as caught:
         StewartPlatform(EXAMPLE.replaced(changes, 'a.yaml')).home_pose()
+    snapshot(caught.value)
 
 
-def test_check_returns_the_likely_mistakes() -> None:
+def test_check_returns_the_likely_mistakes(snapshot: Snapshot) -> None:
     assert ON_EXAMPLE.check() == ()
     wrong = EXAMPLE.replaced({'gravity': [0.0, 0.0, -9806.65]})
     found = StewartPlatform(wrong).check()
     assert found == likely_mistakes(wrong)
     assert len(found) == 1
-    assert found[0].startswith('gravity: 9806.65 m/s^2')
+    snapshot(found[0])
 
 
-def test_representations_are_short(platform: StewartPlatform) -> None:
-    assert repr(ON_EXAMPLE) == (
-        '<StewartPlatform: 150 kg, joints on 0.9 m (base) and 0.6 m (platform)>')
+def test_representations_are_short(platform: StewartPlatform, snapshot: Snapshot) -> None:
+    snapshot(repr(ON_EXAMPLE))
     motion = random_motion(platform.parameters, rng(), 5000)
     for result in (motion, platform.inverse_dynamics(motion), platform.force_breakdown(motion),
                    platform.natural_modes(motion, 1e6)):
@@ -364,13 +368,12 @@ def test_any_arguments_give_finite_numbers_or_one_line(name: str, data: st.DataO
 
 # Results as text, as a table and as a figure
 
-def test_one_result_shows_its_numbers() -> None:
+def test_one_result_shows_its_numbers(snapshot: Snapshot) -> None:
     result = ON_EXAMPLE.inverse_dynamics(Motion.from_pose(ON_EXAMPLE.home_pose()))
     text = repr(result)
     assert isinstance(result.determinant, float)
     assert f'forces [{result.forces[0]:.6g}, ' in text
-    assert f'condition number {result.condition_number:.6g}>' in text
-    assert text.startswith(f'<InverseDynamics: lengths [{result.lengths[0]:.6g}, ')
+    snapshot(text)
 
 
 @pytest.mark.parametrize('shape', [(), (4,), (2, 3)])
@@ -387,20 +390,23 @@ def test_results_are_columns_of_a_table(shape: tuple[int, ...]) -> None:
         assert np.array_equal(table[name].reshape(shape), getattr(result, name))
 
 
-def test_results_are_drawn_where_matplotlib_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_are_drawn_where_matplotlib_is_installed(
+        monkeypatch: pytest.MonkeyPatch, snapshot: Snapshot) -> None:
     position = np.array([[0.0, 0.0, 1.1], [0.0, 0.0, 1.12], [0.0, 0.0, 1.15]])
     result = ON_EXAMPLE.inverse_dynamics(Motion(position, np.eye(3)))
     times = [0.0, 0.1, 0.3]
     axes = result.plot(times).axes
-    assert [each.get_ylabel() for each in axes] == ['length [m]', 'rate [m/s]', 'force [N]']
+    snapshot('\n'.join([each.get_ylabel() for each in axes]))
     for each, values in zip(axes, (result.lengths, result.rates, result.forces), strict=True):
         lines = each.get_lines()
         assert np.array_equal(lines[0].get_xdata(), times)
         assert np.array_equal(np.stack([line.get_ydata() for line in lines], axis=-1), values)
-    with pytest.raises(MotionError, match=r'times: shape \(2,\)'):
+    with pytest.raises(MotionError) as caught:
         result.plot([0.0, 0.1])
-    with pytest.raises(MotionError, match=r'plot: results of shape \(\): must be \(N,\)'):
+    snapshot(caught.value)
+    with pytest.raises(MotionError) as caught:
         ON_EXAMPLE.inverse_dynamics(Motion(position[0], np.eye(3))).plot()
+    snapshot(caught.value)
     monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
     with pytest.raises(ModuleNotFoundError, match='plot: matplotlib is not installed: pip'):
         result.plot()

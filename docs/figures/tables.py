@@ -18,7 +18,6 @@ from itertools import groupby
 import json
 import math
 from pathlib import Path
-import re
 from typing import Any
 
 from stewart_dynamics.mechanics.hexapod_structure import (
@@ -57,7 +56,7 @@ CONTROLLER_NAMES = ('joints', 'base_frame', 'setpoint.timeout', *(
     if not name.startswith('drive.')
     and name not in ('actuator.screw_lead', 'setpoint.sync_tolerance')))
 
-# The ten in the README; legs.* stands for the two parts of a leg.
+# Those that are set first; legs.* stands for the two parts of a leg.
 FIRST = ('joints', 'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',
          'platform.center_of_mass', 'platform.inertia', 'actuator.reflected_mass',
          'limits.force_max', 'singularity.action', 'setpoint.source')
@@ -81,17 +80,11 @@ def parameters_of(kind: type[ParameterSet]) -> str:
                  or kind is not SimulatorParameters})
 
 
-def topics(title: str, table: Sequence[Topic], details: bool = True) -> str:
-    """Return a table of topics: all with their details, or those without a parameter."""
+def topics(title: str, table: Sequence[Topic]) -> str:
+    """Return a table of topics."""
     lines = [f'| {title} | type | meaning |', '| --- | --- | --- |']
     for topic in table:
-        meaning = topic.meaning + topic.details * details
-        if not details:
-            if topic.parameter:
-                continue
-            meaning = re.sub(r'\]\((\w+\.md)', r'](docs/\1', meaning)
-        if topic.parameter:
-            meaning += f'; with `{topic.parameter}`'
+        meaning = topic.meaning + (f'; with `{topic.parameter}`' if topic.parameter else '')
         lines.append(
             f'| `{topic.ros_name}` | {topic.kind.replace("/msg", "")} | {meaning} |')
     return '\n'.join(lines)
@@ -260,7 +253,7 @@ def measured(row: str, column: str) -> str:
 
 
 def accuracy_and_speed() -> str:
-    """Return the README's four figures."""
+    """Return four figures of the tables below them."""
     call, times = '`StewartPlatform.inverse_dynamics`, one `Motion`', 'times `pin.rnea` alone'
     node, replay = 'separate, `stewart_dynamics`', '`stewart_replay`'
     micro = 1e-3 * float(measured(call, 'ns').replace(',', ''))
@@ -285,17 +278,14 @@ def pages() -> dict[Path, dict[str, str]]:
     figures, on_a_ship, known = (json.loads((HERE / f'{name}.json').read_text(encoding='utf-8'))
                                  for name in ('loop', 'ship', 'identify'))
     return {
-        ROOT / 'README.md': {
-            'topics': '\n\n'.join((topics('subscribed', SUBSCRIBED, details=False),
-                                  topics('published', PUBLISHED, details=False))),
-            'first parameters': rows({name: Parameters.table[name] for name in FIRST}),
-            'accuracy and speed': accuracy_and_speed()},
+        ROOT / 'benchmarks' / 'README.md': {'accuracy and speed': accuracy_and_speed()},
         ROOT / 'docs' / 'node.md': {
             'subscribed topics': topics('subscribed', SUBSCRIBED),
             'published topics': topics('published', PUBLISHED)},
         ROOT / 'docs' / 'faults.md': {'queues': queues()},
         ROOT / 'security' / 'policy.xml': {'topics of stewart_dynamics': granted()},
         ROOT / 'docs' / 'parameters.md': {
+            'first parameters': rows({name: Parameters.table[name] for name in FIRST}),
             'parameters of stewart_dynamics': parameters_of(Parameters),
             'parameters of stewart_trajectory': parameters_of(ReferenceMotionParameters),
             'parameters of stewart_simulator': parameters_of(SimulatorParameters)},

@@ -665,8 +665,7 @@ class Capability:
         found = growth.first_exit(min(path.value, most))
         if found is None:
             return path
-        factor, sample, column = found
-        return Extent(factor, growth.limit(factor, sample, column), column % 6, sample)
+        return Extent(found.factor, growth.limit(found), found.column % 6, found.sample)
 
     def _of_path(self, motion: Motion, solved: InverseDynamics) -> Extent | None:
         """

@@ -42,6 +42,27 @@ class _State(NamedTuple):
     ratios: Array  # to the limits (N, 6 M)
 
 
+class Exit(NamedTuple):
+    """The exit of a sample: one of its ratios leaves [-1, 1] just above a factor."""
+
+    factor: float
+    sample: int
+    column: int  # of the ratios
+
+
+class _Brackets(NamedTuple):
+    """Samples (N,), all of whose ratios are within [-1, 1] at one factor and not at another."""
+
+    samples: Integers
+    within: Array
+    outside: Array
+
+    def earliest(self) -> _Brackets:
+        """Return those whose exit may be the first one."""
+        near = self.within <= self.outside.min()
+        return _Brackets(self.samples[near], self.within[near], self.outside[near])
+
+
 class Growth:
     """
     Ratios of a motion's samples to limits, (N, 6 M): six legs for each of ``names``.
@@ -65,11 +86,9 @@ class Growth:
         self._base = np.broadcast_to(
             (BaseMotion(p['gravity']) if base is None else base).rows, (self._count, BASE))
 
-    def first_exit(self, most: float) -> tuple[float, int, int] | None:
+    def first_exit(self, most: float) -> Exit | None:
         """
-        Return the first factor up to ``most`` at which a ratio leaves [-1, 1].
-
-        With its sample and column, or None.
+        Return the first exit of all samples up to the factor ``most``, or None.
 
         Raises MotionError: the ratios are not known from a factor on.
         """
@@ -82,7 +101,7 @@ class Growth:
                 high = last if most < LARGEST else min(max(2.0 * low, 1.0), last)
                 better = self._within(early[first:first + _BLOCK], low, high)
                 if better is not None:
-                    found, last = better, better[0]
+                    found, last = better, better.factor
                 low = high
         return found
 
@@ -99,41 +118,59 @@ class Growth:
         ratios[np.isnan(ratios)] = np.inf
         return ratios
 
-    def _within(self, which: Integers, low: float, high: float,
-                ) -> tuple[float, int, int] | None:
+    def _within(self, which: Integers, low: float, high: float) -> Exit | None:
         """Return the first exit of samples between two factors."""
-        factors = np.linspace(low, high, STEPS + 1)
-        exceeded = self._largest(np.repeat(factors, len(which)), np.tile(
-            which, STEPS + 1)).reshape(STEPS + 1, -1) > 1.0
-        first = np.where(exceeded.any(axis=0), exceeded.argmax(axis=0), STEPS + 1)
-        earliest = int(first.min())
-        if earliest > STEPS:
+        brackets = self._sampled(which, np.linspace(low, high, STEPS + 1, dtype=np.float64))
+        if brackets is None:
             return None
-        which = which[first == earliest]
-        lows: Array = np.full(len(which), factors[max(earliest - 1, 0)])
-        highs: Array = np.full(len(which), factors[earliest])
         while True:
-            near = lows <= highs.min()
-            which, lows, highs = which[near], lows[near], highs[near]
-            middles = 0.5 * (lows + highs)
-            if not ((lows < middles) & (middles < highs)).any():
-                break
-            outside = self._largest(middles, which) > 1.0
-            lows, highs = np.where(outside, lows, middles), np.where(outside, middles, highs)
-        at = highs.argmin()
-        ratios = np.abs(self.state(highs[at:at + 1], which[at:at + 1]).ratios)[0]
+            brackets = brackets.earliest()
+            halves = self._halved(brackets)
+            if halves is None:
+                return self._exit(brackets)
+            brackets = halves
+
+    def _sampled(self, which: Integers, factors: Array) -> _Brackets | None:
+        """Return the samples that exceed a limit at the earliest of the factors (F,), or None."""
+        count = len(factors)
+        exceeded = self._largest(np.repeat(factors, len(which)), np.tile(
+            which, count)).reshape(count, -1) > 1.0
+        at = int(exceeded.any(axis=1).argmax())
+        if not exceeded[at].any():
+            return None
+        samples = which[exceeded[at]]
+        return _Brackets(samples, np.full(len(samples), factors[max(at - 1, 0)]),
+                         np.full(len(samples), factors[at]))
+
+    def _halved(self, brackets: _Brackets) -> _Brackets | None:
+        """Return the halves with the exits; None if no number lies between the factors."""
+        samples, within, outside = brackets
+        middles = 0.5 * (within + outside)
+        if not ((within < middles) & (middles < outside)).any():
+            return None
+        exceeded = self._largest(middles, samples) > 1.0
+        return _Brackets(samples, np.where(exceeded, within, middles),
+                         np.where(exceeded, middles, outside))
+
+    def _exit(self, brackets: _Brackets) -> Exit:
+        """Return the first exit; its column has the largest ratio outside."""
+        first = int(brackets.outside.argmin())
+        only = slice(first, first + 1)
+        ratios = np.abs(self.state(brackets.outside[only], brackets.samples[only]).ratios)[0]
         if np.isnan(ratios).any():
             raise MotionError(
-                f'motion: sample {which[at]}: not known whether a limit is exceeded at '
-                f'{highs[at]:.9g} times its amplitude: too near to a singularity')
-        return float(lows[at]), int(which[at]), int(ratios.argmax())
+                f'motion: sample {brackets.samples[first]}: not known whether a limit is exceeded '
+                f'at {brackets.outside[first]:.9g} times its amplitude: too near to a singularity')
+        return Exit(float(brackets.within[first]), int(brackets.samples[first]),
+                    int(ratios.argmax()))
 
-    def limit(self, factor: float, sample: int, column: int) -> str:
-        """Return the name of the limit of a column of the ratios."""
-        name = self.names[column // 6]
+    def limit(self, found: Exit) -> str:
+        """Return the name of the limit at an exit."""
+        name = self.names[found.column // 6]
         if name == 'torque' and self._motors is not None:
-            state = self.state(np.array([factor]), np.array([sample]))
-            name = str(self._motors.torque_limit(state.rows, state.results)[0, column % 6])
+            state = self.state(np.array([found.factor]), np.array([found.sample]))
+            name = str(self._motors.torque_limit(
+                state.rows, state.results)[0, found.column % 6])
         return name
 
     def state(self, factors: Array, which: Integers) -> _State:

@@ -8,10 +8,10 @@ from __future__ import annotations
 from stewart_dynamics import __version__
 from stewart_dynamics.description.hexapod import Hexapod
 
-_HEAD = '''\
+_HEAD = """\
 # Loops of {name}.urdf, written by stewart_describe {version}: in each pair of frames both origins
 # are one point (3d), a ball joint. The keys are those of Gepetto's example-parallel-robots.
-'''
+"""
 
 
 def loops_yaml(hexapod: Hexapod, name: str) -> str:

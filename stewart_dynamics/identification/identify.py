@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -153,6 +153,40 @@ class _Motion(NamedTuple):
     squares: float  # sum of the squared rates
 
 
+@dataclass
+class _Bag:
+    """A bag whose windows are being added."""
+
+    path: Path
+    begin: int  # stamp of the first sample [ns]
+    period: float  # [s]
+    rates: bool  # recorded
+    extraction: Extraction
+    lag_is_known: bool
+    lag: int = 0  # of the efforts [samples]
+    last: WindowRead | None = None
+    motion: _Motion | None = None  # the window in which the legs move most
+    filtered: int = 0  # samples left by the filters
+    above: float = 0.0  # largest share of the rates above the cut-off frequency
+    end: int = 0  # stamp after the last sample [ns]
+    counts: Counter[str] = field(default_factory=Counter)
+    notices: list[str] = field(default_factory=list)
+
+    def is_long_enough(self, window: Window) -> bool:
+        """Return whether the filters leave samples of a window whose efforts lag."""
+        fewest = 2 * self.extraction.margin + 2 * self.extraction.step
+        return len(window.positions) >= fewest + abs(self.lag)
+
+    def result(self, last: WindowRead) -> BagRead:
+        """Return the data of the bag, with the noise of the last window."""
+        of_lengths, of_rates = last.deviations
+        return BagRead(
+            self.path, self.counts['samples'], (self.end - self.begin) * NANOSECOND, self.period,
+            self.extraction.cutoff, self.rates, self.counts['left out'], self.counts['stops'],
+            self.counts['outliers'], of_lengths, of_rates if self.rates else None,
+            self.lag * self.period + self.extraction.later, {}, [], self.notices)
+
+
 class Identification:
     """Reads bags and identifies parameters, beginning with those of the file."""
 
@@ -192,91 +226,80 @@ class Identification:
 
     def add(self, path: Path, windows: Iterable[Window]) -> BagRead | None:
         """Add the windows of a bag; return None if none of them is usable."""
-        options = self._options
-        lag = begin = end = 0
-        above = 0.0
-        lag_is_known = not options.delay
-        counts: Counter[str] = Counter()
-        notices: list[str] = []
-        extraction: Extraction | None = None
-        last: WindowRead | None = None
-        motion: _Motion | None = None
-        before = self.extracts.samples
+        bag: _Bag | None = None
         for window in windows:
-            if extraction is None:
-                extraction, begin = self._extraction(window), window.begin
+            if bag is None:
+                bag = _Bag(path, window.begin, window.period, window.rates is not None,
+                           self._extraction(window), lag_is_known=not self._options.delay)
             if self._per_effort is not None:
                 window = window._replace(efforts=window.efforts * self._per_effort)
-            fewest = 2 * extraction.margin + 2 * extraction.step
-            if len(window.positions) < fewest + abs(lag):
-                counts['left out'] += 1
+            if not bag.is_long_enough(window):
+                bag.counts['left out'] += 1
                 continue
-            if last is None and not self.bags and self._is_on_other_side(window):
-                notices.append('geometry.platform_side: the efforts are those of a platform on '
-                               f'the {NEGATIVE} side of its base')
-                extraction = self._extraction(window)
-            if not lag_is_known:
-                lag, _, scale = self._lag(extraction, window)
-                if len(window.positions) < fewest + abs(lag):
-                    lag = 0
-            window = window.with_lag(lag)
-            read = self._read_window(path, extraction, window, last)
-            if read.moves and not lag_is_known:
-                lag_is_known = True
-                if 1.0 / FAR < scale < FAR or scale == 0.0:
-                    read = self._delayed(path, extraction, window, last, read)
-                else:  # of another unit or sign
-                    of_model = window._replace(efforts=window.efforts / scale)
-                    self._delayed(path, extraction, of_model, last,
-                                  self._read_window(path, extraction, of_model, last))
-                    read = self._read_window(path, extraction, window, last)
-            last = read
-            speeds = np.abs(last.extract.legs[..., 1])
-            squares = float(np.sum(speeds ** 2))
-            above = max(above, last.above)
-            if motion is None or squares > motion.squares:
-                motion = _Motion(len(self.extracts), window, last, squares)
-            self.extracts.add(len(self.bags), (window.begin - begin) * NANOSECOND, last)
-            counts.update({
-                'samples': len(window.positions), 'stops': last.stops,
-                'outliers': np.count_nonzero(window.outliers), 'speeds': speeds.size,
-                'slow': np.count_nonzero(
-                    speeds < self.parameters['actuator.coulomb_velocity'])})
-            end = window.begin + round(len(window.positions) * window.period * SECOND)
-        if extraction is None or last is None or motion is None:
+            if bag.last is None and not self.bags and self._is_on_other_side(window):
+                bag.notices.append(
+                    'geometry.platform_side: the efforts are those of a platform on the '
+                    f'{NEGATIVE} side of its base')
+                bag.extraction = self._extraction(window)
+            self._add_read(bag, *self._aligned(bag, window))
+        if bag is None or bag.last is None or bag.motion is None:
             return None
-        self._add_noise(extraction, motion)
-        period, rates = window.period, window.rates is not None
-        notices += self._notices(
-            extraction, period, (self.extracts.samples - before) * extraction.step * period,
-            counts['slow'] / counts['speeds'], above)
-        self.bags.append(BagRead(
-            path, counts['samples'], (end - begin) * NANOSECOND, period, extraction.cutoff,
-            rates, counts['left out'], counts['stops'], counts['outliers'], last.deviations[0],
-            last.deviations[1] if rates else None, lag * period + extraction.later,
-            {}, [], notices))
+        self._add_noise(bag.extraction, bag.motion)
+        bag.notices += self._notices(bag)
+        self.bags.append(bag.result(bag.last))
         return self.bags[-1]
 
-    def _notices(self, extraction: Extraction, period: float, filtered: float, inside: float,
-                 above: float) -> Iterator[str]:
-        """
-        Yield notices on a bag.
+    def _aligned(self, bag: _Bag, window: Window) -> tuple[Window, WindowRead]:
+        """Return a window with efforts at the times of its positions, and its extract."""
+        scale = 0.0
+        if not bag.lag_is_known:
+            bag.lag, _, scale = self._lag(bag.extraction, window)
+            if not bag.is_long_enough(window):
+                bag.lag = 0
+        window = window.with_lag(bag.lag)
+        read = self._read_window(bag, window)
+        if bag.lag_is_known or not read.moves:
+            return window, read
+        bag.lag_is_known = True
+        if 1.0 / FAR < scale < FAR or scale == 0.0:
+            return window, self._delayed(bag, window, read)
+        # of another unit or sign
+        of_model = window._replace(efforts=window.efforts / scale)
+        self._delayed(bag, of_model, self._read_window(bag, of_model))
+        return window, self._read_window(bag, window)
 
-        filtered: its time that the filters leave [s].
-        inside, above: shares of the rates in the band of friction, and above the cut-off.
-        """
-        if above > _MOST_ABOVE:
-            yield (f'{100.0 * above:.0f} % of the motion is above the cut-off frequency of '
+    def _add_read(self, bag: _Bag, window: Window, read: WindowRead) -> None:
+        """Add a window that was read to the extracts, and count its samples."""
+        speeds = np.abs(read.extract.legs[..., 1])
+        squares = float(np.sum(speeds ** 2))
+        if bag.motion is None or squares > bag.motion.squares:
+            bag.motion = _Motion(len(self.extracts), window, read, squares)
+        self.extracts.add(len(self.bags), (window.begin - bag.begin) * NANOSECOND, read)
+        bag.last = read
+        bag.filtered += len(read.extract.times)
+        bag.above = max(bag.above, read.above)
+        bag.end = window.begin + round(len(window.positions) * window.period * SECOND)
+        bag.counts.update({
+            'samples': len(window.positions), 'stops': read.stops,
+            'outliers': np.count_nonzero(window.outliers), 'speeds': speeds.size,
+            'slow': np.count_nonzero(speeds < self.parameters['actuator.coulomb_velocity'])})
+
+    def _notices(self, bag: _Bag) -> Iterator[str]:
+        """Yield notices on a bag whose windows are all added."""
+        extraction = bag.extraction
+        if bag.above > _MOST_ABOVE:
+            yield (f'{100.0 * bag.above:.0f} % of the motion is above the cut-off frequency of '
                    f'{extraction.cutoff:.3g} Hz: values and intervals are wrong; '
                    + ('raise --cutoff' if extraction.cutoff == self._options.cutoff else
                       'a slower motion or a faster recording is needed'))
         if extraction.cutoff < self._options.cutoff:
-            yield (f'sampled at {1.0 / period:.4g} Hz: the cut-off frequency is '
+            yield (f'sampled at {1.0 / bag.period:.4g} Hz: the cut-off frequency is '
                    f'{extraction.cutoff:.3g} Hz')
         short = _SHORT / extraction.cutoff
-        if filtered < short:
+        if bag.filtered * extraction.step * bag.period < short:
             yield (f'less than {short:.3g} s are left by the filters: intervals are too narrow '
                    'for so short a recording')
+        inside = bag.counts['slow'] / bag.counts['speeds']
         if inside > _MOST_INSIDE and any(
                 'coulomb_friction' in self.unknowns.names[n] for n in self.unknowns.asked):
             yield (f'{100.0 * inside:.0f} % of the rates are below actuator.coulomb_velocity: '
@@ -320,30 +343,30 @@ class Identification:
         self.parameters, self.platform = parameters, platform
         return False
 
-    def _read_window(self, path: Path, extraction: Extraction, window: Window,
-                     last: WindowRead | None) -> WindowRead:
-        if last is not None:
+    def _read_window(self, bag: _Bag, window: Window) -> WindowRead:
+        if bag.last is not None:
             with suppress(PoseError, SingularityError):
-                return extraction(window, last.end)
+                return bag.extraction(window, bag.last.end)
         try:
-            return extraction(window, first_pose(self.platform, window))
+            return bag.extraction(window, first_pose(self.platform, window))
         except (PoseError, SingularityError) as exc:
-            raise BagError(f'{path}: {of_no_pose(self.parameters, window.positions)}') from exc
+            raise BagError(
+                f'{bag.path}: {of_no_pose(self.parameters, window.positions)}') from exc
 
-    def _delayed(self, path: Path, extraction: Extraction, window: Window,
-                 last: WindowRead | None, read: WindowRead) -> WindowRead:
+    def _delayed(self, bag: _Bag, window: Window, read: WindowRead) -> WindowRead:
         """
         Return a window read with its positions delayed as its efforts are, and so from now on.
 
         Filters of the efforts cannot do that: friction that jumps between two samples aliases.
         """
+        cutoff = np.array([bag.extraction.cutoff])
         with closing(Extracts()) as one:
             for _ in range(_REFINED):
                 one.clear()
                 one.add(0, 0.0, read)
-                extraction.later += float(fit(
-                    one, self.unknowns, None, np.array([extraction.cutoff]), passes=1).delays[0])
-                read = self._read_window(path, extraction, window, last)
+                bag.extraction.later += float(
+                    fit(one, self.unknowns, None, cutoff, passes=1).delays[0])
+                read = self._read_window(bag, window)
         return read
 
     def _add_noise(self, extraction: Extraction, motion: _Motion) -> None:

@@ -94,8 +94,8 @@ class Found(NamedTuple):
 class LackOfFit(NamedTuple):
     """A lack of fit, with its cause or where it is largest."""
 
-    cause: str  # keyword of the cause; UNKNOWN: none is clearly likeliest
-    text: str  # what it is, or where the residuals are largest
+    cause: str  # keyword of the cause; UNKNOWN if no cause is clearly likeliest
+    text: str  # the cause in words, or where the residuals are largest
     ranked: tuple[Found, ...]  # significant causes, the likeliest first
     shifts: Array  # (k,) amount by which the interval of each unknown is widened on both sides
     left: float  # fraction of the residual RMS that remains with the cause

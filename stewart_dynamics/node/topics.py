@@ -4,8 +4,8 @@
 """
 The node's topics: their table, and publishers and subscriptions while it is configured.
 
-The tables of the README and of docs/node.md, and the topics of the node in security/policy.xml are
-made from the table as well (``make docs``).
+The table in docs/node.md and the topics of the node in security/policy.xml are made from this one
+as well (``make docs``).
 """
 
 from __future__ import annotations
@@ -47,8 +47,7 @@ class Topic(NamedTuple):
 
     name: str  # under the node's name, or whole
     kind: str
-    meaning: str  # for the README
-    details: str = ''  # follow the meaning in docs/node.md
+    meaning: str  # in docs/node.md
     parameter: str = ''  # parameter and value with which the topic is there; empty: always
     depth: int = 10  # messages that may wait in the middleware
     latched: bool = False  # a later subscriber gets the last message
@@ -59,38 +58,35 @@ class Topic(NamedTuple):
         return self.name if self.name.startswith('/') else f'~/{self.name}'
 
 
-def _input(name: str, meaning: str, details: str = '', parameter: str = '', kind: str = '',
+def _input(name: str, meaning: str, parameter: str = '', kind: str = '',
            depth: int = WAITING) -> Topic:
-    return Topic(name, kind or INPUT_TYPES[name], meaning, details, parameter, depth)
+    return Topic(name, kind or INPUT_TYPES[name], meaning, parameter, depth)
 
 
 SUBSCRIBED = (
     _input(POSE, 'platform pose in the base frame'),
-    _input(TWIST, "velocity of the platform's origin and angular velocity", ', base axes'),
-    _input(ACCEL, 'their time derivatives', ', base axes'),
-    _input(COMBINED, 'the same three in one message of one point',
-           parameter='setpoint.source: combined'),
-    _input(planned.INPUT, 'a [planned trajectory](planned_trajectories.md)',
-           ': points with transform, velocity and acceleration', kind=planned.INPUT_TYPE,
-           depth=LENGTH),
-    _input(WRENCH, 'load that the surroundings put on the platform, at its origin, base axes',
-           '; held until the next one'),
-    _input(MEASURED_LEGS, 'measured position, velocity and effort of the legs',
-           ', for the [external wrench](external_wrench.md) and the [payload](payload.md); names '
-           'in any order, other joints are ignored', kind=type_names.JOINT_STATE),
-    _input(BASE_POSE, 'base frame in `world_frame`', ': see [Moving base](moving_base.md)',
+    _input(TWIST, "velocity of the platform's origin and angular velocity, base axes"),
+    _input(ACCEL, 'their time derivatives, base axes'),
+    _input(COMBINED, 'the same three in one message of one point', 'setpoint.source: combined'),
+    _input(planned.INPUT, 'a [planned trajectory](planned_trajectories.md): points with '
+           'transform, velocity and acceleration', kind=planned.INPUT_TYPE, depth=LENGTH),
+    _input(WRENCH, 'load that the surroundings put on the platform, at its origin, base axes; '
+           'held until the next one'),
+    _input(MEASURED_LEGS, 'measured position, velocity and effort of the legs, for the [external '
+           'wrench](external_wrench.md) and the [payload](payload.md); names in any order, other '
+           'joints are ignored', kind=type_names.JOINT_STATE),
+    _input(BASE_POSE, 'base frame in `world_frame`: see [Moving base](moving_base.md)',
            'base.source: pose or motion'),
-    _input(BASE_TWIST, "velocity of the base frame's origin and angular velocity",
-           ', axes of the world', 'base.source: motion'),
-    _input(BASE_ACCEL, 'their time derivatives', ', axes of the world', 'base.source: motion'),
+    _input(BASE_TWIST, "velocity of the base frame's origin and angular velocity, axes of the "
+           'world', 'base.source: motion'),
+    _input(BASE_ACCEL, 'their time derivatives, axes of the world', 'base.source: motion'),
     _input(BASE_IMU, 'specific force and angular velocity of an IMU on the base',
-           parameter='base.source: imu'),
+           'base.source: imu'),
 )
 
 
-def _output(name: str, meaning: str, details: str = '', latched: bool = False,
-            parameter: str = '') -> Topic:
-    return Topic(name, (OUTPUT_TYPES | MOTOR_TYPES)[name], meaning, details, parameter,
+def _output(name: str, meaning: str, parameter: str = '', latched: bool = False) -> Topic:
+    return Topic(name, (OUTPUT_TYPES | MOTOR_TYPES)[name], meaning, parameter,
                  latched=latched, depth=1 if latched else 10)
 
 
@@ -101,44 +97,42 @@ PUBLISHED = (
     _output(LEG_FORCES, 'six forces, N, + pushes; remap it to the `commands` of an effort '
             'controller'),
     _output(DETERMINANT, 'det(J), m^3'),
-    _output(WARNING, 'true near and at a [singularity](theory.md#singularity)',
-            '; with the first setpoint and on every change, latched (transient local)', True),
+    _output(WARNING, 'true near and at a [singularity](theory.md#singularity); with the first '
+            'setpoint and on every change, latched (transient local)', latched=True),
     _output(MOTOR_STATES, 'angle [rad], speed [rad/s] and torque [N m] of the six '
-            '[motors](drives.md), named as the joints with `_motor` after it',
-            parameter='drive.*'),
+            '[motors](drives.md), named as the joints with `_motor` after it', 'drive.*'),
     _output(MOTOR_TORQUES, 'six torques, N m; remap it to the `commands` of an effort controller '
-            'of the motors', parameter='drive.*'),
+            'of the motors', 'drive.*'),
     Topic(planned.OUTPUT, planned.OUTPUT_TYPE,
-          'answer to `~/platform_trajectory`', ', with its stamp and times: positions, velocities '
+          'answer to `~/platform_trajectory`, with its stamp and times: positions, velocities '
           'and effort of the legs; nothing when it is rejected', depth=LENGTH),
     Topic(EXTERNAL_WRENCH, type_names.WRENCH_STAMPED,
-          'estimated [external wrench](external_wrench.md)',
-          ', for each message of `~/measured_legs`, with its stamp'),
+          'estimated [external wrench](external_wrench.md), for each message of '
+          '`~/measured_legs`, with its stamp'),
     _output(BASE_WRENCH, '[what the hexapod puts on its base]'
-            '(moving_base.md#what-the-base-must-carry)', ", at the base's origin, base axes; "
+            "(moving_base.md#what-the-base-must-carry), at the base's origin, base axes; "
             'computed while somebody subscribes'),
     Topic(PAYLOAD, type_names.INERTIA_STAMPED,
-          'platform and [payload](payload.md) as one body', ', when the service '
+          'platform and [payload](payload.md) as one body, when the service '
           '`~/identify_payload` (std_srvs/Trigger) has identified it; `~/apply_payload` takes it '
           'over as `payload.*`; latched (transient local)',
           depth=1, latched=True),
     Topic(TRAVEL, type_names.FLOAT64_MULTI_ARRAY, 'how far x, y, z and the rotations about them '
           'can go from the pose of the last setpoint, to minus and to plus, the others held: 6 x '
-          '2, m and rad', '; up to the first limit of lengths, joint angles or clearance of the '
+          '2, m and rad; up to the first limit of lengths, joint angles or clearance of the '
           'legs, or `singularity.stop_condition`, about the origin of the platform. It is 0 if '
           'the pose exceeds a limit already; without a limit on the way it is one turn for a '
           'rotation, the largest finite number for a translation. At most '
           f'{TRAVEL_RATE:g} Hz, computed while somebody subscribes', depth=1),
-    Topic(JOINT_STATES, MODEL_TYPES[JOINT_STATES], 'positions of all joints of the URDF',
-          ', for [robot_state_publisher](visualization.md#as-a-model); at most '
-          '`visualization_rate`, while somebody subscribes'),
-    Topic(TF, MODEL_TYPES[TF], '`base_frame` to `platform_frame`',
-          parameter='publish_tf: true', depth=100),
+    Topic(JOINT_STATES, MODEL_TYPES[JOINT_STATES], 'positions of all joints of the URDF, for '
+          '[robot_state_publisher](visualization.md#as-a-model); at most `visualization_rate`, '
+          'while somebody subscribes'),
+    Topic(TF, MODEL_TYPES[TF], '`base_frame` to `platform_frame`', 'publish_tf: true', depth=100),
     Topic(MARKERS, type_names.MARKER_ARRAY,
-          '[visualization](visualization.md) for RViz and Foxglove',
-          '; at most `visualization_rate`, while somebody subscribes', depth=1),
+          '[visualization](visualization.md) for RViz and Foxglove; at most '
+          '`visualization_rate`, while somebody subscribes', depth=1),
     Topic(DIAGNOSTICS, type_names.DIAGNOSTIC_ARRAY,
-          'state of the node, one status for each part', ', see below'),
+          'state of the node, one status for each part, see below'),
 )
 
 _INPUTS = {topic.name: topic for topic in SUBSCRIBED}
