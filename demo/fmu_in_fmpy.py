@@ -8,10 +8,13 @@ Needs fmpy. Make the FMU first: stewart_export --params my_hexapod.yaml --output
 """
 
 import argparse
+import importlib
 from pathlib import Path
 
-from fmpy import read_model_description, simulate_fmu
 import numpy as np
+
+# Of requirements-fmi.txt, which is installed apart from all others.
+fmpy = importlib.import_module('fmpy')
 
 AMPLITUDE, FREQUENCY = 0.02, 0.5  # [m], [Hz]
 DRIVER = {'payload.mass': 82.0, 'payload.center_of_mass.z': 0.5}
@@ -31,7 +34,7 @@ def simulated(file: Path, seconds: float = 4.0, step: float = 0.001) -> np.ndarr
     times = step * np.arange(round(seconds / step) + 1)
     # At home, with unit quaternion and gravity, where not changed below.
     inputs = {each.name: np.full(len(times), float(each.start))
-              for each in read_model_description(file).modelVariables
+              for each in fmpy.read_model_description(file).modelVariables
               if each.causality == 'input'}
     inputs |= heaving(inputs['position.z'][0], times)
     inputs |= {name: np.where(times < 0.5 * seconds, 0.0, value) for name, value in DRIVER.items()}
@@ -39,8 +42,8 @@ def simulated(file: Path, seconds: float = 4.0, step: float = 0.001) -> np.ndarr
     table['time'] = times
     for name, values in inputs.items():
         table[name] = values
-    return simulate_fmu(file, stop_time=seconds, output_interval=step, step_size=step,
-                        input=table, output=OUTPUTS)
+    return fmpy.simulate_fmu(file, stop_time=seconds, output_interval=step, step_size=step,
+                             input=table, output=OUTPUTS)
 
 
 def main() -> None:

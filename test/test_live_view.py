@@ -59,9 +59,9 @@ def test_a_browser_shows_the_forces_and_warnings_of_the_node(
         node.until(lambda: 'setpoints' in (page.locator('#statuses').text_content() or ''),
                    'diagnostics are shown')
         # Something is drawn.
-        assert page.evaluate('''() => { const c = document.getElementById('picture');
+        assert page.evaluate("""() => { const c = document.getElementById('picture');
             const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
-            return d.some((v, n) => n % 4 === 3 && v > 0); }''')
+            return d.some((v, n) => n % 4 === 3 && v > 0); }""")
     # Nothing is read at the rate of the setpoints.
     readers = {topic for topic, _ in node.peer.node.get_subscriber_names_and_types_by_node(
         'live_view', '/')}

@@ -68,7 +68,7 @@ def _view(root: ET.Element, left: float, title: str, base: Array, platform: Arra
         around = np.argsort(np.arctan2(*(joints - joints.mean(axis=0)).T[::-1]))
         corners = ' '.join(f'{x:.1f},{y:.1f}' for x, y in joints[around])
         _draw(root, 'polygon', None, points=corners, fill=color, fill_opacity=0.5, stroke=color)
-    for n, (color, begin, end) in enumerate(zip(_COLORS, base, platform, strict=True)):
+    for color, begin, end in zip(_COLORS, base, platform, strict=True):
         _line(root, begin, end, stroke=color, stroke_width=3)
         _draw(root, 'circle', None, cx=begin[0], cy=begin[1], r=6, fill=color)
         _draw(root, 'circle', None, cx=end[0], cy=end[1], r=6, fill='white', stroke=color,
