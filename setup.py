@@ -56,7 +56,9 @@ extras_require = {
     'live': ['websockets>=13'],  # for examples/live_view.py
     'mujoco': ['mujoco>=3.14'],  # before, inertias have errors of 1e-5
     'parquet': ['pyarrow>=14'],
+    'pandas': ['pandas>=2'],
     'plot': ['matplotlib>=3.7'],  # a legend outside of the axes
+    'response': ['scipy>=1.10'],
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',
         'ros-rclpy[fastrtps]~=7.1.6',

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-# Of requirements-fmi.txt, which is installed apart from all others.
+# From requirements-fmi.txt, which is installed apart from all others.
 fmpy = importlib.import_module('fmpy')
 
 AMPLITUDE, FREQUENCY = 0.02, 0.5  # [m], [Hz]

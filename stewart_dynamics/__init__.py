@@ -26,15 +26,18 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.planned.approach import approach, rest_to_rest, TimedMotion
     from stewart_dynamics.planned.trajectory import check_planned_trajectory, PlannedTrajectory
+    from stewart_dynamics.replay.read_arrays import (
+        read_legs, read_setpoints, RecordedLegStates, RecordedSetpoints)
 
 __version__ = '1.0.0'
 
 __all__ = [
     'BagError', 'BaseMotion', 'Calibration', 'Capability', 'Extent', 'ForceBreakdown',
     'InverseDynamics', 'Motion', 'MotionError', 'Motors', 'NaturalModes', 'ParameterError',
-    'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'Reachable', 'SingularityError',
-    'StewartError', 'StewartPlatform', 'TimedMotion', '__version__', 'approach', 'calibrate',
-    'check_planned_trajectory', 'rest_to_rest']
+    'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'Reachable', 'RecordedLegStates',
+    'RecordedSetpoints', 'SingularityError', 'StewartError', 'StewartPlatform', 'TimedMotion',
+    '__version__', 'approach', 'calibrate', 'check_planned_trajectory', 'read_legs',
+    'read_setpoints', 'rest_to_rest']
 
 _MODULES = {
     'calibration.calibrate': ('Calibration', 'calibrate'),
@@ -52,6 +55,8 @@ _MODULES = {
     'parameters.table': ('Parameters',),
     'planned.approach': ('TimedMotion', 'approach', 'rest_to_rest'),
     'planned.trajectory': ('PlannedTrajectory', 'check_planned_trajectory'),
+    'replay.read_arrays': ('RecordedLegStates', 'RecordedSetpoints', 'read_legs',
+                           'read_setpoints'),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

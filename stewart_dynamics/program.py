@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 import io
+from itertools import permutations
 import math
 import os
 from pathlib import Path
@@ -21,6 +22,9 @@ from stewart_dynamics.errors import one_line, shown_name, StewartError
 
 DONE, STRICT, PARTLY_READ = 0, 1, 3
 BAD_INPUT, INTERRUPTED = signals.BAD_INPUT, signals.INTERRUPTED
+# Orders of rotations: capital letters about axes that turn along, others about fixed ones.
+EULER = tuple(''.join(each) for letters in ('xyz', 'XYZ') for each in permutations(letters))
+AXES = 'x,y,z'
 NODE = '/stewart_dynamics'  # name of the node if no other is given
 SOFTWARE = f'stewart_dynamics {__version__}'  # name and version, as results have it
 
@@ -208,6 +212,32 @@ def add_node(parser: argparse._ActionsContainer, more: str = '') -> None:
     """Add the option of the node's name; ``more`` follows its help."""
     parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
                         help=f'node whose parameters are read{more} (default: {NODE})')
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add the options for recordings of other sources; ``reading_of`` returns their values."""
+    group = parser.add_argument_group('recordings of other sources')
+    group.add_argument('--child', metavar='FRAME',
+                       help='child_frame_id of the platform in tf2_msgs/TFMessage (default: '
+                            'platform_frame)')
+    group.add_argument('--euler', metavar='ORDER', choices=EULER,
+                       help='order of the rotations about x, y, z in a CSV file, as XYZ: capital '
+                            'letters about axes that turn along, others about fixed axes '
+                            '(default: xyz, Rz Ry Rx, for roll pitch yaw; XYZ for u v w, those of '
+                            'PI hexapods)')
+    group.add_argument('--axes', metavar='X,Y,Z', type=axes, default=AXES,
+                       help='axes of the source that are x, y, z of the base frame, as x,-y,-z '
+                            'for z downward, or x,-y,z for a left-handed source')
+
+
+def axes(text: str) -> str:
+    """Return the axes that an option gives: x, y and z, each once, with a sign."""
+    plain = text.replace(' ', '')
+    if not re.fullmatch(r'[+-]?[xyz](,[+-]?[xyz]){2}', plain) or (
+            len(set(re.findall('[xyz]', plain))) != 3):
+        raise argparse.ArgumentTypeError(
+            f'{_shown(text)}: must be x, y and z, each once, as z,-x,y')
+    return plain
 
 
 def add_motor_efforts(group: argparse._ArgumentGroup) -> None:

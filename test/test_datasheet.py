@@ -35,11 +35,12 @@ from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, both_ways, box_verdict, down, LINEAR, motion_verdict, numbers,
     rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
+from stewart_dynamics.datasheet.motion_ratings import judged, uses
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads, stiffness
-from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, RecordedMotion, uses
 from stewart_dynamics.mechanics.likely_mistakes import mistakes_in_options
 from stewart_dynamics.replay import main as replay
+from stewart_dynamics.replay.recorded_motion import read_motion, RecordedMotion
 from stewart_dynamics.replay.replay_options import NODE, Options
 from stewart_dynamics.reporting.vector_picture import hull, ticks
 

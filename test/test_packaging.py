@@ -39,15 +39,16 @@ KEYS = {
     'mcap_ros2': 'mcap-ros2-support', 'mujoco': 'python3-mujoco-pip',
     'numba': 'python3-numba',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
-    'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '', 'pyarrow': '',
-    'pxr': '', 'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',
+    'pandas': 'python3-pandas', 'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '',
+    'pxr': '', 'pyarrow': '', 'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',
     'scipy': 'python3-scipy', 'setuptools': 'python3-setuptools',
     'sphinx': 'python3-sphinx', 'tqdm': 'python3-tqdm',
     'websockets': '', 'yaml': 'python3-yaml',
     'zstandard': ''}
 # Modules that are imported where an option asks for them, and the extra that brings them.
 OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'matplotlib': 'plot',
-            'mujoco': 'mujoco', 'pxr': 'usd', 'pyarrow': 'parquet', 'scipy': 'differentiate'}
+            'mujoco': 'mujoco', 'pandas': 'pandas', 'pxr': 'usd', 'pyarrow': 'parquet',
+            'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.
 PIP_NAMES = {'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin', 'pxr': 'usd-core',
              'yaml': 'pyyaml'}

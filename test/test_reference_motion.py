@@ -17,6 +17,7 @@ from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import Singularity
 from stewart_dynamics.reference_motion.motion import motion_at, sample_time, sample_times
+from stewart_dynamics.reference_motion.multisine import multisine
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
@@ -43,6 +44,10 @@ MOTIONS = {
             0.01, 0.02, 0.01, 0.02, -0.03, 0.05, 0.0, -0.01, 0.01, 0.0, 0.02, 0.03],
         'motion.fourier.sine': [
             0.02, 0.0, 0.01, 0.05, 0.03, -0.08, 0.01, 0.01, 0.0, -0.03, 0.0, 0.05]},
+    'response': {
+        'motion.type': 'response', 'motion.initial': INITIAL, 'motion.response.period': 2.0,
+        'motion.response.periods': 2.0, 'motion.response.highest_frequency': 2.0,
+        'motion.amplitude': [1e-3, 0.0, 2e-3, 0.0, 2e-3, 1e-3]},
     'hold': {'motion.type': 'hold', 'motion.initial': INITIAL, 'motion.duration': 3.0},
 }
 POINT_TO_POINT = ('paper', 'quintic')
@@ -218,7 +223,8 @@ def test_samples_are_spaced_exactly() -> None:
 @pytest.mark.parametrize(('name', 'changes', 'text'), [
     ('paper', {'motion.final': None}, 'motion.final: missing, motion.type paper needs it'),
     ('paper', {'motion.initial': None}, 'motion.initial: missing'),
-    ('paper', {'motion.type': 'cubic'}, 'must be one of paper, quintic, sine, fourier, hold'),
+    ('paper', {'motion.type': 'cubic'},
+     'must be one of paper, quintic, sine, fourier, response, hold'),
     ('paper', {'motion.duration': 0.0}, 'must be more than 0'),
     ('paper', {'output': 'both'}, 'must be one of separate, combined'),
     ('fourier', {'motion.fourier.cosine': [0.1] * 7},
@@ -267,3 +273,93 @@ def test_singular_path_crosses_once_between_8_and_9_s(platform: StewartPlatform)
     assert len(crossings) == 1 and 8.0 < crossings[0] < 9.0
     worst = times[np.argmax(np.abs(result.forces).max(axis=-1))]
     assert abs(worst - crossings[0]) < 0.02
+
+
+RESPONSE = {
+    'motion.type': 'response', 'motion.initial': [0.0, 0.0, 1.1, 0.0, 0.0, 0.0],
+    'motion.response.params_file': str(CONFIG / 'platform.yaml')}
+
+
+def test_the_motion_response_moves_one_axis_after_the_other_and_rests_between() -> None:
+    p = ReferenceMotionParameters({
+        **MOTIONS['response'], 'motion.response.period': 0.2,
+        'motion.response.highest_frequency': 25.0})
+    times = sample_times(p) * 1e-9
+    assert times[-1] == pytest.approx(4 * (3.5 * 0.2 + 2.5))
+    motion = motion_at(p, times)
+    start = rotations.from_euler(INITIAL[3:])
+    axes = np.hstack([motion.position - INITIAL[:3],
+                      rotations.to_rotation_vector(motion.rotation @ start.T)])
+    moving = np.abs(axes) > 1e-12
+    assert moving.sum(axis=1).max() == 1
+    assert np.flatnonzero(moving.any(axis=0)).tolist() == [0, 2, 4, 5]
+    np.testing.assert_allclose(
+        np.abs(axes).max(axis=0), MOTIONS['response']['motion.amplitude'], rtol=0.05, atol=1e-12)
+    whole = round((3.5 * 0.2 + 2.5) * 100)
+    for n, axis in enumerate((0, 2, 4, 5)):
+        # After the first period it repeats.
+        begin = n * whole + 20
+        np.testing.assert_allclose(axes[begin:begin + 20, axis], axes[begin + 20:begin + 40, axis],
+                                   atol=1e-15)
+        assert not moving[(n + 1) * whole - 240:(n + 1) * whole].any()
+    assert at_rest(motion[0]) and at_rest(motion[-1])
+    looped = motion_at(ReferenceMotionParameters({**p.given, 'loop': True}), times + times[-1])
+    np.testing.assert_allclose(looped.rows, motion.rows, atol=1e-9)
+
+
+@pytest.mark.parametrize('part', [0.1, 0.5])
+def test_the_motion_response_uses_a_part_of_what_the_limits_allow(
+        part: float, platform: StewartPlatform) -> None:
+    p = ReferenceMotionParameters({**RESPONSE, 'motion.response.part': part})
+    motion = motion_at(p, sample_times(p) * 1e-9)
+    result, limits = platform.inverse_dynamics(motion), platform.parameters
+    rest = result.lengths[0]
+    room = np.where(result.lengths > rest, limits['limits.length_max'] - rest,
+                    rest - limits['limits.length_min'])
+    uses = [np.abs(result.lengths - rest) / room,
+            np.abs(result.rates) / limits['limits.velocity_max'],
+            np.abs(result.forces - result.forces[0]) / (
+                limits['limits.force_max'] - np.abs(result.forces[0]))]
+    whole = len(motion) // 6
+    for axis in range(6):
+        of_axis = [each[axis * whole:(axis + 1) * whole].max() for each in uses]
+        # Joint angles and the condition number may bound it, and the fades are a little faster.
+        assert 0.5 * part < max(of_axis) < 1.1 * part, (axis, of_axis)
+
+
+def test_the_motion_response_has_low_peaks() -> None:
+    for highest in (10, 50, 100, 400):
+        signal = multisine(highest)
+        crests = [np.abs(each).max() / each.std()
+                  for each in signal.at(np.arange(32 * highest) / (32 * highest))]
+        # A single sine has 1.41; of random phases the product is above 20.
+        assert np.prod(crests) < 13.0 and crests[0] < 1.7
+        assert np.abs(signal.at(np.linspace(0.0, 1.0, 10_001))[0]).max() == pytest.approx(
+            1.0, rel=2e-3)
+
+
+@pytest.mark.parametrize(('changes', 'words'), [
+    ({'motion.response.params_file': ''}, 'motion.amplitude: missing: motion.type response needs'),
+    ({'motion.amplitude': [0.01] * 6}, 'both given: motion.type response needs one of them'),
+    ({'motion.response.periods': 2.5}, 'periods: 2.5: must be a whole number'),
+    ({'motion.response.highest_frequency': 30.0}, '30.0 Hz: must be at most a quarter of rate'),
+    ({'motion.response.period': 0.1}, 'must be at least 2, at most 2000'),
+    ({'motion.response.period': 10.005}, '10.005 s: times rate, 100.0 Hz, must be a whole')])
+def test_a_motion_response_that_breaks_a_rule_is_rejected(
+        changes: dict[str, object], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        ReferenceMotionParameters({**RESPONSE, **changes})
+
+
+@pytest.mark.parametrize(('given', 'words'), [
+    ({'limits.velocity_max': None, 'limits.force_max': None},
+     'limits.velocity_max, limits.force_max: missing: the motion response needs them'),
+    ({'limits.length_max': 1.0},
+     r'motion.initial: \[0, 0, 1.1, .*: is not within the limits of the hexapod')])
+def test_a_hexapod_whose_limits_do_not_bound_a_motion_is_named(
+        given: dict[str, object], words: str, platform: StewartPlatform, tmp_path: Path) -> None:
+    path = tmp_path / 'hexapod.yaml'
+    platform.parameters.replaced(given).to_yaml(path)
+    p = ReferenceMotionParameters({**RESPONSE, 'motion.response.params_file': str(path)})
+    with pytest.raises(ParameterError, match=words):
+        sample_times(p)

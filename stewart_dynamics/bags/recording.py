@@ -6,16 +6,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from pathlib import Path
 import tempfile
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.blocks import of_good_length, Source
-from stewart_dynamics.bags.find import files_of
+from stewart_dynamics.bags.csv_motion import CsvMotion
+from stewart_dynamics.bags.find import files_of, TABLE
 from stewart_dynamics.bags.mcap_file import MAGIC, McapFile
+from stewart_dynamics.bags.other_messages import Converter, POSE_TYPES
+from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.bags.sqlite_file import SqliteFile
 from stewart_dynamics.errors import BagError, one_line, shown_name
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.parameters.table import PARAMETERS
 import zstandard
 
 _SQLITE = b'SQLite format 3\0'
@@ -36,6 +42,13 @@ class Recording:
     """
     A bag of ROS 2, a folder or one of its files, or a bag of ROS 1, a file or a folder of files.
 
+    A file .csv is read as one, see ``csv_motion``, and so are poses of other types and in other
+    axes, see ``other_messages``.
+
+    reading: options for those.
+    frame: frame of the platform, the child of its transforms.
+    home: returns the position [m] from which accelerations alone are integrated.
+
     Raises BagError if nothing of it can be read, with the reason in one line.
 
     topics: the type of each topic in it.
@@ -43,8 +56,11 @@ class Recording:
     notices: notices to the user about the reading of the bag.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, reading: Reading | None = None,
+                 frame: str = PARAMETERS['platform_frame'].default,
+                 home: Callable[[], Array] | None = None) -> None:
         self.path = path
+        self._reading, self._frame, self._home = reading or Reading(), frame, home
         self.missing: list[str] = []
         self.notices: list[str] = []
         self._sources: list[tuple[Path, Source]] = []
@@ -85,7 +101,7 @@ class Recording:
         """
         if given or usual in self.topics:
             return self.checked_topic(given or usual, kind)
-        others = self.topics_of(kind, left_out)
+        others = self.topics_of(kind, left_out) or self._readable_as(kind, left_out)
         if len(others) == 1:
             return others[0]
         lacking = f'no topic {usual}, and ' if usual else ''
@@ -101,11 +117,20 @@ class Recording:
         return sorted(name for name, other in self.topics.items()
                       if other == kind and name not in left_out)
 
+    def _readable_as(self, kind: str, left_out: Container[str]) -> list[str]:
+        """Return the topics of other types that are read as poses; transforms with a child."""
+        if kind != type_names.POSE_STAMPED:
+            return []
+        return sorted(
+            name for other in POSE_TYPES for name in self.topics_of(other, left_out)
+            if other != type_names.TF_MESSAGE or self._reading.child is not None)
+
     def checked_topic(self, name: str, kind: str) -> str:
         """Return a topic; raise BagError if the bag has no such topic, or one of another type."""
         if name not in self.topics:
             raise BagError(f'{self.path}: has no topic {name}; it contains {self.contents}')
-        if self.topics[name] != kind:
+        others = POSE_TYPES if kind == type_names.POSE_STAMPED else ()
+        if self.topics[name] not in (kind, *others):
             raise BagError(f'{self.path}: {name}: is a {self.topics[name]}, must be a {kind}')
         return name
 
@@ -123,6 +148,8 @@ class Recording:
 
         keys: from topics in the bag to the names under which their messages are given.
         """
+        convert = Converter({key: self.topics[topic] for topic, key in keys.items()
+                             if topic in self.topics}, self._reading, self._frame)
         for file, source in self._sources:
             most, count = _MESSAGES + file.stat().st_size, 0
             for block, size in of_good_length(source.blocks(keys)):
@@ -131,12 +158,15 @@ class Recording:
                     self.missing.append(f'{file.name}: more messages than bytes: those after '
                                         f'{count - len(block.times)} are not read')
                     break
-                yield block, size
+                yield block if isinstance(source, CsvMotion) else convert(block), size
             self.missing += [f'{file.name}: {what}' for what in source.missing]
             source.missing.clear()
             if source.unchecked:
                 self.notices.append(f'{file.name}: has no checksums: damaged bytes '
                                     'cannot be detected')
+        if convert.children and not convert.found:
+            raise BagError(f'{self.path}: no transform has the child frame {convert.child}; there '
+                           f'are {joined(sorted(convert.children))}: select one by --child')
 
     @property
     def damage(self) -> list[str]:
@@ -152,6 +182,10 @@ class Recording:
             self._folder.cleanup()
 
     def _opened(self, file: Path) -> Source:
+        if file.suffix.lower() == TABLE:
+            motion = CsvMotion(file, self._reading, self._home)
+            self.notices += motion.notices
+            return motion
         try:
             unpacked = file
             if file.suffix == '.zstd':

@@ -9,9 +9,10 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.calibration import design_command
 from stewart_dynamics.program import (
-    add_accepted, add_node, add_parameters, add_report, between, DONE, names_of,
+    add_accepted, add_node, add_parameters, add_reading, add_report, between, DONE, names_of,
     Program, share)
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 from stewart_dynamics.reporting.results_folder import CALIBRATED, DESIGNED
@@ -66,6 +67,7 @@ def _arguments() -> argparse.ArgumentParser:
                       help='standard deviations of leg positions [m], of each coordinate of the '
                            'poses [m] and of their rotation about each axis [rad] (default: '
                            'estimated)')
+    add_reading(parser)
     calibrated = parser.add_argument_group('what is calibrated, and how')
     calibrated.add_argument('--fixed', type=names_of, default=(), metavar='NAME,...',
                             help="parts that keep the file's values, as zero_length, "
@@ -102,7 +104,8 @@ def _run(given: argparse.Namespace) -> int:
     missing: list[str] = []
     if given.poses.is_dir() or is_bag_file(given.poses):
         measured, missing = read_bag(
-            given.poses, parameters, given.node, given.measured, given.pose)
+            given.poses, parameters, given.node, given.measured, given.pose,
+            Reading.given(given))
     else:
         measured = read_poses(given.poses, parameters['joints'], given.mm, given.degrees)
     _PROGRAM.prepare(likely_mistakes(parameters))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND, Stamps
+from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.errors import BagError
@@ -37,7 +38,7 @@ class RecordedPoses(NamedTuple):
 
 
 def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None,
-             pose: str | None) -> RecordedPoses:
+             pose: str | None, reading: Reading | None = None) -> RecordedPoses:
     """
     Return the poses at rest of a bag, joined by the stamps of the messages' headers.
 
@@ -45,7 +46,7 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
 
     Raises BagError: the bag cannot be read, a topic is not found, or nothing was measured at rest.
     """
-    with closing(Recording(path)) as recording:
+    with closing(Recording(path, reading, parameters['platform_frame'])) as recording:
         legs_topic, commanded = find_calibrated_legs(recording, node, measured)
         pose_topic = recording.find_topic(type_names.POSE_STAMPED, pose, '', '--pose')
         topics = {legs_topic: 'legs', pose_topic: 'pose'}

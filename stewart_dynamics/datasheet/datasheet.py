@@ -16,15 +16,16 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import claimed_box, ratings, workspace
 from stewart_dynamics.datasheet.claimed_box import largest_length, LARGEST_RULE
 from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
+from stewart_dynamics.datasheet.motion_ratings import judged, uses
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import answer, AXES
-from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, uses
 from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
+from stewart_dynamics.replay.recorded_motion import read_motion
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.block_statistics import finite
 from stewart_dynamics.reporting.results_folder import (

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.program import (
-    add_node, add_parameters, between, frequency, NODE, Program)
+    add_node, add_parameters, add_reading, between, frequency, NODE, Program)
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import DATASHEETS
 from stewart_dynamics.signals import interrupt_on_signals
@@ -62,6 +63,7 @@ def _arguments() -> argparse.ArgumentParser:
     motion.add_argument('--differentiate', type=frequency, metavar='HZ',
                         help='compute twist and acceleration from the poses by smoothing splines '
                              'of this cut-off frequency')
+    add_reading(parser)
     return parser
 
 
@@ -84,7 +86,8 @@ def _run(given: argparse.Namespace) -> int:
 
     interrupt_on_signals()
     options = Options(
-        node=given.node, cutoff=given.differentiate, force=given.force,
+        node=given.node, reading=Reading.given(given), cutoff=given.differentiate,
+        force=given.force,
         topics={'combined': given.combined} if given.combined else {})
     parameters = Parameters.from_yaml(given.params, given.node)
     order = Order(

@@ -17,6 +17,7 @@ from stewart_dynamics.mechanics.arguments import as_array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 LEGS = tuple(f'leg_{leg}' for leg in range(1, 7))
 _HEIGHT = 2.6  # of one plot [in]
@@ -26,6 +27,20 @@ def columns(quantities: Mapping[str, Array]) -> dict[str, Array]:
     """Return quantities (..., 6) as columns (N,), whose names end in _1 to _6."""
     return {f'{name}_{leg + 1}': values.reshape(-1, 6)[:, leg]
             for name, values in quantities.items() for leg in range(6)}
+
+
+def data_frame(table: Mapping[str, Array]) -> DataFrame:
+    """
+    Return columns as a ``pandas.DataFrame``.
+
+    Raises ModuleNotFoundError: pandas is not installed.
+    """
+    try:
+        from pandas import DataFrame
+    except ModuleNotFoundError as exc:
+        raise ModuleNotFoundError('to_dataframe: pandas is not installed: '
+                                  'pip install "stewart_dynamics[pandas]"') from exc
+    return DataFrame(table)
 
 
 def figure(quantities: Mapping[str, Array], times: ArrayLike | None, joints: Sequence[str],

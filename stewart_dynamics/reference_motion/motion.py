@@ -14,6 +14,8 @@ from stewart_dynamics.arrays import Array, Integers, SECOND
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.quintic import quintic
+from stewart_dynamics.reference_motion.response_motion import duration, response_motion
 
 
 def sample_times(parameters: ReferenceMotionParameters) -> Integers:
@@ -28,7 +30,9 @@ def sample_times(parameters: ReferenceMotionParameters) -> Integers:
 
 def sample_count(parameters: ReferenceMotionParameters) -> int:
     """Return the number of times in ``sample_times``."""
-    exact: float = parameters['motion.duration'] * parameters['rate']
+    seconds = (duration(parameters) if parameters['motion.type'] == 'response'
+               else parameters['motion.duration'])
+    exact: float = seconds * parameters['rate']
     near = round(exact)
     is_near = math.isclose(exact, near, rel_tol=1e-12, abs_tol=1e-9)
     return 1 + (near if is_near else math.ceil(exact))
@@ -63,6 +67,7 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
       start, then 1, and at the end the same backward, so that position, velocity and
       acceleration begin and end as at rest, whatever the coefficients are. Looped it is 1 from
       the fade on.
+    - response: about initial, each axis in turn as a multisine, see ``response_motion``.
     - hold: at rest in initial.
 
     paper and quintic are at rest in initial before their start and in final after their end;
@@ -80,6 +85,8 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
         return _euler_motion(
             initial + amplitude * np.sin(angle), amplitude * omega * np.cos(angle),
             -amplitude * omega ** 2 * np.sin(angle))
+    if kind == 'response':
+        return response_motion(parameters, time)
     if kind == 'fourier':
         offset, rate, acceleration = _series(parameters, time)
         return _euler_motion(initial + offset, rate, acceleration)
@@ -145,9 +152,3 @@ def _window(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, 
     u = np.clip(np.where(ends, duration - time, time) / fade, 0.0, 1.0)
     w, dw, ddw = quintic(u)
     return w, sign * dw / fade, ddw / fade ** 2
-
-
-def quintic(u: Array) -> tuple[Array, Array, Array]:
-    """Return 10 u^3 - 15 u^4 + 6 u^5 for u (...) from 0 to 1, and its first two derivatives."""
-    return (u ** 3 * (10.0 + u * (6.0 * u - 15.0)), 30.0 * (u * (1.0 - u)) ** 2,
-            60.0 * u * (1.0 - u) * (1.0 - 2.0 * u))

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array, RPM, SECOND
+from stewart_dynamics.estimation.confidence_level import PERCENT
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.frames.rotation import to_euler
@@ -32,6 +33,8 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import NEEDS
+from stewart_dynamics.replay.recorded_response import Followed
+from stewart_dynamics.replay.response_charts import bode_charts, legs_chart, zoom_charts
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
 from stewart_dynamics.replay.summary import Answered, margin_key, unit_key
 from stewart_dynamics.reporting.colors import FORCE_COLORS
@@ -126,7 +129,8 @@ class Report:
             'measured': measured, 'computed': computed, 'residual': measured - computed,
             'external_force': wrench[:, :3], 'external_moment': wrench[:, 3:]})
 
-    def write(self, path: Path, summary: Mapping[str, Any], plotly: Path | None = None) -> None:
+    def write(self, path: Path, summary: Mapping[str, Any], plotly: Path | None = None,
+              followed: Followed | None = None) -> None:
         """
         Write the report, from summary.json; a file that exists is overwritten.
 
@@ -149,7 +153,7 @@ class Report:
             date=date(summary['setpoints']['first_stamp_ns']), quantities=QUANTITIES,
             units={name: each.unit or '' for name, each in PARAMETERS.items()},
             most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
-            unit_key=unit_key,
+            unit_key=unit_key, percent=PERCENT, **_response_charts(followed),
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})
         write_files({path: text})
@@ -201,6 +205,13 @@ class Report:
             'curves': [_packed(*each) for each in curves],
             'plots': [plot.plain() for plot in plots],
         }
+
+
+def _response_charts(followed: Followed | None) -> dict[str, Any]:
+    if followed is None:
+        return {'bode': {}, 'bode_legs': '', 'zooms': {}}
+    return {'bode': bode_charts(followed.values), 'bode_legs': legs_chart(followed.values),
+            'zooms': zoom_charts(followed.values, followed.samples)}
 
 
 def _add(curves: Curves, seconds: Array, quantities: Mapping[str, Array]) -> dict[str, slice]:

@@ -19,7 +19,7 @@ from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
 from stewart_dynamics.setpoints.output_messages import LEG_STATES, MOTOR_TYPES, OUTPUT_TYPES
 
-MEASURED = 'measured'
+MEASURED, MEASURED_POSE = 'measured', 'measured_pose'
 # JointState topics that the node publishes, under its name: computed, never measured legs.
 _COMPUTED = tuple(name for name, kind in (OUTPUT_TYPES | MOTOR_TYPES | MODEL_TYPES).items()
                   if kind == type_names.JOINT_STATE)
@@ -49,8 +49,13 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
     # A WrenchStamped found by its type could be anything: a load cell, an estimate.
     if load := _named(recording, inputs.WRENCH, options, ending=False):
         found[inputs.WRENCH] = load
-    if options.measured:
+    if options.measured_pose:
+        found[MEASURED_POSE] = recording.checked_topic(
+            options.measured_pose, type_names.POSE_STAMPED)
+    elif options.measured:
         found[MEASURED] = recording.checked_topic(options.measured, type_names.JOINT_STATE)
+    elif options.response:
+        found[MEASURED] = find_measured_legs(recording, options.node, None)
     names = list(found.values())
     for name in names:
         if names.count(name) > 1:

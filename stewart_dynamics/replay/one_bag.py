@@ -20,20 +20,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.bags.find import bytes_of, RESULT
 from stewart_dynamics.bags.recording import LISTED, listed, Recording
+from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.bag_report import Report
-from stewart_dynamics.replay.bag_topics import find_topics, MEASURED, notices_of
+from stewart_dynamics.replay.bag_topics import find_topics, MEASURED, MEASURED_POSE, notices_of
 from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
+from stewart_dynamics.replay.recorded_response import Followed, RecordedResponse
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
@@ -82,8 +85,10 @@ def replay(
     options = options or Options()
     before = check_free(folder, options)
     made_of = fingerprint(bag, parameters, options)
-    parameters = options.applied_to(parameters)
-    with closing(Recording(bag)) as recording:
+    parameters = options.applied_to(parameters, bag)
+    with closing(Recording(
+            bag, options.reading, parameters['platform_frame'],
+            lambda: StewartPlatform(parameters).home_pose().position)) as recording:
         topics = find_topics(recording, parameters, options)
         notices = notices_of(recording, topics, parameters, options)
         with whole_folder(folder, options, before=before) as partial, ExitStack() as stack:
@@ -97,7 +102,8 @@ def replay(
             summary = run.summary() | {'fingerprint': made_of}
             write_json(partial / RESULT, summary)
             if run.report is not None:
-                run.report.write(partial / REPORT_PAGE, summary, options.plotly)
+                run.report.write(
+                    partial / REPORT_PAGE, summary, options.plotly, run.followed)
     return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
 
 
@@ -160,22 +166,28 @@ class _Run:
         self._comparison = None if options.measured is None else Comparison(
             parameters, self._per_effort is not None)
         self._efforts = Efforts(parameters['joints'])
+        self._response = RecordedResponse(
+            parameters, topics, self._setpoints.reject) if options.response else None
+        self.followed: Followed | None = None
+        self._response_missing = ''
+        self._first_measured = True
         self.report: Report | None = None
         if options.report:
             self.report = Report(parameters, options.measured is not None, folder)
             self._breakdown = ForceBreakdownRows(parameters)
         files = OutputProcess if bytes_of(recording.path) > _LARGE else OutputFiles
         self._files = files(folder, parameters, options, self._quasi_static,
-                            [topic for topic in topics if topic != MEASURED])
+                            [topic for topic in topics if topic not in (MEASURED, MEASURED_POSE)])
         stack.callback(self._files.abandon)
 
     def take(self, messages: Messages) -> int:
         """Process messages; return the number of setpoints answered."""
-        if self._comparison is not None:
-            measured = messages.of_topic == messages.topics.index(MEASURED)
-            if measured.any():
-                self._take_measured(messages, measured)
-                messages = messages.chosen(~measured)
+        for key in (MEASURED, MEASURED_POSE):
+            if key in self._topics:
+                measured = messages.of_topic == messages.topics.index(key)
+                if measured.any():
+                    self._take_measured(messages.chosen(measured))
+                    messages = messages.chosen(~measured)
         self._files.write_inputs(messages)
         setpoints = self._setpoints.take_many(messages)
         if self._differentiator is not None:
@@ -194,6 +206,13 @@ class _Run:
         if self._comparison is not None:
             self._efforts.check()
             self._compared(self._comparison.finish())
+        if self._response is not None:
+            try:
+                self.followed = self._response.finish()
+            except StewartError as exc:
+                self._response_missing = f'{exc}'
+            for notice in self._response.notices:
+                self._notice(notice)
         self._files.close()
 
     def summary(self) -> dict[str, Any]:
@@ -210,6 +229,8 @@ class _Run:
         if measured and not measured['setpoints_compared']:
             missing.append(f'nothing could be compared with {self._options.measured}: no '
                            f'setpoint has valid samples on both sides of its stamp')
+        if self._response_missing:
+            missing.append(self._response_missing)
         notices = [*self._recording.notices, *self.notices]
         if self._more:
             notices.append(f'and {self._more} more like these')
@@ -225,6 +246,7 @@ class _Run:
                 'node': self._options.node, 'topics': self._topics,
                 'differentiated_cutoff_hz': self._options.cutoff,
                 'measured': self._options.measured,
+                'measured_pose': self._options.measured_pose,
                 'motor_torque': self._options.motor_torque,
                 'motor_current': self._options.motor_current},
             'rejected': [{'topic': rejection.topic, 'reason': rejection.reason, 'count': number,
@@ -238,6 +260,7 @@ class _Run:
                  'first_at_s': _since_first(each.first, values['setpoints'])}
                 for each in mistakes],
             'measured': measured and {'headline': measured_headline(measured), **measured},
+            'response': self.followed and self.followed.values,
             'parameters': self._parameters.plain(),
         }
 
@@ -287,6 +310,8 @@ class _Run:
         self._summary.add(block)
         if self._comparison is not None:
             self._compared(self._comparison.add_setpoints(block.seconds, setpoints, outputs))
+        if self._response is not None:
+            self._response.add(setpoints)
         return len(setpoints.stamps)
 
     def _seconds(self, stamps: Stamps) -> Array:
@@ -300,15 +325,26 @@ class _Run:
         seconds: Array = (whole + rest // SECOND) + (rest % SECOND) * NANOSECOND
         return seconds
 
-    def _take_measured(self, messages: Messages, which: Flags) -> None:
-        assert self._comparison is not None
+    def _take_measured(self, messages: Messages) -> None:
+        """Process messages of the measured legs or poses."""
+        if self._response is not None:
+            self._response.take(messages)
+            if self._first_measured and not self._efforts_recorded(messages):
+                self._comparison = None  # the response needs none
+            self._first_measured = False
+        if self._comparison is None:
+            return
         stamps, efforts, rejected = self._efforts.read(
-            messages.data, messages.starts[which], messages.sizes[which])
+            messages.data, messages.starts, messages.sizes)
         for reason, number in rejected.items():
             self._setpoints.reject(MEASURED, reason, '', number)
         if self._per_effort is not None:
             efforts = efforts * self._per_effort
         self._compared(self._comparison.add_measured(stamps, efforts))
+
+    def _efforts_recorded(self, messages: Messages) -> bool:
+        reader = JointStateReader(self._parameters['joints'], ['effort'])
+        return len(reader.read_many(messages.data, messages.starts, messages.sizes).stamps) > 0
 
     def _compared(self, compared: Any) -> None:
         if self.report is not None and len(compared[0]):

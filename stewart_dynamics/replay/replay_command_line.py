@@ -11,8 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.program import (
-    add_motor_efforts, add_node, add_parameters, add_report, frequency, Program, whole)
+    add_motor_efforts, add_node, add_parameters, add_reading, add_report, frequency, Program,
+    whole)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
 from stewart_dynamics.reporting.results_folder import REPLAYS
 from stewart_dynamics.signals import interrupt_on_signals
@@ -40,6 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.cutoff and not given.differentiate:
         parser.error('--cutoff: needs --differentiate')
+    if given.measured_pose and not given.response:
+        parser.error('--measured-pose: needs --response')
+    if given.measured_pose and given.measured:
+        parser.error('--measured-pose: not with --measured')
     if (given.motor_torque or given.motor_current) and not given.measured:
         parser.error('--motor-torque, --motor-current: need --measured')
     return _PROGRAM.exit_code(lambda: _run(given, _options(given)))
@@ -54,8 +60,8 @@ def _arguments() -> argparse.ArgumentParser:
               'index.html.',
         more='\nof several bags the most severe: 2, then 3, then 1')
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
-                        help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
-                             'with bags in it')
+                        help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, CSV file '
+                             'with named columns, or a folder with bags in it')
     add_parameters(parser)
     _PROGRAM.add_results(parser, REPLAYS)
     topics = parser.add_argument_group(
@@ -65,8 +71,16 @@ def _arguments() -> argparse.ArgumentParser:
         topics.add_argument(f'--{name.replace("_", "-")}', metavar='TOPIC',
                             help=f'topic of the {what}')
     topics.add_argument('--measured', metavar='TOPIC',
-                        help='JointState whose efforts are compared with the computed forces')
+                        help='JointState whose efforts are compared with the computed forces, '
+                             'and whose positions are the achieved ones of --response')
     add_motor_efforts(topics)
+    response = parser.add_argument_group('how the platform follows')
+    response.add_argument('--response', action='store_true',
+                          help='frequency responses, delays and bandwidths from commanded and '
+                               'achieved poses; those of the measured legs by default')
+    response.add_argument('--measured-pose', metavar='TOPIC',
+                          help='topic of the achieved poses in the base frame')
+    add_reading(parser)
     poses = parser.add_argument_group('bags that have only poses')
     poses.add_argument('--differentiate', action='store_true',
                        help='compute twist and acceleration from the poses by smoothing splines')
@@ -91,10 +105,11 @@ def _arguments() -> argparse.ArgumentParser:
 
 def _options(given: argparse.Namespace) -> Options:
     return Options(
-        node=given.node,
+        node=given.node, reading=Reading.given(given),
         topics={name: getattr(given, name) for name in _TOPICS if getattr(given, name)},
         cutoff=(given.cutoff or _CUTOFF) if given.differentiate else None,
-        measured=given.measured or None,
+        measured=given.measured or None, response=given.response,
+        measured_pose=given.measured_pose or None,
         motor_torque=given.motor_torque, motor_current=given.motor_current,
         parquet=given.parquet, report=given.report, force=given.force)
 

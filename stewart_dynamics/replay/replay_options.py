@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from stewart_dynamics.bags.find import TABLE
+from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.program import DONE, NODE, PARTLY_READ, STRICT
 
 if TYPE_CHECKING:
@@ -23,6 +25,7 @@ class Options(NamedTuple):
 
     node: str = NODE
     """Node name: the prefix of the output topics, and of setpoint topics with usual names."""
+    reading: Reading = Reading()  # of recordings of other sources
     topics: Mapping[str, str] = {}
     """
     Topics in the bag to be read as pose, twist, accel, combined or wrench, or as base_pose,
@@ -31,6 +34,9 @@ class Options(NamedTuple):
     cutoff: float | None = None
     """Cut-off frequency [Hz]: read only poses, and differentiate them by smoothing splines."""
     measured: str | None = None  # topic of a sensor_msgs/JointState with the measured efforts
+    response: bool = False  # analyze how the platform follows its setpoints
+    measured_pose: str | None = None
+    """Topic of the achieved poses for the response; None: those of the measured legs."""
     motor_torque: bool = False  # measured efforts are motor torques [N m]
     motor_current: bool = False  # measured efforts are motor currents [A]
     parquet: bool = False  # write legs.parquet in place of legs.csv
@@ -40,10 +46,12 @@ class Options(NamedTuple):
     force: bool = False  # replace existing results
     run: str = ''  # identifier of a run over many bags, written to summary.json
 
-    def applied_to(self, parameters: Parameters) -> Parameters:
-        """Return the parameters with the source of setpoints that these options demand."""
+    def applied_to(self, parameters: Parameters, bag: Path) -> Parameters:
+        """Return the parameters with the source of setpoints that options and bag demand."""
         source = ('pose' if self.cutoff is not None
-                  else 'combined' if 'combined' in self.topics else None)
+                  else 'combined' if 'combined' in self.topics
+                  else 'separate' if bag.suffix.lower() == TABLE
+                  and parameters['setpoint.source'] == 'combined' else None)
         return parameters.replaced({'setpoint.source': source}) if source else parameters
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.response import AXES
 from stewart_dynamics.replay.statements import (
     INPUTS, JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING, SINGULARITY)
 from stewart_dynamics.reporting.pages import fixed
@@ -26,6 +27,8 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     lines = [f'{summary["bag"]}:']
     if summary['measured']:
         lines += _measured_lines(summary['measured'])
+    if summary['response']:
+        lines += _response_lines(summary['response'])
     lines += summary_lines(summary)
     mistakes = likely_mistakes(parameters)
     lines += [notice for notice in summary['notices'] if notice not in mistakes]
@@ -87,6 +90,23 @@ def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
               for each in contacts['strongest'][:_LISTED]]
     if contacts['count'] > _LISTED:
         lines.append(f'and {contacts["count"] - _LISTED} more contacts')
+    return lines
+
+
+def _response_lines(response: Mapping[str, Any]) -> list[str]:
+    """Return the delay and bandwidths of each axis."""
+    lines = []
+    for axis in AXES:
+        each = response[axis]
+        if each['reason']:
+            lines.append(f'response of {axis:<2}  not stated: {each["reason"]}')
+            continue
+        delay = '-' if each['delay'] is None else f'{1e3 * each["delay"]:.2f} ms'
+        bandwidths = ', '.join(
+            f'{name} at {each[key]:.3g} Hz' if each[key] is not None else
+            f'{name} above {each["frequency"][-1]:.3g} Hz'
+            for name, key in (('-3 dB', 'bandwidth_3db'), ('-90 deg', 'bandwidth_90deg')))
+        lines.append(f'response of {axis:<2}  delay {delay}, {bandwidths}')
     return lines
 
 

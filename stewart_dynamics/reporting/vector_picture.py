@@ -73,25 +73,31 @@ class Chart:
 
     frame: left, top, width and height [px].
     x, y: ranges of the data.
+    logarithmic: the scale of x is; its range is above zero.
     """
 
     def __init__(self, picture: Picture, frame: tuple[float, float, float, float],
-                 x: tuple[float, float], y: tuple[float, float]) -> None:
+                 x: tuple[float, float], y: tuple[float, float], *, logarithmic: bool = False,
+                 ) -> None:
         self.picture, self.frame, self.x, self.y = picture, frame, x, y
+        self._logarithmic = logarithmic
 
     def at(self, points: ArrayLike) -> Array:
         """Return where data (..., 2) are in the picture."""
         left, top, width, height = self.frame
         data = np.asarray(points, dtype=float)
         (x0, x1), (y0, y1) = self.x, self.y
-        return np.stack([left + (data[..., 0] - x0) / (x1 - x0) * width,
+        along = data[..., 0]
+        if self._logarithmic:
+            along, x0, x1 = np.log(along), math.log(x0), math.log(x1)
+        return np.stack([left + (along - x0) / (x1 - x0) * width,
                          top + (y1 - data[..., 1]) / (y1 - y0) * height], axis=-1)
 
     def draw_axes(self, x_title: str, y_title: str, count: int = 5) -> None:
         """Draw grid, numbers and titles."""
         left, top, width, height = self.frame
         p = self.picture
-        for value in ticks(*self.x, count):
+        for value in (logarithmic_ticks if self._logarithmic else ticks)(*self.x, count):
             x, _ = self.at([value, self.y[0]])
             p.line([x, top], [x, top + height], css='zero' if value == 0.0 else 'grid')
             p.text([x, top + height + 13], tick_text(value), 'middle', css='tick')
@@ -112,6 +118,18 @@ def ticks(low: float, high: float, count: int) -> list[float]:
     step = next(power * each for each in (1.0, 2.0, 2.5, 5.0, 10.0) if power * each >= rough)
     first = math.ceil(low / step - 1e-9)
     return [n * step for n in range(first, math.floor(high / step + 1e-9) + 1)]
+
+
+def logarithmic_ticks(low: float, high: float, count: int) -> list[float]:
+    """Return at least ``count`` round values between two, if there are as many."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    found: list[float] = []
+    for digits in ((1,), (1, 3), (1, 2, 5), range(1, 10)):
+        found = [value for power in powers for digit in digits
+                 if low * (1 - 1e-9) <= (value := float(f'{digit}e{power}')) <= high * (1 + 1e-9)]
+        if len(found) >= count:
+            break
+    return found
 
 
 def tick_text(value: float) -> str:

@@ -28,7 +28,7 @@ from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import ACCELERATION, BASE, GRAVITY, POSITION, TWIST
-from stewart_dynamics.reference_motion.motion import quintic
+from stewart_dynamics.reference_motion.quintic import quintic
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.inputs import LARGEST
 from stewart_dynamics.setpoints.rejections import Rejections

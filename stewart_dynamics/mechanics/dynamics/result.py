@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.motion import listed
-from stewart_dynamics.mechanics.leg_curves import columns, figure, LEGS
+from stewart_dynamics.mechanics.leg_curves import columns, data_frame, figure, LEGS
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, RATES, RESULT,
     UNIT_LOAD_FORCES)
@@ -21,6 +21,7 @@ from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 
 def _column(where: slice | int, text: str) -> Any:
@@ -105,6 +106,18 @@ class InverseDynamics:
                 'determinant_rate': rows[:, DETERMINANT_RATE],
                 'condition_number': rows[:, CONDITION],
                 'time_to_crossing': np.reshape(self.time_to_crossing, -1)}
+
+    def to_dataframe(self) -> DataFrame:
+        """
+        Return the numbers as a ``pandas.DataFrame``, with the columns of ``to_dict``.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            Pandas is not installed.
+
+        """
+        return data_frame(self.to_dict())
 
     def plot(self, times: ArrayLike | None = None, joints: Sequence[str] = LEGS) -> Figure:
         """

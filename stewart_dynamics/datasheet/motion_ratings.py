@@ -1,36 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A recorded motion for a datasheet: whether it is possible, how far, and its use of limits."""
+"""A recorded motion in a datasheet: whether it is possible, how far, and its use of limits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import closing
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, NANOSECOND
-from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.datasheet.ratings import answer
-from stewart_dynamics.errors import BagError, MotionError
+from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.bag_topics import find_topics
-from stewart_dynamics.replay.differentiate import differentiator
-from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.replay.recorded_motion import RecordedMotion
 from stewart_dynamics.reporting.block_statistics import finite
-from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.step import Batch
 
 LENGTH, RATE, FORCE, SPEED, TORQUE, ANGLE, CLEARANCE, SINGULARITY = (
     'length', 'rate', 'force', 'motor speed', 'motor torque', 'joint angle', 'leg clearance',
@@ -38,62 +28,6 @@ LENGTH, RATE, FORCE, SPEED, TORQUE, ANGLE, CLEARANCE, SINGULARITY = (
 # Largest number of samples of which the amplitude is computed, and the motion between them, which
 # takes 0.6 ms for each.
 _MOST, _MOST_BETWEEN = 100_000, 10_000
-
-
-class RecordedMotion(NamedTuple):
-    """Setpoints of a bag."""
-
-    seconds: Array  # since the first setpoint (N,) [s]
-    motion: Motion
-    wrench: Array  # external wrench (N, 6) [N, N m]
-    base: BaseMotion | None
-    missing: list[str]  # parts of the bag that could not be read
-    rejected: int = 0  # number of rejected messages
-    mistakes: tuple[str, ...] = ()  # likely mistakes in the setpoints, or in the base's motion
-
-
-def read_motion(bag: Path, parameters: Parameters, options: Options,
-                progress: Callable[[int], object]) -> RecordedMotion:
-    """
-    Return the setpoints of a bag, joined as in the replay.
-
-    Raises BagError: the bag cannot be read, or has no setpoints.
-    """
-    parameters = options.applied_to(parameters)
-    splines = differentiator(parameters, options)
-    batches: list[Batch] = []
-    with closing(Recording(bag)) as recording:
-        topics = find_topics(recording, parameters, options)
-        setpoints = Setpoints(parameters, lambda rejection, details: None, lambda text: None)
-        for messages, size in recording.messages({name: key for key, name in topics.items()}):
-            batch = setpoints.take_many(messages)
-            batches.append(batch if splines is None else splines.add(batch))
-            progress(size)
-        setpoints.end('the bag ends')
-        if splines is not None:
-            batches.append(splines.finish())
-        missing = list(recording.missing)
-    batches = [each for each in batches if len(each.stamps)]
-    if not batches:
-        why = '' if splines is None else ''.join(f'; {reason}' for reason in splines.left_out)
-        raise BagError(f'{bag}: has no valid setpoint{why}')
-    stamps = np.concatenate([each.stamps for each in batches])
-    rows = np.concatenate([each.motions for each in batches])
-    wrenches = np.concatenate([np.broadcast_to(each.wrenches, (len(each.stamps), 6))
-                               for each in batches])
-    bases = None if batches[0].bases is None else np.concatenate(
-        [np.asarray(each.bases) for each in batches])
-    if bases is not None:
-        known = np.isfinite(bases).all(axis=1)
-        if not known.any():
-            raise BagError(f"{bag}: the base's motion is not known at any setpoint")
-        stamps, rows, wrenches, bases = (each[known] for each in (stamps, rows, wrenches, bases))
-    steps = np.maximum(np.diff(stamps, prepend=stamps[0]), 0)  # a bag that loops
-    return RecordedMotion(np.cumsum(steps) * NANOSECOND, Motion.of_rows(rows), wrenches,
-                          None if bases is None else BaseMotion.of_rows(bases), missing,
-                          sum(setpoints.counts.values())
-                          + (0 if splines is None else splines.left_out.total()),
-                          tuple(each.words for each in setpoints.mistakes(ever=True)))
 
 
 def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array]:

@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Samples of two sources, commanded and achieved, brought to the same even times.
+
+By cubic splines through the samples of each; where a source has a gap, a run of samples ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.reporting.block_statistics import longest_step
+
+# Highest frequency, relative to the rate of samples between which a spline interpolates, and to
+# that of samples at the times of the setpoints.
+_INTERPOLATED, _SAMPLED = 0.2, 0.45
+# Difference of two times that are the same, relative to a step.
+_SAME_TIME = 0.01
+# Shortest run [samples].
+SHORTEST = 64
+# Difference between the clocks of two sources from which on it is noticed [s].
+_CLOCKS = 0.01
+
+
+class Track(NamedTuple):
+    """Samples of one source."""
+
+    stamps: Stamps  # (N,) [ns], strictly increasing
+    values: Array  # (N, K)
+    late: float  # median time from the stamps to the recording [s]
+
+
+class Tracks:
+    """Collects the samples of one source, block by block."""
+
+    def __init__(self, columns: int) -> None:
+        self._stamps: list[Stamps] = [np.empty(0, dtype=np.int64)]
+        self._values: list[Array] = [np.empty((0, columns))]
+        self._times: list[Stamps] = [np.empty(0, dtype=np.int64)]
+        self.left_out = 0  # samples that were not after those before them
+
+    def add(self, stamps: Stamps, values: Array, times: Stamps) -> None:
+        """Add samples (N, K) with their stamps and times of recording (N,) [ns]."""
+        self._stamps.append(stamps)
+        self._values.append(values.copy())
+        self._times.append(times)
+
+    def track(self) -> Track:
+        """Return the samples; of those whose stamps do not increase, the first ones."""
+        stamps, times = np.concatenate(self._stamps), np.concatenate(self._times)
+        values = np.concatenate(self._values)
+        newest = np.maximum.accumulate(stamps)
+        rises = np.diff(newest, prepend=newest[:1] - 1) > 0
+        self.left_out = int(np.count_nonzero(~rises))
+        late = float(np.median(times - stamps)) * NANOSECOND if len(stamps) else 0.0
+        return Track(stamps[rises], values[rises], late)
+
+
+class Run(NamedTuple):
+    """Commanded and achieved samples at even times, without a gap."""
+
+    seconds: Array  # since the first setpoint (N,)
+    commanded: Array  # (N, K)
+    achieved: Array  # (N, K)
+
+
+class Runs(NamedTuple):
+    """All runs of a recording."""
+
+    runs: list[Run]
+    rate: float  # samples per second
+    highest: float  # highest frequency that the samples show [Hz]
+
+
+def at_even_times(commanded: Track, achieved: Track, timeout: float) -> Runs:
+    """
+    Return commanded and achieved samples at even times, where both are there.
+
+    timeout: a step up to this long is never a gap [s].
+    """
+    from scipy.interpolate import CubicSpline
+
+    step = float(np.median(np.diff(commanded.stamps)))
+    origin = int(commanded.stamps[0])
+    times = [(each.stamps - origin) / step for each in (commanded, achieved)]
+    segments = [_segments(each, timeout * SECOND / step) for each in times]
+    runs = []
+    for first in segments[0]:
+        for second in segments[1]:
+            begin = np.ceil(max(times[0][first.start], times[1][second.start]) - _SAME_TIME)
+            end = np.floor(min(times[0][first.stop - 1], times[1][second.stop - 1]) + _SAME_TIME)
+            if end - begin + 1 < SHORTEST:
+                continue
+            at = np.arange(begin, end + 1)
+            runs.append(Run(at * step * NANOSECOND, *(
+                CubicSpline(time[part], track.values[part])(at) for time, part, track in
+                zip(times, (first, second), (commanded, achieved), strict=True))))
+    rate = SECOND / step
+    other = SECOND / float(np.median(np.diff(achieved.stamps)))
+    offsets = np.abs(times[1] - np.round(times[1]))
+    same = float(np.median(offsets)) <= _SAME_TIME and other >= rate * (1.0 - _SAME_TIME)
+    return Runs(runs, rate, _SAMPLED * rate if same else _INTERPOLATED * min(rate, other))
+
+
+def _segments(times: Array, timeout: float) -> list[slice]:
+    """Return the parts of times without a gap, of more than three samples."""
+    steps = np.diff(times)
+    edges = [0, *(np.flatnonzero(steps > longest_step(steps, timeout)) + 1).tolist(), len(times)]
+    return [slice(begin, end) for begin, end in zip(edges[:-1], edges[1:], strict=True)
+            if end - begin > 3]
+
+
+def clock_notices(commanded: Track, achieved: Track, name: str, delays: Sequence[float],
+                  drift: float | None) -> list[str]:
+    """Return notices about clocks that may differ."""
+    notices = []
+    off = achieved.late - commanded.late
+    if abs(off) > _CLOCKS:
+        notices.append(
+            f'{name}: recorded {achieved.late * 1e3:.3g} ms after their stamps, setpoints '
+            f'{commanded.late * 1e3:.3g} ms: if clocks differ by these {off * 1e3:.3g} ms, '
+            'delays are wrong by them')
+    if delays and min(delays) < 0.0:
+        notices.append(f'{name}: {-1e3 * min(delays):.3g} ms earlier than the setpoints: the '
+                       'clocks of their stamps differ, or setpoints are stamped late')
+    if drift is not None:
+        notices.append(f'{name}: the delay changes by {1e6 * drift:.3g} us in a second: the '
+                       'clocks drift, delays are those of the middle of each part')
+    return notices
+
+
+def check_overlap(commanded: Track, achieved: Track, name: str) -> None:
+    """Raise StewartError if commanded and achieved samples are not of the same time."""
+    for track, what in ((commanded, 'setpoints'), (achieved, name)):
+        if len(track.stamps) < SHORTEST:
+            raise StewartError(f'response: {len(track.stamps)} samples of {what}: must be at '
+                               f'least {SHORTEST}')
+    begin, end = (np.array([track.stamps[at] for track in (commanded, achieved)]) * NANOSECOND
+                  for at in (0, -1))
+    if begin.max() >= end.min():
+        late = achieved.late - commanded.late
+        raise StewartError(
+            f'response: stamps of {name} are from {begin[1]:.3f} to {end[1]:.3f} s, those of the '
+            f'setpoints from {begin[0]:.3f} to {end[0]:.3f} s: they do not overlap; by the times '
+            f'of recording, their clocks differ by {-late:.6g} s')

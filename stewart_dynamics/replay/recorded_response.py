@@ -1,0 +1,200 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The part ``response`` of summary.json: how the platform of a bag follows its setpoints.
+
+Achieved poses are measured, or those of measured legs by forward kinematics. The six axes are the
+position of the platform's origin and the rotation vector from the mean orientation, base axes.
+All samples are kept until the end: 200 bytes for each setpoint and measured sample.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Integers, Records
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.frames.rotation import to_rotation_vector
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
+from stewart_dynamics.mechanics.rows import MOTION, POSE, POSITION, ROTATION
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.messages.joint_state import JointStateReader, NUMBERS_END
+from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.bag_topics import MEASURED, MEASURED_POSE
+from stewart_dynamics.replay.even_samples import (
+    at_even_times, check_overlap, clock_notices, Runs, Track, Tracks)
+from stewart_dynamics.replay.frequency_response import signal_module
+from stewart_dynamics.replay.response import AXES, axes_response, legs_response
+from stewart_dynamics.setpoints import inputs
+from stewart_dynamics.setpoints.inputs import SampleReader
+from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejections
+from stewart_dynamics.setpoints.step import Batch
+
+NO_POSE = 'no pose has these lengths'
+
+
+class Followed(NamedTuple):
+    """How a platform follows: the values of summary.json, and the samples that plots show."""
+
+    values: dict[str, Any]
+    samples: Runs  # of the six axes
+
+
+class RecordedResponse:
+    """
+    Collects setpoints and measured legs or poses, and analyzes them at the end.
+
+    topics: in the bag, by MEASURED or MEASURED_POSE.
+    reject: called with topic, reason, details and number of messages that are rejected.
+
+    Raises StewartError where SciPy is not installed.
+    """
+
+    def __init__(self, parameters: Parameters, topics: Mapping[str, str],
+                 reject: Callable[[str, str, str, int], None]) -> None:
+        signal_module()
+        self._parameters, self._reject = parameters, reject
+        self._platform = StewartPlatform(parameters)
+        self.key = MEASURED_POSE if MEASURED_POSE in topics else MEASURED
+        self._topic = topics[self.key]
+        self._legs = JointStateReader(parameters['joints'], ['position'])
+        self._rejections = Rejections(
+            lambda rejection, details: reject(self.key, rejection.reason, details, 1))
+        self._poses = SampleReader(inputs.POSE, parameters['base_frame'], self._rejections)
+        self._commanded = Tracks(12)
+        self._measured = Tracks(6 if self.key == MEASURED else 12)
+        self.notices: list[str] = []
+
+    def add(self, setpoints: Batch) -> None:
+        """Add setpoints."""
+        self._commanded.add(setpoints.stamps, setpoints.motions[:, POSE], setpoints.times)
+
+    def take(self, messages: Messages) -> None:
+        """Add messages of the measured legs or poses."""
+        if self.key == MEASURED:
+            self._take_legs(messages)
+        else:
+            self._take_poses(messages)
+
+    def _take_legs(self, messages: Messages) -> None:
+        stamps, times, values = [], [], []
+        rejected: Counter[str] = Counter()
+        states = self._legs.read_many(messages.data, messages.starts, messages.sizes)
+        if len(states.stamps) == len(messages.times):
+            stamps, values, times = [states.stamps], [states.values], [messages.times]
+        else:  # one by one, so that each has its time of recording
+            for n in range(len(messages.times)):
+                one = self._legs.read_many(
+                    messages.data, messages.starts[n:n + 1], messages.sizes[n:n + 1])
+                rejected.update(one.rejected)
+                if len(one.stamps):
+                    stamps.append(one.stamps)
+                    values.append(one.values)
+                    times.append(messages.times[n:n + 1])
+        for reason, number in rejected.items():
+            self._reject(self.key, reason, '', number)
+        if not stamps:
+            return
+        rows = np.concatenate(values)
+        sound = (np.abs(rows) < NUMBERS_END).all(axis=1)
+        if not sound.all():
+            self._reject(self.key, OUT_OF_RANGE, '', int(np.count_nonzero(~sound)))
+        self._measured.add(
+            np.concatenate(stamps)[sound], rows[sound], np.concatenate(times)[sound])
+
+    def _take_poses(self, messages: Messages) -> None:
+        whole = self._poses.read_many(messages.data, messages.starts, messages.sizes)
+        if whole is not None:
+            self._measured.add(*whole, messages.times)
+            return
+        for _, time, data in messages.each():
+            if (one := self._poses.read(data)) is not None:
+                self._measured.add(np.array([one[0]]), np.array([one[1]]), np.array([time]))
+
+    def finish(self) -> Followed:
+        """
+        Return the response.
+
+        Raises StewartError if there are too few samples, or they are not of the same time.
+        """
+        if self.key == MEASURED:
+            self._legs.check(self._topic)
+        commanded, measured = self._commanded.track(), self._measured.track()
+        for tracks, name in ((self._commanded, 'setpoints'), (self._measured, self._topic)):
+            if tracks.left_out:
+                self.notices.append(f'response: {tracks.left_out} samples of {name} are left out: '
+                                    'their stamps do not increase')
+        check_overlap(commanded, measured, self._topic)
+        timeout = self._parameters['setpoint.timeout']
+        legs: dict[str, Any] = {'legs': {}, 'leg_balance': None}
+        if self.key == MEASURED:
+            measured = measured._replace(
+                values=measured.values + self._parameters['geometry.zero_length'])
+            lengths = commanded._replace(values=self._platform.inverse_kinematics(
+                Pose(commanded.values[:, POSITION],
+                     commanded.values[:, ROTATION].reshape(-1, 3, 3))))
+            own = at_even_times(lengths, measured, timeout)
+            if own.runs:
+                legs = legs_response(own, self._parameters['joints'])
+            measured, lost = achieved_poses(self._platform.structure, measured, commanded)
+            if lost:
+                self._reject(self.key, NO_POSE, '', lost)
+            check_overlap(commanded, measured, self._topic)
+        axes_commanded, axes_achieved = (
+            each._replace(values=axes_of(each.values, mean_orientation(each.values)))
+            for each in (commanded, measured))
+        samples = at_even_times(axes_commanded, axes_achieved, timeout)
+        if not samples.runs:
+            raise StewartError(f'response: setpoints and {self._topic} have no time without a gap '
+                               'in common that is long enough')
+        size = self._parameters['singularity.characteristic_length']
+        axes = axes_response(samples, size)
+        self.notices += clock_notices(commanded, measured, self._topic, [
+            axes[name]['delay'] for name in AXES if axes[name]['delay'] is not None],
+            axes['clock_drift'])
+        self.notices += [
+            f'{self._topic}: {name} moves opposite to its setpoints: the sign of an axis differs'
+            for name in AXES if axes[name]['opposite']]
+        return Followed({
+            **axes, **legs, 'topic': self._topic, 'samples': len(measured.stamps),
+            'rate': samples.rate, 'highest_frequency': samples.highest}, samples)
+
+
+def axes_of(poses: Array, center: Array) -> Array:
+    """Return the six axes (N, 6) [m, rad] of rows of poses (N, 12) about an orientation (3, 3)."""
+    turns = poses[:, ROTATION].reshape(-1, 3, 3) @ center.T
+    return np.hstack([poses[:, POSITION], to_rotation_vector(turns)])
+
+
+def mean_orientation(poses: Array) -> Array:
+    """Return the mean orientation (3, 3) of rows of poses (N, 12)."""
+    left, _, right = np.linalg.svd(poses[:, ROTATION].reshape(-1, 3, 3).mean(axis=0))
+    flip = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
+    found: Array = left @ flip @ right
+    return found
+
+
+def achieved_poses(structure: Records, lengths: Track, commanded: Track) -> tuple[Track, int]:
+    """
+    Return the poses (N, 12) of measured lengths by forward kinematics, begun at commanded poses.
+
+    The number of lengths without a pose, which are left out, is returned too.
+
+    structure: of the hexapod. lengths: (N, 6) [m]. commanded: rows of poses (M, 12).
+    """
+    rows = np.zeros((len(lengths.stamps), MOTION))
+    nearest = np.searchsorted(commanded.stamps, lengths.stamps).clip(0, len(commanded.stamps) - 1)
+    rows[:, POSE] = commanded.values[nearest]
+    codes: Integers = np.empty(len(rows), dtype=np.int64)
+    forward_kinematics.poses(structure, np.ascontiguousarray(lengths.values), rows, codes,
+                             np.empty_like(codes), np.empty(len(rows)))
+    found = codes == forward_kinematics.FOUND
+    return (Track(lengths.stamps[found], rows[found, POSE], lengths.late),
+            int(np.count_nonzero(~found)))

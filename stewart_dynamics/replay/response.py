@@ -1,0 +1,285 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+How the axes of the platform, and the legs, follow their commands: frequency responses and noise.
+
+A part in which the commands repeat, as the motion ``response`` of stewart_trajectory, is analyzed
+by its periods, see ``frequency_response``; other motion as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.replay.even_samples import Run, Runs, SHORTEST
+from stewart_dynamics.replay.frequency_response import (
+    aligned, FrequencyResponses, Part, periodic_parts, responses, segment_length, spectra)
+from stewart_dynamics.replay.response_measures import CERTAIN, Response
+
+AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
+# Part of the largest motion of an axis below which another axis is not excited.
+_EXCITED = 1e-3
+_STILL = 1e-9  # [m, rad]
+# Smallest drift of clocks that is stated, also in standard errors, and the periods it needs.
+_DRIFT, _CERTAIN_DRIFT, _FEWEST_PERIODS = 2e-6, 5.0, 4
+# Time around a reversal of an axis in which the turn-around bump is searched [s].
+_AROUND = 0.1
+
+
+class Analysis:
+    """The frequency responses of the axes, or of the legs, of a recording."""
+
+    def __init__(self, recorded: Runs, scales: Sequence[float]) -> None:
+        self._recorded = recorded
+        self._scales = np.asarray(scales)
+        whole = np.concatenate([run.commanded for run in recorded.runs])
+        self.excited = self._moving(whole)
+        self.periodic = [
+            (run, part) for run in recorded.runs
+            for part in periodic_parts(run.commanded[:, self.excited], recorded.rate)]
+
+    def _moving(self, commanded: Array) -> list[int]:
+        sizes = commanded.std(axis=0) / self._scales
+        moving: list[int] = np.flatnonzero(
+            (sizes > _EXCITED * sizes.max()) & (sizes > _STILL)).tolist()
+        return moving
+
+    def axes(self) -> list[tuple[list[int], FrequencyResponses, float]]:
+        """
+        Return responses of all six outputs: the inputs, the responses, the step in frequency.
+
+        Each part that repeats has its own inputs; axes that have no such part follow.
+        """
+        found = []
+        for run, part in self.periodic:
+            inputs = self._moving(run.commanded[part.begin:part.end])
+            if (one := self._of([_both(run, part)], part.period, inputs)) is not None:
+                found.append((inputs, *one))
+        covered = {each for inputs, several, _ in found for n, each in enumerate(inputs)
+                   if np.isfinite(several.responses[:, each, n]).any()}
+        if set(self.excited) - covered:
+            whole = self._of([_both(run) for run in self._recorded.runs], None, self.excited)
+            if whole is not None:
+                found.append((self.excited, *whole))
+        return found
+
+    def _of(self, samples: list[Array], period: int | None, inputs: Sequence[int],
+            ) -> tuple[FrequencyResponses, float] | None:
+        rate = self._recorded.rate
+        samples, late = (samples, 0) if period else aligned(samples, rate)
+        length = period or segment_length(samples, rate, len(inputs))
+        if length < (4 if period else SHORTEST):
+            return None
+        found = spectra(samples, rate, length, hann=period is None)
+        if found is None or found.averages <= len(inputs):
+            return None
+        return _later(responses(found, inputs, range(6, 12)), late / rate), rate / length
+
+    def legs(self) -> list[tuple[Response, float]]:
+        """
+        Return the response of each leg to its own command, and the step in frequency.
+
+        Legs are driven one by one: all parts with the period of most samples are averaged.
+        """
+        rate = self._recorded.rate
+        lengths: dict[int | None, list[Array]] = {}
+        for run, part in self.periodic:
+            lengths.setdefault(part.period, []).append(_both(run, part))
+        if lengths:
+            period = max(lengths, key=lambda each: sum(map(len, lengths[each])))
+            samples = lengths[period]
+        else:
+            period, samples = None, [_both(run) for run in self._recorded.runs]
+        samples, late = (samples, 0) if period else aligned(samples, rate)
+        length = period or segment_length(samples, rate, 1)
+        found = spectra(samples, rate, length, period is None) if length >= 4 else None
+        if found is None or found.averages <= 1:
+            return []
+        return [(self.one(_later(responses(found, [leg], [6 + leg]), late / rate), 0, 0),
+                 rate / length) for leg in range(6)]
+
+    def one(self, several: FrequencyResponses, output: int, number: int) -> Response:
+        """Return one of several responses, at the frequencies where it is known."""
+        value = several.responses[:, output, number]
+        known = np.isfinite(value) & (several.frequencies <= self._recorded.highest)
+        return Response(several.frequencies[known], value[known],
+                        several.radii[known, output, number],
+                        several.coherences[known, output, number])
+
+    def clock_drift(self) -> float | None:
+        """
+        Return how much faster the clock of the achieved samples is, relative; None if not certain.
+
+        By how much later each period is than the mean of its part, up to the highest frequency.
+        """
+        times: list[Array] = [np.empty(0)]
+        lags: list[Array] = [np.empty(0)]
+        for run, part in self.periodic:
+            assert part.period is not None
+            for axis in self._moving(run.commanded[part.begin:part.end]):
+                x, y = (np.fft.rfft(each[part.begin:part.end, axis].reshape(-1, part.period))
+                        for each in (run.commanded, run.achieved))
+                omega = 2.0 * np.pi * self._recorded.rate / part.period * np.arange(x.shape[1])
+                cross = y * x.conj()
+                mean = cross.mean(axis=0)
+                lines = (np.abs(x[0]) > 1e-3 * np.abs(x[0]).max()) & (
+                    omega <= 2.0 * np.pi * self._recorded.highest) & (omega > 0.0)
+                phase = np.angle(cross[:, lines] * mean[lines].conj())
+                weights = np.abs(mean[lines]) * omega[lines]
+                if not weights.any():  # it does not follow at all
+                    continue
+                lags.append((-phase @ weights / (weights @ omega[lines])).astype(np.float64))
+                middle = 0.5 * (len(x) - 1)
+                numbers: Array = np.arange(len(x), dtype=np.float64)
+                times.append((numbers - middle) * (part.period / self._recorded.rate))
+        t, late = np.concatenate(times), np.concatenate(lags)
+        if len(t) < _FEWEST_PERIODS:
+            return None
+        slope = float(t @ late / (t @ t))
+        error = float(np.sqrt(np.sum((late - slope * t) ** 2) / (len(t) - 1) / (t @ t)))
+        return slope if abs(slope) > max(_DRIFT, _CERTAIN_DRIFT * error) else None
+
+    def deviations(self, axis: int) -> tuple[float, float] | None:
+        """
+        Return repeatability and turn-around bump of an axis in its periods [m or rad].
+
+        The largest deviation of a period from the mean of all; the largest deviation of that mean
+        from the coherent response around the reversals of the axis. None without periods.
+        """
+        for run, part in self.periodic:
+            assert part.period is not None
+            if axis not in self._moving(run.commanded[part.begin:part.end]):
+                continue
+            commanded, achieved = (
+                each[part.begin:part.end, axis].reshape(-1, part.period)
+                for each in (run.commanded, run.achieved))
+            mean = achieved.mean(axis=0)
+            spread = achieved - mean
+            spread = spread - spread.mean(axis=1, keepdims=True)
+            x, y = np.fft.rfft(commanded.mean(axis=0)), np.fft.rfft(mean)
+            x[0] = 0.0
+            lines = np.abs(x) > 1e-3 * np.abs(x).max()
+            y[~lines] = 0.0
+            bump = mean - mean.mean() - np.fft.irfft(y, part.period)
+            speed = np.diff(commanded.mean(axis=0), append=commanded[0, 0])
+            turns = np.flatnonzero(speed * np.roll(speed, 1) < 0.0)
+            reach = round(_AROUND * self._recorded.rate)
+            near = (turns[:, None] + np.arange(-reach, reach + 1)) % part.period
+            return float(np.abs(spread).max()), float(np.abs(bump[near]).max(initial=0.0))
+        return None
+
+
+def _later(several: FrequencyResponses, seconds: float) -> FrequencyResponses:
+    """Return responses of outputs that are later by a time."""
+    turn = np.exp(-2j * np.pi * several.frequencies * seconds)
+    return several._replace(responses=several.responses * turn[:, None, None])
+
+
+def _both(run: Run, part: Part | None = None) -> Array:
+    """Return commanded and achieved samples side by side."""
+    which = slice(None) if part is None else slice(part.begin, part.end)
+    return np.hstack([run.commanded[which], run.achieved[which]])
+
+
+def axes_response(recorded: Runs, size: float) -> dict[str, Any]:
+    """Return the part of ``response`` about the axes; ``size`` [m] compares turns with shifts."""
+    analysis = Analysis(recorded, [size] * 3 + [1.0] * 3)
+    found = analysis.axes()
+    result: dict[str, Any] = {}
+    for axis, name in enumerate(AXES):
+        pieces = [(several, inputs.index(axis), step) for inputs, several, step in found
+                  if axis in inputs]
+        own = [analysis.one(several, axis, number) for several, number, _ in pieces]
+        response = _joined(own)
+        excited = bool(len(response.frequency))
+        noise = next(
+            (several.noise[:, axis], step) for (several, _, step), one in
+            zip(pieces, own, strict=True) if len(one.frequency)) if excited else _quiet(
+                found, axis)
+        repeated = analysis.deviations(axis) if excited else None
+        result[name] = {
+            **(response.measures() if excited else _NOT_EXCITED),
+            'cross': _cross(analysis, pieces, axis) if excited else {},
+            'noise': None if noise is None else float(np.sqrt(np.sum(noise[0]) * noise[1])),
+            'repeatability': repeated and repeated[0], 'turn_around': repeated and repeated[1],
+            'reason': None if response.coherent.any() else _reason(
+                analysis, excited, bool(pieces), axis)}
+    return result | {'clock_drift': analysis.clock_drift()}
+
+
+def _reason(analysis: Analysis, excited: bool, analyzed: bool, axis: int) -> str:
+    """Return why an axis is not stated."""
+    if excited:
+        return 'not coherent with its setpoints'
+    if axis not in analysis.excited:
+        return 'not excited'
+    return 'moves only together with other axes' if analyzed else 'the recording is too short'
+
+
+_NOT_EXCITED: dict[str, Any] = {name: [] for name in (
+    'frequency', 'gain', 'phase', 'coherence', 'gain_low', 'gain_high', 'phase_low', 'phase_high')
+    } | dict.fromkeys(('delay', 'bandwidth_3db', 'bandwidth_90deg', 'second_order')) | {
+        'opposite': False}
+
+
+def _joined(pieces: Sequence[Response]) -> Response:
+    """Return several responses of one axis as one; of a frequency the most certain."""
+    if not pieces:
+        none = np.empty(0)
+        return Response(none, none.astype(complex), none, none)
+    columns = [np.concatenate(each) for each in zip(*pieces, strict=True)]
+    order = np.lexsort((columns[2], columns[0]))
+    columns = [each[order] for each in columns]
+    first = np.diff(columns[0], prepend=-1.0) > 1e-9
+    return Response(*(each[first] for each in columns))
+
+
+def _cross(analysis: Analysis, pieces: Sequence[tuple[FrequencyResponses, int, float]],
+           axis: int) -> dict[str, float | None]:
+    """Return the largest gain from an axis to each other one; None: lost in the noise."""
+    cross: dict[str, float | None] = {}
+    for other, name in enumerate(AXES):
+        if other == axis:
+            continue
+        all_of = _joined([analysis.one(several, other, number) for several, number, _ in pieces])
+        gains = np.abs(all_of.value)
+        sure = gains > CERTAIN * all_of.radius
+        cross[name] = float(gains[sure].max()) if sure.any() else None
+    return cross
+
+
+def _quiet(found: Sequence[tuple[list[int], FrequencyResponses, float]], axis: int,
+           ) -> tuple[Array, float] | None:
+    """Return the density of the noise of an axis that is not excited, and its step [Hz]."""
+    return next(((several.noise[:, axis], step) for _, several, step in found), None)
+
+
+def legs_response(recorded: Runs, joints: Sequence[str]) -> dict[str, Any]:
+    """Return the parts of ``response`` about the legs."""
+    found = Analysis(recorded, [1.0] * 6).legs()
+    legs = {joint: one.measures() for joint, (one, _) in zip(joints, found, strict=False)
+            if len(one.frequency)}
+    return {'legs': legs, 'leg_balance': _balance([one for one, _ in found])}
+
+
+def _balance(legs: Sequence[Response]) -> dict[str, float] | None:
+    """Return the largest difference in phase [deg] between two legs, and where [Hz]."""
+    legs = [each for each in legs if each.coherent.any()]
+    if len(legs) < 2:
+        return None
+    top = min(each.half_bandwidth() for each in legs)
+    common = legs[0].frequency[legs[0].coherent]
+    for each in legs[1:]:
+        common = np.intersect1d(common, each.frequency[each.coherent])
+    common = common[common <= top]
+    if not len(common):
+        return None
+    phases = np.array([np.interp(common, each.frequency, each.phase) for each in legs])
+    spread = np.degrees(np.ptp(phases, axis=0))
+    at = int(spread.argmax())
+    return {'phase_difference': float(spread[at]), 'frequency': float(common[at])}

@@ -1,0 +1,301 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Motions in CSV files: columns, units, angles, axes, accelerations alone, and bad files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import rng, ROOT
+from scipy.spatial.transform import Rotation
+
+from stewart_dynamics import BagError, Motion, Parameters, read_setpoints, StewartPlatform
+from stewart_dynamics.bags.baseline import integrated
+from stewart_dynamics.bags.csv_motion import _GROUPS, factor, QUATERNION
+from stewart_dynamics.datasheet.datasheet_command_line import main as capability
+from stewart_dynamics.program import EULER
+from stewart_dynamics.replay import main as replay
+
+Array = NDArray[np.float64]
+
+PARAMS = ROOT / 'config' / 'platform.yaml'
+PLATFORM = StewartPlatform.from_yaml(PARAMS)
+TIMES = np.arange(0.0, 2.0, 0.01)
+
+
+def smooth(amplitude: float = 0.05) -> Motion:
+    """Return a motion of all six coordinates at TIMES."""
+    w = 2.0 * np.pi * np.array([0.5, 0.7, 0.4, 0.6, 0.8, 0.3])
+    phase = w * TIMES[:, None] + np.arange(6)
+    x, v, a = (amplitude * each for each in (
+        np.sin(phase), w * np.cos(phase), -w ** 2 * np.sin(phase)))
+    x[:, 2] += 1.1
+    return Motion.from_euler(x[:, :3], x[:, 3:], v[:, :3], v[:, 3:], a[:, :3], a[:, 3:])
+
+
+MOTION = smooth()
+
+
+def columns(motion: Motion) -> dict[str, Array]:
+    """Return a motion as columns in SI, its rotation as angles of Rz Ry Rx."""
+    angles = Rotation.from_matrix(motion.rotation).as_euler('xyz')
+    found = {'t': TIMES}
+    for names, values in (
+            ('x y z', motion.position), ('roll pitch yaw', angles),
+            ('vx vy vz', motion.linear_velocity), ('wx wy wz', motion.angular_velocity),
+            ('ax ay az', motion.linear_acceleration),
+            ('alx aly alz', motion.angular_acceleration)):
+        found |= {name: values[:, n] for n, name in enumerate(names.split())}
+    return found
+
+
+def write(path: Path, table: dict[str, Array], separator: str = ',', mark: str = '.') -> Path:
+    text = io.StringIO()
+    writer = csv.writer(text, delimiter=separator, lineterminator='\n')
+    writer.writerow(table)
+    writer.writerows([[repr(float(each)).replace('.', mark) for each in row]
+                      for row in zip(*table.values(), strict=True)])
+    path.write_text(text.getvalue())
+    return path
+
+
+def close(found: Any, wanted: Motion) -> None:
+    np.testing.assert_allclose(found.motion.rows, wanted.rows, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found.times, TIMES, rtol=0.0, atol=1e-9)
+
+
+def test_columns_with_units_are_read_in_si(tmp_path: Path) -> None:
+    given = columns(MOTION)
+    scaled = {
+        't': ('t [ms]', 1e3), 'x': ('x [mm]', 1e3), 'y': ('y [cm]', 1e2),
+        'z': ('z [in]', 1.0 / 0.0254), 'roll': ('roll [deg]', np.degrees(1.0)),
+        'pitch': ('pitch[mrad]', 1e3), 'yaw': ('yaw [°]', np.degrees(1.0)),
+        'vx': ('vx [mm/s]', 1e3), 'vy': ('VY [m/s]', 1.0), 'wx': ('wx [deg/s]', np.degrees(1.0)),
+        'ax': ('ax [g]', 1.0 / 9.80665), 'ay': ('ay [gal]', 100.0), 'az': ('az [mm/s^2]', 1e3),
+        'alx': ('alx [deg/s²]', np.degrees(1.0)), 'aly': ('aly [rad/s**2]', 1.0)}
+    table = {scaled.get(name, (name, 1.0))[0]: values * scaled.get(name, (name, 1.0))[1]
+             for name, values in given.items()}
+    table['comment'] = np.zeros(len(TIMES))
+    close(read_setpoints(write(tmp_path / 'a.csv', table)), MOTION)
+    close(read_setpoints(write(tmp_path / 'b.csv', table, ';', ',')), MOTION)
+
+
+@pytest.mark.parametrize('order', EULER)
+def test_angles_of_any_order_are_those_of_scipy(order: str, tmp_path: Path) -> None:
+    angles = rng(1).uniform(-0.5, 0.5, (len(TIMES), 3))
+    table = {'t': TIMES, 'x': TIMES, 'y': TIMES, 'z': TIMES}
+    table |= {name: angles[:, n] for n, name in enumerate(('roll', 'pitch', 'yaw'))}
+    path = write(tmp_path / 'a.csv', table)
+    # scipy takes the angles in the order of the rotations.
+    wanted = Rotation.from_euler(order, angles[:, ['xyz'.index(each) for each in order.lower()]])
+    np.testing.assert_allclose(
+        read_setpoints(path, euler=order).motion.rotation, wanted.as_matrix(), atol=1e-12)
+
+
+def test_u_v_w_turn_along_and_roll_pitch_yaw_do_not(tmp_path: Path) -> None:
+    angles = np.array([[0.1, 0.2, 0.3]]).repeat(len(TIMES), axis=0)
+    for names, order in ((('u', 'v', 'w'), 'XYZ'), (('roll', 'pitch', 'yaw'), 'xyz')):
+        table = {'t': TIMES, 'x': TIMES, 'y': TIMES, 'z': TIMES}
+        table |= {name: angles[:, n] for n, name in enumerate(names)}
+        found = read_setpoints(write(tmp_path / 'a.csv', table))
+        np.testing.assert_allclose(
+            found.motion.rotation[0], Rotation.from_euler(order, angles[0]).as_matrix(),
+            atol=1e-12)
+
+
+@pytest.mark.parametrize('axes', ['x,-y,z', 'z,-x,y', 'x,-y,-z', '-y,x,z'])
+def test_axes_of_other_sources_left_handed_or_not(axes: str, tmp_path: Path) -> None:
+    matrix = np.zeros((3, 3))
+    for row, name in enumerate(axes.split(',')):
+        matrix[row, 'xyz'.index(name[-1])] = -1.0 if name[0] == '-' else 1.0
+    axial = np.linalg.det(matrix) * matrix
+    # The motion in the axes of the source.
+    source = Motion(MOTION.position @ matrix, matrix.T @ MOTION.rotation @ matrix,
+                    MOTION.linear_velocity @ matrix, MOTION.angular_velocity @ axial,
+                    MOTION.linear_acceleration @ matrix, MOTION.angular_acceleration @ axial)
+    close(read_setpoints(write(tmp_path / 'a.csv', columns(source)), axes=axes), MOTION)
+
+
+def test_replay_and_capability_read_the_same_file(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path / 'motion.csv', columns(MOTION))
+    assert replay([str(path), '--params', str(PARAMS), '--output', str(tmp_path / 'r'),
+                   '--no-report', '--strict']) == 0
+    summary = json.loads((tmp_path / 'r' / 'motion' / 'summary.json').read_text())
+    assert summary['setpoints']['answered'] == len(TIMES)
+    assert not summary['mistakes'] and not summary['rejected'] and not summary['notices']
+    forces = PLATFORM.inverse_dynamics(MOTION).forces
+    assert summary['legs']['leg_1']['force_peak_n'] == pytest.approx(
+        forces[np.abs(forces[:, 0]).argmax(), 0])
+    assert capability(['--params', str(PARAMS), '--motion', str(path), '--output',
+                       str(tmp_path / 'c'), '--strict']) == 0
+    assert 'possible' in capsys.readouterr().out
+
+
+def test_a_file_needs_no_other_source_of_setpoints(tmp_path: Path) -> None:
+    path = write(tmp_path / 'motion.csv', columns(MOTION))
+    params = tmp_path / 'combined.yaml'
+    Parameters.from_yaml(PARAMS).replaced({'setpoint.source': 'combined'}).to_yaml(params)
+    assert replay([str(path), '--params', str(params), '--output', str(tmp_path / 'r'),
+                   '--no-report']) == 0
+    close(read_setpoints(path, Parameters.from_yaml(params)), MOTION)
+
+
+def test_poses_alone_need_to_be_differentiated(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = columns(MOTION)
+    path = write(tmp_path / 'poses.csv', {
+        name: table[name] for name in ('t', 'x', 'y', 'z', 'roll', 'pitch', 'yaw')})
+    plain = ['--params', str(PARAMS), '--output', str(tmp_path / 'r'), '--no-report']
+    assert replay([str(path), *plain]) == 2
+    assert '--differentiate computes twist' in capsys.readouterr().err
+    assert replay([str(path), *plain, '--differentiate']) == 0
+    found = read_setpoints(path, cutoff=10.0)
+    inner = slice(30, -30)
+    np.testing.assert_allclose(found.motion.linear_acceleration[inner],
+                               MOTION.linear_acceleration[inner], atol=0.01)
+    assert not read_setpoints(path).motion.rows[:, 12:].any()
+
+
+def test_a_platform_that_stays_level_needs_no_rotation(tmp_path: Path) -> None:
+    table = columns(MOTION)
+    path = write(tmp_path / 'level.csv', {name: table[name] for name in (
+        't', 'x', 'y', 'z', 'vx', 'vy', 'vz', 'ax', 'ay', 'az')})
+    found = read_setpoints(path).motion
+    np.testing.assert_array_equal(found.rotation, np.tile(np.eye(3), (len(TIMES), 1, 1)))
+    np.testing.assert_allclose(found.linear_velocity, MOTION.linear_velocity)
+    assert not found.angular_velocity.any()
+
+
+# -- accelerations alone --------------------------------------------------------------------------
+
+def quake(offset: float = 0.0, drift: float = 0.0) -> tuple[Array, Array, Array]:
+    """Return times, positions and accelerations with the errors of an accelerometer."""
+    t = np.arange(0.0, 20.0, 0.005)
+    w, u = 2.0 * np.pi * np.array([1.5, 2.3, 3.1]), (t[:, None] - 8.0) / 3.0
+    envelope = np.exp(-u ** 2)
+    x = 0.01 * envelope * np.sin(w * t[:, None])
+    rate, change = -2.0 * u / 3.0 * envelope, (4.0 * u ** 2 - 2.0) / 9.0 * envelope
+    a = 0.01 * (change * np.sin(w * t[:, None]) + 2.0 * rate * w * np.cos(w * t[:, None])
+                - envelope * w ** 2 * np.sin(w * t[:, None]))
+    return t, x, a + offset + drift * t[:, None]
+
+
+def test_the_record_of_an_earthquake_is_integrated_with_its_base_line_corrected(
+        tmp_path: Path) -> None:
+    t, x, a = quake(offset=0.02, drift=0.001)
+    path = write(tmp_path / 'quake.csv', {
+        't': t, 'ax [g]': a[:, 0] / 9.80665, 'az': a[:, 2], 'ay [cm/s^2]': 100.0 * a[:, 1]})
+    motion = read_setpoints(path, PLATFORM).motion
+    home = PLATFORM.home_pose().position
+    # A line is fitted to the motion as well; without one it would end 5 m away.
+    np.testing.assert_allclose(motion.position - home, x, atol=5e-4)
+    for end in (0, -1):
+        np.testing.assert_allclose(motion.position[end], home, atol=1e-9)
+        np.testing.assert_allclose(motion.linear_velocity[end], 0.0, atol=1e-9)
+    assert replay([str(path), '--params', str(PARAMS), '--output', str(tmp_path / 'r'),
+                   '--no-report', '--strict']) == 0
+    summary = json.loads((tmp_path / 'r' / 'quake' / 'summary.json').read_text())
+    assert not summary['mistakes']
+    notice, = summary['notices']
+    assert 'after the base line, a polynomial of second degree' in notice
+    with pytest.raises(BagError, match='needs the parameters of the hexapod'):
+        read_setpoints(path)
+
+
+def test_position_velocity_and_acceleration_belong_together() -> None:
+    t, _, a = quake(offset=0.1)
+    found = integrated(t, a)
+    steps = np.diff(t)[:, None]
+    first, second = found.accelerations[:-1], found.accelerations[1:]
+    np.testing.assert_allclose(
+        np.diff(found.velocities, axis=0), steps * (first + second) / 2.0, atol=1e-12)
+    np.testing.assert_allclose(
+        np.diff(found.positions, axis=0),
+        steps * found.velocities[:-1] + steps ** 2 * (2.0 * first + second) / 6.0, atol=1e-12)
+    # No other line of second degree, that ends at rest in the same place, has a smaller velocity.
+    for change in np.random.default_rng(1).normal(size=(20, 3)):
+        u = t / t[-1]
+        v = change[0] * u + change[1] * u ** 2 / 2.0 + change[2] * u ** 3 / 3.0
+        x = np.cumsum(v) * 0.005
+        basis = np.stack([u * (1.0 - u), u ** 2 * (1.0 - u)], axis=1)
+        v = basis[:, 0] - basis[:, 1] * (basis[:, 0].sum() / basis[:, 1].sum())
+        assert abs(x).max() > 0.0
+        assert np.sum((found.velocities + 1e-3 * v[:, None]) ** 2) >= np.sum(
+            found.velocities ** 2)
+
+
+# -- bad files ------------------------------------------------------------------------------------
+
+HEAD = 't,x,y,z,qx,qy,qz,qw'
+ROW = '{},0,0,1.1,0,0,0,1'
+
+
+def rows(*more: str) -> str:
+    return '\n'.join([HEAD, *(ROW.format(n) for n in (1, 2)), *more]) + '\n'
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('', 'is empty: row 1 must name the columns'),
+    (HEAD, '0 rows of numbers: must be at least 2'),
+    (rows().replace('t,', 'time,'), 'row 1: has no column t; it has time, x, y'),
+    (rows().replace(',y,', ',why,'), 'row 1: has column x, z but not y'),
+    (rows().replace('qw', 'q4'), 'row 1: has column qx, qy, qz but not qw'),
+    (rows().replace('x,y', 'x [furlong],y', 1),
+     'row 1: column x: unit furlong: must be one of m, mm, cm'),
+    (rows().replace('qx', 'qx [deg]'), 'row 1: column qx: unit deg: must be empty'),
+    (rows().replace('t,', 't [m],'), 'row 1: column t: unit m: must be one of s, ms'),
+    (rows().replace('qw', 'x'), 'row 1: column x: is there twice'),
+    (rows('3,0,0,abc,0,0,0,1'), "row 4: z: 'abc': must be a finite number"),
+    (rows('3,0,nan,1,0,0,0,1'), "row 4: y: 'nan': must be a finite number"),
+    (rows('3,0,0,1_0,0,0,0,1'), "row 4: z: '1_0': must be a finite number"),
+    (rows('3,0,0,1.1,0,0,0'), 'row 4: has 7 cells, row 1 has 8'),
+    (rows('3,0,0,1.1,0,0,0,2'), 'row 4: qx, qy, qz, qw: length 2'),
+    (rows('2,0,0,1.1,0,0,0,1'), 'row 4: t: 2: must be more than that of the row before'),
+    (rows('1e10,0,0,1.1,0,0,0,1'), 'row 4: t: 1e10: must be below 2147483648 s'),
+    ('t,ax\n1,0\n2,x\n', "row 3: ax: 'x': must be a finite number"),
+    ('t,vx,vy,vz\n1,0,0,0\n2,0,0,0\n', 'row 1: has no columns x, y, z; it has t, vx, vy, vz'),
+    ('t,ax,alx\n1,0,1\n2,0,1\n', 'angular accelerations alone are not integrated'),
+    (rows().replace('qw\n', 'qw,roll\n').replace('1\n', '1,0\n'),
+     'row 1: has columns qx and roll: the rotation must be given once'),
+    ('t,x,y,z,roll,pitch,yaw,vx,vy,vz\n' + '1,0,0,1,0,0,0,0,0,0\n' * 2, 'row 3: t: 1: must be'),
+])
+def test_a_bad_file_is_named_with_row_column_value_and_rule(
+        text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'bad.csv'
+    path.write_text(text)
+    assert replay([str(path), '--params', str(PARAMS), '--output', str(tmp_path / 'r')]) == 2
+    error = capsys.readouterr().err
+    assert f'{path}: {words}' in error or (str(path) in error and words in error)
+    assert error.count('\n') == 1 and not (tmp_path / 'r' / 'bad').exists()
+
+
+@pytest.mark.parametrize('change', [
+    lambda text: '\ufeff' + text, lambda text: text.replace('\n', '\r\n'),
+    lambda text: '# from the tracker, 2026\n' + text, lambda text: text.replace(',', '\t'),
+    lambda text: text.replace(',', ' , '), lambda text: text + '\n\n'])
+def test_files_as_programs_write_them(change: Callable[[str], str], tmp_path: Path) -> None:
+    path = tmp_path / 'a.csv'
+    path.write_text(change(rows('3,0,0,1.2,0,0,0,1')))
+    found = read_setpoints(path)
+    assert found.motion.position[:, 2].tolist() == [1.1, 1.1, 1.2]
+    assert found.times.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_every_unit_is_known_in_all_its_spellings() -> None:
+    for group in _GROUPS:
+        assert factor(group, '') == 1.0
+        for unit, si in group.units.items():
+            for ending in {0: ('',), 1: ('/s', ' / s'), 2: (
+                    '/s^2', '/s2', '/s²', '/s/s', '/s**2')}[group.order]:
+                assert factor(group, unit + ending) == si
+    assert factor(QUATERNION, 'm') is None
