@@ -89,7 +89,7 @@ class Samples:
         many = len(self.seconds)
         results = np.concatenate([
             self.lengths, self.rates, self.demanded, self.det[:, None],
-            np.zeros((many, 1)), self.condition[:, None], self.unit_load], axis=1)
+            np.zeros((many, 1)), self.condition[:, None], self.unit_load, self.demanded], axis=1)
         assert results.shape == (many, RESULT)
         states = np.zeros((many, STATE))
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
