@@ -53,6 +53,7 @@ extras_require = {
         'numpydoc>=1.6',
         'sphinx>=7.3.7',  # for this docutils; 7.3.0 warns of any type of a setting
     ],
+    'live': ['websockets>=13'],  # for examples/live_view.py
     'mujoco': ['mujoco>=3.14'],  # before, inertias have errors of 1e-5
     'parquet': ['pyarrow>=14'],
     'pandas': ['pandas>=2'],
@@ -66,6 +67,7 @@ extras_require = {
         'ros-kilted-common-interfaces~=5.5',
         'ros-rclpy[fastrtps]~=9.1.2',
     ],
+    'usd': ['usd-core>=24.8'],
     'test': [
         'cmake',
         'colcon-common-extensions',
@@ -195,7 +197,8 @@ setup(
           if not bag.startswith('bags/__')],
         (f'{share}/config', sorted(glob('config/*.*'))),
         (f'{share}/config/controllers', sorted(glob('config/controllers/*.*'))),
-        (f'{share}/examples', sorted(glob('examples/*.py') + glob('examples/*.ipynb'))),
+        (f'{share}/deploy', sorted(glob('deploy/*'))),
+        (f'{share}/examples', sorted(glob('examples/*.*'))),
         # Not launch/*: after a launch file was compiled there is a folder __pycache__.
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),
         (f'{share}/security', sorted(glob('security/*'))),

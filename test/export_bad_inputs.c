@@ -6,6 +6,7 @@
 
 #include "hexapod.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -45,7 +46,8 @@ static void check_null(void)
   stewart_result result;
   stewart_pose pose;
   stewart_motors motors;
-  double six[6] = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}, rotation[9];
+  double six[6] = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}, rotation[9], far[3] = {1e200, 0.0, 0.0};
+  stewart_platform heavy = hexapod;
   EXPECT(stewart_inverse_dynamics(NULL, &good, NULL, NULL, &result) == STEWART_NULL);
   EXPECT(stewart_inverse_dynamics(&hexapod, NULL, NULL, NULL, &result) == STEWART_NULL);
   EXPECT(stewart_inverse_dynamics(&hexapod, &good, NULL, NULL, NULL) == STEWART_NULL);
@@ -62,6 +64,16 @@ static void check_null(void)
   EXPECT(stewart_motor_torques(&hexapod, &good, six, NULL) == STEWART_NULL);
   EXPECT(stewart_rotation(NULL, rotation) == STEWART_NULL);
   EXPECT(stewart_rotation(six, NULL) == STEWART_NULL);
+  EXPECT(stewart_add_payload(NULL, 1.0, six, six) == STEWART_NULL);
+  EXPECT(stewart_add_payload(&heavy, 1.0, NULL, six) == STEWART_NULL);
+  EXPECT(stewart_add_payload(&heavy, 1.0, six, NULL) == STEWART_NULL);
+  EXPECT(stewart_add_payload(&heavy, NAN, six, six) == STEWART_NOT_FINITE);
+  EXPECT(stewart_add_payload(&heavy, INFINITY, six, six) == STEWART_NOT_FINITE);
+  EXPECT(stewart_add_payload(&heavy, -heavy.mass, six, six) == STEWART_OUT_OF_RANGE);
+  EXPECT(stewart_add_payload(&heavy, DBL_MAX, far, six) == STEWART_OUT_OF_RANGE);
+  EXPECT(!memcmp(&heavy, &hexapod, sizeof heavy));
+  EXPECT(stewart_add_payload(&heavy, 10.0, six, six) == STEWART_OK);
+  EXPECT(heavy.mass == hexapod.mass + 10.0);
 }
 
 /* NaN and infinity in each number of motion, wrench and base. */

@@ -788,3 +788,25 @@ def test_a_published_hexapod_reaches_each_of_its_limits_alone_but_not_all_at_onc
     assert found.worst.excess == pytest.approx(0.0200, abs=1e-4)
     assert rated.reachable_factor(box).value == pytest.approx(
         0.4173, abs=1e-4)
+
+
+def test_a_stuck_leg_is_on_the_sheet_where_it_is_asked_for(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run('--params', PLATFORM, '--stuck', 'leg_3', '--output', tmp_path / 'sheet') == 0
+    assert 'leg_3 stuck: five motions remain' in capsys.readouterr().out
+    found = json.loads((tmp_path / 'sheet' / 'datasheet.json').read_text())['stuck_leg']
+    assert found['leg'] == 'leg_3' and len(found['motions']) == 5
+    c = Capability(StewartPlatform.from_yaml(PLATFORM))
+    expected = c.stuck_leg(c.platform.home_pose(), 2)
+    assert expected.load is not None and expected.payload is not None
+    for n, row in enumerate(found['motions']):
+        assert row['motion'] == pytest.approx(expected.motions[n], abs=1e-9)
+        for side, sign in enumerate('+-'):
+            assert row[f'load{sign}']['value'] == pytest.approx(expected.load.value[n, side])
+    assert found['payload']['value'] == pytest.approx(expected.payload.value)
+    page = (tmp_path / 'sheet' / 'datasheet.html').read_text()
+    assert 'leg_3 stuck: five motions remain' in page
+    assert run('--params', PLATFORM, '--stuck', 'leg_7', '--output', tmp_path / 'b') == 2
+    assert capsys.readouterr().err == (
+        "stewart_capability: --stuck: 'leg_7': must be one of leg_1, leg_2, leg_3, leg_4, leg_5, "
+        'leg_6\n')

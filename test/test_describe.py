@@ -7,11 +7,14 @@
 from pathlib import Path
 import subprocess
 import sys
+from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.description import main
+from test_circles import ON_CIRCLES
 
 PROGRAM = 'stewart_describe'
 
@@ -23,9 +26,10 @@ def run(*arguments):
     return main([str(each) for each in arguments])
 
 
-def test_three_files_are_written_and_nothing_is_said(tmp_path, capsys):
+def test_all_files_are_written_and_nothing_is_said(tmp_path, capsys):
     assert run('--params', PLATFORM, '--output', tmp_path) == 0
-    names = ['platform.urdf', 'platform.sdf', 'platform.xml']
+    names = ['platform.urdf', 'platform.sdf', 'platform.xml', 'platform.svg', 'robot.yaml',
+             'platform_scene.xml']
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     printed = capsys.readouterr()
     assert printed.out.split() == [str(tmp_path / name) for name in names]
@@ -120,3 +124,33 @@ def test_help_needs_neither_numpy_nor_the_compiler():
     done = subprocess.run(
         [sys.executable, '-c', code], capture_output=True, text=True, timeout=300)
     assert done.stdout.endswith('[]\n')
+
+
+def test_joints_on_circles_are_written_as_points(tmp_path):
+    on_circles = tmp_path / 'circles.yaml'
+    ON_CIRCLES.to_yaml(on_circles)
+    assert run('--params', on_circles, '--output', tmp_path) == 0
+    written = Parameters.from_yaml(tmp_path / 'circles_points.yaml')
+    assert written == ON_CIRCLES.with_points()
+    assert 'geometry.base_joints' in written.given
+    assert run('--from', tmp_path / 'circles.urdf', '--output', tmp_path / 'read') == 0
+    read = Parameters.from_yaml(tmp_path / 'read' / 'circles.yaml')
+    assert np.array_equal(read['geometry.base_joints'], written['geometry.base_joints'])
+
+
+@pytest.mark.parametrize('source', ['params', 'from'])
+def test_a_picture_shows_all_joints_with_the_numbers_of_their_legs(source, tmp_path):
+    run('--params', PLATFORM, '--output', tmp_path)
+    picture = tmp_path / 'platform.svg'
+    if source == 'from':
+        run('--from', tmp_path / 'platform.urdf', '--output', tmp_path / 'read')
+        picture = tmp_path / 'read' / 'platform.svg'
+    tree = ET.parse(picture)
+    texts = [each.text for each in tree.iter('{http://www.w3.org/2000/svg}text')]
+    # From above each joint has a number of its own; from the front pairs are behind each other.
+    for leg in range(1, 7):
+        assert texts.count(str(leg)) == 2
+    assert texts.count('1, 6') == texts.count('2, 5') == texts.count('3, 4') == 2
+    assert '0.8803, 0.1871, 0' in [text.replace(',  ', ', ') for text in texts]
+    circles = list(tree.iter('{http://www.w3.org/2000/svg}circle'))
+    assert len(circles) == 2 * 12

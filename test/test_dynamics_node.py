@@ -480,6 +480,21 @@ def test_a_payload_is_picked_up_while_active(node: DynamicsNode) -> None:
     assert ask(mass=150.0) == [True]
     lighter = StewartPlatform(laden.parameters.replaced({'platform.mass': 150.0}))
     node.answer(MOVING, platform=lighter)
+    # A driver gets in, and out again by the mass alone.
+    driver = {'payload.mass': 82.0, 'payload.center_of_mass': [0.1, -0.2, 0.6],
+              'payload.inertia': [9.0, 0.1, 0.2, 8.0, -0.3, 3.0]}
+    assert node.set_atomically([
+        RosParameter(name, value=value) for name, value in driver.items()]).successful
+    with_driver = StewartPlatform(lighter.parameters.replaced(driver))
+    state = node.answer(MOVING, platform=with_driver)
+    assert bits(state.effort) == bits(StewartPlatform(
+        with_driver.parameters.merged()).inverse_dynamics(MOVING.motion()).forces)
+    bad = {'payload.mass': 10.0, 'payload.inertia': [1.0, 2.0, 0.0, 1.0, 0.0, 1.0]}
+    assert not node.set_atomically([
+        RosParameter(name, value=value) for name, value in bad.items()]).successful
+    node.answer(MOVING, platform=with_driver)
+    assert node.set_atomically([RosParameter('payload.mass', value=0.0)]).successful
+    node.answer(MOVING, platform=lighter)
     # Each change is logged, and likely mistakes.
     assert 'platform.mass: 210.0 -> 150.0' in node.program.stderr
     assert ask(mass=150000.0) == [True]

@@ -14,6 +14,7 @@ from lifecycle_msgs.msg import Transition
 from messages import joint_state
 import numpy as np
 import pytest
+from rclpy.parameter import Parameter as RosParameter
 from rclpy.serialization import deserialize_message
 from referees import rng
 from running import DynamicsNode, LATCHED, log_lines, nanoseconds, NODE
@@ -23,7 +24,9 @@ from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench, Measurement
 from stewart_dynamics.external_wrench.measured_legs import LegHistory, MeasuredLegs
-from stewart_dynamics.external_wrench.payload import identify, numbers_of, PayloadOutcome
+from stewart_dynamics.external_wrench.payload import (
+    carried_payload, identify, numbers_of, PayloadOutcome)
+from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from test_external_wrench import (
     BEGIN, HEXAPOD, HOME as AT_HOME, JOINTS, LOAD, measured, message_of, MILLISECOND, resting, six,
@@ -343,6 +346,36 @@ def test_the_answer_has_the_librarys_numbers_and_sets_no_parameter(carried: Carr
     assert len(carried.payloads) == 1
     late = node.peer.listen(f'{NODE}/payload', InertiaStamped, LATCHED)
     node.until(lambda: late == carried.payloads, 'the payload comes to a late subscriber')
+
+
+def test_the_payload_is_taken_over_by_a_service(carried: Carried) -> None:
+    node = carried.node
+    client = node.peer.node.create_client(Trigger, f'{NODE}/apply_payload')
+    node.until(client.service_is_ready, 'the service is there')
+
+    def apply() -> Trigger.Response:
+        future = client.call_async(Trigger.Request())
+        node.until(future.done, 'the service answers')
+        return future.result()
+
+    answer = apply()
+    assert not answer.success
+    assert answer.message == 'no payload is identified: call ~/identify_payload first'
+    outcome = expected(carried.messages)
+    assert outcome.payload is not None
+    body = carried_payload(outcome.payload)
+    assert isinstance(body, Body)
+    carried.move()
+    assert carried.identify().success
+    answer = apply()
+    assert answer.success and f'; {answer.message}' in outcome.message
+    laden = StewartPlatform(node.platform.parameters.with_payload(body))
+    assert laden.parameters.carried.mass == pytest.approx(outcome.payload.fitted.body.mass)
+    node.answer(platform=laden)
+    # Once more it is the same, not added again.
+    assert apply().success
+    node.answer(platform=laden)
+    assert node.set_atomically([RosParameter('payload.mass', value=0.0)]).successful
 
 
 def test_setpoints_are_answered_meanwhile_and_all_requests_are(carried: Carried) -> None:

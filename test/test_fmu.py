@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+import importlib.util
 import math
 from pathlib import Path
 import shutil
@@ -40,7 +41,7 @@ REFERENCES = {each.name: n for n, each in enumerate(VARIABLES)}
 FORCES = [REFERENCES[f'forces[{leg}]'] for leg in range(1, 7)]
 LENGTHS = [REFERENCES[f'lengths[{leg}]'] for leg in range(1, 7)]
 STATUS = [REFERENCES['status']]
-HOME = [each.start for each in VARIABLES[:37]]
+HOME = [each.start for each in VARIABLES[:47]]
 NOT_FINITE, NOT_UNIT, OUT_OF_RANGE, SINGULAR, SUPPRESSED = 2, 4, 5, 6, 7
 
 
@@ -183,13 +184,14 @@ BAD: list[tuple[int, list[float], int]] = [
     (0, [math.nan], NOT_FINITE), (7, [math.inf], NOT_FINITE), (19, [math.nan], NOT_FINITE),
     (25, [math.nan], NOT_FINITE), (3, [0.0, 0.0, 0.0, 1.002], NOT_UNIT),
     (3, [0.0, 0.0, 0.0, 0.0], NOT_UNIT), (0, [1e200], OUT_OF_RANGE), (37, [-1.0], OUT_OF_RANGE),
-    (37, [math.nan], OUT_OF_RANGE), (41, [0.0], OUT_OF_RANGE), (47, [0.5], OUT_OF_RANGE),
-    (48, [2.0], OUT_OF_RANGE), (2, [0.0], SINGULAR)]
+    (37, [math.nan], NOT_FINITE), (47, [-1.0], OUT_OF_RANGE), (47, [math.nan], OUT_OF_RANGE),
+    (51, [0.0], OUT_OF_RANGE), (57, [0.5], OUT_OF_RANGE),
+    (58, [2.0], OUT_OF_RANGE), (2, [0.0], SINGULAR)]
 
 
 def test_bad_input(unit: Unit) -> None:
     """Forces are zero and the status says why; the next valid input is answered."""
-    start = [each.start for each in VARIABLES[:50]]
+    start = [each.start for each in VARIABLES[:60]]
     unit.fmu.exitInitializationMode()
     good = unit.step()
     for first, values, status in BAD:
@@ -208,6 +210,26 @@ def test_parameters_are_tunable(unit: Unit) -> None:
     unit.put(REFERENCES['platform.mass'], [250.0])
     heavy = PARAMETERS.replaced({'platform.mass': 250.0})
     assert unit.step() == at_home(heavy).forces.tolist()
+
+
+def test_a_payload_is_an_input(unit: Unit) -> None:
+    """A driver gets in and out: the bits of the library, whose parameters have the payload."""
+    unit.fmu.exitInitializationMode()
+    empty = unit.step()
+    driver = [82.0, 0.1, -0.2, 0.6, 9.0, 0.1, 0.2, 8.0, -0.3, 3.0]
+    unit.put(REFERENCES['payload.mass'], driver)
+    laden = PARAMETERS.replaced({'payload.mass': driver[0], 'payload.center_of_mass': driver[1:4],
+                                 'payload.inertia': driver[4:]})
+    assert unit.step() == at_home(laden).forces.tolist()
+    unit.put(REFERENCES['payload.mass'], [0.0])
+    assert unit.step() == empty
+
+
+def test_a_payload_of_the_file_is_the_start_value() -> None:
+    laden = PARAMETERS.replaced({'payload.mass': 82.0, 'payload.center_of_mass': [0.1, 0.0, 0.6]})
+    starts = {each.name: each.start for each in variables(laden)}
+    assert starts['payload.mass'] == 82.0 and starts['payload.center_of_mass.z'] == 0.6
+    assert starts['platform.mass'] == PARAMETERS['platform.mass']
 
 
 def test_initialization(unit: Unit) -> None:
@@ -393,3 +415,24 @@ def test_motors_have_the_bits_of_the_library(version: str, tmp_path: Path) -> No
     unit.step()
     assert unit.get([places[f'motor_torques[{leg}]'] for leg in range(1, 7)]) == [0.0] * 6
     unit.close()
+
+
+def test_the_example_in_fmpy_has_the_forces_of_the_library(path: Path) -> None:
+    """The last sample: heaving with the driver, as FMPy steps it."""
+    spec = importlib.util.spec_from_file_location('example', ROOT / 'demo' / 'fmu_in_fmpy.py')
+    assert spec is not None and spec.loader is not None
+    example: Any = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
+    found = example.simulated(path, 0.4)
+    laden = PARAMETERS.replaced({
+        'payload.mass': 82.0, 'payload.center_of_mass': [0.0, 0.0, 0.5]})
+    # A step computes the outputs of the inputs before it: those of the last sample but one.
+    at = {name: values[0] for name, values in example.heaving(
+        HOME[2], np.array([found['time'][-2]])).items()}
+    rotation = np.reshape(from_quaternion(*HOME[3:7]), (3, 3))
+    motion = Motion([*HOME[:2], at['position.z']], rotation,
+                    [0.0, 0.0, at['linear_velocity.z']], np.zeros(3),
+                    [0.0, 0.0, at['linear_acceleration.z']], np.zeros(3))
+    expected = StewartPlatform(laden).inverse_dynamics(motion).forces
+    assert [found[f'forces[{leg}]'][-1] for leg in range(1, 7)] == pytest.approx(
+        expected.tolist(), rel=1e-9)

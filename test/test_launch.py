@@ -146,3 +146,19 @@ def test_the_demo_runs_and_ends(launch: Launch, peer: Peer) -> None:
     assert program.stop() == 0
     assert said(program).count('process has finished cleanly') == 4, said(program)
     peer.until(lambda: nodes(peer) == set(), 'all have ended')
+
+
+@pytest.mark.slow
+def test_two_hexapods_run_beside_each_other(launch: Launch, peer: Peer) -> None:
+    program = launch('two_hexapods.launch.py', 'names:=one,two')
+    peer.until(lambda: all(peer.node.count_subscribers(f'/{name}/stewart_dynamics/setpoint/pose')
+                           for name in ('one', 'two')), 'both nodes are there')
+    assert program.stop() == 0
+    peer.until(lambda: nodes(peer) == set(), 'both have ended')
+
+
+@pytest.mark.parametrize('names', ['left', 'left,left', 'left,Right', 'a,b,c'])
+def test_names_of_two_hexapods_are_two_namespaces(launch: Launch, names: str) -> None:
+    program = launch('two_hexapods.launch.py', f'names:={names}')
+    assert program.wait() == 1
+    assert f'names: {names}: must be two different namespaces' in said(program)

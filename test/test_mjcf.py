@@ -14,7 +14,7 @@ from referees import (
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.description.hexapod import Hexapod
-from stewart_dynamics.description.mjcf import mjcf
+from stewart_dynamics.description.mjcf import mjcf, scene
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 
 mujoco = pytest.importorskip('mujoco')
@@ -198,3 +198,24 @@ def test_meshes_with_a_uri_do_not_keep_mujoco_from_loading():
     model = mujoco.MjModel.from_xml_string(text, {'rod.obj': triangle})
     assert model.nmesh == 1
     assert model.body('leg_1_piston').mass[0] == 6.0
+
+
+def test_a_scene_around_it_starts_at_home_with_groups_as_in_menagerie(tmp_path):
+    for p in (Parameters.from_yaml(PLATFORM), Parameters.from_yaml(PLATFORM).replaced(
+            {'gravity': [0.0, 9.81, 0.0]})):
+        hexapod = Hexapod(p)
+        (tmp_path / 'hexapod.xml').write_text(mjcf(hexapod, 'hexapod'))
+        (tmp_path / 'scene.xml').write_text(scene(hexapod, 'hexapod'))
+        model = mujoco.MjModel.from_xml_path(str(tmp_path / 'scene.xml'))
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, model.key('home').id)
+        assert data.qpos == pytest.approx(model.qpos0, abs=1e-14)
+        mujoco.mj_forward(model, data)
+        # Nothing touches the floor, which is across gravity.
+        assert data.ncon == 0
+        floor = data.geom('floor').xmat.reshape(3, 3)[:, 2]
+        assert floor @ p['gravity'] == pytest.approx(-np.linalg.norm(p['gravity']))
+    geoms = [model.geom(n) for n in range(model.ngeom) if model.geom(n).name != 'floor']
+    assert {int(each.group[0]) for each in geoms} == {2, 3}
+    for each in geoms:
+        assert bool(each.contype[0]) == (each.group[0] == 3)

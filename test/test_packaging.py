@@ -41,17 +41,18 @@ KEYS = {
     'numba': 'python3-numba',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
     'pandas': 'python3-pandas', 'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '',
-    'pyarrow': '',
-    'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',
+    'pxr': '', 'pyarrow': '', 'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',
     'scipy': 'python3-scipy', 'setuptools': 'python3-setuptools',
     'sphinx': 'python3-sphinx', 'tqdm': 'python3-tqdm',
-    'yaml': 'python3-yaml',
+    'websockets': '', 'yaml': 'python3-yaml',
     'zstandard': ''}
 # Modules that are imported where an option asks for them, and the extra that brings them.
 OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'matplotlib': 'plot',
-            'mujoco': 'mujoco', 'pandas': 'pandas', 'pyarrow': 'parquet', 'scipy': 'differentiate'}
+            'mujoco': 'mujoco', 'pandas': 'pandas', 'pxr': 'usd', 'pyarrow': 'parquet',
+            'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.
-PIP_NAMES = {'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin', 'yaml': 'pyyaml'}
+PIP_NAMES = {'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin', 'pxr': 'usd-core',
+             'yaml': 'pyyaml'}
 
 HEADER = re.compile(r"""(#!.*\n)?(#|//|/\*) SPDX-FileCopyrightText: 20\d\d [^\n]+ developers
 (#|//| \*) SPDX-License-Identifier[:] Apache-2\.0(\n|$)""")
@@ -293,7 +294,7 @@ def test_pip_requirements(distribution: importlib.metadata.Distribution) -> None
     for name in imported & set(OPTIONAL):
         assert not any(item.name == name for item in requirements
                        if 'extra' not in str(item.marker))
-        assert any(item.name in (name, 'distributed') for item in requirements
+        assert any(item.name in (PIP_NAMES.get(name, name), 'distributed') for item in requirements
                    if f'extra == "{OPTIONAL[name]}"' in str(item.marker))
     assert not [name for name in always if name.startswith('ros-')]
     extras = {item.name for item in requirements} | {'pip'}

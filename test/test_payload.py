@@ -22,10 +22,12 @@ from stewart_dynamics.external_wrench.body_fit import about
 from stewart_dynamics.external_wrench.estimate import Estimate
 from stewart_dynamics.external_wrench.measured_legs import HIGHEST_RATE, LegHistory
 from stewart_dynamics.external_wrench.payload import (
-    identify, NAMES, numbers_of, Payload, PayloadOutcome)
+    carried_payload, identify, NAMES, numbers_of, Payload, PayloadOutcome)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin
 from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.node.diagnostics.outcomes import PayloadDiagnostics
+from stewart_dynamics.parameters.body import Body
+from stewart_dynamics.parameters.table import inertia_matrix
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
@@ -200,7 +202,8 @@ def test_only_mass_and_horizontal_center_are_identified_at_rest() -> None:
     assert body.inertia.tolist() == given.inertia.tolist()
     assert np.abs(errors(payload)[:3]).max() < 1.0
     assert f'; not identified, as in the parameters: {", ".join(NAMES[3:])}; ' in outcome.message
-    assert ', 0.12], inertia: [13.0, 0.3, -0.4, 14.0, 0.2, 22.0]' in outcome.message
+    # A point mass at the height of the platform's center.
+    assert ', 0.12], inertia: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]' in outcome.message
     diagnostics.done(outcome, 0.1)
     status = diagnostics.status(0.0)
     assert status is not None
@@ -277,11 +280,11 @@ def test_the_message_is_valid_in_a_parameter_file(tmp_path: Any) -> None:
     outcome = outcome_of(recorded(excited))
     assert outcome.message.startswith('mass 17') and ' +- 0.0' in outcome.message
     assert re.search(r'; 2\d\.\d+ kg more than platform\.mass; from', outcome.message)
-    _, _, text = outcome.message.rpartition('; platform: ')
+    _, _, text = outcome.message.rpartition('; payload: ')
     file = tmp_path / 'payload.yaml'
-    file.write_text(f'/**:\n  ros__parameters:\n    platform: {text}\n', encoding='utf-8')
+    file.write_text(f'/**:\n  ros__parameters:\n    payload: {text}\n', encoding='utf-8')
     Parameters.check_file(file)
-    assert text.startswith('{mass: 17')
+    assert text.startswith('{mass: 2')
 
 
 def test_an_inertia_that_no_body_has_is_not_given() -> None:
@@ -384,3 +387,40 @@ def test_right_forces_of_creeping_legs_are_explained() -> None:
         found = judged_payload(drawn(seed), 'creeping', seed)
         assert found.judged, found.notices
         assert found.of('platform.mass').miss < 1.5
+
+
+def test_a_payload_that_is_given_is_part_of_the_body() -> None:
+    """Given apart or in ``platform.*``, the same body is identified from the same file."""
+    rider = Body(30.0, np.array([0.1, 0.0, 0.3]), np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.5]))
+    apart = HEXAPOD.with_payload(rider)
+    one, two = (payload_of(recorded(excited), given) for given in (apart, apart.merged()))
+    assert numbers_of(one.fitted.body) == pytest.approx(numbers_of(two.fitted.body), rel=1e-9)
+    assert one.fitted.half_widths == pytest.approx(two.fitted.half_widths, rel=1e-9)
+    # The payload alone does not depend on the one that was given.
+    body, other = carried_payload(one), carried_payload(payload_of(recorded(excited)))
+    assert isinstance(body, Body) and isinstance(other, Body)
+    assert body.mass == pytest.approx(22.0, abs=1.0)
+    assert other.mass == pytest.approx(22.0, abs=1.0)
+
+
+def test_the_payload_alone_with_the_platform_is_what_was_identified() -> None:
+    found = payload_of(recorded(excited))
+    body = carried_payload(found)
+    assert isinstance(body, Body)
+    assert np.linalg.eigvalsh(inertia_matrix(body.inertia))[0] >= -1e-12
+    carried = HEXAPOD.with_payload(body).carried
+    assert carried.mass == pytest.approx(found.fitted.body.mass, rel=1e-12)
+    assert carried.center == pytest.approx(found.fitted.body.center, rel=1e-12)
+
+
+def test_no_payload_and_less_than_the_platform_are_told_apart() -> None:
+    found = payload_of(recorded(at_rest, true=HEXAPOD))
+    assert carried_payload(found) == Body(0.0, pytest.approx(np.zeros(3)), pytest.approx(
+        np.zeros(6)))
+    heavy = HEXAPOD.replaced({'platform.mass': 200.0})
+    reason = carried_payload(payload_of(recorded(excited), heavy))
+    assert isinstance(reason, str) and 'less than platform.mass, 200 kg' in reason
+    # At rest the inertia is not identified: a point mass.
+    point = carried_payload(payload_of(recorded(at_rest)))
+    assert isinstance(point, Body) and point.mass == pytest.approx(22.0, abs=3.0)
+    assert not point.inertia.any()

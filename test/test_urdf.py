@@ -20,8 +20,10 @@ from referees import (
 
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.loops import loops_yaml
 from stewart_dynamics.description.urdf import Ros2Control, urdf
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
+import yaml
 
 pin = pytest.importorskip('pinocchio')
 
@@ -188,3 +190,36 @@ def test_two_bodies_or_joints_of_the_same_name_are_rejected(changes, name):
     p = Parameters.from_yaml(PLATFORM).replaced(changes)
     with pytest.raises(ParameterError, match=f"the name '{name}' would be there twice"):
         Hexapod(p)
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_loops_of_robot_yaml_give_the_closed_mechanism_in_pinocchio(seed):
+    """As Gepetto's loader makes them: ball joints between frames; then constrained dynamics."""
+    p = random_parameters(rng(seed), actuators=False)
+    closed = yaml.safe_load(loops_yaml(Hexapod(p), 'hexapod'))
+    assert closed['type'] == ['3d'] * 6 and closed['name_mot'] == list(p['joints'])
+    tree = Tree(p)
+    model, data = tree.model, tree.data
+    constraints = pin.StdVec_RigidConstraintModel()
+    datas = pin.StdVec_RigidConstraintData()
+    for names in closed['closed_loop']:
+        first, second = (model.frames[model.getFrameId(name)] for name in names)
+        constraints.append(pin.RigidConstraintModel(
+            pin.ContactType.CONTACT_3D, model, first.parentJoint, first.placement,
+            second.parentJoint, second.placement, pin.ReferenceFrame.LOCAL))
+    for each in constraints:
+        datas.append(each.createData())
+    pose = random_motion(p, rng(seed), 1)[0].pose
+    q = tree.configuration(tree.joints.positions(pose.position, pose.rotation))
+    forces = 100.0 * rng(seed).normal(size=6)
+    torques = np.zeros(model.nv)
+    for leg, force in zip(p['joints'], forces, strict=True):
+        torques[model.joints[model.getJointId(leg)].idx_v] = force
+    model.gravity.linear = p['gravity']
+    pin.initConstraintDynamics(model, data, constraints, datas)
+    settings = pin.ProximalSettings(1e-13, 1e-13, 50)
+    found = pin.constraintDynamics(
+        model, data, q, np.zeros(model.nv), torques, constraints, datas, settings)
+    expected = StewartPlatform(p).forward_dynamics(Motion.from_pose(pose), forces)
+    places = [model.joints[model.getJointId(f'platform_{axis}')].idx_v for axis in 'xyz']
+    assert each_relative(found[places][None], expected.linear_acceleration[None]) < 1e-7

@@ -49,9 +49,10 @@ CONTROLLER = (
               'the controller starts; required where reference is legs', 'm, rad', (),
               sizes=(6,)))
 
+PAYLOAD = {each: f'payload.{each}' for each in ('mass', 'center_of_mass', 'inertia')}
 # Parameters of the node that the controller reads: it commands forces, not motor torques.
 CONTROLLER_NAMES = ('joints', 'base_frame', 'setpoint.timeout', *(
-    name for fields in (FIELDS_BEFORE_LEGS, LEG_FIELDS, FIELDS_AFTER_LEGS)
+    name for fields in (FIELDS_BEFORE_LEGS, PAYLOAD, LEG_FIELDS, FIELDS_AFTER_LEGS)
     for name in fields.values()
     if not name.startswith('drive.')
     and name not in ('actuator.screw_lead', 'setpoint.sync_tolerance')))

@@ -23,6 +23,7 @@ from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.capability.quantities import (
     Angles, Conditioning, Lengths, starts_at)
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
+from stewart_dynamics.capability.stuck_leg import remaining
 from stewart_dynamics.capability.travel import ENDS, LIMITS
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
@@ -84,6 +85,37 @@ class Extent(NamedTuple):
     sample: int | None = None
     time: float | None = None
     upper: float | None = None
+
+
+class StuckLeg(NamedTuple):
+    """
+    A platform with a leg that keeps its length: see ``stuck_leg.Remaining``.
+
+    Attributes
+    ----------
+    leg : int
+        Index of the leg from 0.
+    motions, wrenches : (..., 5, 6)
+        The motions that remain [m/s, rad/s], and the wrench along each [N, N m], base axes.
+    lost : (..., 6)
+        The motion that the leg blocks.
+    velocity : Extent or None
+        Largest multiple (..., 5) of each motion; None without a limit of rates or speeds.
+    load : Extent or None
+        Largest multiple (..., 5, 2) of each wrench and of its opposite that the platform at rest
+        can exert on its surroundings; None without a limit of forces or torques.
+    payload : Extent or None
+        Largest point mass that can be added [kg], likewise.
+
+    """
+
+    leg: int
+    motions: Array
+    wrenches: Array
+    lost: Array
+    velocity: Extent | None
+    load: Extent | None
+    payload: Extent | None
 
 
 class Tilt(NamedTuple):
@@ -367,6 +399,48 @@ class Capability:
             still, self._forces(still, base), self._per_wrench(pose, directions),
             continuous=continuous), sizes)
 
+    def stuck_leg(self, pose: Pose | Motion, leg: int,
+                  center_of_mass: ArrayLike = (0.0, 0.0, 0.0)) -> StuckLeg:
+        """
+        Return the motions that remain while a leg keeps its length, and the loads they can hold.
+
+        A brake is on, or a screw has jammed: the leg holds any force, which no motor makes, so
+        that its limits of force and torque do not count.
+
+        Parameters
+        ----------
+        pose : Pose or Motion
+            Pose, (...).
+        leg : int
+            Index of the leg from 0.
+        center_of_mass : (3,)
+            Position of the payload, platform frame [m].
+
+        Raises
+        ------
+        SingularityError
+            J_inv cannot be solved at a pose.
+
+        """
+        if not (isinstance(leg, int) and 0 <= leg < 6):
+            raise MotionError(f'leg: {leg!r}: must be an index from 0 to 5')
+        still = self._held(pose)
+        forces = self._forces(still, None)
+        found = remaining(self.platform.drive_jacobian(pose), leg, float(
+            self.platform.parameters['singularity.characteristic_length']))
+        one = Motion.of_rows(still.rows[..., None, :])
+        wrenches = None
+        if self.limits_forces:
+            both = np.stack([found.wrenches, -found.wrenches], axis=-2)
+            two = Motion.of_rows(still.rows[..., None, None, :])
+            wrenches = self._multiple(
+                two, forces[..., None, None, :], self._per_wrench(two, both), stuck=leg)
+        return StuckLeg(
+            leg, found.motions, found.wrenches, found.lost,
+            self.velocity(one, found.motions) if self.limits_rates else None, wrenches,
+            self._added_mass(still, forces, center_of_mass, stuck=leg)
+            if self.limits_forces else None)
+
     def clearance(self, pose: Pose | Motion) -> Array | float:
         """Return the smallest distance of a leg from another or a plate [m]; negative: overlap."""
         values = LegClearance(self.platform.parameters)(motion_rows(pose)).min(axis=1)
@@ -480,15 +554,20 @@ class Capability:
             return timed(times, motion, lambda each, _: self.payload(each, center_of_mass),
                          lambda mass: (StewartPlatform(with_point_mass(
                              self.platform.parameters, mass, center_of_mass)), motion.rows, 1.0))
-        center = as_array('center_of_mass', center_of_mass, (3,))
         moving = motion if isinstance(motion, Motion) else Motion.from_pose(motion)
-        forces = self.platform.inverse_dynamics(moving).forces
+        return self._added_mass(
+            moving, self.platform.inverse_dynamics(moving).forces, center_of_mass,
+            whole=isinstance(motion, Motion), continuous=continuous)
+
+    def _added_mass(self, moving: Motion, forces: Array, center_of_mass: ArrayLike,
+                    **how: Any) -> Extent:
+        """Return the largest point mass [kg] beside leg forces; ``how`` as in ``_multiple``."""
+        center = as_array('center_of_mass', center_of_mass, (3,))
         matrix = self.platform.regressor(moving).matrix[..., PLATFORM]
         with np.errstate(over='ignore', invalid='ignore'):
             mass = np.array([1.0, *center, *about_origin(1.0, center, np.zeros(6))])
             per_mass = check_finite('center_of_mass', matrix @ mass, 0)
-        return self._multiple(moving, forces, per_mass, whole=isinstance(motion, Motion),
-                              continuous=continuous)
+        return self._multiple(moving, forces, per_mass, **how)
 
     def speed_factor(self, motion: Motion, wrench: ArrayLike | None = None,
                      base: BaseMotion | None = None, times: ArrayLike | None = None) -> Extent:
@@ -687,12 +766,14 @@ class Capability:
         return np.asarray(np.linalg.solve(transposed, whole)[..., 0], dtype=float)
 
     def _multiple(self, motion: Motion, forces: Array, change: Array, whole: bool = False,
-                  directions: Array | None = None, continuous: bool = False) -> Extent:
+                  directions: Array | None = None, continuous: bool = False,
+                  stuck: int | None = None) -> Extent:
         """
         Return the largest multiple of a change of leg forces that forces and torques permit.
 
         ``directions`` (..., 6): the change is that of this acceleration.
         continuous: the load is held without end.
+        stuck: index of a leg whose limits do not count.
         """
         found: list[tuple[Array, Any]] = []
         if continuous:
@@ -706,7 +787,10 @@ class Capability:
             found.append(self._torques(self._motors, motion, forces, change, directions))
         if not found:
             raise self._unlimited((limits.FORCE_MAX,))
-        return (_of_all if whole else _smallest)(*_tightest(found))
+        multiples, names = _tightest(found)
+        if stuck is not None:
+            multiples[..., stuck] = math.inf
+        return (_of_all if whole else _smallest)(multiples, names)
 
     def _torques(self, bounds: MotorBounds, motion: Motion, forces: Array, change: Array,
                  directions: Array | None) -> tuple[Array, Array]:

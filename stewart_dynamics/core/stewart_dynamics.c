@@ -541,6 +541,28 @@ int stewart_rotation(const double quaternion[4], double rotation[9]) {
   return STEWART_OK;
 }
 
+int stewart_add_payload(
+  stewart_platform * platform, double mass, const double center_of_mass[3],
+  const double inertia[6]) {
+  if (!platform || !center_of_mass || !inertia) {return STEWART_NULL;}
+  if (!all_finite(&mass, sizeof mass) || !all_finite(center_of_mass, 3 * sizeof(double)) ||
+      !all_finite(inertia, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
+  stewart_platform whole = *platform;
+  whole.mass = platform->mass + mass;
+  if (!(whole.mass > 0.0)) {return STEWART_OUT_OF_RANGE;}
+  vector center = read3(platform->center_of_mass), arm = subtract(read3(center_of_mass), center);
+  /* Parallel axes: both bodies about their common center of mass (Huygens and Steiner). */
+  double part = mass / whole.mass, reduced = platform->mass * part, square = dot(arm, arm);
+  put3(whole.center_of_mass, add(center, scale(part, arm)));
+  double turning[6] = {square - arm.x * arm.x, -arm.x * arm.y, -arm.x * arm.z,
+    square - arm.y * arm.y, -arm.y * arm.z, square - arm.z * arm.z};
+  for (int n = 0; n < 6; n++) {whole.inertia[n] += inertia[n] + reduced * turning[n];}
+  if (!isfinite(whole.mass) || !all_finite(whole.center_of_mass, 3 * sizeof(double)) ||
+      !all_finite(whole.inertia, 6 * sizeof(double))) {return STEWART_OUT_OF_RANGE;}
+  *platform = whole;
+  return STEWART_OK;
+}
+
 /* ---- one sample: inverse dynamics ----------------------------------------------------------- */
 
 int stewart_inverse_dynamics(

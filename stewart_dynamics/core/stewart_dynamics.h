@@ -178,6 +178,13 @@ int stewart_motion_of_legs(
   const stewart_platform * platform, const double rates[6], const double accelerations[6],
   stewart_motion * motion);
 
+/* Adds a payload to the platform, as one rigid body with it: its mass [kg], center of mass [m] and
+ * inertia about that [kg m^2], as those of the platform. With mass and inertia negated it removes
+ * one. Written with STEWART_OK alone; STEWART_OUT_OF_RANGE: no mass is left. */
+int stewart_add_payload(
+  stewart_platform * platform, double mass, const double center_of_mass[3],
+  const double inertia[6]);
+
 /* The rotation, row by row, of a quaternion x y z w; written with STEWART_OK alone. */
 int stewart_rotation(const double quaternion[4], double rotation[9]);
 

@@ -19,7 +19,7 @@ from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import answer, AXES
-from stewart_dynamics.errors import StewartError
+from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -51,6 +51,7 @@ class Order(NamedTuple):
     bag: Path | None = None
     recording: Options = Options()
     leg_stiffness: float | None = None
+    stuck: int | None = None  # index of a leg
 
 
 class Progress(NamedTuple):
@@ -93,6 +94,8 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     sheet['worst'] = None if ranges is None else ratings.worst(hexapod, ranges, _LEVELS)
     sheet['stiffness'] = None if order.leg_stiffness is None else ratings.stiffness(
         hexapod, order.leg_stiffness, ranges, _LEVELS)
+    sheet['stuck_leg'] = None if order.stuck is None else ratings.stuck_leg(
+        hexapod, order.stuck)
     progress.stage('workspace')
     sections = {name: hexapod.section(normal) for name, normal in zip(
         workspace.PLANES, 'yxz', strict=True) if hexapod.limited('length_max')}
@@ -210,9 +213,17 @@ def check_order(order: Order, parameters: Parameters) -> None:
         raise StewartError(f'--leg-stiffness: {order.leg_stiffness:g} N/m: must be above 0')
 
 
+def leg_of(name: str, parameters: Parameters) -> int:
+    """Return the index of a leg by its name."""
+    joints: tuple[str, ...] = parameters['joints']
+    if name not in joints:
+        raise StewartError(f'--stuck: {shown(name)}: must be one of {", ".join(joints)}')
+    return joints.index(name)
+
+
 def soft_legs(parameters: Parameters, stiffness: float | None) -> Iterator[str]:
     """Yield a likely mistake in the stiffness of the legs [N/m]: its unit."""
-    mass = parameters['platform.mass']
+    mass = parameters.carried.mass
     if stiffness is not None and 6.0 * stiffness < mass * (2.0 * math.pi * _SLOWEST) ** 2:
         yield (f'--leg-stiffness: {stiffness:g} N/m: six such legs and {mass:.3g} kg have a '
                f'natural frequency below {_SLOWEST:g} Hz: in N/um, or in N/mm?')

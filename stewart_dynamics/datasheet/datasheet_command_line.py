@@ -47,6 +47,9 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--leg-stiffness', type=between(-1e15, 1e15), metavar='K',
                         help='stiffness of a leg along its axis [N/m]: adds stiffness and natural '
                              'frequencies')
+    parser.add_argument('--stuck', metavar='LEG',
+                        help='name of a leg that keeps its length: the motions that remain, and '
+                             'the loads they can hold')
     parser.add_argument('--box', type=Path, metavar='FILE',
                         help='YAML file of a claimed set of ranges, x y z [m] rx ry rz [rad] from '
                              'the pose: is all of it reachable?')
@@ -72,7 +75,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.bags.find import bytes_of
     from stewart_dynamics.datasheet.claimed_box import doubtful_ranges, read_box
     from stewart_dynamics.datasheet.datasheet import (
-        check_order, is_possible, Order, Progress, soft_legs, STAGES, write_datasheet)
+        check_order, is_possible, leg_of, Order, Progress, soft_legs, STAGES, write_datasheet)
     from stewart_dynamics.datasheet.datasheet_text import sheet_text
     from stewart_dynamics.datasheet.rated_hexapod import Payload
     from stewart_dynamics.mechanics.frames.motion import Pose
@@ -94,7 +97,7 @@ def _run(given: argparse.Namespace) -> int:
         None if given.payload is None else Payload(
             given.payload[0], np.array(given.payload[1:])),
         None if given.box is None else read_box(given.box, parameters), given.motion, options,
-        given.leg_stiffness)
+        given.leg_stiffness, None if given.stuck is None else leg_of(given.stuck, parameters))
     check_order(order, parameters)
     check_free(given.output, options, DATASHEET)
     remove_abandoned([given.output])

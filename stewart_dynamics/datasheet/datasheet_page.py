@@ -19,6 +19,7 @@ from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, both_payloads, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
     motion_verdict, numbers, payloads_in_words, possible, rated_payload, setpoints_used, span,
+    stuck_rows,
     unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
@@ -130,14 +131,16 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         motion=(chart.svg() if (chart := pictures.motion()) else None),
         between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
         dashes={name: charts.DASHES[name] for name in pictures.limits()},
-        payloads=payloads_in_words(sheet), limit_name=limit_name, possible=possible,
-        setpoints_used=setpoints_used, down=down, span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
+        payloads=payloads_in_words(sheet),
+        stuck=stuck_rows(sheet['stuck_leg']) if sheet['stuck_leg'] else None,
+        limit_name=limit_name, possible=possible, setpoints_used=setpoints_used, down=down,
+        span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 
 def _summary(hexapod: RatedHexapod) -> str:
     p = hexapod.given
-    parts = [f'{p["platform.mass"]:.4g} kg on six legs']
+    parts = [f'{p.carried.mass:.4g} kg on six legs']
     if p['limits.length_min'] is not None and p['limits.length_max'] is not None:
         low, high = p['limits.length_min'].min(), p['limits.length_max'].max()
         parts.append(f'{1e3 * low:.5g} to {1e3 * high:.5g} mm long')
@@ -274,7 +277,7 @@ def _joints(hexapod: RatedHexapod) -> list[dict[str, Any]]:
 def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[str, str]]:
     """Return names and values of the other parameters that the figures rest on."""
     p = hexapod.given
-    inertia = inertia_matrix(p['platform.inertia'])
+    inertia = inertia_matrix(p.carried.inertia)
 
     rows = [
         ('Rated pose' + (', home' if sheet['pose']['home'] else ''),
@@ -283,8 +286,8 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
         ('Pivot, platform frame', numbers(sheet['pivot'], 1e3, ' mm')),
         *([('Pivot at the rated pose', numbers(sheet['pose']['pivot_position'], 1e3, ' mm'))]
           if any(sheet['pivot']) else []),
-        ('Platform' + (' with payload' if sheet['added_payload'] else ''),
-         f'{p["platform.mass"]:.5g} kg at {numbers(p["platform.center_of_mass"], 1e3, " mm")}'),
+        ('Platform' + (' with payload' if p['payload.mass'] > 0.0 else ''),
+         f'{p.carried.mass:.5g} kg at {numbers(p.carried.center, 1e3, " mm")}'),
         ('Its inertia, xx yy zz', numbers(np.diagonal(inertia), 1.0, ' kg m²')),
         ('Leg: cylinder, piston', f'{numbers(p["legs.cylinder.mass"])}, '
          f'{numbers(p["legs.piston.mass"], 1.0, " kg")}'),

@@ -121,6 +121,8 @@ def sheet_text(sheet: dict[str, Any]) -> str:
             limit = f', by {_limit(payload)}' if payload['limit'] and not any_orientation else ''
             lines.append(f'payload at the pivot, at rest{kind and f", {kind}"}{any_orientation}: '
                          f'{down(value)} kg{limit}')
+    if sheet['stuck_leg']:
+        lines += stuck_lines(sheet['stuck_leg'])
     for name, words in (('box', box_verdict), ('motion', motion_verdict)):
         if sheet[name]:
             lines.append(f'{name} {possible(sheet[name])}: {words(sheet[name])}')
@@ -132,6 +134,27 @@ def sheet_text(sheet: dict[str, Any]) -> str:
             lines.append('  payload at the pivot that can be added in the motion: '
                          f'{down(motion["payload"]["value"])} kg')
     return '\n'.join(lines)
+
+
+def stuck_lines(found: Mapping[str, Any]) -> list[str]:
+    """Return lines about the motions that remain with a stuck leg."""
+    lines = [f'{found["leg"]} stuck: five motions remain, x y z [m/s] rx ry rz [rad/s]']
+    for row in stuck_rows(found):
+        lines.append(f'  {row["motion"]:<52} {row["velocity"]:>8} times, {row["load"]}')
+    if found['payload'] is not None:
+        lines.append(f'  payload at the pivot, at rest: {down(found["payload"]["value"])} kg')
+    return lines
+
+
+def stuck_rows(found: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Return motion, speed and load of each motion that remains, as text."""
+    rows = []
+    for row in found['motions']:
+        speed, *loads = ('–' if row[key] is None else down(row[key]['value'])
+                         for key in ('velocity', 'load+', 'load-'))
+        rows.append({'motion': ' '.join(typeset(f'{each + 0.0:+.3f}') for each in row['motion']),
+                     'velocity': speed, 'load': f'+{loads[0]} / −{loads[1]}'})
+    return rows
 
 
 def both_payloads(sheet: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:

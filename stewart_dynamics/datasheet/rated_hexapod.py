@@ -153,4 +153,5 @@ def _moved(p: Parameters, pivot: Array) -> Parameters:
         'geometry.platform_joints': p['geometry.platform_joints'] - pivot,
         PLATFORM_OUTLINE: None if p[PLATFORM_OUTLINE] is None else p[PLATFORM_OUTLINE] - pivot,
         'platform.center_of_mass': p['platform.center_of_mass'] - pivot,
+        'payload.center_of_mass': p['payload.center_of_mass'] - pivot,
         'singularity.characteristic_length': p['singularity.characteristic_length']})

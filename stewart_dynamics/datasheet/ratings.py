@@ -103,6 +103,27 @@ def at_pose(hexapod: RatedHexapod) -> dict[str, Any]:
     return _loads(hexapod, hexapod.pose)
 
 
+def stuck_leg(hexapod: RatedHexapod, leg: int) -> dict[str, Any]:
+    """Return the motions that remain at the pose with a stuck leg, their speeds and loads."""
+    found, joints = hexapod.loads.stuck_leg(hexapod.pose, leg), hexapod.joints
+    rows: list[dict[str, Any]] = []
+    for n in range(len(found.motions)):
+        rows.append({'motion': found.motions[n].tolist(), 'wrench': found.wrenches[n].tolist(),
+                     'velocity': _one(found.velocity, n, joints)})
+        rows[n] |= {f'load{sign}': _one(found.load, (n, side), joints)
+                    for side, sign in enumerate('+-')}
+    return {'leg': joints[leg], 'lost': found.lost.tolist(), 'motions': rows,
+            'payload': _one(found.payload, (), joints)}
+
+
+def _one(extent: Extent | None, at: Any, joints: Sequence[str]) -> dict[str, Any] | None:
+    """Return one of several extents for JSON."""
+    if extent is None:
+        return None
+    value, limit, leg = (np.asarray(each)[at] for each in extent[:3])
+    return answer(float(value), str(limit), int(leg), joints)
+
+
 def _loads(hexapod: RatedHexapod, poses: Pose) -> dict[str, Any]:
     """Return the smallest of each rating over poses (N,), or at one."""
     c, joints = hexapod.loads, hexapod.joints

@@ -37,11 +37,16 @@ def _arguments() -> argparse.ArgumentParser:
     parser = _PROGRAM.parser(
         description='Write a hexapod as URDF, SDFormat and MJCF, or read one from these formats '
                     'into a parameter file.',
-        files='DIR gets NAME.urdf, NAME.sdf and NAME.xml (MJCF), or with --from NAME.yaml.')
+        files='DIR gets NAME.urdf with its loops in robot.yaml, NAME.sdf, NAME.xml (MJCF) and '
+              'NAME_scene.xml around it, or with --from NAME.yaml, and a\npicture with numbered '
+              'joints, NAME.svg; NAME_points.yaml, the parameters with the '
+              'joints as points, where they are on circles.')
     source = parser.add_mutually_exclusive_group(required=True)
     add_parameters(source, required=False)
     source.add_argument('--from', dest='source', type=Path, metavar='FILE',
                         help='URDF, SDFormat or MJCF (needs mujoco) of a hexapod')
+    parser.add_argument('--usd', action='store_true',
+                        help='write NAME.usda, too (needs usd-core)')
     parser.add_argument('--geometry-only', action='store_true',
                         help='with --from: geometry and limits of a file without masses')
     _PROGRAM.add_results(parser, '.')
@@ -76,9 +81,12 @@ def _interfaces(text: str) -> list[str]:
 def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.description.hexapod import Hexapod
-    from stewart_dynamics.description.mjcf import mjcf
+    from stewart_dynamics.description.loops import loops_yaml
+    from stewart_dynamics.description.mjcf import mjcf, scene
+    from stewart_dynamics.description.picture import picture
     from stewart_dynamics.description.sdf import sdf
     from stewart_dynamics.description.urdf import Ros2Control, urdf
+    from stewart_dynamics.parameters.circles import CIRCLE_NAMES
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
@@ -90,21 +98,32 @@ def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
     if given.ros2_control is not None:
         control = Ros2Control(given.ros2_control, given.hardware)
     texts = {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
-             f'{name}.xml': mjcf(hexapod, name)}
+             f'{name}.xml': mjcf(hexapod, name), f'{name}.svg': picture(hexapod, name)}
+    texts |= {'robot.yaml': loops_yaml(hexapod, name), f'{name}_scene.xml': scene(hexapod, name)}
+    if given.usd:
+        from stewart_dynamics.description.usd import usd
+        texts[f'{name}.usda'] = usd(hexapod, name)
+    if CIRCLE_NAMES & set(parameters.given):
+        texts[f'{name}_points.yaml'] = parameters.with_points().yaml_text()
     for path in files.write(texts):
         _PROGRAM.say(str(path))
     return _judge(parameters, given)
 
 
 def _read(given: argparse.Namespace, files: FilesOfFolder) -> int:
+    from stewart_dynamics.description.hexapod import Hexapod
+    from stewart_dynamics.description.picture import picture
     from stewart_dynamics.description.recognition import read_hexapod
 
     interrupt_on_signals()
-    if given.ros2_control is not None:
-        raise StewartError('--ros2-control: not with --from')
+    if given.ros2_control is not None or given.usd:
+        option = '--usd' if given.usd else '--ros2-control'
+        raise StewartError(f'{option}: not with --from')
     found = read_hexapod(given.source, given.geometry_only)
     text = found.parameters.yaml_text(_STANDS_FOR_NONE if given.geometry_only else None)
-    for path in files.write({f'{given.name or given.source.stem}.yaml': text}):
+    name = given.name or given.source.stem
+    for path in files.write({f'{name}.yaml': text,
+                             f'{name}.svg': picture(Hexapod(found.parameters), name)}):
         _PROGRAM.say(str(path))
     for remark in found.remarks:
         _PROGRAM.complain(remark)

@@ -91,7 +91,8 @@ class Hexapod:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self.parameters = parameters
+        # Platform and payload are one body in all formats.
+        self.parameters = parameters = parameters.merged()
         self.joints = joint_names(parameters)
         positions, rotations = homes(parameters)
         self.position, self.rotation = positions[0], rotations[0]

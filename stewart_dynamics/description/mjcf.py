@@ -22,10 +22,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
-    COLORS, Hexapod, LegDescription, RigidBody, shapes, VisualShape)
+    COLORS, Hexapod, LegDescription, PLATE, RigidBody, shapes, VisualShape)
 from stewart_dynamics.description.xml_text import (
     add, CARRIED, carried, LEG_BODIES, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.parameters.table import mean_radius
 
 _TIMESTEP = 0.0005  # [s]
 # Constraints: time constant [s] and damping ratio; impedance, 1 for a rigid one, at no gap and
@@ -33,6 +34,7 @@ _TIMESTEP = 0.0005  # [s]
 _SOLREF = (2.0 * _TIMESTEP, 1.0)
 _SOLIMP = (0.9999, 0.9999, 0.001)
 _TOLERANCE = 1e-12
+_CLASS, _VISUAL, _COLLISION = 'hexapod', 'visual', 'collision'  # defaults
 _NOT_IN_MJCF = ('limits.velocity_max',)
 _COMMENT = 'It starts at the home pose. ctrl: the forces of the legs in N, a positive one pushes.'
 
@@ -45,23 +47,60 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     add(root, 'option', timestep=numbers(_TIMESTEP), gravity=numbers(p['gravity']),
         integrator='implicitfast', solver='Newton', tolerance=numbers(_TOLERANCE))
     # Other bodies collide with the hexapod, but its parts do not collide with each other.
-    add(add(root, 'default'), 'geom', contype='1', conaffinity='0', mass='0')
+    hexapods = add(add(root, 'default'), 'default', class_=_CLASS)
+    # Groups as in MuJoCo Menagerie.
+    add(add(hexapods, 'default', class_=_VISUAL), 'geom', group='2', contype='0', conaffinity='0',
+        mass='0')
+    add(add(hexapods, 'default', class_=_COLLISION), 'geom', group='3', contype='1',
+        conaffinity='0', mass='0')
     add(add(root, 'visual'), 'headlight', ambient='0.4 0.4 0.4', diffuse='0.5 0.5 0.5')
     looks = shapes(hexapod, uris=False)  # MuJoCo knows paths alone
     _assets(root, looks)
     world = add(root, 'worldbody')
-    base = add(world, 'body', name=hexapod.base_body)
+    base = add(world, 'body', name=hexapod.base_body, childclass=_CLASS)
     _geoms(base, looks[hexapod.base])
     for leg in hexapod.legs:
         _leg(base, hexapod, leg, looks)
     _platform(world, hexapod, looks[hexapod.platform])
     _loops(root, hexapod)
     _actuators(root, hexapod)
+    add(add(root, 'keyframe'), 'key', name='home', qpos=numbers(*_home(hexapod)))
     custom = add(root, 'custom')
     names = [*_NOT_IN_MJCF, *(each for each in LEG_BODIES if not p[each].all())]
     for each, text in {**carried(p, names), 'base_frame': hexapod.base}.items():
         add(custom, 'text', name=f'{CARRIED}.{each}', data=text)
     return text_of(root, _COMMENT)
+
+
+def scene(hexapod: Hexapod, name: str) -> str:
+    """Return a scene around the MJCF of a hexapod, with light and a floor under the base."""
+    root = ET.Element('mujoco', {'model': f'{name}_scene'})
+    add(root, 'include', file=f'{name}.xml')
+    size = mean_radius(hexapod.parameters['geometry.base_joints'])
+    add(root, 'statistic', center=numbers(0.5 * hexapod.position), extent=numbers(3.0 * size))
+    assets = add(root, 'asset')
+    add(assets, 'texture', type='skybox', builtin='gradient', rgb1='0.3 0.5 0.7', rgb2='0 0 0',
+        width='512', height='3072')
+    add(assets, 'texture', type='2d', name='floor', builtin='checker', rgb1='0.2 0.3 0.4',
+        rgb2='0.1 0.2 0.3', width='300', height='300')
+    add(assets, 'material', name='floor', texture='floor', texrepeat='5 5', reflectance='0.2')
+    world = add(root, 'worldbody')
+    gravity = hexapod.parameters['gravity']
+    up = -gravity / np.linalg.norm(gravity) if gravity.any() else np.array([0.0, 0.0, 1.0])
+    above = hexapod.position + 4.0 * size * up
+    add(world, 'light', pos=numbers(above), dir=numbers(-up), type='directional')
+    lowest = min(float(each @ up) for each in (
+        *hexapod.parameters['geometry.base_joints'], hexapod.position - 2.0 * size * np.abs(up)))
+    add(world, 'geom', name='floor', type='plane', size='0 0 0.05', material='floor',
+        pos=numbers((lowest - PLATE * size) * up), zaxis=numbers(up))
+    return text_of(root, 'A scene around the hexapod.')
+
+
+def _home(hexapod: Hexapod) -> list[Array]:
+    """Return the positions of all joints at home, in MuJoCo's order."""
+    legs = [np.array([0.0, 0.0, leg.home_length - leg.zero_length]) for leg in hexapod.legs]
+    x, y, z, w = to_quaternion(hexapod.rotation)
+    return [*legs, hexapod.position, np.array([w, x, y, z])]
 
 
 def _leg(base: ET.Element, hexapod: Hexapod, leg: LegDescription,
@@ -88,8 +127,8 @@ def _leg(base: ET.Element, hexapod: Hexapod, leg: LegDescription,
 
 
 def _platform(world: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) -> None:
-    platform = add(world, 'body', name=hexapod.platform, pos=numbers(hexapod.position),
-                   quat=_quaternion(hexapod.rotation))
+    platform = add(world, 'body', name=hexapod.platform, childclass=_CLASS,
+                   pos=numbers(hexapod.position), quat=_quaternion(hexapod.rotation))
     add(platform, 'freejoint', name=hexapod.platform)
     _inertial(platform, hexapod.platform_body)
     _geoms(platform, looks)
@@ -135,15 +174,17 @@ def _assets(root: ET.Element, looks: dict[str, tuple[VisualShape, ...]]) -> None
 
 def _geoms(body: ET.Element, looks: Sequence[VisualShape]) -> None:
     for shape in looks:
-        geom = add(body, 'geom', type=shape.kind, material=shape.color,
-                   pos=numbers(shape.position), quat=_quaternion(shape.rotation))
-        if shape.kind == 'mesh':
-            geom.set('mesh', shape.color)
-        elif shape.kind == 'sphere':
-            geom.set('size', numbers(shape.radius))
-            geom.set('contype', '0')
-        else:
-            geom.set('size', numbers(shape.radius, 0.5 * shape.length))
+        for kind in (_VISUAL,) if shape.kind == 'sphere' else (_VISUAL, _COLLISION):
+            geom = add(body, 'geom', class_=kind, type=shape.kind, pos=numbers(shape.position),
+                       quat=_quaternion(shape.rotation))
+            if kind == _VISUAL:
+                geom.set('material', shape.color)
+            if shape.kind == 'mesh':
+                geom.set('mesh', shape.color)
+            elif shape.kind == 'sphere':
+                geom.set('size', numbers(shape.radius))
+            else:
+                geom.set('size', numbers(shape.radius, 0.5 * shape.length))
 
 
 def _inertial(parent: ET.Element, body: RigidBody) -> None:

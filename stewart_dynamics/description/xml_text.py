@@ -15,6 +15,7 @@ import numpy as np
 from stewart_dynamics import __version__
 from stewart_dynamics.description.hexapod import RigidBody
 from stewart_dynamics.mechanics.limits import OF_RESULTS
+from stewart_dynamics.parameters.circles import CIRCLE_NAMES
 from stewart_dynamics.parameters.table import INERTIA, Parameters
 
 CARRIED = 'stewart_dynamics'
@@ -25,7 +26,7 @@ _GROUPS = ('actuator.', 'drive.', 'geometry.', 'legs.', 'limits.')
 # Parameters of these groups that formats have elements for.
 _IN_ELEMENTS = frozenset((
     *OF_RESULTS, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
-    'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
+    *CIRCLE_NAMES, 'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
     'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'))
 NOT_CHECKED = 'none'  # value there of a limit that is not checked
 

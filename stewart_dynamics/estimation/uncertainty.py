@@ -11,13 +11,14 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     CYLINDER_FIRST, CYLINDER_SECOND, FIRST_MOMENT, INERTIA, LINEAR, linear_parameters, MASS,
     PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS)
+from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.table import Parameters
 
 _PARTS = {'cylinder': (None, CYLINDER_FIRST, CYLINDER_SECOND),
           'piston': (PISTON_MASS, PISTON_FIRST, PISTON_SECOND)}
 
 
-def root_of_covariance(p: Parameters, others: Array) -> Array:
+def root_of_covariance(p: Parameters, body: Body, others: Array) -> Array:
     """
     Return R (LINEAR, LINEAR): the linear parameters are the file's plus R z.
 
@@ -25,13 +26,14 @@ def root_of_covariance(p: Parameters, others: Array) -> Array:
     center of mass, and its inertia about that. The numbers of all legs are uncertain together and
     each by itself.
 
+    body: the platform, or platform and payload, whichever is uncertain as the platform is.
     others (LINEAR,): deviations of friction and offsets, which ``uncertainty.*`` does not contain;
         of a parameter of the legs it counts where that has the deviation 0.
     """
     deviations = others.copy()
-    deviations[MASS] = p['uncertainty.platform_mass'] * p['platform.mass']
+    deviations[MASS] = p['uncertainty.platform_mass'] * body.mass
     deviations[FIRST_MOMENT] = p['uncertainty.center_of_mass']
-    deviations[INERTIA] = p['uncertainty.inertia'] * np.mean(p['platform.inertia'][[0, 3, 5]])
+    deviations[INERTIA] = p['uncertainty.inertia'] * np.mean(body.inertia[[0, 3, 5]])
     covariance = _of_legs(p)
     known = np.diag(covariance) > 0.0
     covariance += np.diag(np.where(known, 0.0, deviations ** 2))

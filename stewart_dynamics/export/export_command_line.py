@@ -34,6 +34,9 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--fmu', nargs='?', const='3', choices=('3', '2'), metavar='VERSION',
                         help='write an FMU for co-simulation, too, of FMI 3.0 (3, the default) or '
                              'FMI 2.0 (2)')
+    parser.add_argument('--drives', action='store_true',
+                        help='write the units of the amplifiers, too: NAME_drives.h and .md, and '
+                             'NAME_ethercat_LEG.yaml; needs drive.rated_torque and more')
     parser.add_argument('--name', default='hexapod', metavar='NAME',
                         help='name of the hexapod in C (default: hexapod)')
     add_node(parser)
@@ -43,6 +46,7 @@ def _arguments() -> argparse.ArgumentParser:
 def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.export.c_project import c_project, check_name
+    from stewart_dynamics.export.drive_files import drive_files
     from stewart_dynamics.export.fmu import find_compiler, fmu, has_binaries
     from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
@@ -59,6 +63,8 @@ def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
         if compiler is None:
             _PROGRAM.complain(f'warning: {name}.fmu has no binary: no C compiler for this '
                               'computer is found ($CC, cc, gcc, clang)')
+    if given.drives:
+        files |= drive_files(parameters, name)
     for path in files_of_folder.write(files):
         _PROGRAM.say(str(path))
     return DONE

@@ -30,6 +30,7 @@ from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import CONDITION
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.table import INERTIA, Parameters, SUPPRESS_FORCES
 
 # SI base units of each unit, by their exponents in FMI.
@@ -78,8 +79,8 @@ def variables(parameters: Parameters) -> list[Variable]:
     """
     position, rotation = _start_pose(parameters)
     start = [*position, *to_quaternion(rotation), *np.zeros(18), *parameters['gravity'],
-             *np.zeros(9), parameters['platform.mass'], *parameters['platform.center_of_mass'],
-             *parameters['platform.inertia'], parameters['singularity.warn_condition'],
+             *np.zeros(9), *_numbers(parameters.payload), *_numbers(parameters.empty),
+             parameters['singularity.warn_condition'],
              parameters['singularity.stop_condition'], parameters['singularity.warn_time'],
              parameters['singularity.action'] == SUPPRESS_FORCES,
              parameters['limits.action'] == SUPPRESS_FORCES]
@@ -115,16 +116,26 @@ def _inputs() -> Iterator[Variable]:
             ('base.angular_acceleration', 'rad/s2', 'xyz', 'of the base, base axes')):
         for axis in axes:
             yield Variable(f'{name}.{axis}', 'input', text, unit)
+    yield from _body('payload', 'input', 'of a payload on the platform; 0: none')
+
+
+def _body(name: str, causality: str, text: str) -> Iterator[Variable]:
+    """Yield the ten numbers of a body on the platform."""
+    yield Variable(f'{name}.mass', causality, f'mass {text}', 'kg')
+    for axis in 'xyz':
+        yield Variable(f'{name}.center_of_mass.{axis}', causality,
+                       'its center of mass, platform frame', 'm')
+    for moment in INERTIA:
+        yield Variable(f'{name}.inertia.{moment}', causality,
+                       'its inertia about the center of mass, platform axes', 'kg.m2')
+
+
+def _numbers(body: Body) -> list[float]:
+    return [body.mass, *body.center.tolist(), *body.inertia.tolist()]
 
 
 def _tunable() -> Iterator[Variable]:
-    yield Variable('platform.mass', 'parameter', 'mass with payload', 'kg')
-    for axis in 'xyz':
-        yield Variable(f'platform.center_of_mass.{axis}', 'parameter',
-                       'center of mass with payload, platform frame', 'm')
-    for moment in INERTIA:
-        yield Variable(f'platform.inertia.{moment}', 'parameter',
-                       'inertia with payload about the center of mass, platform axes', 'kg.m2')
+    yield from _body('platform', 'parameter', 'of the empty platform')
     yield Variable('singularity.warn_condition', 'parameter', 'condition number of the warning')
     yield Variable('singularity.stop_condition', 'parameter',
                    'condition number at which singularity.suppress_forces begins')

@@ -79,7 +79,7 @@ def golden_vectors(parameters: Parameters) -> Array:
     hexapod = hexapod_structure(parameters)
     drives = None if parameters['actuator.screw_lead'] is None else Drives(parameters)
     motions = _motions(parameters)
-    weight = parameters['platform.mass'] * 10.0 + 1.0
+    weight = parameters.carried.mass * 10.0 + 1.0
     phases = np.arange(_COUNT)[:, None] + np.arange(WRENCH + BASE)
     wrenches = weight * np.sin(phases[:, :WRENCH]) * (np.arange(_COUNT) % 4 > 0)[:, None]
     bases = np.sin(phases[:, WRENCH:])

@@ -30,20 +30,13 @@ from stewart_dynamics.estimation.whitening import (
     covariance_of_scores, gram_of, spectra_of, Weights, weights_of)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import FIRST_MOMENT, INERTIA, MASS
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import is_consistent
+from stewart_dynamics.parameters.body import Body
 
 TEN = 10
 # Passes over the samples, each with the spectrum of the residuals of the one before.
 ROUNDS = 3
 # The noise is at least this part of the largest effort: no sensor is better.
 _LEAST_NOISE = 1e-5
-
-
-class Body(NamedTuple):
-    """Mass, center of mass and inertia, as a parameter file has them."""
-
-    mass: float  # [kg]
-    center: Array  # platform axes (3,) [m]
-    inertia: Array  # ixx ixy ixz iyy iyz izz about the center of mass, platform axes (6,) [kg m^2]
 
 
 class FittedBody(NamedTuple):

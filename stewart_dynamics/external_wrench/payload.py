@@ -26,7 +26,7 @@ from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, SECOND
 from stewart_dynamics.estimation.noisy_rates import rates_in_noise, smoothed_law
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.external_wrench.body_fit import (
-    about, Body, BodyFit, FittedBody, LegSamples, ROUNDS, TEN)
+    about, BodyFit, FittedBody, LegSamples, ROUNDS, TEN)
 from stewart_dynamics.external_wrench.measured_legs import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, stamps_of, TURNED)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
@@ -35,6 +35,7 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
 from stewart_dynamics.mechanics.rows import ACCELERATION, BASE, FORCES, GRAVITY, LENGTHS, MOTION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
+from stewart_dynamics.parameters.body import Body
 
 # Measurements between two yields.
 PIECE = 128
@@ -133,8 +134,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
                              f'likely they have another {what}')
         return
     samples = yield from work.samples()
-    given = Body(p['platform.mass'], p['platform.center_of_mass'], p['platform.inertia'])
-    fit = BodyFit(samples, given)
+    fit = BodyFit(samples, p.carried)
     try:
         yield from fit.prepare()
         for _ in range(ROUNDS):
@@ -147,7 +147,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         yield PayloadOutcome(f'the model does not explain the measured forces: residual '
                              f'{fitted.residual:.3g} N of {samples.measured:.4g} N (RMS)')
         return
-    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, given))
+    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, p.empty))
 
 
 def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
@@ -303,11 +303,11 @@ class _Windows:
         of_friction = np.zeros(LINEAR)
         for name, part in (('viscous', VISCOUS_FRICTION), ('coulomb', COULOMB_FRICTION)):
             of_friction[part] = p[f'actuator.{name}_friction']
-        root = root_of_covariance(p, of_friction)
+        root = root_of_covariance(p, p.carried, of_friction)
         yield
-        root[FIRST_MOMENT] *= p['platform.mass']
+        root[FIRST_MOMENT] *= p.carried.mass
         change = root[PLATFORM, PLATFORM].copy()
-        root[PLATFORM] = about(p['platform.center_of_mass']) @ root[PLATFORM]
+        root[PLATFORM] = about(p.carried.center) @ root[PLATFORM]
         root = root[:, np.any(root != 0.0, axis=0) | (np.arange(LINEAR) < TEN)]
         by_tilt = self._by_tilt(motions, bases)
         yield
@@ -373,7 +373,32 @@ def _words(payload: Payload) -> str:
         text += '; no real body has the inertia that fits best'
     if unknown:
         text += f'; not identified, as in the parameters: {", ".join(unknown)}'
-    return f'{text}; platform: {_parameters(fitted.body)}'
+    found = carried_payload(payload)
+    if isinstance(found, str):
+        return f'{text}; platform: {body_words(fitted.body)}'
+    return f'{text}; payload: {body_words(found)}'
+
+
+def carried_payload(payload: Payload) -> Body | str:
+    """
+    Return the identified body without the empty platform, or why it is no body.
+
+    A mass within its interval of zero counts as zero. The inertia is that of a point mass where it
+    is not identified; moments that noise made negative are zero.
+    """
+    fitted, empty = payload.fitted, payload.given
+    mass, half = fitted.body.mass - empty.mass, float(fitted.half_widths[0])
+    if mass < -half:
+        return (f'{-mass:.6g} kg less than platform.mass, {empty.mass:.6g} kg, that of the empty '
+                'platform')
+    if mass <= half:
+        return Body(0.0, np.zeros(3), np.zeros(6))
+    rest = fitted.body.without(empty)
+    if not fitted.known[4:].all():
+        return rest._replace(inertia=np.zeros(6))
+    moments, axes = np.linalg.eigh(table.inertia_matrix(rest.inertia))
+    inertia = (axes * np.maximum(moments, 0.0)) @ axes.T
+    return rest._replace(inertia=inertia[np.triu_indices(3)])
 
 
 def _excluded(count: int) -> str:
@@ -392,7 +417,8 @@ def _decimals(half_width: float) -> int:
     return min(max(digits, 0), 9)
 
 
-def _parameters(body: Body) -> str:
+def body_words(body: Body) -> str:
+    """Return a body as the value of ``platform`` or ``payload`` in a parameter file."""
     center, inertia = (', '.join(f'{float(f"{value:.6g}")}' for value in values)
                        for values in (body.center, body.inertia))
     return (f'{{mass: {float(f"{body.mass:.6g}")}, center_of_mass: [{center}], '

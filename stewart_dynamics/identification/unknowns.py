@@ -30,8 +30,9 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, BODY_UNITS, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND,
-    FIRST_MOMENT, LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST,
-    PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
+    FIRST_MOMENT, inertial_parameters, LINEAR, linear_parameters, names_of, OFFSET,
+    parameter_values, PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, UNITS,
+    VISCOUS_FRICTION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
 from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
@@ -120,6 +121,8 @@ class Unknowns:
                  known: Flags | None = None) -> None:
         self._parameters = p = parameters
         self._theta = linear_parameters(p)
+        # Known beside the platform: its ten parameters, zero without one.
+        self._payload = inertial_parameters(p.payload)
         self.tilt = Tilt(p['gravity'])
         names = names_of(p)
         self.names = (*_PLATFORM, *(names[n] for n in _LINEAR[PLATFORM:]), *self.tilt.names,
@@ -137,7 +140,8 @@ class Unknowns:
         scales = _leg_scales(p)
         of_friction = np.isin(np.arange(LINEAR), np.r_[VISCOUS_FRICTION, COULOMB_FRICTION])
         # Numbers that the file does not know at all count if they are asked for.
-        level = root_of_covariance(p, np.where(asked | of_friction, scales, 0.0))
+        level = root_of_covariance(
+            p, p.empty, np.where(asked | of_friction, scales, 0.0))
         more = [p['uncertainty.tilt'], p['uncertainty.tilt'], p['uncertainty.effort_gain']]
         self.root: Array = np.diag(np.concatenate([np.zeros(LINEAR_UNKNOWNS), more]))
         self.root[:LINEAR_UNKNOWNS, :LINEAR_UNKNOWNS] = level[np.ix_(_LINEAR, _LINEAR)]
@@ -188,7 +192,7 @@ class Unknowns:
     def _level(self, values: Array) -> Array:
         """Return the linear parameters without those of the tilt."""
         level: Array = np.concatenate([
-            _inertial(values[:PLATFORM]), values[PLATFORM:LINEAR_UNKNOWNS]])
+            _inertial(values[:PLATFORM]) + self._payload, values[PLATFORM:LINEAR_UNKNOWNS]])
         return level
 
     def with_inertial(self, values: Array, ten: Array) -> Array:
@@ -279,7 +283,7 @@ def _derivative(function: Callable[[Array], Array], at: Array) -> Array:
 
 def _leg_scales(p: Parameters) -> Array:
     """Return sizes of the linear parameters at which they matter; only those of legs are set."""
-    mass, size = p['platform.mass'] / 6.0, float(p['singularity.characteristic_length'])
+    mass, size = p.carried.mass / 6.0, float(p['singularity.characteristic_length'])
     weight, rate = _ACCELERATION * mass, _RATE * math.sqrt(_ACCELERATION * size)
     length = 2.0 * size
     scales: Array = np.zeros(LINEAR)

@@ -57,8 +57,9 @@ def field_values(parameters: Parameters, screws: Array | None = None) -> dict[st
 
     An array for the fields of the legs, (6,) or (6, 3). A limit that is not set is infinite, a
     length or radius that is not set zero; so are axes of joints, which ``joint_angles`` has, and
-    of universal joints where screws are guided. ``drive.screw_rotation`` is the turn of the motor
-    for a turn of its leg. ``screws`` (6, SCREW) are those of ``screw_constants``.
+    of universal joints where screws are guided. ``platform.*`` are platform and payload.
+    ``drive.screw_rotation`` is the turn of the motor for a turn of its leg. ``screws`` (6, SCREW)
+    are those of ``screw_constants``.
     """
     values: dict[str, Any] = {}
     for name in (*FIELDS_BEFORE_LEGS.values(), *LEG_FIELDS.values(), *FIELDS_AFTER_LEGS.values()):
@@ -71,6 +72,8 @@ def field_values(parameters: Parameters, screws: Array | None = None) -> dict[st
     values['drive.screw_rotation'] = motor_turns(parameters)
     values['drive.base_universal_axes'] = screws[:, BASE_AXIS]
     values['drive.platform_universal_axes'] = screws[:, PLATFORM_AXIS]
+    (values['platform.mass'], values['platform.center_of_mass'],
+     values['platform.inertia']) = parameters.carried
     for name in LEG_FIELDS.values():
         if np.ndim(values[name]) < 1:
             values[name] = np.full(6, values[name])

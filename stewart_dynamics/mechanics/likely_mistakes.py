@@ -162,6 +162,7 @@ def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
 def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
     moments = np.linalg.eigvalsh(inertia_matrix(p['platform.inertia']))
     gyration = math.sqrt(moments[2] / p['platform.mass'])
+    yield from _payload(p, shape)
     size = f'the platform joints are {shape.platform_radius:.3g} m from their center'
     if gyration > _LARGEST_GYRATION * shape.radius:
         yield (f'platform.inertia: {moments[2]:.3g} kg m^2 at most, a radius of gyration of '
@@ -172,10 +173,29 @@ def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
     elif gyration < _SMALLEST_GYRATION_OF_A_MASS * shape.platform_radius:
         yield (f'platform.mass: {p["platform.mass"]:.6g} kg, with platform.inertia a radius of '
                f'gyration of {gyration:.3g} m, but {size}: in g, or the joints in cm?')
-    if moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
-        yield (f'platform.inertia: principal moments {_listed(moments)} kg m^2: no body has one '
-               'larger than the sum of the other two: is the order ixx ixy ixz iyy iyz izz?')
+    yield from _impossible_inertia('platform.inertia', moments)
     yield from _far_point('platform.center_of_mass', p['platform.center_of_mass'], p, shape)
+
+
+def _impossible_inertia(name: str, moments: Array) -> Iterator[str]:
+    """Yield that no body has these principal moments (3,), in ascending order."""
+    if moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
+        yield (f'{name}: principal moments {_listed(moments)} kg m^2: no body has one '
+               'larger than the sum of the other two: is the order ixx ixy ixz iyy iyz izz?')
+
+
+def _payload(p: Parameters, shape: Shape) -> Iterator[str]:
+    mass, center, inertia = p.payload
+    if mass == 0.0:
+        return
+    moments = np.linalg.eigvalsh(inertia_matrix(inertia))
+    gyration = math.sqrt(max(float(moments[2]), 0.0) / mass)
+    if gyration > _LARGEST_GYRATION * shape.radius:
+        yield (f'payload.inertia: {moments[2]:.3g} kg m^2 at most, with payload.mass, {mass:.3g} '
+               f'kg, a radius of gyration of {gyration:.3g} m, but the platform joints are '
+               f'{shape.platform_radius:.3g} m from their center: in g mm^2 or kg mm^2?')
+    yield from _impossible_inertia('payload.inertia', moments)
+    yield from _far_point('payload.center_of_mass', center, p, shape)
 
 
 def _far_point(name: str, point: Array, p: Parameters, shape: Shape) -> Iterator[str]:
@@ -262,8 +282,8 @@ def _torques_at_home(p: Parameters, home: Home) -> Iterator[str]:
     positions, rotations = home.poses(p)
     jacobian = lagrange.inverse_jacobian(
         lagrange.unchecked_legs(p, positions[:1], rotations[:1]))[0]
-    weight = p['platform.mass'] * p['gravity']
-    load = np.concatenate([weight, np.cross(rotations[0] @ p['platform.center_of_mass'], weight)])
+    weight = p.carried.mass * p['gravity']
+    load = np.concatenate([weight, np.cross(rotations[0] @ p.carried.center, weight)])
     if np.linalg.cond(jacobian) > UNSOLVABLE_CONDITION:
         return
     torques = np.abs(np.linalg.solve(jacobian.T, load)) / motor_ratio(p) / p[
@@ -296,7 +316,7 @@ def _reflected_mass(p: Parameters, shape: Shape) -> Iterator[str]:
             yield (f'{name}: missing, but {given[0]} is given: it is J (2 pi / lead)^2 of '
                    'rotor and screw; write 0.0 for a drive that has none')
         return
-    carried = (p['platform.mass'] + np.sum(p['legs.piston.mass'])) / 6.0
+    carried = (p.carried.mass + np.sum(p['legs.piston.mass'])) / 6.0
     least = float(np.min(p[name]))
     if 0.0 < least < _SMALLEST_REFLECTED_MASS * carried:
         yield (f'{name}: {least:.3g} kg, but each leg carries {carried:.3g} kg: the inertia of '
@@ -327,8 +347,12 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
                      gravity_mistakes.NONE: 'none, as in orbit?'}[wrong]
         yield (f'gravity: {gravity:.6g} m/s^2: {suspected} The earth has '
                f'{-STANDARD_GRAVITY[2]:g}')
-    weight, most = p['platform.mass'] * gravity, p['limits.force_max']
-    if most is not None and wrong != gravity_mistakes.IN_MM and weight > most.sum():
+    weight, most = p.carried.mass * gravity, p['limits.force_max']
+    if most is not None and p['platform.mass'] * gravity <= most.sum() < weight:
+        yield (f'payload.mass: {p["payload.mass"]:.3g} kg: six legs with limits.force_max, '
+               f'{_listed(np.unique(most))} N, cannot carry it and the platform, {weight:.3g} N: '
+               'in g?')
+    elif most is not None and wrong != gravity_mistakes.IN_MM and weight > most.sum():
         yield (f'limits.force_max: {_listed(np.unique(most))} N: six such legs cannot carry the '
                f'platform, {weight:.3g} N: in kN?')
     friction = p['actuator.coulomb_friction']
@@ -347,7 +371,7 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
     needed = fastest ** 2 / (2.0 * (high - low))
     largest = np.full(6, _LARGEST_ACCELERATION / min(shape.radius, 1.0))
     if most is not None and weight <= most.sum():
-        largest = np.minimum(largest, most / (p['platform.mass'] / 6.0 + p[
+        largest = np.minimum(largest, most / (p.carried.mass / 6.0 + p[
             'legs.piston.mass'] + p['actuator.reflected_mass']))
     at = int(np.argmax(needed / largest))
     if needed[at] > _UNREACHABLE * largest[at]:

@@ -110,7 +110,7 @@ class StewartPlatform:
         p = self.parameters
         base, platform = (
             mean_radius(p[name]) for name in ('geometry.base_joints', 'geometry.platform_joints'))
-        return (f'<StewartPlatform: {p["platform.mass"]:g} kg, joints on {base:.3g} m (base) and '
+        return (f'<StewartPlatform: {p.carried.mass:g} kg, joints on {base:.3g} m (base) and '
                 f'{platform:.3g} m (platform)>')
 
     def inverse_dynamics(

@@ -37,6 +37,7 @@ NO_FORCE: Color = (0.4, 0.4, 0.4, 1.0)
 PLATFORM: dict[int, Color] = {
     OK: COLORS['platform'], WARN: (0.941, 0.894, 0.259, 1.0), ERROR: PUSH}
 _CENTER_OF_MASS: Color = (0.8, 0.475, 0.655, 1.0)  # Okabe and Ito's reddish purple
+_PAYLOAD: Color = (0.0, 0.62, 0.451, 1.0)  # and their bluish green
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 _AXES: list[Color] = [(0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.1, 1.0), (0.1, 0.3, 0.9, 1.0)]
 
@@ -70,7 +71,7 @@ class Markers:
     as it pulls; where there is no such limit, with up to the largest of the six forces. They are
     grey where no forces are published. The platform is grey blue, yellow while the singularity
     warning is on, and vermillion inside ``singularity.stop_condition`` and at a crossing. A purple
-    ball is the platform's centre of mass.
+    ball is the centre of mass of platform and payload, a green one that of the payload.
 
     parameters: geometry, centre of mass, limits, thresholds, names and ``visualization_rate``.
         Some of them may change while the node is active: other parameters need other ``Markers``.
@@ -118,7 +119,10 @@ class Markers:
             self._marker('platform', 2, Marker.LINE_LIST, _WHITE, line, axes,
                          [color for color in _AXES for _ in range(2)]),
             self._marker('platform', 3, Marker.SPHERE_LIST, _CENTER_OF_MASS, (_HEAVY * size,) * 3,
-                         parameters['platform.center_of_mass'][None])]
+                         parameters.carried.center[None]),
+            *([self._marker('platform', 4, Marker.SPHERE_LIST, _PAYLOAD, (_HEAVY * size,) * 3,
+                            parameters.payload.center[None])]
+              if parameters['payload.mass'] > 0.0 else [])]
         self._bodies = [self._marker('cylinders' if n < 6 else 'pistons', n % 6, Marker.CYLINDER,
                                      NO_FORCE) for n in range(12)]
         self._text = self._marker('singularity', 0, Marker.TEXT_VIEW_FACING, _WHITE, text_size)

@@ -16,6 +16,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
+from std_srvs.srv import Trigger
 
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError, StewartError
@@ -32,9 +33,9 @@ from stewart_dynamics.node.markers import Markers
 from stewart_dynamics.node.publishers_at_rate import (
     DiagnosticsPublisher, PublisherAtRate, TravelPublisher)
 from stewart_dynamics.node.tasks import (
-    inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)
+    APPLY_PAYLOAD, inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)
 from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD, TRAVEL
-from stewart_dynamics.parameters.table import AS_MEASURED, Parameters
+from stewart_dynamics.parameters.table import AS_MEASURED, Parameters, payload_values
 from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned import messages as planned
 from stewart_dynamics.ros.declared_parameters import changed, declare_parameters, log_changes
@@ -94,6 +95,8 @@ class DynamicsNode(LifecycleNode):
         self._planned: TaskQueue[planned.PlannedOutcome] = TaskQueue(
             partial(OneShotTimer, self, PAUSE), self._on_outcome)
         self._payload = PayloadService(self, self._identify_payload, self._on_payload)
+        self._identified: payload.Payload | None = None  # the last one
+        self.create_service(Trigger, f'~/{APPLY_PAYLOAD}', self._on_apply_payload)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         # A steady clock: ROS time may stand still or jump.
         self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -126,6 +129,7 @@ class DynamicsNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to answer; earlier messages are not used."""
         parameters, models = self._settings, self._models
+        self._identified = None
         self._setpoints = Setpoints(parameters, self._on_rejection, self._on_notice)
         self._history = LegHistory(parameters['payload.window'])
         self._measured_legs = MeasuredLegs(
@@ -353,10 +357,28 @@ class DynamicsNode(LifecycleNode):
         if not self._active:
             return
         if outcome.payload:
+            self._identified = outcome.payload
             self._topics.publishers[PAYLOAD].publish(
                 inertia_message(outcome.payload, self._settings['platform_frame']))
         self._diagnostics.payload.done(outcome, seconds)
         self._report()
+
+    def _on_apply_payload(
+            self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Take the payload that was identified last as ``payload.*``."""
+        found = self._identified and payload.carried_payload(
+            self._identified._replace(given=self._settings.empty))
+        if found is None:
+            response.message = 'no payload is identified: call ~/identify_payload first'
+        elif isinstance(found, str):
+            response.message = found
+        else:
+            result = self.set_parameters_atomically([
+                RosParameter(name, value=value if isinstance(value, float) else value.tolist())
+                for name, value in payload_values(found).items()])
+            response.success = result.successful
+            response.message = result.reason or f'payload: {payload.body_words(found)}'
+        return response
 
     def _on_trajectory(self, data: bytes) -> None:
         if not self._active:

@@ -81,7 +81,7 @@ class TaskQueue(Generic[Outcome]):
         return number
 
 
-IDENTIFY_PAYLOAD = 'identify_payload'
+IDENTIFY_PAYLOAD, APPLY_PAYLOAD = 'identify_payload', 'apply_payload'
 
 # Pause between two pieces of the work [s]: they take less than a tenth of the time, 1 s in all.
 _PAUSE = 0.004

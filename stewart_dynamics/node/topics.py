@@ -114,7 +114,8 @@ PUBLISHED = (
             'computed while somebody subscribes'),
     Topic(PAYLOAD, type_names.INERTIA_STAMPED,
           'platform and [payload](payload.md) as one body, when the service '
-          '`~/identify_payload` (std_srvs/Trigger) has identified it; latched (transient local)',
+          '`~/identify_payload` (std_srvs/Trigger) has identified it; `~/apply_payload` takes it '
+          'over as `payload.*`; latched (transient local)',
           depth=1, latched=True),
     Topic(TRAVEL, type_names.FLOAT64_MULTI_ARRAY, 'how far x, y, z and the rotations about them '
           'can go from the pose of the last setpoint, to minus and to plus, the others held: 6 x '

@@ -45,6 +45,7 @@ class Parameter(NamedTuple):
     maximum: float = math.inf
     above: bool = False  # whether ``minimum`` itself is out of range
     choices: tuple[str, ...] = ()  # the accepted texts
+    instead: tuple[str, ...] = ()  # parameters of which one may be given in place of this one
     while_active: bool = False  # whether it may be changed while the node is active
 
     @property
@@ -80,7 +81,9 @@ def checked(parameter: Parameter, value: Any, source: str) -> Any:
     """Return the value as the package uses it; ParameterError if it breaks a rule."""
     if value is None:
         if parameter.required:
-            raise ParameterError(f'{source}: {parameter.name}: missing, it has no default')
+            instead = f'; or give {" and ".join(parameter.instead)}' if parameter.instead else ''
+            raise ParameterError(
+                f'{source}: {parameter.name}: missing, it has no default{instead}')
         return None
     is_array = isinstance(value, list | tuple)
     entries = list(value) if is_array else [value]
@@ -215,7 +218,8 @@ class ParameterSet(Mapping[str, Any]):
             for name, value in values.items() if value is not None}
         self._values = {
             name: checked(parameter, self._given.get(name, parameter.default), source)
-            for name, parameter in self.table.items()}
+            if name in self._given or not any(each in self._given for each in parameter.instead)
+            else None for name, parameter in self.table.items()}
         self._check_together(source)
 
     def __getitem__(self, name: str) -> Any:

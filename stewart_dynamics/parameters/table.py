@@ -12,19 +12,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 import math
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.parameters.body import Body
+from stewart_dynamics.parameters.circles import (
+    BODIES, circle_names, joints_of, without_other)
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.tolerances import (
     HYSTERESIS, is_unit, REFLECTED_MASS_TOLERANCE, START_TOLERANCE, unit_rule)
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 CENTER_UNCERTAINTY = 0.1  # default of uncertainty.center_of_mass, by the characteristic length
+# Moments of an inertia that rounding made negative, by the largest.
+_ROUNDING = 1e-12
 # Corners of a plate are in a plane to this part of its size.
 _FLAT = 1e-6
 NO_MASS = 1e-15
@@ -34,6 +41,18 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s^2]
 
 def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:
     return Parameter(name, 'double', text, unit, default, sizes=(1, 6), **rule)
+
+
+def _circles() -> Iterator[Parameter]:
+    for body in BODIES:
+        radius, angles, height = circle_names(body)
+        yield Parameter(radius, 'double', f'radius of the circle of the {body} joints about the '
+                        f'origin of the {body} frame, with {angles}: in place of '
+                        f'geometry.{body}_joints', 'm', minimum=0.0, above=True)
+        yield Parameter(angles, 'double', f'angle of each {body} joint on its circle, leg by leg, '
+                        f'about the z axis of the {body} frame, from x toward y', 'rad', (),
+                        sizes=(6,), minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
+        yield Parameter(height, 'double', f'z of the {body} joints on their circle', 'm', 0.0)
 
 
 def _meshes() -> Iterator[Parameter]:
@@ -85,6 +104,15 @@ def _drives() -> Iterator[Parameter]:
                 minimum=0.0, above=True)
     yield _legs('drive.temperature_rise_max', 'maximum temperature of a winding above ambient; '
                 'unlimited if not set', 'K', (), minimum=0.0, above=True)
+    yield _legs('drive.rated_torque', 'torque that the amplifier calls 1000 per mille, object '
+                '6076h of CiA 402; for stewart_export --drives', 'N m', (), minimum=0.0,
+                above=True)
+    yield _legs('drive.counts_per_turn', 'increments of position in one turn of the motor, as the '
+                'amplifier counts them; for stewart_export --drives', '', (), minimum=0.0,
+                above=True)
+    yield _legs('drive.direction', '1.0 if positive torque and position of the amplifier extend '
+                'the leg, else -1.0; for stewart_export --drives', '', (1.0,), minimum=-1.0,
+                maximum=1.0)
     yield Parameter('drive.screw_rotation', 'string', 'guided: screw and nut cannot turn with the '
                     'leg; universal: the leg turns between its universal joints, and its motor '
                     'makes up for it', '', GUIDED, choices=(GUIDED, UNIVERSAL))
@@ -193,10 +221,11 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               default=tuple(f'leg_{n}' for n in range(1, 7)), sizes=(6,)),
     Parameter('geometry.base_joints', 'double',
               'x y z of the six base joints, leg by leg, base frame', 'm', required=True,
-              sizes=(18,)),
+              sizes=(18,), instead=circle_names('base')[:2]),
     Parameter('geometry.platform_joints', 'double',
               'x y z of the six platform joints, in the same order, platform frame', 'm',
-              required=True, sizes=(18,)),
+              required=True, sizes=(18,), instead=circle_names('platform')[:2]),
+    *_circles(),
     Parameter('geometry.base_joint_axes', 'double', 'x y z of the direction from which the angle '
               'of each base joint is measured, toward the platform, of any length, base axes; '
               'default: along the leg at the home pose', '', (), sizes=(18,)),
@@ -217,14 +246,23 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               choices=(AUTO, POSITIVE, NEGATIVE)),
     _legs('geometry.zero_length', 'length of a leg at which its published position is zero', 'm',
           minimum=0.0),
-    Parameter('platform.mass', 'double', 'mass of the platform with its payload', 'kg',
+    Parameter('platform.mass', 'double', 'mass of the empty platform', 'kg',
               required=True, minimum=0.0, above=True, while_active=True),
     Parameter('platform.center_of_mass', 'double',
-              'center of mass of the platform with its payload, from the platform frame', 'm',
+              'center of mass of the empty platform, from the platform frame', 'm',
               (0.0, 0.0, 0.0), sizes=(3,), while_active=True),
-    Parameter('platform.inertia', 'double', 'ixx ixy ixz iyy iyz izz of the platform with its '
-              'payload, about its center of mass, platform axes', 'kg m^2', required=True,
-              sizes=(6,), while_active=True),
+    Parameter('platform.inertia', 'double', 'ixx ixy ixz iyy iyz izz of the empty platform, about '
+              'its center of mass, platform axes', 'kg m^2', required=True, sizes=(6,),
+              while_active=True),
+    Parameter('payload.mass', 'double', 'mass of a payload on the platform, a driver for example; '
+              '0: none, and the other two have no effect', 'kg', 0.0, minimum=0.0,
+              while_active=True),
+    Parameter('payload.center_of_mass', 'double',
+              'center of mass of the payload, from the platform frame', 'm', (0.0, 0.0, 0.0),
+              sizes=(3,), while_active=True),
+    Parameter('payload.inertia', 'double', 'ixx ixy ixz iyy iyz izz of the payload, about its '
+              'center of mass, platform axes; 0: a point mass', 'kg m^2', (0.0,) * 6, sizes=(6,),
+              while_active=True),
     _legs('legs.cylinder.mass', 'mass of a cylinder, the lower part of a leg', 'kg', minimum=0.0),
     _legs('legs.cylinder.center_of_mass', 'distance of its center of mass from the base joint',
           'm'),
@@ -362,18 +400,16 @@ class Parameters(ParameterSet):
     node = 'stewart_dynamics'
     described = 'cueing.', 'drive.', 'actuator.reflected_mass'  # which may follow from drive.*
     drives: tuple[str, ...]  # names of drive.* that are given; without them no motors are computed
+    carried: Body  # by the legs: platform and payload as one
 
     def _check_together(self, source: str) -> None:
         """Check the rules between parameters."""
+        for body in BODIES:
+            self._values[f'geometry.{body}_joints'] = joints_of(self, body, source)
         joints = self['joints']
         if len(set(joints)) < 6 or '' in joints:
             raise ParameterError(f'{source}: joints: {list(joints)}: six different names needed')
-        moments = np.linalg.eigvalsh(inertia_matrix(self['platform.inertia']))
-        if moments[0] <= 0.0:
-            raise ParameterError(
-                f'{source}: platform.inertia: {self["platform.inertia"].tolist()}: must be '
-                f'positive definite, but its smallest principal moment is {moments[0]:.6g} '
-                'kg m^2 (the order is ixx ixy ixz iyy iyz izz)')
+        self._check_bodies(source)
         for name, relation, other in _RELATED:
             values = [np.asarray(self[each]).tolist() for each in (name, other)]
             if None not in values and not np.all(_RELATIONS[relation](*values)):
@@ -409,6 +445,64 @@ class Parameters(ParameterSet):
                     f'{source}: {name}: {axes.tolist()}: a direction must not be 0, 0, 0')
         self._check_drives(source)
 
+    def _check_bodies(self, source: str) -> None:
+        """Check the inertias of platform and payload, and set ``carried``."""
+        for name, least, rule in (('platform.inertia', 0.0, 'positive definite'),
+                                  ('payload.inertia', -_ROUNDING, 'positive semidefinite')):
+            moments = np.linalg.eigvalsh(inertia_matrix(self[name]))
+            if moments[0] < least * moments[2] or moments[0] == least:
+                raise ParameterError(
+                    f'{source}: {name}: {self[name].tolist()}: must be {rule}, but its smallest '
+                    f'principal moment is {moments[0]:.6g} kg m^2 (the order is ixx ixy ixz iyy '
+                    'iyz izz)')
+        self.carried = self.empty
+        if self['payload.mass'] > 0.0:
+            try:
+                self.carried = self.empty.with_body(self.payload)
+            except ParameterError as exc:
+                raise ParameterError(f'{source}: payload.mass: {self["payload.mass"]:g} kg, with '
+                                     f'platform.mass: {exc}') from exc
+
+    @property
+    def empty(self) -> Body:
+        """Return the empty platform, ``platform.*``."""
+        return self._body('platform')
+
+    @property
+    def payload(self) -> Body:
+        """Return the payload, ``payload.*``; zeros without one."""
+        if self['payload.mass'] == 0.0:
+            return Body(0.0, np.zeros(3), np.zeros(6))
+        return self._body('payload')
+
+    def _body(self, group: str) -> Body:
+        return Body(*(self[f'{group}.{name}'] for name in ('mass', 'center_of_mass', 'inertia')))
+
+    def replaced(self, changes: Mapping[str, Any], source: str = '', *,
+                 exact_types: bool = False) -> Self:
+        """Return a copy with these values changed; new joints are points or on a circle."""
+        dropped = without_other(changes) if isinstance(changes, Mapping) else {}
+        return super().replaced({**dropped, **changes} if dropped else changes, source,
+                                exact_types=exact_types)
+
+    def with_points(self) -> Self:
+        """Return a copy whose joints are given as points."""
+        return self.replaced({f'geometry.{body}_joints': self[f'geometry.{body}_joints']
+                              for body in BODIES})
+
+    def with_payload(self, payload: Body) -> Self:
+        """Return a copy with another payload."""
+        return self.replaced(payload_values(payload))
+
+    def merged(self) -> Self:
+        """Return a copy without payload, whose ``platform.*`` are platform and payload."""
+        if self['payload.mass'] == 0.0:
+            return self
+        mass, center, inertia = self.carried
+        return self.replaced({
+            'platform.mass': mass, 'platform.center_of_mass': center, 'platform.inertia': inertia,
+            **dict.fromkeys(payload_values(self.payload))})
+
     def _check_drives(self, source: str) -> None:
         """Check drive.*, and complete it and actuator.reflected_mass."""
         lead, ratio = self['actuator.screw_lead'], self['drive.gear_ratio']
@@ -441,6 +535,10 @@ class Parameters(ParameterSet):
                 raise ParameterError(f'{source}: actuator.reflected_mass: {follows.tolist()} kg '
                                      f'from {MOTOR_INERTIA} and {SCREW_INERTIA}: must be finite')
             self._set('actuator.reflected_mass', follows)
+        direction = self['drive.direction']
+        if np.any(np.abs(direction) != 1.0):
+            raise ParameterError(
+                f'{source}: drive.direction: {direction.tolist()}: must be 1.0 or -1.0')
         curve = self['drive.torque_speed']
         if curve is not None and np.any(np.diff(curve[:, 0]) <= 0.0):
             raise ParameterError(
@@ -471,6 +569,12 @@ def _broken_rule_of_plate(corners: Any) -> str:
     if turns.min() < -_FLAT * size ** 2 or around > 3.0 * math.pi:
         return 'must be convex, its corners in order around it'
     return ''
+
+
+def payload_values(payload: Body) -> dict[str, Any]:
+    """Return the values of a payload under the names of a parameter file."""
+    return {'payload.mass': payload.mass, 'payload.center_of_mass': payload.center,
+            'payload.inertia': payload.inertia}
 
 
 def mean_radius(points: Array) -> float:

@@ -64,9 +64,9 @@ class Sampling:
         radii = np.linalg.norm(parameters['geometry.platform_joints'], axis=1)
         self._lever = np.maximum(1.0, radii / arm)
         # Largest wrench |F| + |N| / arm at an acceleration |a| + arm |alpha| of the platform.
-        offset = float(np.linalg.norm(parameters['platform.center_of_mass'])) / arm
-        xx, _, _, yy, _, zz = parameters['platform.inertia']
-        self._platform_mass = (parameters['platform.mass'] * (1.0 + offset) ** 2
+        offset = float(np.linalg.norm(parameters.carried.center)) / arm
+        xx, _, _, yy, _, zz = parameters.carried.inertia
+        self._platform_mass = (parameters.carried.mass * (1.0 + offset) ** 2
                                + float(xx + yy + zz) / arm ** 2)
         self._piston_mass = parameters['legs.piston.mass']
         self._piston_center = parameters['legs.piston.center_of_mass']

@@ -22,7 +22,7 @@ def stiffness_and_damping(parameters: Parameters) -> tuple[Array, Array]:
     A leg carries a sixth of platform and pistons and its own reflected mass; on a stop it has the
     natural frequency and the damping ratio of the parameters.
     """
-    carried = ((parameters['platform.mass'] + np.sum(parameters['legs.piston.mass'])) / 6.0
+    carried = ((parameters.carried.mass + np.sum(parameters['legs.piston.mass'])) / 6.0
                + parameters['actuator.reflected_mass'])
     if parameters[LENGTH_MIN] is None and parameters[LENGTH_MAX] is None:
         carried = np.zeros(6)  # no stops

@@ -88,7 +88,7 @@ def substeps(parameters: Parameters) -> int:
         text += f' N within actuator.coulomb_velocity {velocity} m/s'
     raise ParameterError(
         f'{name}: {text}: too large for a '
-        f'platform of {parameters["platform.mass"]:g} kg: the integration would need steps of '
+        f'platform of {parameters.carried.mass:g} kg: the integration would need steps of '
         f'{_REACH / fastest:.2g} s, the shortest possible are {step / _MOST_SUBSTEPS:.2g} s')
 
 
@@ -96,7 +96,7 @@ def screw_friction(parameters: Parameters) -> Array:
     """Return the largest losses in the screws (6,) as forces [N], where commands are torques."""
     if parameters['commands'] != TORQUE:
         return np.zeros(6)
-    weight = parameters['platform.mass'] * np.linalg.norm(parameters['gravity'])
+    weight = parameters.carried.mass * np.linalg.norm(parameters['gravity'])
     most = parameters['drive.torque_max']
     loads = weight if most is None else most * motor_ratio(parameters)
     losses: Array = loads * (1.0 / parameters['drive.efficiency'] - 1.0)
@@ -113,9 +113,9 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
     another bound; the masses of the legs would only make it smaller. ``of_legs`` (6,) are dampings
     [N s/m] or stiffnesses [N/m].
     """
-    arms = parameters['geometry.platform_joints'] - parameters['platform.center_of_mass']
-    smallest = np.linalg.eigvalsh(inertia_matrix(parameters['platform.inertia']))[0]
-    mobility = 1.0 / parameters['platform.mass'] + np.sum(arms ** 2, axis=-1) / smallest
+    arms = parameters['geometry.platform_joints'] - parameters.carried.center
+    smallest = np.linalg.eigvalsh(inertia_matrix(parameters.carried.inertia))[0]
+    mobility = 1.0 / parameters.carried.mass + np.sum(arms ** 2, axis=-1) / smallest
     having = of_legs > 0.0
     if not having.any():
         return 0.0

@@ -148,6 +148,10 @@ stewart_platform hexapod_of(const Params & p)
   check(
     i[0] > 0.0 && minor > 0.0 && minor * i[5] - i[0] * i[4] * i[4] - i[2] * i[2] * i[3] +
     2.0 * i[1] * i[2] * i[4] > 0.0, "platform.inertia: must be positive definite");
+  check(
+    p.payload.mass == 0.0 || stewart_add_payload(
+      &hexapod, p.payload.mass, p.payload.center_of_mass.data(), p.payload.inertia.data()) ==
+    STEWART_OK, "payload: must be finite");
   for (std::size_t n = 0; n < 6; ++n) {
     hexapod.legs[n] = leg_of(p, n);
   }

@@ -101,6 +101,11 @@ int fmu_step(fmu_instance * instance, double time)
   if (!put_parameters(values, &platform) || !(fabs(time) < 2e9)) {
     code = STEWART_OUT_OF_RANGE;
   }
+  if (code == STEWART_OK && values[FMU_PAYLOAD_MASS] != 0.0) {
+    code = values[FMU_PAYLOAD_MASS] < 0.0 ? STEWART_OUT_OF_RANGE : stewart_add_payload(
+      &platform, values[FMU_PAYLOAD_MASS], values + FMU_PAYLOAD_CENTER_OF_MASS,
+      values + FMU_PAYLOAD_INERTIA);
+  }
   if (code == STEWART_OK) {
     code = stewart_step(
       &platform, &motion, values + FMU_WRENCH, &base, (int64_t)floor(time * 1e9 + 0.5),

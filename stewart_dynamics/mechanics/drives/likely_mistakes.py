@@ -72,7 +72,7 @@ def likely_mistakes(p: Parameters) -> Iterator[str]:
         return
     k = motor_ratio(p)
     most = torque * k * p['drive.efficiency']
-    weight = p['platform.mass'] * float(np.linalg.norm(p['gravity'])) / 6.0
+    weight = p.carried.mass * float(np.linalg.norm(p['gravity'])) / 6.0
     force = np.full(6, weight) if force is None else force
     # The reserve of both: above one, the drive cannot reach the limit of the leg.
     loads = force / most

@@ -248,12 +248,12 @@ def leg_gravity(parameters: Parameters, at: Legs) -> Array:
 
 
 def _center_of_mass(parameters: Parameters, rotation: Array) -> Array:
-    com: Array = rotation @ parameters['platform.center_of_mass']
+    com: Array = rotation @ parameters.carried.center
     return com
 
 
 def _platform_inertia(parameters: Parameters, rotation: Array) -> Array:
-    local = inertia_matrix(parameters['platform.inertia'])
+    local = inertia_matrix(parameters.carried.inertia)
     inertia: Array = rotation @ local @ _transposed(rotation)
     return inertia
 
@@ -271,7 +271,7 @@ def mass_matrix(parameters: Parameters, position: Array, rotation: Array,
     j = _joint_jacobian(at.arms)
     j_q = drive_jacobian(at, rotation, screws)
     m: Array = (
-        parameters['platform.mass'] * _transposed(j_com) @ j_com
+        parameters.carried.mass * _transposed(j_com) @ j_com
         + _turning(_platform_inertia(parameters, rotation))
         + np.sum(_transposed(j) @ leg_mass(parameters, at) @ j, axis=-3)
         + _transposed(j_q) @ (parameters['actuator.reflected_mass'][:, None] * j_q))
@@ -292,7 +292,7 @@ def coriolis_matrix(
     joint_rates = velocity[..., None, :] + np.cross(omega[..., None, :], at.arms)
     c = leg_coriolis(parameters, at, joint_rates, christoffel)
     coriolis: Array = (
-        parameters['platform.mass'] * _transposed(_joint_jacobian(com)) @ j_com_rate
+        parameters.carried.mass * _transposed(_joint_jacobian(com)) @ j_com_rate
         + _turning(skew(omega) @ _platform_inertia(parameters, rotation))
         + np.sum(_transposed(j) @ (leg_mass(parameters, at) @ j_rate + c @ j), axis=-3)
         + _transposed(drive_jacobian(at, rotation, screws)) @ (
@@ -305,7 +305,7 @@ def gravity_vector(parameters: Parameters, position: Array, rotation: Array) -> 
     """Return G = G_p + sum J_i^T G_i, (..., 6) [N, N m]."""
     at = legs(parameters, position, rotation)
     g = leg_gravity(parameters, at)
-    weight = -parameters['platform.mass'] * parameters['gravity']
+    weight = -parameters.carried.mass * parameters['gravity']
     com = _center_of_mass(parameters, rotation)
     force = weight + np.sum(g, axis=-2)
     moment = np.cross(com, weight) + np.sum(np.cross(at.arms, g), axis=-2)
@@ -333,7 +333,7 @@ def base_coriolis_matrix(
     of_legs = (_each(2.0 * piston) * (outer - _transposed(outer))
                + _each(2.0 * terms.inertia * along) * skew(at.directions))
     coriolis: Array = (
-        2.0 * parameters['platform.mass'] * _transposed(j_com) @ turn @ j_com
+        2.0 * parameters.carried.mass * _transposed(j_com) @ turn @ j_com
         + _turning(turning) + np.sum(_transposed(j) @ of_legs @ j, axis=-3))
     return coriolis
 
@@ -360,7 +360,7 @@ def base_gravity_vector(
 
     com = _center_of_mass(parameters, rotation)
     inertia = _platform_inertia(parameters, rotation)
-    force = parameters['platform.mass'] * felt((position + com)[..., None, :])[..., 0, :]
+    force = parameters.carried.mass * felt((position + com)[..., None, :])[..., 0, :]
     momentum = (inertia @ spin[..., None])[..., 0]
     moment = (np.cross(com, force) + (inertia @ spin_rate[..., None])[..., 0]
               + np.cross(spin, momentum))

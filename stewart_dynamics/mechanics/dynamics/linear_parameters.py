@@ -4,11 +4,11 @@
 """
 The parameters in which leg forces are linear, theta (70,): their order, their names, both ways.
 
-The platform has ten: mass, first moment m c, inertia about the platform's origin (not about its
-center of mass). Each part of a leg has three: mass m, first moment m S, second moment I + m S^2
-about its joint (cylinder: base joint, piston: platform joint). Each actuator has reflected mass,
-viscous and Coulomb friction; each measured effort has a constant offset, which is zero in every
-parameter file.
+Platform and payload have ten: mass, first moment m c, inertia about the platform's origin (not
+about the center of mass). Each part of a leg has three: mass m, first moment m S, second moment
+I + m S^2 about its joint (cylinder: base joint, piston: platform joint). Each actuator has
+reflected mass, viscous and Coulomb friction; each measured effort has a constant offset, which is
+zero in every parameter file.
 
 Each kind has one number per leg: ``theta[VISCOUS_FRICTION]`` are six numbers. The mass of a
 cylinder alone does not affect the leg forces, and the second moments of both parts of a leg have
@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.rows import consecutive
+from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 
 (PLATFORM, CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND, PISTON_MASS, PISTON_FIRST,
@@ -67,8 +68,7 @@ def names_of(p: Parameters) -> tuple[str, ...]:
 def linear_parameters(p: Parameters) -> Array:
     """Return theta (LINEAR,) of a hexapod, SI units."""
     theta = np.zeros(LINEAR)
-    mass, center = p['platform.mass'], p['platform.center_of_mass']
-    theta[:10] = mass, *(mass * center), *about_origin(mass, center, p['platform.inertia'])
+    theta[PLATFORM] = inertial_parameters(p.carried)
     for part, of_mass, first, second in _PARTS:
         masses, distances, inertias = (
             p[f'legs.{part}.{name}'] for name in ('mass', 'center_of_mass', 'inertia'))
@@ -84,10 +84,13 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
     Return the values of theta under the names of a parameter file, offsets left out.
 
     theta (LINEAR,): parameters of a hexapod, SI units.
-    p: source of the center of mass of each part of a leg without mass.
+    p: source of the payload, and of the center of mass of each part of a leg without mass.
     Raises ParameterError: no body has these parameters: a mass is not positive, or a part of a leg
         has moments without mass or a negative inertia about its center of mass.
     """
+    if p['payload.mass'] > 0.0:
+        theta = theta.copy()
+        theta[PLATFORM] -= inertial_parameters(p.payload)
     mass = float(theta[MASS])
     if not mass > 0.0:
         raise ParameterError(f'platform.mass: {mass:g} kg: must be more than 0')
@@ -114,6 +117,11 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
     return values | {name: theta[where].copy() for name, where in _OF_ACTUATORS.items()}
 
 
+def inertial_parameters(body: Body) -> Array:
+    """Return mass, first moment and inertia about the origin (10,) of a body on the platform."""
+    return np.concatenate([[body.mass], body.mass * body.center, about_origin(*body)])
+
+
 def about_origin(mass: float, center: Array, inertia: Array) -> Array:
     """Return ixx ixy ixz iyy iyz izz about the origin, given about a center of mass (6,)."""
     whole = inertia_matrix(inertia) + mass * (
@@ -124,12 +132,5 @@ def about_origin(mass: float, center: Array, inertia: Array) -> Array:
 
 def with_point_mass(p: Parameters, added: float, position: ArrayLike) -> Parameters:
     """Return the parameters with a point mass [kg] on the platform, platform frame (3,) [m]."""
-    masses = np.array([p['platform.mass'], added])
-    centers = np.array([p['platform.center_of_mass'], position])
-    center = masses @ centers / masses.sum()
-    inertia = inertia_matrix(p['platform.inertia'])
-    for mass, arm in zip(masses, centers - center, strict=True):
-        inertia = inertia + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return p.replaced({
-        'platform.mass': masses.sum(), 'platform.center_of_mass': center,
-        'platform.inertia': inertia[np.triu_indices(3)]})
+    point = Body(added, np.array(position, dtype=float), np.zeros(6))
+    return p.with_payload(p.payload.with_body(point) if p['payload.mass'] > 0.0 else point)

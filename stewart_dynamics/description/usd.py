@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+A hexapod as USD with UsdPhysics: rigid bodies, joints, drives; for Isaac Sim and other tools.
+
+The world's axes are base axes, in which gravity is given. A solver of articulations (reduced
+coordinates) needs a tree: the platform hangs on the first leg, and the ball joints of the other
+five have ``excludeFromArticulation``, so that they close the loops. Solvers of maximal coordinates
+ignore the flag. Coulomb friction and reflected mass have no attribute in UsdPhysics: they are
+custom attributes ``stewart_dynamics:...`` of the leg's joint.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
+from stewart_dynamics import __version__
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.hexapod import (
+    COLORS, Hexapod, LegDescription, RigidBody, shapes, VisualShape)
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+_LOCKED = 1.0, -1.0  # a lower limit above the upper one locks an axis
+
+
+def usd(hexapod: Hexapod, name: str) -> str:
+    """
+    Return a hexapod at home as the text of a .usda file.
+
+    Raises StewartError: usd-core is not installed.
+    """
+    try:
+        from pxr import Gf, Usd, UsdGeom, UsdPhysics
+    except ImportError as exc:
+        raise StewartError(
+            "--usd: needs usd-core: pip install 'stewart_dynamics[usd]'") from exc
+    stage = Usd.Stage.CreateInMemory()
+    stage.SetMetadata('comment', f'Written by stewart_describe {__version__}.')
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+    root = UsdGeom.Xform.Define(stage, f'/{_prim(name)}')
+    stage.SetDefaultPrim(root.GetPrim())
+    UsdPhysics.ArticulationRootAPI.Apply(root.GetPrim())
+    scene = UsdPhysics.Scene.Define(stage, '/physicsScene')
+    gravity = hexapod.parameters['gravity']
+    size = float(np.linalg.norm(gravity))
+    scene.CreateGravityMagnitudeAttr(size)
+    scene.CreateGravityDirectionAttr(Gf.Vec3f(*(gravity / size if size else (0.0, 0.0, -1.0))))
+    writer = _Writer(stage, str(root.GetPath()))
+    looks = shapes(hexapod, uris=False)
+    writer.body(RigidBody(hexapod.base, 0.0, np.zeros(3), np.zeros((3, 3))), np.zeros(3),
+                np.eye(3), looks[hexapod.base])
+    writer.joint('Fixed', f'{hexapod.base}_to_world', None, hexapod.base, np.zeros(3), np.eye(3),
+                 np.zeros(3))
+    writer.body(hexapod.platform_body, hexapod.position, hexapod.rotation,
+                looks[hexapod.platform])
+    for n, leg in enumerate(hexapod.legs):
+        _leg(writer, hexapod, leg, looks, excluded=n > 0)
+    text: str = stage.GetRootLayer().ExportToString()
+    return text
+
+
+def _leg(writer: _Writer, hexapod: Hexapod, leg: LegDescription,
+         looks: dict[str, tuple[VisualShape, ...]], excluded: bool) -> None:
+    tip = leg.base_joint + leg.home_length * leg.mount[:, 2]
+    writer.body(hexapod.solid(leg.cylinder, leg), leg.base_joint, leg.mount,
+                looks[leg.cylinder.name])
+    writer.body(hexapod.solid(leg.piston, leg), tip, leg.mount, looks[leg.piston.name])
+    universal = writer.joint('', f'{leg.name}_universal', hexapod.base, leg.cylinder.name,
+                             leg.base_joint, leg.mount, np.zeros(3))
+    for axis in ('transX', 'transY', 'transZ', 'rotZ'):
+        writer.limit(universal, axis, *_LOCKED)
+    slide = writer.joint('Prismatic', leg.name, leg.cylinder.name, leg.piston.name,
+                         np.zeros(3), np.eye(3), np.zeros(3))
+    slide.CreateAxisAttr('Z')
+    low, high = leg.limits.lengths(leg.home_length)
+    if leg.limits.length_min is not None or leg.limits.length_max is not None:
+        slide.CreateLowerLimitAttr(low)
+        slide.CreateUpperLimitAttr(high)
+    writer.drive(slide, leg)
+    ball = writer.joint('Spherical', leg.ball, hexapod.platform, leg.piston.name,
+                        leg.platform_joint, hexapod.rotation.T @ leg.mount, np.zeros(3))
+    ball.CreateExcludeFromArticulationAttr(excluded)
+
+
+def _prim(name: str) -> str:
+    """Return a name as USD allows it."""
+    from pxr import Tf
+
+    return str(Tf.MakeValidIdentifier(name))
+
+
+class _Writer:
+    """Writes bodies and joints below a root prim."""
+
+    def __init__(self, stage: Usd.Stage, root: str) -> None:
+        from pxr import Gf, UsdGeom, UsdPhysics
+
+        self._stage, self._root = stage, root
+        self._gf, self._geom, self._physics = Gf, UsdGeom, UsdPhysics
+
+    def body(self, body: RigidBody, position: Array, rotation: Array,
+             looks: tuple[VisualShape, ...]) -> None:
+        """Add a rigid body; one without mass is the base, fixed to the world."""
+        xform = self._geom.Xform.Define(self._stage, self._path(body.name))
+        self._place(xform, position, rotation)
+        prim = xform.GetPrim()
+        self._physics.RigidBodyAPI.Apply(prim)
+        mass = self._physics.MassAPI.Apply(prim)
+        moments, axes = np.linalg.eigh(body.inertia)
+        axes = axes * np.sign(np.linalg.det(axes))
+        mass.CreateMassAttr(body.mass or 1.0)
+        mass.CreateCenterOfMassAttr(self._gf.Vec3f(*body.center.tolist()))
+        mass.CreateDiagonalInertiaAttr(self._gf.Vec3f(*(
+            moments if body.mass else np.ones(3)).tolist()))
+        mass.CreatePrincipalAxesAttr(self._quaternion(axes, self._gf.Quatf))
+        for n, shape in enumerate(looks):
+            self._shape(f'{self._path(body.name)}/shape_{n}', shape)
+
+    def joint(self, kind: str, name: str, first: str | None, second: str, position: Array,
+              rotation: Array, in_second: Array) -> Any:
+        """
+        Add a joint of a kind of UsdPhysics, of six axes if empty; its axes are the second's.
+
+        position, rotation: of the joint in the first body, or in the world.
+        """
+        define = getattr(self._physics, f'{kind}Joint').Define
+        joint = define(self._stage, f'{self._root}/joints/{_prim(name)}')
+        if first is not None:
+            joint.CreateBody0Rel().SetTargets([self._path(first)])
+        joint.CreateBody1Rel().SetTargets([self._path(second)])
+        joint.CreateLocalPos0Attr(self._gf.Vec3f(*position.tolist()))
+        joint.CreateLocalRot0Attr(self._quaternion(rotation, self._gf.Quatf))
+        joint.CreateLocalPos1Attr(self._gf.Vec3f(*in_second.tolist()))
+        joint.CreateLocalRot1Attr(self._gf.Quatf(1.0))
+        return joint
+
+    def limit(self, joint: Any, axis: str, low: float, high: float) -> None:
+        """Limit an axis of a joint."""
+        limit = self._physics.LimitAPI.Apply(joint.GetPrim(), axis)
+        limit.CreateLowAttr(low)
+        limit.CreateHighAttr(high)
+
+    def drive(self, slide: Any, leg: LegDescription) -> None:
+        """Add the actuator of a leg: a force, its limit and viscous friction."""
+        from pxr import Sdf
+
+        drive = self._physics.DriveAPI.Apply(slide.GetPrim(), 'linear')
+        drive.CreateTypeAttr('force')
+        drive.CreateStiffnessAttr(0.0)
+        drive.CreateDampingAttr(leg.viscous_friction)
+        if leg.limits.force_max is not None:
+            drive.CreateMaxForceAttr(leg.limits.force_max)
+        for name in ('reflected_mass', 'coulomb_friction', 'zero_length'):
+            slide.GetPrim().CreateAttribute(
+                f'stewart_dynamics:{name}', Sdf.ValueTypeNames.Double).Set(getattr(leg, name))
+
+    def _path(self, name: str) -> str:
+        return f'{self._root}/{_prim(name)}'
+
+    def _place(self, xform: Any, position: Array, rotation: Array) -> None:
+        xform.AddTranslateOp(self._geom.XformOp.PrecisionDouble).Set(
+            self._gf.Vec3d(*position.tolist()))
+        xform.AddOrientOp(self._geom.XformOp.PrecisionDouble).Set(
+            self._quaternion(rotation, self._gf.Quatd))
+
+    def _shape(self, path: str, shape: VisualShape) -> None:
+        if shape.kind == 'mesh':
+            return  # files of meshes are no USD
+        kind = self._geom.Sphere if shape.kind == 'sphere' else self._geom.Cylinder
+        drawn = kind.Define(self._stage, path)
+        self._place(drawn, shape.position, shape.rotation)
+        drawn.CreateRadiusAttr(shape.radius)
+        if shape.kind == 'cylinder':
+            drawn.CreateHeightAttr(shape.length)
+            drawn.CreateAxisAttr('Z')
+        drawn.CreateDisplayColorAttr([self._gf.Vec3f(*COLORS[shape.color][:3])])
+
+    def _quaternion(self, rotation: Array, kind: Any) -> Any:
+        x, y, z, w = to_quaternion(rotation)
+        return kind(float(w), float(x), float(y), float(z))
