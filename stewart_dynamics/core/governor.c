@@ -128,9 +128,6 @@ static int exceeded_by(
     return GOVERNED_SINGULARITY + 1;
   }
   if ((found = above(GOVERNED_FORCE_MAX, result->forces, g->force_max, share))) {return found;}
-  if ((found = above(GOVERNED_JOINT_FORCE_MAX, result->joint_forces, g->joint_force_max, share))) {
-    return found;
-  }
   if (g->with_angles != 0.0) {
     double angles[12];
     joint_angles_many(on->platform, g->joint_axes, 1, motion, angles);

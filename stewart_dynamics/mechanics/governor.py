@@ -51,9 +51,8 @@ from stewart_dynamics.mechanics.rows import DETERMINANT, MOTION, POSE
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.parameters.table import Parameters
 
-JOINT_FORCE_MAX = 'limits.joint_force_max'
 KEPT = (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX,
-        CLEARANCE_MIN, TORQUE_MAX, SPEED_MAX, SINGULARITY, JOINT_FORCE_MAX)
+        CLEARANCE_MIN, TORQUE_MAX, SPEED_MAX, SINGULARITY)
 """The limits that a governor keeps, in the order of ``governor_state.held``."""
 
 # Margins: of lengths a part of the stroke; of forces, torques and the condition number, which
@@ -121,8 +120,6 @@ class Governor:
                 ('platform_joint_angle_max', PLATFORM_ANGLE_MAX, _OF_OTHERS)):
             limits[field] = (1.0 - part) * bounds.get(name, np.full(6, math.inf))
         limits['length_min'] = bounds.get(LENGTH_MIN, 0.0)
-        most = parameters.get(JOINT_FORCE_MAX)
-        limits['joint_force_max'] = math.inf if most is None else (1.0 - _OF_LOADS) * most
         # Friction changes its sign where a leg reverses between two samples.
         limits['force_max'] -= 2.0 * parameters['actuator.coulomb_friction']
         margin = _OF_STROKE * _stroke(parameters)
