@@ -81,7 +81,7 @@ def test_the_example_of_the_readme_runs(
 def test_the_examples_of_the_library_run(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     blocks = re.findall(r'```python\n(.*?)```', TEXTS['docs/library.md'], flags=re.DOTALL)
-    assert len(blocks) == 6
+    assert len(blocks) == 7
     monkeypatch.chdir(ROOT)
     names: dict[str, object] = {}
     exec(compile(''.join(blocks), 'library.md', 'exec'), names)
