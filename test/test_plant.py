@@ -65,6 +65,7 @@ def test_parameters_that_help_lists_as_not_used_change_nothing() -> None:
             changes[name] = f'other_{value}'
         else:
             changes[name] = (0.5 + 1.5 * value if value is not None and not np.ndim(value)
+                             else 1.1 * value if value is not None and np.any(value)
                              else 0.01 if rule.sizes == () or 1 in rule.sizes
                              else np.linspace(0.01, 0.02, rule.sizes[-1]))
     one, other = Plant(given), Plant(given.replaced(changes))

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 import pytest
 
 from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
+from stewart_dynamics.colors import LEG_COLORS, ROLES
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import BASE, NO_BASE
@@ -32,7 +33,6 @@ from stewart_dynamics.replay.bag_report import Report, share_plotly
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.replay.summary_text import measured_headline
-from stewart_dynamics.reporting.colors import LEG_COLORS, ROLES
 from stewart_dynamics.reporting.pages import (
     decimals, digits, number, plotly_script, thousands)
 from stewart_dynamics.setpoints.base_wrench import BaseWrench

@@ -83,7 +83,9 @@ def test_a_full_disk_leaves_no_partial_description(
     assert contents(tmp_path) == {}
     assert describe(arguments) == 0
     before = contents(tmp_path)
-    assert set(before) == {'platform.urdf', 'platform.sdf', 'platform.xml'}
+    assert set(before) == {
+        'platform.urdf', 'platform.sdf', 'platform.xml', 'platform_scene.xml', 'platform.svg',
+        'robot.yaml'}
     capsys.readouterr()
     with full_disk():
         assert describe([*arguments, '--force', '--ros2-control', 'effort']) == 2

@@ -25,11 +25,11 @@ from playwright.sync_api import sync_playwright
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.colors import AXIS_COLORS, LEG_COLORS
 from stewart_dynamics.datasheet import main as datasheet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.replay_options import NODE
-from stewart_dynamics.reporting.colors import AXIS_COLORS, LEG_COLORS
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 

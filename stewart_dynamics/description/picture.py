@@ -16,14 +16,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.colors import LEG_COLORS, ROLES
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.xml_text import add, text_of
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 
 _WIDTH, _VIEW, _MARGIN = 900.0, 420.0, 48.0  # [px]
 _TABLE = 24.0  # height of a row [px]
-# Okabe and Ito's colors, distinct for the color-blind, one a leg.
-_COLORS = '#0072b2', '#d55e00', '#009e73', '#cc79a7', '#8a6d00', '#3a8fc4'
 _AWAY = 17.0  # of a number from its joint [px]
 _SAME = 6.0  # joints as near to each other in a view have their numbers together [px]
 _VIEWS = (('From above: x to the right, y up', (0, 1)),
@@ -64,11 +63,11 @@ def _view(root: ET.Element, left: float, title: str, base: Array, platform: Arra
     place = (np.array([1.0, -1.0]) * scale, np.array([left + 0.25 * _WIDTH, 0.5 * _VIEW + 12.0]))
     base, platform = ((each - middle) * place[0] + place[1] for each in (base, platform))
     _text(root, left + 20.0, 24.0, title, font_weight='bold')
-    for joints, color in ((base, '#d5d8db'), (platform, '#9fb6c6')):
+    for joints, color in ((base, ROLES['base']), (platform, ROLES['piston'])):
         around = np.argsort(np.arctan2(*(joints - joints.mean(axis=0)).T[::-1]))
         corners = ' '.join(f'{x:.1f},{y:.1f}' for x, y in joints[around])
         _draw(root, 'polygon', None, points=corners, fill=color, fill_opacity=0.5, stroke=color)
-    for color, begin, end in zip(_COLORS, base, platform, strict=True):
+    for color, begin, end in zip(LEG_COLORS, base, platform, strict=True):
         _line(root, begin, end, stroke=color, stroke_width=3)
         _draw(root, 'circle', None, cx=begin[0], cy=begin[1], r=6, fill=color)
         _draw(root, 'circle', None, cx=end[0], cy=end[1], r=6, fill='white', stroke=color,
@@ -88,7 +87,8 @@ def _numbers(root: ET.Element, joints: Array) -> None:
         away = (at - middle) / max(float(np.linalg.norm(at - middle)), 1e-9)
         x, y = at + away * (_AWAY + 6.0 * (len(same) - 1))
         _text(root, x, y + 5.0, ', '.join(str(each + 1) for each in same), text_anchor='middle',
-              font_weight='bold', fill=_COLORS[n] if len(same) == 1 else '#222', stroke='white',
+              font_weight='bold',
+              fill=LEG_COLORS[n] if len(same) == 1 else ROLES['black'], stroke='white',
               stroke_width=3, paint_order='stroke')
 
 
@@ -96,7 +96,7 @@ def _origin(root: ET.Element, at: Array, title: str) -> None:
     """Draw the axes of the base frame at its origin."""
     up = title[-4]
     for name, (x, y) in (('x', (28.0, 0.0)), (up, (0.0, -28.0))):
-        _line(root, at, at + (x, y), stroke='#333')
+        _line(root, at, at + (x, y), stroke=ROLES['ink'])
         _text(root, at[0] + 1.35 * x, at[1] + 1.2 * y + (4.0 if x else 0.0), name, font_size=12,
               text_anchor='middle')
 
@@ -111,7 +111,8 @@ def _table(root: ET.Element, hexapod: Hexapod) -> None:
             ',  '.join(map(_number, joint)) for joint in (leg.base_joint, leg.platform_joint)),
             _number(leg.home_length))
         for text, (_, left) in zip(texts, _COLUMNS, strict=True):
-            _text(root, left, row, text, fill=_COLORS[n] if left == _COLUMNS[0][1] else '#222')
+            color = LEG_COLORS[n] if left == _COLUMNS[0][1] else ROLES['black']
+            _text(root, left, row, text, fill=color)
 
 
 def _number(value: float) -> str:

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array, RPM, SECOND
+from stewart_dynamics.colors import FORCE_COLORS
 from stewart_dynamics.estimation.confidence_level import PERCENT
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
@@ -37,7 +38,6 @@ from stewart_dynamics.replay.recorded_response import Followed
 from stewart_dynamics.replay.response_charts import bode_charts, legs_chart, zoom_charts
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
 from stewart_dynamics.replay.summary import Answered, margin_key, unit_key
-from stewart_dynamics.reporting.colors import FORCE_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
     base64_of, link, link_to_other, page, plotly_script)

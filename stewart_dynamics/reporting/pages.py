@@ -26,8 +26,8 @@ from urllib.parse import quote
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 import numpy as np
 from numpy.typing import ArrayLike
+from stewart_dynamics.colors import custom_properties
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.reporting.colors import custom_properties
 from stewart_dynamics.whole_file import to_json
 
 _SHARED = Path(__file__).with_name('templates')

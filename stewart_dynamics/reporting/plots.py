@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stewart_dynamics.colors import AXIS_COLORS, LEG_COLORS, ROLES
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
 from stewart_dynamics.mechanics.limits import (
     ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS,
     QUANTITIES, short_name, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.reporting.colors import AXIS_COLORS, LEG_COLORS, ROLES
 from stewart_dynamics.reporting.spectrum import Density
 
 _BLACK = ROLES['black']
