@@ -90,7 +90,7 @@ def test_a_full_disk_leaves_no_partial_description(
     with full_disk():
         assert describe([*arguments, '--force', '--ros2-control', 'effort']) == 2
         assert describe([
-            '--from', f'{tmp_path / "platform.urdf"}', '--output', f'{tmp_path}']) == 2
+            '--from', f'{tmp_path / "platform.urdf"}', '--output', f'{tmp_path / "read"}']) == 2
     said = capsys.readouterr().err.splitlines()
     snapshot(said[0])
     snapshot(said[-1])
