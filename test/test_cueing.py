@@ -13,7 +13,7 @@ from referees import PLATFORM
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim, lti
 from stewart_dynamics import (
-    GovernedStream, Motion, MotionCueing, MotionError, ParameterError, Parameters)
+    GovernedStream, Motion, MotionCueing, MotionError, ParameterError, Parameters, Pose)
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.cueing.motion_cueing import AXES, GRAVITY, OMCT_FREQUENCIES
 from stewart_dynamics.mechanics.frames.rotation import to_euler
@@ -319,14 +319,18 @@ def test_governor_returns_to_the_washout() -> None:
     assert np.array_equal(motion.rows[-100:], demand.rows[-100:])
 
 
-def test_changed_parameters_blend_in() -> None:
+@pytest.mark.parametrize('changes', [
+    {'cueing.translation.gain': [0.9, 0.2, 0.7], 'cueing.tilt.gain': [0.8, 0.1],
+     'cueing.rotation.gain': [0.1, 0.9, 0.6], 'cueing.translation.natural_frequency': [4.0] * 3,
+     'cueing.tilt.natural_frequency': [3.0, 3.0]},
+    {'cueing.head': [0.3, -0.2, 1.0]}, {'cueing.tilt.rate_max': 0.1},
+    {'cueing.translation.washout_frequency': [1.0] * 3},
+    {'cueing.rotation.natural_frequency': [0.3] * 3}])
+def test_changed_parameters_blend_in(changes: dict[str, Any]) -> None:
     """Without a step in the acceleration, and soon as if they had always been these."""
     times = np.arange(10000) * 0.004
     force, rates = vehicle(times)
-    before, after = cueing_of(), cueing_of({
-        'cueing.translation.gain': [0.9, 0.2, 0.7], 'cueing.tilt.gain': [0.8, 0.1],
-        'cueing.rotation.gain': [0.1, 0.9, 0.6], 'cueing.translation.natural_frequency': [4.0] * 3,
-        'cueing.tilt.natural_frequency': [3.0, 3.0]})
+    before, after = cueing_of(), cueing_of(changes)
     stream = before.stream()
     first = stream.advance(times[:2000], force[:2000], rates[:2000])
     stream.use(after)
@@ -411,3 +415,31 @@ def test_any_stream_can_be_governed() -> None:
     assert sum(stream.held.values()) > 1.0
     with pytest.raises(MotionError, match='must be after'):
         stream.advance(times[:1], large[:1])
+
+
+def test_changes_under_which_the_stop_would_exceed_a_limit_are_rejected() -> None:
+    times = np.arange(1000) * 0.004
+    force, rates = vehicle(times)
+    stream = cueing_of(GAIN_1).stream()
+    last = stream.advance(times[:500], force[:500], rates[:500])[-1]
+    rate = np.abs(StewartPlatform(PARAMETERS).inverse_dynamics(last).rates).max()
+    with pytest.raises(ParameterError, match='limits.velocity_max would be exceeded by the pres'):
+        stream.use(cueing_of({**GAIN_1, 'limits.velocity_max': 0.5 * float(rate)}))
+    motion = stream.advance(times[500:], force[500:], rates[500:])
+    assert np.array_equal(motion.rows, cueing_of(GAIN_1).run(times, force, rates).rows[500:])
+
+
+def test_a_governed_stream_begins_within_the_limits() -> None:
+    beyond = Pose([0.0, 0.0, 5.0], np.eye(3))
+    with pytest.raises(MotionError, match='start: limits.length_max is exceeded there'):
+        GovernedStream(PARAMETERS, beyond)
+    with pytest.raises(MotionError, match=r'start: shape \(2,\): must be one sample'):
+        GovernedStream(PARAMETERS, Pose(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1))))
+    with pytest.raises(MotionError, match=r'parameters: '):
+        GovernedStream('platform.yaml')  # type: ignore[arg-type]
+
+
+def test_gaps_that_would_take_long_to_compute_are_rejected() -> None:
+    times, force = np.array([0.0, 1.0, 1e6]), np.tile([0.0, 0.0, 9.80665], (3, 1))
+    with pytest.raises(MotionError, match=r'times\[2\]: 1000000 s, 999999 s after the one before'):
+        cueing_of().run(times, force)

@@ -131,7 +131,7 @@ def test_units_in_brackets(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('text, words', [
     ('', 'is empty: row 1 must name the columns'),
-    ('t,ax,ay\n0,1,2\n', 'column az: is there 0 times; row 1 has t, ax, ay'),
+    ('t,ax,ay\n0,1,2\n', 'row 1: no column az: t, ax, ay'),
     ('t,ax [ft/s^2],ay,az\n0,1,2,3\n', "column ax: unit 'ft/s^2': must be one of m/s^2"),
     ('t,ax,ay,az\n0,1,2,3\n', '1 samples: must be at least 2'),
     ('t,ax,ay,az\n0,1,2,3\n0,1,2,3\n', 'row 3: t: 0 s: must be after 0 s'),

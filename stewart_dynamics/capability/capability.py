@@ -422,7 +422,7 @@ class Capability:
             J_inv cannot be solved at a pose.
 
         """
-        if not (isinstance(leg, int) and 0 <= leg < 6):
+        if isinstance(leg, bool) or not (isinstance(leg, int | np.integer) and 0 <= leg < 6):
             raise MotionError(f'leg: {leg!r}: must be an index from 0 to 5')
         still = self._held(pose)
         forces = self._forces(still, None)

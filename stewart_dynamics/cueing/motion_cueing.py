@@ -32,10 +32,10 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import function, record
-from stewart_dynamics.errors import MotionError
+from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
-from stewart_dynamics.mechanics.governor import Governor, KEPT
+from stewart_dynamics.mechanics.governor import check_gaps, Governor, KEPT
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE, STANDARD_GRAVITY
 
@@ -149,7 +149,7 @@ class MotionCueing:
         Surge, sway and heave are specific forces, roll, pitch and yaw angular velocities; the
         governor and the limit of the rate of tilt are idle.
         """
-        s = 1j * np.asarray(frequencies, dtype=float)
+        s = 1j * as_array('frequencies', frequencies, np.shape(frequencies))
         p = {name.removeprefix('cueing.'): value for name, value in self.parameters.items()
              if name.startswith('cueing.')}
         found: dict[str, Array] = {}
@@ -171,7 +171,7 @@ class MotionCueing:
 
         Tilt is felt as rotation [rad/s by m/s^2], and rotation tilts gravity [m/s^2 by rad/s].
         """
-        s = 1j * np.asarray(frequencies, dtype=float)
+        s = 1j * as_array('frequencies', frequencies, np.shape(frequencies))
         p, found = self.parameters, {}
         for n, (axis, turn, sign) in enumerate((('surge', 'pitch', -1.0), ('sway', 'roll', 1.0))):
             w, zeta, gain = (p[f'cueing.tilt.{name}'][n] for name in (
@@ -216,8 +216,8 @@ class CueingStream:
     """
     A motion of the platform that is computed piece by piece.
 
-    row (MOTION,), felt (6,): last motion of ``advance_by_one``, and specific force and angular
-        velocity at the head.
+    row (MOTION,): last motion.
+    felt (6,): specific force and angular velocity at the head, of ``advance_by_one``.
     """
 
     def __init__(self, cueing: MotionCueing) -> None:
@@ -254,11 +254,26 @@ class CueingStream:
         if (stuck := array <= before).any():
             n = int(np.argmax(stuck))
             raise MotionError(f'times[{n}]: {array[n]:.9g} s: must be after {before[n]:.9g} s')
-        return Motion.of_rows(self.cueing.advance(
-            np.ascontiguousarray(array, dtype=float), inputs, self._state))
+        check_gaps(array, before)
+        rows = self.cueing.advance(np.ascontiguousarray(array, dtype=float), inputs, self._state)
+        self.row[:] = rows[-1]
+        return Motion.of_rows(rows)
 
     def use(self, cueing: MotionCueing) -> None:
-        """Go on with other parameters, into which the motion blends without a step."""
+        """
+        Go on with other parameters, into which the motion blends without a step.
+
+        Raises ParameterError, and changes nothing: with these parameters the present motion, or
+            the stop from it, would exceed a limit.
+        """
+        if not np.isnan(self._state['time']):
+            now = cueing.governor.coordinates(Motion.of_rows(self.row[None]))
+            limit = cueing.governor.limit_of(now) if cueing.governed else None
+            if limit is not None:
+                raise ParameterError(
+                    f'parameters: {limit} would be exceeded by the present motion or by the stop '
+                    'from it: change them nearer to rest')
+            self._state['governor']['now'] = now[0]
         self._bind(cueing)
         self._state['governor']['following'] = 0.0
 

@@ -347,6 +347,8 @@ class CueingNode(LifecycleNode):
         try:
             parameters = changed(self._settings, ours, self._configured)
             cueing = MotionCueing(parameters)
+            if self._active and self._stream is not None:
+                self._stream.use(cueing)
         except ParameterError as exc:
             return SetParametersResult(
                 successful=False, reason=str(exc).removeprefix('parameters: '))
@@ -354,8 +356,6 @@ class CueingNode(LifecycleNode):
         self._settings, self._cueing = parameters, cueing
         if self._active:
             self._vehicle.kind = parameters['cueing.input']
-            if self._stream is not None:
-                self._stream.use(cueing)
         return SetParametersResult(successful=True)
 
 

@@ -30,7 +30,7 @@ _UNITS = {
     't': {'s': 1.0, 'ms': 1e-3},
     'a': {'m/s^2': 1.0, 'm/s2': 1.0, 'g': GRAVITY},
     'w': {'rad/s': 1.0, 'deg/s': math.radians(1.0)}}
-_COLUMN = re.compile(r'\s*(\w+)\s*(?:\[(.*)\])?\s*')
+_COLUMN = re.compile(r'\s*(\w+)\s*(?:\[([^\[\]]*)\])?\s*')
 _LARGEST = 1 << 30  # [bytes]
 
 
@@ -106,7 +106,7 @@ def _read_csv(path: Path) -> RecordedVehicle:
     for name in ('t', *FORCES, *(RATES if turning else ())):
         if names.count(name) != 1:
             raise StewartError(
-                f'{path}: column {name}: is there {names.count(name)} times; row 1 has '
+                f'{path}: row 1: {"more than one" if name in names else "no"} column {name}: '
                 f'{shown_name(", ".join(rows[0][1]))}')
         place = names.index(name)
         column = columns[place]

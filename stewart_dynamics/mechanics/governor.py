@@ -34,7 +34,7 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import function, record
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import batch
-from stewart_dynamics.mechanics.arguments import as_array
+from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds
 from stewart_dynamics.mechanics.drives.motors import Drives
 from stewart_dynamics.mechanics.frames import rotation as rotations
@@ -63,6 +63,7 @@ _OF_CLEARANCE = 0.003
 # A stop from velocity_max needs this part of the stroke, where its rate is between two bounds
 # [1/s]; the third is the rate without these limits.
 _STOP_IN, _SLOWEST_STOP, _FASTEST_STOP, _USUAL_STOP = 0.15, 5.0, 50.0, 10.0
+_LONGEST_GAP = 1000.0  # between two samples [s]: it takes half a second to compute
 _RETURN_RATE = 2.0  # with which the deviation from the demand vanishes [1/s]
 
 
@@ -100,13 +101,41 @@ class Governor:
         self.arguments = (*drives.arguments, len(base), base, len(platform), platform, limits)
         self._at_home = row, result
 
+    def coordinates(self, motion: Motion) -> Records:
+        """Return motions (N,) of the platform as the structure ``coordinates``."""
+        home = self.home.rotation
+        rotation = home.T @ motion.rotation
+        velocity, acceleration, omega, alpha = (vectors @ home for vectors in (
+            motion.linear_velocity, motion.linear_acceleration, motion.angular_velocity,
+            motion.angular_acceleration))
+        angles = rotations.to_euler(rotation)
+        matrix = rotations.euler_rate_matrix(angles)
+        rates = np.linalg.solve(matrix, omega[..., None])[..., 0]
+        carried = rotations.euler_rate_matrix_rate(angles, rates) @ rates[..., None]
+        head = self.limits['head']
+        arm = rotation @ head
+        turning = np.cross(omega, arm)
+        found: Any = np.zeros(len(motion), record('coordinates'))
+        found['value'] = np.column_stack([
+            (motion.position - self.home.position) @ home + arm - head, angles])
+        found['rate'] = np.column_stack([velocity + turning, rates])
+        found['acceleration'] = np.column_stack([
+            acceleration + np.cross(alpha, arm) + np.cross(omega, turning),
+            np.linalg.solve(matrix, alpha[..., None] - carried)[..., 0]])
+        return found  # type: ignore[no-any-return]
+
+    def limit_of(self, state: Records) -> str | None:
+        """Return a limit that a state (1,), or the stop from it, exceeds, with its margin."""
+        limit = function('governed_limit')(*self.arguments, state)
+        return None if limit == 0 else KEPT[limit - 1]
+
     def check_home(self, parameters: Parameters) -> None:
         """Raise ParameterError where a limit is exceeded at home, at rest."""
         found = PoseLimits(parameters).first_exceeded(*self._at_home)
-        limit = function('governed_limit')(*self.arguments, np.zeros((), record('coordinates')))
-        if found is None and limit == 0:
+        limit = self.limit_of(np.zeros(1, record('coordinates')))
+        if found is None and limit is None:
             return
-        words = (f'{KEPT[limit - 1]} is nearer than the margin of the governor' if found is None
+        words = (f'{limit} is nearer than the margin of the governor' if found is None
                  else found.words(parameters['joints']))
         raise ParameterError(f'{parameters.source}: cueing.govern: at home {words}')
 
@@ -161,14 +190,22 @@ class GovernedStream:
     """
 
     def __init__(self, parameters: Parameters, start: Pose | Motion | None = None) -> None:
+        if not isinstance(parameters, Parameters):
+            raise wrong_type('parameters', parameters, 'Parameters')
         self._governor = Governor(parameters, np.zeros(3))
         self._governor.check_home(parameters)
         self._stream: Any = np.zeros((), record('governed_stream'))
         self._stream['time'] = np.nan
         if start is not None:
             check_kind(start, Pose, Motion)
+            if start.shape not in ((), (1,)):
+                raise MotionError(f'start: shape {start.shape}: must be one sample')
             at_rest = Motion.from_pose(start[None] if not start.shape else start)
-            self._stream['governor']['now'] = self._coordinates(at_rest)[0]
+            now = self._governor.coordinates(at_rest)
+            if (limit := self._governor.limit_of(now)) is not None:
+                raise MotionError(f'start: {limit} is exceeded there, or nearer than the margin '
+                                  'of the governor')
+            self._stream['governor']['now'] = now[0]
 
     def advance(self, times: ArrayLike, demand: Motion) -> Motion:
         """
@@ -183,9 +220,10 @@ class GovernedStream:
         if (stuck := array <= before).any():
             n = int(np.argmax(stuck))
             raise MotionError(f'times[{n}]: {array[n]:.9g} s: must be after {before[n]:.9g} s')
+        check_gaps(array, before)
         rows = np.empty((len(array), MOTION))
         function('govern_many')(*self._governor.arguments, len(array), array,
-                                self._coordinates(demand), self._stream, rows)
+                                self._governor.coordinates(demand), self._stream, rows)
         return Motion.of_rows(rows)
 
     @property
@@ -193,24 +231,13 @@ class GovernedStream:
         """Return the time by which each limit has held the demand back [s], all axes together."""
         return dict(zip(KEPT, self._stream['governor']['held'].tolist(), strict=True))
 
-    def _coordinates(self, motion: Motion) -> Records:
-        """Return motions (N,) as the structure ``coordinates``."""
-        home = self._governor.home
-        rotation = home.rotation.T @ motion.rotation
-        velocity, acceleration, omega, alpha = (vectors @ home.rotation for vectors in (
-            motion.linear_velocity, motion.linear_acceleration, motion.angular_velocity,
-            motion.angular_acceleration))
-        angles = rotations.to_euler(rotation)
-        matrix = rotations.euler_rate_matrix(angles)
-        rates = np.linalg.solve(matrix, omega[..., None])[..., 0]
-        carried = rotations.euler_rate_matrix_rate(angles, rates) @ rates[..., None]
-        found: Any = np.zeros(len(motion), record('coordinates'))
-        found['value'] = np.column_stack([
-            (motion.position - home.position) @ home.rotation, angles])
-        found['rate'] = np.column_stack([velocity, rates])
-        found['acceleration'] = np.column_stack([
-            acceleration, np.linalg.solve(matrix, alpha[..., None] - carried)[..., 0]])
-        return found  # type: ignore[no-any-return]
+
+def check_gaps(times: Array, before: Array) -> None:
+    """Raise MotionError where a time (N,) is too long after the one before [s]."""
+    if (long := times - before > _LONGEST_GAP).any():
+        n = int(np.argmax(long))
+        raise MotionError(f'times[{n}]: {times[n]:.9g} s, {times[n] - before[n]:.6g} s after the '
+                          f'one before: must be at most {_LONGEST_GAP:g} s')
 
 
 def _stroke(parameters: Parameters) -> Array:
