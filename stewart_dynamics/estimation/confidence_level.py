@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The confidence level of all intervals, and what follows from it."""
+"""The confidence level of all intervals, and their width."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ class Estimate(NamedTuple):
 
 
 class _Result(NamedTuple):
-    """What the library computes of a measurement: fields of its structure."""
+    """Fields of the structure of a measurement that the library writes."""
 
     motion_after: tuple[float, ...]
     after: Six  # external wrench [N, N m]
