@@ -47,7 +47,8 @@ MOTION = smooth()
 
 def columns(motion: Motion) -> dict[str, Array]:
     """Return a motion as columns in SI, its rotation as angles of Rz Ry Rx."""
-    angles = Rotation.from_matrix(motion.rotation).as_euler('xyz')
+    # a copy: SciPy 1.10 takes no arrays that are read-only
+    angles = Rotation.from_matrix(motion.rotation.copy()).as_euler('xyz')
     found = {'t': TIMES}
     for names, values in (
             ('x y z', motion.position), ('roll pitch yaw', angles),
