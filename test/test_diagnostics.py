@@ -387,7 +387,8 @@ def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None
     (Cause.PREDICTED, 5.0, 0.25, 'crossing of det(J) = 0 predicted in 0.25 s, '
      'singularity.warn_time is 0.5 s'),
     (Cause.PREDICTED, 5.0, 0.6, 'crossing of det(J) = 0 predicted in 0.6 s, '
-     'singularity.warn_time is 0.5 s (the warning ends above 0.625 s)')])
+     'singularity.warn_time is 0.5 s (the warning ends above 0.625 s)')],
+    ids=['exceeds', 'has exceeded', 'predicted', 'predicted later'])
 def test_a_warning_states_its_reason_with_its_own_numbers(
         cause: Cause, condition: float, time: float, message: str, snapshot: Snapshot) -> None:
     diagnostics = begun()

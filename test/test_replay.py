@@ -843,7 +843,7 @@ def test_a_killed_replay_leaves_nothing_under_the_final_name(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('sent', [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize('sent', [signal.SIGTERM, signal.SIGHUP], ids=['SIGTERM', 'SIGHUP'])
 def test_an_interrupted_replay_leaves_nothing(
         long_bag: Path, tmp_path: Path, sent: signal.Signals, snapshot: Snapshot) -> None:
     """By SIGINT in test_fleet.py."""
