@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 from contextlib import closing
-import csv
-import io
 import math
 from pathlib import Path
 import re
@@ -16,16 +14,16 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND
+from stewart_dynamics.bags.csv_table import read_table
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.cueing.motion_cueing import GRAVITY
 from stewart_dynamics.errors import BagError, shown, shown_name, StewartError
 from stewart_dynamics.messages import type_names
-from stewart_dynamics.program import plain_digits
 from stewart_dynamics.setpoints.inputs import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import Rejections
-from stewart_dynamics.whole_file import read_text
 
 FORCES, RATES = ('ax', 'ay', 'az'), ('wx', 'wy', 'wz')
+_COLUMNS = ('t', *FORCES, *RATES)
 _UNITS = {
     't': {'s': 1.0, 'ms': 1e-3},
     'a': {'m/s^2': 1.0, 'm/s2': 1.0, 'g': GRAVITY},
@@ -91,50 +89,36 @@ def _read_bag(path: Path, given: str | None) -> RecordedVehicle:
 
 
 def _read_csv(path: Path) -> RecordedVehicle:
-    text = read_text(path, _LARGEST, StewartError).lstrip('\ufeff')
-    try:
-        lines = csv.reader(io.StringIO(text, newline=None), strict=True)
-        rows = [(lines.line_num, row) for row in lines if any(map(str.strip, row))]
-    except csv.Error as exc:
-        raise StewartError(f'{path}: not a CSV file: {exc}') from exc
-    if not rows:
-        raise StewartError(f'{path}: is empty: row 1 must name the columns')
-    columns = [_COLUMN.fullmatch(cell) for cell in rows[0][1]]
-    names = [column[1] if column else '' for column in columns]
+    table = read_table(path, lambda cell: _named(cell)[0] in _COLUMNS, _LARGEST)
+    columns = [_named(cell) for cell in table.header]
+    names = [name for name, _ in columns]
     turning = any(name in names for name in RATES)
     places, scales = [], []
-    for name in ('t', *FORCES, *(RATES if turning else ())):
+    for name in _COLUMNS if turning else _COLUMNS[:4]:
         if names.count(name) != 1:
             raise StewartError(
                 f'{path}: row 1: {"more than one" if name in names else "no"} column {name}: '
-                f'{shown_name(", ".join(rows[0][1]))}')
+                f'{shown_name(", ".join(table.header))}')
         place = names.index(name)
-        column = columns[place]
-        unit, units = column[2] if column else None, _UNITS[name[0]]
+        unit, units = columns[place][1], _UNITS[name[0]]
         if unit is not None and unit not in units:
             raise StewartError(f'{path}: column {name}: unit {shown(unit)}: must be one of '
                                f'{", ".join(units)}')
         places.append(place)
         scales.append(1.0 if unit is None else units[unit])
-    values = np.zeros((len(rows) - 1, 7))
-    for n, (line, row) in enumerate(rows[1:]):
-        for k, place in enumerate(places):
-            values[n, k] = _number(row, place, f'{path}: row {line}: {names[place]}')
-    values[:, :len(scales)] *= scales
+    # a cell that is missing is named, as an empty one
+    rows = [row + [''] * (len(table.header) - len(row)) for row in table.rows]
+    values = np.zeros((len(rows), 7))
+    values[:, :len(scales)] = table._replace(rows=rows).numbers(places) * scales
     times = values[:, 0]
     if (stuck := np.diff(times) <= 0.0).any():
         n = int(np.argmax(stuck))
-        raise StewartError(f'{path}: row {rows[n + 2][0]}: t: {times[n + 1]:.9g} s: must be '
+        raise StewartError(f'{path}: row {table.lines[n + 1]}: t: {times[n + 1]:.9g} s: must be '
                            f'after {times[n]:.9g} s')
     return RecordedVehicle(times, values[:, 1:4], values[:, 4:])
 
 
-def _number(row: list[str], place: int, where: str) -> float:
-    cell = row[place] if place < len(row) else ''
-    try:
-        value = float(plain_digits(cell.strip()))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise StewartError(f'{where}: {shown(cell)}: must be a finite number')
-    return value
+def _named(cell: str) -> tuple[str, str | None]:
+    """Return the name of a column and its unit, from the cell of row 1."""
+    found = _COLUMN.fullmatch(cell)
+    return (found[1], found[2]) if found else ('', None)
