@@ -174,7 +174,7 @@ class Capability:
         self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes
         self._plates = (none, none) if clearance is None else (clearance.base, clearance.platform)
         self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
-        size = float(platform.parameters['singularity.characteristic_length'])
+        size = float(platform.parameters.singularity.characteristic_length)
         nearest = float(self._bounds[travel.CLEARANCE_MIN, 0])
         self._margins = travel.PoseMargins(
             Lengths(self._bounds[:2]) if (self._bounds[0] > 0.0).any() or np.isfinite(
@@ -427,7 +427,7 @@ class Capability:
         still = self._held(pose)
         forces = self._forces(still, None)
         found = remaining(self.platform.drive_jacobian(pose), leg, float(
-            self.platform.parameters['singularity.characteristic_length']))
+            self.platform.parameters.singularity.characteristic_length))
         one = Motion.of_rows(still.rows[..., None, :])
         wrenches = None
         if self.limits_forces:
@@ -717,9 +717,9 @@ class Capability:
             self._frictionless.inverse_dynamics(Motion.of_rows(each), wrench, base).forces
             for each in (still, back))
         p, rates = self.platform.parameters, self.platform.drive_rates(rows, solved.rates)
-        linear = (solved.forces - backward) / 2.0 + p['actuator.viscous_friction'] * rates
+        linear = (solved.forces - backward) / 2.0 + p.actuator.viscous_friction * rates
         square = (solved.forces + backward) / 2.0 - constant
-        coulomb, band = p['actuator.coulomb_friction'], p['actuator.coulomb_velocity']
+        coulomb, band = p.actuator.coulomb_friction, p.actuator.coulomb_velocity
         with np.errstate(divide='ignore'):
             knee = band / np.abs(rates)
         sign = np.sign(rates)
@@ -805,7 +805,7 @@ class Capability:
             accelerated[..., ACCELERATION] += directions
             more = bounds.moving(accelerated, solved.rows)
         rates = self.platform.drive_rates(rows, solved.rates)
-        slow = np.abs(rates) < self.platform.parameters['actuator.coulomb_velocity']
+        slow = np.abs(rates) < self.platform.parameters.actuator.coulomb_velocity
         return bounds.exits(
             (forces - motors.inertial, change - (more.inertial - motors.inertial), none),
             (motors.own, more.own - motors.own, none), motors.speeds,

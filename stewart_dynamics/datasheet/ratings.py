@@ -35,7 +35,7 @@ class Payloads:
         platform = capability.platform
         p = platform.parameters
         self._largest = capability.holding_forces(continuous)
-        self._gravity = np.asarray(p['gravity'])
+        self._gravity = np.asarray(p.gravity)
         rows = Motion.from_pose(poses).rows
         matrices = np.stack([platform.regressors_at_rest(rows, each[None]) for each in np.eye(3)])
         # (N, 6, 3) of the hexapod, and (N, 6, 3, 4) of a mass of 1 kg: itself, its first moment

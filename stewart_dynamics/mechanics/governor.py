@@ -136,7 +136,7 @@ class Governor:
         if found is None and limit is None:
             return
         words = (f'{limit} is nearer than the margin of the governor' if found is None
-                 else found.words(parameters['joints']))
+                 else found.words(parameters.joints))
         raise ParameterError(f'{parameters.source}: cueing.govern: at home {words}')
 
     def _put_bounds(self, parameters: Parameters, limits: Any) -> None:
@@ -150,7 +150,7 @@ class Governor:
             limits[field] = (1.0 - part) * bounds.get(name, np.full(6, math.inf))
         limits['length_min'] = bounds.get(LENGTH_MIN, 0.0)
         # Friction changes its sign where a leg reverses between two samples.
-        limits['force_max'] -= 2.0 * parameters['actuator.coulomb_friction']
+        limits['force_max'] -= 2.0 * parameters.actuator.coulomb_friction
         margin = _OF_STROKE * _stroke(parameters)
         limits['length_min'] += margin
         limits['length_max'] -= margin
@@ -162,12 +162,13 @@ class Governor:
 
     def _put_clearance(self, parameters: Parameters, limits: Any) -> tuple[Array, Array]:
         """Put the bound of the clearance; return the corners of the plates."""
-        if parameters[CLEARANCE_MIN] is None:
+        least = parameters.limits.leg_clearance_min
+        if least is None:
             return np.empty((0, 3)), np.empty((0, 3))
         shape = LegClearance(parameters)
         limits['with_clearance'] = True
-        limits['clearance_min'] = parameters[CLEARANCE_MIN] + _OF_CLEARANCE * parameters[
-            'singularity.characteristic_length']
+        limits['clearance_min'] = (
+            least + _OF_CLEARANCE * parameters.singularity.characteristic_length)
         return shape.base, shape.platform
 
 
@@ -242,13 +243,13 @@ def check_gaps(times: Array, before: Array) -> None:
 
 def _stroke(parameters: Parameters) -> Array:
     """Return the strokes of the legs (6,) [m]; zero without both limits of length."""
-    low, high = parameters[LENGTH_MIN], parameters[LENGTH_MAX]
+    low, high = parameters.limits.length_min, parameters.limits.length_max
     return np.zeros(6) if low is None or high is None else np.broadcast_to(high - low, 6)
 
 
 def _stop_rate(parameters: Parameters) -> float:
     """Return the rate of a stop [1/s]."""
-    stroke, fastest = _stroke(parameters), parameters[VELOCITY_MAX]
+    stroke, fastest = _stroke(parameters), parameters.limits.velocity_max
     if fastest is None or not stroke.all():
         return _USUAL_STOP
     rate = 2.0 * float(np.max(fastest / stroke)) / _STOP_IN
