@@ -314,6 +314,10 @@ class LimitsGroup(ParameterGroup):
     force_max: Array | None = _legs(
         'maximum force of a leg, to which forces are clipped; unlimited if not set', 'N', (),
         minimum=0.0, above=True)
+    joint_force_max: Array | None = _legs(
+        'maximum force along a leg that its joints and its rod carry, the thrust rating of a '
+        'cylinder: without friction and reflected mass of the actuator; unlimited if not set',
+        'N', (), minimum=0.0, above=True)
     base_joint_angle_max: Array | None = _legs(
         'maximum angle between a leg and its geometry.base_joint_axes; unlimited if not set',
         'rad', (), minimum=0.0, above=True, maximum=math.pi)
@@ -325,8 +329,8 @@ class LimitsGroup(ParameterGroup):
         'another leg, and from the outlines of geometry that are given; unlimited if not set',
         'm', minimum=0.0)
     action: str = declare(
-        'action while a limit of length, rate, joint angle or clearance, or of speed or '
-        'temperature of a motor, is exceeded, or a setpoint is too far from the last one for '
+        'action while a limit of length, rate, joint force, joint angle or clearance, or of speed '
+        'or temperature of a motor, is exceeded, or a setpoint is too far from the last one for '
         'limits.velocity_max: warn only, or publish no forces and torques', '', WARN,
         choices=ACTIONS, while_active=True)
 
