@@ -222,7 +222,7 @@ class ParameterGroup:
         vars(self).update(_set=of_set, _path=path)
 
     def __init_subclass__(cls) -> None:
-        """Collect what the class declares."""
+        """Collect the declarations of the class."""
         declared, groups = dict(cls._declarations), dict(cls._groups)
         hints = get_type_hints(cls, localns={cls.__name__: cls})
         for name in vars(cls).get('__annotations__', ()):
@@ -294,7 +294,7 @@ class ParameterSet(ParameterGroup, Mapping[str, Any]):
     described: ClassVar[tuple[str, ...]] = ()  # groups that a file describes by giving any of them
 
     def __init_subclass__(cls) -> None:
-        """Make the table of what the class declares."""
+        """Make the table from the declarations of the class."""
         super().__init_subclass__()
         cls.table, cls._set = MappingProxyType(dict(cls._declarations)), cls
 

@@ -4,8 +4,8 @@
 """
 The table of the parameters of a hexapod, and the rules between them.
 
-The table is made of what class Parameters and its groups declare, in this order. The check, the
-node's declaration, ``--help`` and the documents are all made from it.
+The table is made from the attributes of class Parameters and of its groups, in their order. The
+check, the node's declaration, ``--help`` and the documents are all made from it.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ class PayloadGroup(ParameterGroup):
 
 
 class LegPartGroup(ParameterGroup):
-    """What both parts of a leg have."""
+    """A part of a leg."""
 
     mass: Array
     center_of_mass: Array
@@ -221,7 +221,7 @@ class LegsGroup(ParameterGroup):
 
 
 class ActuatorGroup(ParameterGroup):
-    """What the actuators add along the legs."""
+    """Inertia and friction of the actuators, along the legs."""
 
     reflected_mass: Array = _legs(
         'inertia of rotor and screw along the leg, J (2 pi / lead)^2', 'kg', minimum=0.0)
@@ -303,7 +303,7 @@ class DriveGroup(ParameterGroup):
 
 
 class LimitsGroup(ParameterGroup):
-    """What the legs may be asked for."""
+    """Limits of legs and joints."""
 
     length_min: Array | None = _legs(
         'minimum length of a leg; unlimited if not set', 'm', (), minimum=0.0)
@@ -503,7 +503,7 @@ def _deviation(text: str, unit: str, default: float | None) -> Any:
 
 
 class UncertaintyGroup(ParameterGroup):
-    """What is known of the parameters before they are identified."""
+    """Standard deviations of the parameters of the file."""
 
     platform_mass: float = _deviation('platform.mass, relative to it', '', 0.5)
     center_of_mass: float = _deviation(
@@ -548,7 +548,7 @@ class MeshesGroup(ParameterGroup):
 
 
 class JointStatesGroup(ParameterGroup):
-    """What the shown hexapod follows."""
+    """Poses of the hexapod in RViz."""
 
     source: str = declare(
         'whose poses ~/joint_states and /tf have: those of setpoints, or of the measured legs '
