@@ -19,7 +19,7 @@ from stewart_dynamics.mechanics.limits import TORQUE_MAX, TORQUE_SPEED
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.motor_loads import CONTINUOUS
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
-from stewart_dynamics.setpoints.motor_step import OF_DRIVES
+from stewart_dynamics.setpoints.motor_row import OF_DRIVES
 
 # Cells of each motor: magnitude of the speed, torque.
 _CELLS = 128
