@@ -31,6 +31,7 @@ from stewart_dynamics.mechanics.kinematics.pose_mistakes import typed_pose_mista
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
+from stewart_dynamics.parameters.circles import circle_names
 from stewart_dynamics.parameters.table import (
     BY_IMU, DRIVE_INERTIAS, FIXED, inertia_matrix, NO_MASS, Parameters, STANDARD_GRAVITY)
 
@@ -144,19 +145,25 @@ def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
                'without masses: write the mass of the platform')
         return
     if base > _LARGEST_RADIUS:
-        yield (f'geometry.base_joints: {base:.3g} m from their center: larger than any hexapod '
+        yield (f'{_joints(p, "base")}: {base:.3g} m from their center: larger than any hexapod '
                'known: in mm?')
     if platform > _SMALL_RADIUS and mass < _THINNEST * platform * platform * platform:
-        yield (f'geometry.platform_joints: {platform:.3g} m from their center, and '
+        yield (f'{_joints(p, "platform")}: {platform:.3g} m from their center, and '
                f'platform.mass only {mass:.3g} kg: in mm?')
     if max(base, platform) > _LARGEST_RATIO * min(base, platform):
-        yield (f'geometry.platform_joints: {platform:.3g} m from their center, the base joints '
+        yield (f'{_joints(p, "platform")}: {platform:.3g} m from their center, the base joints '
                f'{base:.3g} m: one of them in mm?')
     for name in ('singularity.characteristic_length', 'geometry.zero_length',
                  'limits.length_min', 'limits.length_max'):
         if is_too_long(p, name, shape):
             yield (f'{name}: {np.max(p[name]):.3g} m, but the joints are {shape.radius:.3g} m '
                    'from their center: in mm?')
+
+
+def _joints(p: Parameters, body: str) -> str:
+    """Return the parameter that says how far the joints of a body are from their center."""
+    radius = circle_names(body)[0]
+    return f'geometry.{body}_joints' if p[radius] is None else radius
 
 
 def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
@@ -229,7 +236,7 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
     shape = home.shape
     away = shape.axes[2] * home.side  # from the base to the platform
     if shape.platform_radius > _LARGEST_PLATFORM_RATIO * shape.base_radius:
-        yield (f'geometry.platform_joints: {shape.platform_radius:.3g} m from their center, the '
+        yield (f'{_joints(p, "platform")}: {shape.platform_radius:.3g} m from their center, the '
                f'base joints only {shape.base_radius:.3g} m: base and platform exchanged?')
     if p['base.source'] == FIXED and gravity_mistakes.likely_mistake(
             p['gravity'], home) == gravity_mistakes.AWAY:

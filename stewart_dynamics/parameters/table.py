@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 CENTER_UNCERTAINTY = 0.1  # default of uncertainty.center_of_mass, by the characteristic length
 # Moments of an inertia that rounding made negative, by the largest.
 _ROUNDING = 1e-12
+# Joints that are this near to their center, in terms of their coordinates, are at one point.
+_ONE_POINT = 1e-12
 # Corners of a plate are in a plane to this part of its size.
 _FLAT = 1e-6
 NO_MASS = 1e-15
@@ -398,7 +400,9 @@ class Parameters(ParameterSet):
 
     table = PARAMETERS
     node = 'stewart_dynamics'
-    described = 'cueing.', 'drive.', 'actuator.reflected_mass'  # which may follow from drive.*
+    # The reflected mass may follow from drive.*; heights belong to circles.
+    described = ('cueing.', 'drive.', 'actuator.reflected_mass',
+                 *(circle_names(body)[2] for body in BODIES))
     drives: tuple[str, ...]  # names of drive.* that are given; without them no motors are computed
     carried: Body  # by the legs: platform and payload as one
 
@@ -427,11 +431,12 @@ class Parameters(ParameterSet):
         if not is_unit(length):
             raise ParameterError(f'{source}: base.imu.orientation: '
                                  f'{self["base.imu.orientation"].tolist()}: {unit_rule(length)}')
-        platform_joints = self['geometry.platform_joints']
-        size = mean_radius(platform_joints)
-        if size == 0.0:
-            raise ParameterError(
-                f'{source}: geometry.platform_joints: all six are at one point')
+        for body in BODIES:
+            joints, angles = self[f'geometry.{body}_joints'], circle_names(body)[1]
+            if mean_radius(joints) <= _ONE_POINT * np.abs(joints).max():
+                name = f'geometry.{body}_joints' if self[angles] is None else angles
+                raise ParameterError(f'{source}: {name}: all six are at one point')
+        size = mean_radius(self['geometry.platform_joints'])
         if self['singularity.characteristic_length'] is None:
             self._values['singularity.characteristic_length'] = size
         if self['uncertainty.center_of_mass'] is None:
