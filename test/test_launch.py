@@ -14,8 +14,9 @@ import pytest
 
 pytest.importorskip('launch_ros', reason='launch_ros comes with a ROS installation')
 
+from rclpy.serialization import deserialize_message  # noqa: E402
 from running import executable, own_domain, Peer, Program, ROOT  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
+from sensor_msgs.msg import Imu, JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
 
 NAME = 'stewart_dynamics'
@@ -49,7 +50,7 @@ def prefix(tmp_path: Path) -> Path:
     (index / NAME).touch()
     for name in ('config', 'examples', 'launch'):
         (share / name).symlink_to(ROOT / name)
-    for name in ('stewart_dynamics', 'stewart_simulator', 'stewart_trajectory'):
+    for name in ('stewart_cueing', 'stewart_dynamics', 'stewart_simulator', 'stewart_trajectory'):
         (scripts / name).symlink_to(executable(name))
     return folder
 
@@ -145,6 +146,25 @@ def test_the_demo_runs_and_ends(launch: Launch, peer: Peer) -> None:
         'leg_controller', 'stewart_dynamics', 'stewart_simulator', 'stewart_trajectory'}
     assert program.stop() == 0
     assert said(program).count('process has finished cleanly') == 4, said(program)
+    peer.until(lambda: nodes(peer) == set(), 'all have ended')
+
+
+@pytest.mark.slow
+def test_a_drive_moves_the_simulated_hexapod(launch: Launch, peer: Peer) -> None:
+    """Vehicle, motion cueing, node, simulator and controller: the legs follow, and all end."""
+    felt = peer.listen('/stewart_cueing/felt', Imu)
+    legs = peer.listen('/stewart_simulator/leg_states', JointState)
+    program = launch('cueing.launch.py')
+
+    def moved() -> bool:
+        positions = [deserialize_message(data, JointState).position[0] for data in legs[::100]]
+        return bool(felt) and max(positions, default=0.0) - min(positions, default=0.0) > 5e-3
+
+    peer.until(moved, 'the simulated legs move')
+    assert nodes(peer) == {'leg_controller', 'stewart_cueing', 'stewart_dynamics',
+                           'stewart_simulator', 'town_drive'}
+    assert program.stop() == 0
+    assert said(program).count('process has finished cleanly') == 5, said(program)
     peer.until(lambda: nodes(peer) == set(), 'all have ended')
 
 
