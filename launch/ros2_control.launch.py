@@ -25,12 +25,12 @@ from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
-import yaml
 
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.launch_arguments import check_launch_arguments
+import yaml
 
 PACKAGES = ('controller_manager', 'joint_state_broadcaster', 'joint_trajectory_controller',
             'robot_state_publisher')

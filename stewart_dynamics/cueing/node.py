@@ -13,7 +13,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.clock import Clock, ClockType, JumpHandle, JumpThreshold
+from rclpy.clock import Clock, ClockType, JumpHandle, JumpThreshold, ROSClock
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
@@ -51,7 +51,8 @@ FELT, DIAGNOSTICS, MEASURED_LEGS = 'felt', '/diagnostics', 'measured_legs'
 _TICK = 0.2  # between two looks at the input [s]
 _TICKS_A_REPORT = 5
 _FADE = 1.0  # in which the motion of the vehicle fades in, or out [s]
-# Time that is skipped where it is longer, by a steady clock and by /clock, which may be coarse [ns].
+# Time that is skipped where it is longer, by a steady clock, and by /clock, which may be coarse
+# [ns].
 _BACKLOG, _JUMP = 100_000_000, 1_000_000_000
 _REST = 1e-4  # velocity of a platform at rest [m/s, rad/s]
 _LONGEST_STOP = 5.0  # [s]
@@ -228,10 +229,15 @@ class CueingNode(LifecycleNode):
     # -- setpoints --------------------------------------------------------------------------
 
     @property
+    def _simulated(self) -> bool:
+        """Whether time is that of /clock."""
+        clock = self.get_clock()
+        return isinstance(clock, ROSClock) and clock.ros_time_is_active
+
+    @property
     def _now(self) -> int:
         """Time of the clock by which setpoints are due [ns]; 0 before the first /clock."""
-        clock = self.get_clock()
-        return clock.now().nanoseconds if clock.ros_time_is_active else time.monotonic_ns()
+        return self.get_clock().now().nanoseconds if self._simulated else time.monotonic_ns()
 
     def _on_time(self) -> None:
         """Publish the setpoints that are due, each with its own stamp."""
@@ -239,7 +245,7 @@ class CueingNode(LifecycleNode):
             return
         now = self._now
         late = now - self._begin - self._time_of(self._due)
-        simulated = self.get_clock().ros_time_is_active
+        simulated = self._simulated
         if late > (_JUMP if simulated else _BACKLOG) or late < -_JUMP:
             self._begin += late
             self._stamp += late
