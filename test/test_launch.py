@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import os
 from pathlib import Path
+import runpy
 import sys
+from xml.etree import ElementTree
 
 import pytest
 
@@ -117,6 +119,22 @@ def test_a_wrong_argument_is_named_and_starts_nothing(
     assert program.wait() == 1
     assert words in said(program)
     assert 'process started' not in said(program)
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'config' / 'controllers').glob('*.yaml')),
+                         ids=lambda path: path.name)
+def test_the_mock_hardware_has_the_interfaces_of_the_controllers_file(path: Path) -> None:
+    module = runpy.run_path(str(ROOT / 'launch' / 'ros2_control.launch.py'))
+    if path.name == 'effort.yaml':
+        with pytest.raises(RuntimeError, match='effort.yaml: has no leg_trajectory_controller'):
+            module['command_interfaces'](str(path))
+        return
+    interfaces = module['command_interfaces'](str(path))
+    assert path.name == f'trajectory_{"_".join(interfaces)}.yaml'
+    described = ElementTree.fromstring(module['robot_description'](
+        str(ROOT / 'config' / 'platform.yaml'), '', interfaces))
+    for joint in described.findall('ros2_control/joint'):
+        assert [each.get('name') for each in joint.findall('command_interface')] == interfaces
 
 
 @pytest.mark.slow
