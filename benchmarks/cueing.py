@@ -179,11 +179,13 @@ class Drive:
         while time.monotonic() < end:
             spin(0.01)
         times, values = (np.array(each) for each in zip(*self.heard[name], strict=True))
-        jumps = times[1:][np.abs(np.diff(values)) > 0.2 * STEP]
-        at = np.searchsorted(jumps, steps)
-        if at[-1] == len(jumps) or len(set(at.tolist())) != len(steps):
-            raise SystemExit(f'{name}: a step did not arrive')
-        latencies: Array = (jumps[at] - np.array(steps)) * 1e-3
+        jumps = np.append(times[1:][np.abs(np.diff(values)) > 0.2 * STEP], np.iinfo(np.int64).max)
+        arrived = jumps[np.searchsorted(jumps, steps)]
+        # Where the computer is so late that a step and the next one are in one setpoint: neither.
+        known = arrived < np.append(steps[1:], steps[-1] + 10 ** 9)
+        if known.mean() < 0.8:
+            raise SystemExit(f'{name}: {(~known).sum()} of {len(steps)} steps did not arrive')
+        latencies: Array = (arrived - np.array(steps))[known] * 1e-3
         return latencies
 
 
