@@ -123,7 +123,7 @@ class Bare:
 
 
 class Drive:
-    """The vehicle, and what the setpoints of both nodes have of it."""
+    """The vehicle, and the accelerations in the setpoints of both nodes."""
 
     def __init__(self) -> None:
         import rclpy

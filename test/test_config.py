@@ -168,7 +168,7 @@ OF_TRAJECTORY = {
         'p', 'i', 'd', 'i_clamp_max', 'i_clamp_min', 'ff_velocity_scale', 'u_clamp_max',
         'u_clamp_min', 'tracking_time_constant', 'error_deadband')},
     'gains.JOINT.antiwindup_strategy': str}
-# Of joint_trajectory_controller/validate_jtc_parameters.hpp.
+# Some of those that joint_trajectory_controller/validate_jtc_parameters.hpp admits.
 COMMANDS = (['effort'], ['position'], ['position', 'effort'], ['velocity'])
 WITH_PID = (['effort'], ['velocity'])
 ANTIWINDUP = ('back_calculation', 'conditional_integration', 'legacy', 'none')

@@ -333,7 +333,7 @@ def test_a_changed_rate_of_tilt_is_neared_without_a_jerk(rate_max: float, govern
     rates = np.concatenate([each.angular_velocity[:, 1] for each in (first, motion)])
     assert rates[399] == pytest.approx(-0.0524, abs=1e-4)
     assert np.abs(rates).max() <= max(0.0524, rate_max) * (1.0 + 1e-9)
-    # That of the exponential with 4/s, and less than a tenth of what a step of the input takes.
+    # The exponential with 4/s has this acceleration; a step of the input needs ten times as much.
     accelerations = motion.angular_acceleration[:, 1]
     assert np.abs(accelerations).max() < 4.0 * abs(rate_max - 0.0524) + 0.01
     assert np.abs(first.angular_acceleration).max() > 2.0

@@ -70,7 +70,7 @@ class Cueing:
         self.vehicle.publish(message)
 
     def tick(self, now: int, count: int) -> None:
-        """Publish a time on /clock [ns], and wait until there are so many setpoints."""
+        """Publish a time on /clock [ns], and wait until a number of setpoints has come."""
         message = Clock(clock=Time(nanoseconds=now).to_msg())
         self.peer.until(lambda: self.clock.publish(message) or len(self.raw['accel']) >= count,
                         f'{count} setpoints at {now}')

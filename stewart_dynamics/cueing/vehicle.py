@@ -109,7 +109,7 @@ class Vehicle:
 
     def silent(self, now: float) -> float:
         """Return the time since the last message [s]; infinite without one."""
-        # The clock may jump back: then there is none yet.
+        # After a jump back of the clock there is no message yet.
         return now - self.heard if now >= self.heard else math.inf
 
     def check(self, now: float) -> None:
