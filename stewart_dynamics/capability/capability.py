@@ -175,7 +175,7 @@ class Capability:
         self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes
         self._plates = (none, none) if clearance is None else (clearance.base, clearance.platform)
         self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
-        size = float(platform.parameters['singularity.characteristic_length'])
+        size = float(platform.parameters.singularity.characteristic_length)
         nearest = float(self._bounds[travel.CLEARANCE_MIN, 0])
         self._margins = travel.PoseMargins(
             Lengths(self._bounds[:2]) if (self._bounds[0] > 0.0).any() or np.isfinite(
@@ -428,7 +428,7 @@ class Capability:
         still = self._held(pose)
         results = self._results(still, None)
         found = remaining(self.platform.drive_jacobian(pose), leg, float(
-            self.platform.parameters['singularity.characteristic_length']))
+            self.platform.parameters.singularity.characteristic_length))
         one = Motion.of_rows(still.rows[..., None, :])
         wrenches = None
         if self.limits_forces:
@@ -567,7 +567,7 @@ class Capability:
         with np.errstate(over='ignore', invalid='ignore'):
             arm = moving.rotation @ center
             turning = np.cross(moving.angular_velocity, arm)
-            force = self.platform.parameters['gravity'] - moving.linear_acceleration - np.cross(
+            force = self.platform.parameters.gravity - moving.linear_acceleration - np.cross(
                 moving.angular_acceleration, arm) - np.cross(moving.angular_velocity, turning)
             load = check_finite(
                 'center_of_mass', np.concatenate([force, np.cross(arm, force)], axis=-1), 0)
@@ -726,8 +726,8 @@ class Capability:
         strongest = self._limits.bounds.get(limits.FORCE_MAX)
         constant, linear, square = _of_limit(limits.FORCE_MAX, powers)
         p, rates = self.platform.parameters, self.platform.drive_rates(rows, solved.rates)
-        linear = linear + p['actuator.viscous_friction'] * rates
-        coulomb, band = p['actuator.coulomb_friction'], p['actuator.coulomb_velocity']
+        linear = linear + p.actuator.viscous_friction * rates
+        coulomb, band = p.actuator.coulomb_friction, p.actuator.coulomb_velocity
         with np.errstate(divide='ignore'):
             knee = band / np.abs(rates)
         sign = np.sign(rates)
@@ -816,7 +816,7 @@ class Capability:
             accelerated[..., ACCELERATION] += directions
             more = bounds.moving(accelerated, solved.rows)
         rates = self.platform.drive_rates(rows, solved.rates)
-        slow = np.abs(rates) < self.platform.parameters['actuator.coulomb_velocity']
+        slow = np.abs(rates) < self.platform.parameters.actuator.coulomb_velocity
         return bounds.exits(
             (forces - motors.inertial, change - (more.inertial - motors.inertial), none),
             (motors.own, more.own - motors.own, none), motors.speeds,

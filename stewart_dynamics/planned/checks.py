@@ -98,14 +98,14 @@ class Checks:
         self.condition_number, self.condition_time = 0.0, 0.0
         self.force, self.force_leg, self.load = -1.0, 0, 0.0
         self._strongest = np.zeros(6)
-        self._joints = parameters['joints']
+        self._joints = parameters.joints
         self._limits = Limits(parameters)
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._clearance = clearance_to_check(parameters)
-        self._clearance_tolerance = _CLEARANCE * parameters['singularity.characteristic_length']
+        self._clearance_tolerance = _CLEARANCE * parameters.singularity.characteristic_length
         self._stop = stop_condition_of(parameters)
-        self._coulomb = parameters['actuator.coulomb_friction']
-        self._coulomb_velocity = parameters['actuator.coulomb_velocity']
+        self._coulomb = parameters.actuator.coulomb_friction
+        self._coulomb_velocity = parameters.actuator.coulomb_velocity
         self._parameters = parameters
         self._drives = Drives(parameters) if parameters.drives else None
         self._motor_limits = MotorLimits(parameters)
@@ -195,9 +195,9 @@ class Checks:
         """Return after which samples a drive reverses while its motor may be at its limit."""
         p, ratio = self._parameters, motor_ratio(self._parameters)
         rates = rows[:, SPEEDS] / ratio
-        inertial = p['actuator.reflected_mass'] / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
+        inertial = p.actuator.reflected_mass / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
         highest = (np.abs(inertial) + (np.abs(samples.results[:, FORCES] - inertial)
-                                       + 2.0 * self._coulomb) / p['drive.efficiency']) / ratio
+                                       + 2.0 * self._coulomb) / p.drive.efficiency) / ratio
         may = exceeds(np.maximum(highest[:-1], highest[1:]), np.minimum(
             rows[:-1, AVAILABLE_TORQUES], rows[1:, AVAILABLE_TORQUES]))
         reverses = (rates[:-1] * rates[1:] < 0.0) & (np.maximum(
