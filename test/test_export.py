@@ -55,6 +55,7 @@ COMPILERS = [name for name in ('gcc', 'clang', 'cc') if shutil.which(name)][:2]
 WARNINGS = ['-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wdouble-promotion', '-Wshadow',
             '-Werror']
 
+
 def knows_cpp(compiler: str) -> bool:
     """Return whether a compiler compiles C++, for which gcc needs the package g++."""
     return subprocess.run([compiler, '-xc++', '-fsyntax-only', '-'], input=b'#include <cmath>',
