@@ -33,7 +33,8 @@ from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.circles import circle_names
 from stewart_dynamics.parameters.table import (
-    BY_IMU, DRIVE_INERTIAS, FIXED, inertia_matrix, NO_MASS, Parameters, STANDARD_GRAVITY)
+    BY_IMU, DRIVE_INERTIAS, FIXED, inertia_matrix, NO_MASS, ONE_POINT, Parameters,
+    STANDARD_GRAVITY)
 
 # Digits of the position of a joint in a message.
 _DIGITS = 5
@@ -116,6 +117,8 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
     # An overflow of numbers near the largest double is not reported by itself.
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)
+        if one_point := _base_at_one_point(parameters, shape):
+            return (one_point,)  # all others would follow from it
         sizes = [*_sizes(parameters, shape)]
         found = [*sizes, *_inertia(parameters, shape),
                  *_reflected_mass(parameters, shape), *drives.likely_mistakes(parameters),
@@ -158,6 +161,15 @@ def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
         if is_too_long(p, name, shape):
             yield (f'{name}: {np.max(p[name]):.3g} m, but the joints are {shape.radius:.3g} m '
                    'from their center: in mm?')
+
+
+def _base_at_one_point(p: Parameters, shape: Shape) -> str:
+    """Return that all base joints are at one point; empty if they are not."""
+    reach = max(shape.platform_radius, np.abs(p.geometry.base_joints).max())
+    if shape.base_radius > ONE_POINT * reach:
+        return ''
+    name = ('geometry.base_joints' if p.geometry.base_angles is None else 'geometry.base_angles')
+    return f'{name}: all six are at one point: the legs hold the platform in no pose'
 
 
 def _joints_of(p: Parameters, body: str) -> str:

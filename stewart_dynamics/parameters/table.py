@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 CENTER_UNCERTAINTY = 0.1  # default of uncertainty.center_of_mass, by the characteristic length
 # Moments of an inertia that rounding made negative, by the largest.
 _ROUNDING = 1e-12
-# Joints that are this near to their center, in terms of their coordinates, are at one point.
-_ONE_POINT = 1e-12
+ONE_POINT = 1e-12
+"""Joints that are this near to their center, in terms of their coordinates, are at one point."""
 # Corners of a plate are in a plane to this part of its size.
 _FLAT = 1e-6
 NO_MASS = 1e-15
@@ -624,12 +624,12 @@ class Parameters(ParameterSet):
         if not is_unit(length):
             raise ParameterError(f'{source}: base.imu.orientation: '
                                  f'{self.base.imu.orientation.tolist()}: {unit_rule(length)}')
-        for body in BODIES:
-            joints, angles = self[f'geometry.{body}_joints'], circle_names(body)[1]
-            if mean_radius(joints) <= _ONE_POINT * np.abs(joints).max():
-                name = f'geometry.{body}_joints' if self[angles] is None else angles
-                raise ParameterError(f'{source}: {name}: all six are at one point')
-        size = mean_radius(self.geometry.platform_joints)
+        platform_joints = self.geometry.platform_joints
+        size = mean_radius(platform_joints)
+        if size <= ONE_POINT * np.abs(platform_joints).max():
+            name = ('geometry.platform_joints' if self.geometry.platform_angles is None
+                    else 'geometry.platform_angles')
+            raise ParameterError(f'{source}: {name}: all six are at one point')
         if self.singularity.characteristic_length is None:
             self._complete('singularity.characteristic_length', size)
         if self.uncertainty.center_of_mass is None:
