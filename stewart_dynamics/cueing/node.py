@@ -77,7 +77,7 @@ class CueingNode(LifecycleNode):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         answer_impossible_transitions(
             self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
-        self._starting = self._settings['autostart']
+        self._starting = self._settings.autostart
         if self._starting:
             if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
                 raise StewartError(f'cannot be configured: {self._fault}')
@@ -145,26 +145,26 @@ class CueingNode(LifecycleNode):
         for mistake in likely_mistakes(p):
             self.get_logger().warning(mistake)
         self._cueing = MotionCueing(p)
-        self._setpoints = SetpointPublisher(self, p['target'], p['output'], p['base_frame'])
+        self._setpoints = SetpointPublisher(self, p.target, p.output, p.base_frame)
         qos = QoSProfile(depth=1000)
         self._felt = self.create_publisher(Imu, f'~/{FELT}', qos)
-        self._felt_writer = ImuWriter(p['platform_frame'], 0.0, 0.0)
+        self._felt_writer = ImuWriter(p.platform_frame, 0.0, 0.0)
         self._diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS, qos)
-        self._legs = JointStateReader(p['joints'], ('position',))
+        self._legs = JointStateReader(p.joints, ('position',))
         self._ours = [
             (self.destroy_subscription, self.create_subscription(
                 Imu, f'~/{VEHICLE}', self._on_vehicle, qos, raw=True)),
             (self.destroy_subscription, self.create_subscription(
                 JointState, f'~/{MEASURED_LEGS}', self._on_legs, qos, raw=True)),
             (self.destroy_timer, self.create_timer(
-                1.0 / p['cueing.rate'], self._on_time, clock=self._steady)),
+                1.0 / p.cueing.rate, self._on_time, clock=self._steady)),
             (self.destroy_timer, self.create_timer(_TICK, self._on_tick, clock=self._steady)),
             *((self.destroy_publisher, each) for each in (
                 self._felt, self._diagnostics, *self._setpoints.publishers))]
         self._configured = True
         self.get_logger().info(
-            f'motion cueing at {p["cueing.rate"]:g} Hz to {p["target"]}, '
-            + ('within the limits of the hexapod' if p['cueing.govern'] else 'not governed'))
+            f'motion cueing at {p.cueing.rate:g} Hz to {p.target}, '
+            + ('within the limits of the hexapod' if p.cueing.govern else 'not governed'))
         # The objects that exist now stay: see DynamicsNode.
         gc.unfreeze()
         gc.collect()
@@ -189,7 +189,7 @@ class CueingNode(LifecycleNode):
         platform = StewartPlatform(self._settings)
         try:
             _, positions = self._legs.read_one(data)
-            lengths = np.array(positions) + self._settings['geometry.zero_length']
+            lengths = np.array(positions) + self._settings.geometry.zero_length
             away = np.abs(lengths - platform.inverse_kinematics(self._cueing.governor.home))
             pose = (self._cueing.governor.home if away.max() < _AWAY
                     else platform.forward_kinematics(lengths))
@@ -202,7 +202,7 @@ class CueingNode(LifecycleNode):
         """Begin with the approach from a pose to home."""
         p, home = self._settings, self._cueing.governor.home
         try:
-            found = approach(StewartPlatform(p), pose, home, rate=p['cueing.rate'])
+            found = approach(StewartPlatform(p), pose, home, rate=p.cueing.rate)
         except StewartError as exc:
             self._log.write([LogLine(ERROR, f'no approach to the home pose: {exc}', 'approach')])
             return
@@ -231,7 +231,7 @@ class CueingNode(LifecycleNode):
 
     def _time_of(self, index: int) -> int:
         """Return the time of a setpoint from the begin on [ns]; rounding does not add up."""
-        rate: float = self._settings['cueing.rate']
+        rate = self._settings.cueing.rate
         return round(index * SECOND / rate)
 
     def _publish_next(self) -> None:
@@ -257,7 +257,7 @@ class CueingNode(LifecycleNode):
         vehicle, gravity = self._vehicle, float(self._cueing.at_rest[2])
         heard = (vehicle.reading is not None and not vehicle.mistake
                  and time.monotonic() - vehicle.heard < self._silence)
-        change = 1.0 / (_FADE * self._settings['cueing.rate'])
+        change = 1.0 / (_FADE * self._settings.cueing.rate)
         share = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
         self._presence = share
         x, y, z, *rates = vehicle.reading or (0.0, 0.0, gravity, 0.0, 0.0, 0.0)
@@ -266,7 +266,7 @@ class CueingNode(LifecycleNode):
 
     @property
     def _silence(self) -> float:
-        timeout: float = self._settings['vehicle_timeout']
+        timeout = self._settings.vehicle_timeout
         return timeout
 
     def _end_motion(self) -> None:
@@ -293,7 +293,7 @@ class CueingNode(LifecycleNode):
         self._vehicle.check(now)
         if self._vehicle.mistake and self._vehicle.mistake != mistake:
             self._log.write([LogLine(WARN, f'vehicle: {self._vehicle.mistake}', 'mistake')])
-        if self._begin is None and now - self._activated > self._settings['start_timeout']:
+        if self._begin is None and now - self._activated > self._settings.start_timeout:
             self.get_logger().warning('no ~/measured_legs: starts at the home pose')
             self._go()
         self._ticks += 1
@@ -355,7 +355,7 @@ class CueingNode(LifecycleNode):
         self._log.write(log_changes(self._settings, parameters))
         self._settings, self._cueing = parameters, cueing
         if self._active:
-            self._vehicle.kind = parameters['cueing.input']
+            self._vehicle.kind = parameters.cueing.input
         return SetParametersResult(successful=True)
 
 

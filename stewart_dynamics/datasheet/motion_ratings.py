@@ -22,9 +22,8 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.replay.recorded_motion import RecordedMotion
 from stewart_dynamics.reporting.block_statistics import finite
 
-LENGTH, RATE, FORCE, SPEED, TORQUE, ANGLE, CLEARANCE, SINGULARITY = (
-    'length', 'rate', 'force', 'motor speed', 'motor torque', 'joint angle', 'leg clearance',
-    'singularity')
+LENGTH, SPEED, TORQUE, ANGLE, CLEARANCE, SINGULARITY = (
+    'length', 'motor speed', 'motor torque', 'joint angle', 'leg clearance', 'singularity')
 # Largest number of samples of which the amplitude is computed, and the motion between them, which
 # takes 0.6 ms for each.
 _MOST, _MOST_BETWEEN = 100_000, 10_000
@@ -40,17 +39,17 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
     result = platform.inverse_dynamics(
         recorded.motion, recorded.wrench, recorded.base, singular='nan')
     found: dict[str, Array] = {}
-    low, high = p[limits.LENGTH_MIN], p[limits.LENGTH_MAX]
+    low, high = p.limits.length_min, p.limits.length_max
     if high is not None:
         shortest = np.zeros(6) if low is None else low
         found[LENGTH] = np.abs(2.0 * result.lengths - high - shortest) / (high - shortest)
     elif low is not None:
         found[LENGTH] = low / result.lengths
-    if p[limits.VELOCITY_MAX] is not None:
-        found[RATE] = np.abs(result.rates) / p[limits.VELOCITY_MAX]
-    if p[limits.FORCE_MAX] is not None:
-        forces = np.where(np.isfinite(result.forces), np.abs(result.forces), np.inf)
-        found[FORCE] = forces / p[limits.FORCE_MAX]
+    for limit in (*limits.OF_RATES, *limits.OF_LOADS):
+        if p[limit] is not None:
+            values = np.abs(result.rows[..., limits.LIMITS[limit].columns])
+            found[limits.LIMITS[limit].quantity.name] = np.where(
+                np.isfinite(values), values, np.inf) / p[limit]
     if p.drives:
         motors = MotorBounds(p)
         speeds, torques = motors.ratios(recorded.motion.rows, result.rows)
@@ -62,12 +61,11 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
     if known:
         angles = dict(zip(limits.OF_JOINTS, platform.joint_angles(recorded.motion), strict=True))
         found[ANGLE] = np.max([angles[name] / p[name] for name in known], axis=0)
-    clearances = clearance_to_check(p)
-    if clearances is not None:
+    clearances, least = clearance_to_check(p), p.limits.leg_clearance_min
+    if clearances is not None and least is not None:
         distances = clearances(recorded.motion.rows)
         with np.errstate(divide='ignore'):
-            found[CLEARANCE] = np.where(
-                distances > 0.0, p[limits.CLEARANCE_MIN] / distances, np.inf)
+            found[CLEARANCE] = np.where(distances > 0.0, least / distances, np.inf)
     found = {name: each.max(axis=-1) for name, each in found.items()}
     condition = result.condition_number / stop_condition_of(p)
     crossed = np.diff(np.sign(result.determinant), prepend=np.sign(result.determinant[0])) != 0.0
@@ -79,7 +77,7 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
            used: dict[str, Array]) -> dict[str, Any]:
     """Return whether a motion is possible, how much faster it could be, and its payload."""
     c, p = Capability(platform), platform.parameters
-    joints = p['joints']
+    joints = p.joints
     worst = max(used, key=lambda name: float(used[name].max()))
     sample = int(used[worst].argmax())
     singular = used[SINGULARITY].max() >= 1.0

@@ -22,7 +22,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
-from stewart_dynamics.mechanics.limits import JUMP, LIMITS, OF_MOTORS
+from stewart_dynamics.mechanics.limits import LIMITS, OF_MOTORS
 from stewart_dynamics.mechanics.rows import BASE, FORCES, MOTION, POSE, RESULT, WRENCH
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
@@ -30,8 +30,6 @@ from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 # Return codes of the C source.
 OK, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = (CODES[f'STEWART_{name}'] for name in (
     'OK', 'SINGULAR', 'SUPPRESSED', 'NO_POSE', 'NO_MOTORS'))
-# Bits of stewart_output.exceeded, from the lowest one.
-_BITS = (*LIMITS, JUMP)
 
 _COUNT = 40
 _PERIOD = 20_000_000  # of the setpoints [ns]
@@ -77,13 +75,13 @@ def golden_vectors(parameters: Parameters) -> Array:
     # The C source checks no limits of motors.
     step = Step(parameters.replaced(dict.fromkeys(OF_MOTORS)))
     hexapod = hexapod_structure(parameters)
-    drives = None if parameters['actuator.screw_lead'] is None else Drives(parameters)
+    drives = None if parameters.actuator.screw_lead is None else Drives(parameters)
     motions = _motions(parameters)
     weight = parameters.carried.mass * 10.0 + 1.0
     phases = np.arange(_COUNT)[:, None] + np.arange(WRENCH + BASE)
     wrenches = weight * np.sin(phases[:, :WRENCH]) * (np.arange(_COUNT) % 4 > 0)[:, None]
     bases = np.sin(phases[:, WRENCH:])
-    bases[:, :3] += parameters['gravity']
+    bases[:, :3] += parameters.gravity
     guess = np.zeros((1, MOTION))
     guess[0, :POSE.stop] = motions[0, :POSE.stop]
     rows, state = [], None
@@ -108,7 +106,7 @@ def golden_vectors(parameters: Parameters) -> Array:
 def _motions(parameters: Parameters) -> Array:
     """Return rows of motion (_COUNT, MOTION)."""
     positions, rotations = homes(parameters)
-    size = parameters['singularity.characteristic_length']
+    size = parameters.singularity.characteristic_length
     times = NANOSECOND * _PERIOD * np.arange(_COUNT)[:, None]
     omega = 2.0 * math.pi * np.array([0.9, 1.1, 1.3, 1.5, 1.7, 1.9])
     growth = times / times[-1]
@@ -127,7 +125,7 @@ def _motions(parameters: Parameters) -> Array:
 def _results(output: Output) -> list[float]:
     """Return the columns from CODE to WARNING."""
     code = SINGULAR if not output.solvable else OK if output.forces else SUPPRESSED
-    exceeded = [sum(1 << _BITS.index(each.limit) for each in output.exceedances
+    exceeded = [sum(LIMITS[each.limit].bit for each in output.exceedances
                     if each.leg == leg) for leg in range(6)]
     state = output.singularity
     return [code, *output.lengths, *output.rates, *(output.demanded_forces or (0.0,) * 6),

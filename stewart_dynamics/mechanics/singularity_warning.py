@@ -27,7 +27,7 @@ UNSOLVABLE_CONDITION = 1e12
 
 def stop_condition_of(parameters: Parameters) -> float:
     """Return the condition number from which on a pose counts as singular."""
-    return min(float(parameters['singularity.stop_condition']), UNSOLVABLE_CONDITION)
+    return min(parameters.singularity.stop_condition, UNSOLVABLE_CONDITION)
 
 
 class Cause(IntEnum):

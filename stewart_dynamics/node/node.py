@@ -102,7 +102,7 @@ class DynamicsNode(LifecycleNode):
         self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         answer_impossible_transitions(
             self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
-        self._starting = self._settings['autostart']
+        self._starting = self._settings.autostart
         if self._starting:
             if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
                 raise StewartError(f'cannot be configured: {self._fault}')
@@ -131,7 +131,7 @@ class DynamicsNode(LifecycleNode):
         parameters, models = self._settings, self._models
         self._identified = None
         self._setpoints = Setpoints(parameters, self._on_rejection, self._on_notice)
-        self._history = LegHistory(parameters['payload.window'])
+        self._history = LegHistory(parameters.payload.window)
         self._measured_legs = MeasuredLegs(
             parameters, models.external_wrench, self._on_rejection, self._on_notice,
             self._history)
@@ -143,13 +143,13 @@ class DynamicsNode(LifecycleNode):
         self._last: Output | None = None
         self._target: Target | None = None  # the last answered setpoint
         self._restarting = False  # the last setpoint was a restart that could not be answered
-        publishers, rate = self._topics.publishers, parameters['visualization_rate']
+        publishers, rate = self._topics.publishers, parameters.visualization_rate
         self._markers = PublisherAtRate(publishers.get(MARKERS), rate, Markers(parameters).write)
         self._joint_states = PublisherAtRate(
             publishers.get(JOINT_STATES), rate, self._model_messages.joint_states)
         self._transforms_read = False  # they have a subscriber
         self._travel = TravelPublisher(parameters, publishers[TRAVEL])
-        self._model_measured = parameters['joint_states.source'] == AS_MEASURED
+        self._model_measured = parameters.joint_states.source == AS_MEASURED
         self._handled, self._rested = -math.inf, False
         self._active = True
         return TransitionCallbackReturn.SUCCESS
@@ -190,7 +190,7 @@ class DynamicsNode(LifecycleNode):
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
             planned.INPUT: self._on_trajectory})
         self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
-        self._exclusive = self._settings['setpoint.exclusive']
+        self._exclusive = self._settings.setpoint.exclusive
         self._configured = True
         # These objects stay: the collector would go through all of them again and again, for
         # 50 ms and more, while a setpoint waits.
@@ -359,7 +359,7 @@ class DynamicsNode(LifecycleNode):
         if outcome.payload:
             self._identified = outcome.payload
             self._topics.publishers[PAYLOAD].publish(
-                inertia_message(outcome.payload, self._settings['platform_frame']))
+                inertia_message(outcome.payload, self._settings.platform_frame))
         self._diagnostics.payload.done(outcome, seconds)
         self._report()
 
@@ -367,7 +367,7 @@ class DynamicsNode(LifecycleNode):
             self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Take the payload that was identified last as ``payload.*``."""
         found = self._identified and payload.carried_payload(
-            self._identified._replace(given=self._settings.empty))
+            self._identified._replace(given=self._settings.platform.body))
         if found is None:
             response.message = 'no payload is identified: call ~/identify_payload first'
         elif isinstance(found, str):
@@ -392,7 +392,7 @@ class DynamicsNode(LifecycleNode):
         base = self._setpoints.base.at_rest(known=not self._diagnostics.base.stale(now))
         measured = (
             self._measured_legs.motion if now - self._diagnostics.external_wrench.used_at
-            <= self._settings['setpoint.timeout'] else None)
+            <= self._settings.setpoint.timeout else None)
         self._planned.add(planned.answer(
             self._settings, self._setpoints.wrench, data, base, measured), now)
 

@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, Limits, result_values,
+    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, result_values,
     SPEED_MAX, TEMPERATURE_RISE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
@@ -98,14 +98,14 @@ class Checks:
         self.condition_number, self.condition_time = 0.0, 0.0
         self.force, self.force_leg, self.load = -1.0, 0, 0.0
         self._strongest = np.zeros(6)
-        self._joints = parameters['joints']
+        self._joints = parameters.joints
         self._limits = Limits(parameters)
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._clearance = clearance_to_check(parameters)
-        self._clearance_tolerance = _CLEARANCE * parameters['singularity.characteristic_length']
+        self._clearance_tolerance = _CLEARANCE * parameters.singularity.characteristic_length
         self._stop = stop_condition_of(parameters)
-        self._coulomb = parameters['actuator.coulomb_friction']
-        self._coulomb_velocity = parameters['actuator.coulomb_velocity']
+        self._coulomb = parameters.actuator.coulomb_friction
+        self._coulomb_velocity = parameters.actuator.coulomb_velocity
         self._parameters = parameters
         self._drives = Drives(parameters) if parameters.drives else None
         self._motor_limits = MotorLimits(parameters)
@@ -126,8 +126,7 @@ class Checks:
             samples = samples.until(n)
         results = samples.results
         self._keep_largest_force(results[:, FORCES])
-        for limit, values in result_values(
-                results[:, LENGTHS], results[:, RATES], results[:, FORCES]).items():
+        for limit, values in result_values(results).items():
             self._check_limit(limit, values, _of_legs(samples.times))
         self._name_mistake(samples)
         self._check_cubics(samples)
@@ -196,9 +195,9 @@ class Checks:
         """Return after which samples a drive reverses while its motor may be at its limit."""
         p, ratio = self._parameters, motor_ratio(self._parameters)
         rates = rows[:, SPEEDS] / ratio
-        inertial = p['actuator.reflected_mass'] / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
+        inertial = p.actuator.reflected_mass / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
         highest = (np.abs(inertial) + (np.abs(samples.results[:, FORCES] - inertial)
-                                       + 2.0 * self._coulomb) / p['drive.efficiency']) / ratio
+                                       + 2.0 * self._coulomb) / p.drive.efficiency) / ratio
         may = exceeds(np.maximum(highest[:-1], highest[1:]), np.minimum(
             rows[:-1, AVAILABLE_TORQUES], rows[1:, AVAILABLE_TORQUES]))
         reverses = (rates[:-1] * rates[1:] < 0.0) & (np.maximum(
@@ -232,7 +231,7 @@ class Checks:
             lowest = 0.5 * (nearest[:-1] + nearest[1:]) - samples.ways
         self._check_limit(CLEARANCE_MIN, clearances, _of_legs(samples.times), others)
         bound = float(self._limits.bounds[CLEARANCE_MIN][0])
-        held = np.minimum(nearest[:-1], nearest[1:]) >= self._limits.threshold(CLEARANCE_MIN)[0]
+        held = np.minimum(nearest[:-1], nearest[1:]) >= self._limits.thresholds[CLEARANCE_MIN][0]
         unclear: list[int] = np.flatnonzero(
             samples.near & held & (lowest < bound - self._clearance_tolerance)).tolist()
         return unclear
@@ -315,8 +314,8 @@ class Checks:
         low, high = cubics.bounds()
         with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
             middle = np.abs(cubics.middle_rate() / durations[:, None])
-        shortest, longest, fastest = map(
-            self._limits.threshold, (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX))
+        shortest, longest, fastest = (
+            self._limits.thresholds[name] for name in (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX))
         suspect = np.flatnonzero(samples.joined & (
             (low < shortest) | (high > longest) | (middle > fastest)).any(axis=1))
         if not len(suspect):
@@ -363,11 +362,19 @@ class Checks:
         lowest = np.fmin.reduce([smaller, *map(cubics.at, cubics.extrema())])
         # The condition number grows about as det(J) falls.
         predicted = np.maximum(condition[dips], condition[dips + 1]) * smaller
-        forces = np.abs(results[:, FORCES])
-        forces = np.maximum(forces[dips], forces[dips + 1]) * (smaller / lowest)[:, None]
+        here, there = np.abs(results[dips]), np.abs(results[dips + 1])
+        loads = np.maximum(here, there) * (smaller / lowest)[:, None]
         unclear: list[int] = dips[(lowest < DIP * smaller) | ((lowest < smaller) & (
-            (predicted >= self._stop * lowest) | self._exceed_known(forces)))].tolist()
+            (predicted >= self._stop * lowest) | self._exceed_known(loads[:, FORCES])
+            | self._may_exceed(loads)))].tolist()
         return unclear
+
+    def _may_exceed(self, results: Array) -> Flags:
+        """Return which rows of results (M, RESULT) exceed a limit of loads."""
+        found = np.zeros(len(results), dtype=bool)
+        for name in self._limits.of_loads:
+            found |= self._limits.exceeds(name, results[:, LIMITS[name].columns]).any(axis=1)
+        return found
 
     def _singular(self, time: float, result: Array, words: str) -> None:
         leg = int(np.argmax(result[UNIT_LOAD_FORCES]))

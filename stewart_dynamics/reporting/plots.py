@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.colors import AXIS_COLORS, LEG_COLORS, ROLES
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS,
-    QUANTITIES, short_name, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
+    ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, LIMITS, LOAD, OF_JOINTS,
+    OF_LOADS, OF_RATES, OF_RESULTS, POSE, short_name, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.spectrum import Density
 
@@ -78,7 +78,7 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
 
     first: position of the first setpoint [m]; the curves of positions begin there.
     """
-    joints, begin = p['joints'], ', '.join(f'{each:.6g}' for each in first)
+    joints, begin = p.joints, ', '.join(f'{each:.6g}' for each in first)
     of_motion = [
         Plot('velocity', 'Velocity of the platform', 'm/s',
              _of_axes(at['velocity'], 'v x', 'v y', 'v z'), 'of its origin, base axes'),
@@ -90,7 +90,7 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
         Plot('angular_acceleration', 'Angular acceleration of the platform', 'deg/s²',
              _of_axes(at['angular_acceleration'], 'dw/dt x', 'dw/dt y', 'dw/dt z'), 'base axes')]
     of_rates = [
-        _bounded(p, [VELOCITY_MAX], 'Leg rates', at['rates'], '+ extends', both=True),
+        *_of_results(p, at, OF_RATES),
         Plot('powers', 'Mechanical power of the legs', 'W', _of_legs(joints, at['powers']),
              'demanded force times rate; + drives, − brakes', spikes=True)]
     return [
@@ -101,11 +101,10 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
         Plot('angles', 'Inputs: orientation of the platform', 'deg',
              _of_axes(at['angles'], 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
         *(of_motion if velocities_known else ()),
-        _bounded(p, [LENGTH_MIN, LENGTH_MAX], 'Leg lengths', at['lengths'],
-                 'between the joint centers'),
+        *_of_results(p, at, (LENGTH_MIN, LENGTH_MAX)),
         *(_of_joints(p, limit, at['joint_angles'].start) for limit in OF_JOINTS
           if p[limit] is not None),
-        *([] if p[CLEARANCE_MIN] is None else [
+        *([] if p.limits.leg_clearance_min is None else [
             _bounded(p, [CLEARANCE_MIN], 'Clearance between the legs', at['clearances'],
                      'from each leg to the nearest other leg')]),
         Plot('determinant', 'det(J)', 'm³',
@@ -115,24 +114,38 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
         Plot('condition', 'Condition number of J_inv', '–',
              {'': [Curve('condition', LEG_COLORS[1], at['condition'].start)]},
              'dimensionless; 1 is best', [
-                 Bound(p['singularity.warn_condition'], 'warn', ROLES['near']),
-                 Bound(p['singularity.stop_condition'], 'stop', ROLES['singular'])], log=True),
-        _bounded(p, [FORCE_MAX], 'Leg forces', at['forces'], 'demanded by the motion, + pushes',
-                 both=True, spikes=True),
+                 Bound(p.singularity.warn_condition, 'warn', ROLES['near']),
+                 Bound(p.singularity.stop_condition, 'stop', ROLES['singular'])], log=True),
+        *_of_results(p, at, OF_LOADS),
         *(of_rates if velocities_known else ()),
         *(_of_motors(p, at, velocities_known) if p.drives else ()),
         Plot('force_breakdown', 'Leg force by source', 'N', {
-            leg: [Curve('sum', ROLES['zero'], at['forces'].start + n, width=4.5),
+            leg: [Curve('sum', ROLES['zero'], at['force'].start + n, width=4.5),
                   *(Curve(source, _SOURCE_COLORS[source], at['breakdown'].start + 6 * k + n)
                     for k, source in enumerate(sources_of(p)))]
             for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
 
 
+def plotted(p: Parameters) -> list[str]:
+    """Return the limits in OF_RESULTS whose quantities are plotted."""
+    return [name for name in OF_RESULTS if LIMITS[name].usual or p[name] is not None]
+
+
+def _of_results(p: Parameters, at: Places, names: Sequence[str]) -> Iterator[Plot]:
+    """Yield the plots of quantities in a row of results, each with its limits."""
+    shown = [LIMITS[name] for name in names if name in plotted(p)]
+    for quantity in dict.fromkeys(limit.quantity for limit in shown):
+        limits = [limit for limit in shown if limit.quantity == quantity]
+        yield _bounded(
+            p, [limit.name for limit in limits], limits[0].title, at[quantity.key],
+            limits[0].note, both=limits[0].depends != POSE, spikes=limits[0].depends == LOAD)
+
+
 def _bounded(p: Parameters, limits: Sequence[str], title: str, channels: slice, note: str,
              both: bool = False, spikes: bool = False) -> Plot:
     """Return the plot of a quantity with limits, the lower one first; both: of either sign."""
-    quantity = QUANTITIES[limits[0]]
-    return Plot(quantity.key, title, quantity.unit, _of_legs(p['joints'], channels), note,
+    quantity = LIMITS[limits[0]].quantity
+    return Plot(quantity.key, title, quantity.unit, _of_legs(p.joints, channels), note,
                 [bound for limit in limits for bound in _bounds(limit, p[limit], both)],
                 spikes=spikes)
 
@@ -141,8 +154,8 @@ def _of_joints(p: Parameters, limit: str, first: int) -> Plot:
     """Return the plot of the angles of the joints that a limit bounds, in degrees."""
     which, joint = ANGLES[limit], 'base' if limit == BASE_ANGLE_MAX else 'platform'
     return Plot(
-        QUANTITIES[limit].key, f'Angles of the {joint} joints', 'deg',
-        _of_legs(p['joints'], slice(first + which.start, first + which.stop)),
+        LIMITS[limit].quantity.key, f'Angles of the {joint} joints', 'deg',
+        _of_legs(p.joints, slice(first + which.start, first + which.stop)),
         f'between the leg and geometry.{joint}_joint_axes, by default its direction at home',
         _bounds(limit, np.degrees(p[limit])))
 
@@ -181,9 +194,9 @@ def measured_plots(p: Parameters, at: Places) -> list[Plot]:
             leg: [Curve('measured', _BLACK, at['measured'].start + n),
                   Curve('computed', LEG_COLORS[n], at['computed'].start + n),
                   Curve('residual', ROLES['faint'], at['residual'].start + n, 'dot')]
-            for n, leg in enumerate(p['joints'])}, 'residual: measured less computed',
+            for n, leg in enumerate(p.joints)}, 'residual: measured less computed',
             contacts=True, spikes=True),
-        Plot('residuals', 'Residual of every leg', 'N', _of_legs(p['joints'], at['residual']),
+        Plot('residuals', 'Residual of every leg', 'N', _of_legs(p.joints, at['residual']),
              'measured less computed force', contacts=True, spikes=True),
         Plot('external_force', 'External force', 'N',
              _of_axes(at['external_force'], 'F x', 'F y', 'F z'),
@@ -200,11 +213,11 @@ def _of_motors(p: Parameters, at: Places, velocities_known: bool) -> Iterator[Pl
     if velocities_known:
         yield _bounded(p, [SPEED_MAX], 'Speeds of the motors', at['speeds'], '+ extends',
                        both=True)
-        if p['drive.resistance'] is not None:
+        if p.drive.resistance is not None:
             yield Plot('bus_power', 'Power of the bus', 'W', {
                 '': [Curve('bus', _BLACK, at['bus_power'].start)]},
                 'electrical, of all motors; − flows back', spikes=True)
-    if p['drive.thermal_resistance'] is not None:
+    if p.drive.thermal_resistance is not None:
         yield _bounded(p, [TEMPERATURE_RISE_MAX], 'Temperature rises of the windings', at['rises'],
                        'above ambient, from ambient at the beginning')
 

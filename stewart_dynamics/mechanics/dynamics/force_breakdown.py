@@ -87,15 +87,16 @@ _TOGETHER = 1024
 
 def sources_of(parameters: Parameters) -> tuple[str, ...]:
     """Return SOURCES, without the base's motion, the last, where ``base.source`` is fixed."""
-    return SOURCES[:-1] if parameters['base.source'] == FIXED else SOURCES
+    return SOURCES[:-1] if parameters.base.source == FIXED else SOURCES
 
 
 class ForceBreakdownRows:
     """The force breakdown of rows of motion, as one array."""
 
     def __init__(self, parameters: Parameters) -> None:
-        self._friction = tuple(parameters[f'actuator.{name}'].copy() for name in (
-            'viscous_friction', 'coulomb_friction', 'coulomb_velocity'))
+        actuator = parameters.actuator
+        self._friction = tuple(each.copy() for each in (
+            actuator.viscous_friction, actuator.coulomb_friction, actuator.coulomb_velocity))
         self._parameters, self._screws = parameters, screw_constants(parameters)
         self._whole = hexapod_structure(parameters)
         self._weightless = hexapod_structure(
