@@ -318,7 +318,7 @@ def test_the_numbers_of_an_array_are_read_whatever_its_layout(
 
 
 @given(st.data())
-def test_no_corrupted_array_raises_anything_else(data: st.DataObject, snapshot: Snapshot) -> None:
+def test_no_corrupted_array_raises_anything_else(data: st.DataObject) -> None:
     spoiled = bytearray(float64_array((1.0,) * 6))
     for at in data.draw(st.lists(st.integers(0, len(spoiled) - 1), max_size=6)):
         spoiled[at] = data.draw(st.integers(0, 255))
@@ -328,7 +328,7 @@ def test_no_corrupted_array_raises_anything_else(data: st.DataObject, snapshot: 
             assert all(type(number) is float for number in float64_values(bad))
         except MalformedError as exc:
             assert str(exc)
-    with snapshot.raises(MalformedError):
+    with pytest.raises(MalformedError, match='not plain CDR'):
         float64_values(b'\1' + float64_array((1.0,) * 6)[1:])
 
 
