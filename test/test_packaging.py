@@ -54,7 +54,7 @@ OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'matplotlib': 'plot',
 PIP_NAMES = {'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin', 'pxr': 'usd-core',
              'yaml': 'pyyaml'}
 
-# What is built here is hardly run: without optimization, which takes most of the time.
+# A compiler that does not optimize, which takes most of the time of a build.
 COMPILER = {'CC': """sh -c 'exec cc "$@" -O0' cc"""}
 
 HEADER = re.compile(r"""(#!.*\n)?(#|//|/\*) SPDX-FileCopyrightText: 20\d\d [^\n]+ developers
