@@ -5,13 +5,18 @@
 Sentences that programs print, one file for each program: test/snapshots/<program>.txt.
 
 Tests assert what kind of message comes, and compare its words with the file by the fixture
-``snapshot``. ``python -m pytest --update-snapshots`` writes the files; read the difference.
+``snapshot``; modules without a ``PROGRAM`` test the library.
+``python -m pytest --update-snapshots`` writes the files; read the difference.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 import re
+
+import pytest
 
 FOLDER = Path(__file__).with_name('snapshots')
 
@@ -45,6 +50,14 @@ class Snapshot:
             self._said.append(shown)
         if not self._update:
             assert self._said == self._known[:len(self._said)]
+
+    @contextmanager
+    def raises(self, kind: type[Exception] | tuple[type[Exception], ...],
+               ) -> Iterator[pytest.ExceptionInfo[Exception]]:
+        """Check that an error of this kind is raised, and compare its sentence."""
+        with pytest.raises(kind) as caught:
+            yield caught
+        self(caught.value)
 
     def close(self) -> None:
         """Check that no sentence is missing; or write them all."""

@@ -10,6 +10,7 @@ from typing import Any
 import messages
 import numpy as np
 import pytest
+from snapshot import Snapshot
 from stewart_dynamics import (
     approach, check_planned_trajectory, Motion, MotionError, Pose, rest_to_rest, StewartPlatform)
 from stewart_dynamics.arrays import NO_WRENCH
@@ -35,16 +36,16 @@ def test_a_motion_from_rest_to_rest_is_the_quintic_reference_motion() -> None:
     assert np.all(motion.rows[[0, -1], 12:] == 0.0)
 
 
-@pytest.mark.parametrize(('arguments', 'text'), [
-    ((HOME, HOME, 0.0), 'duration: 0.0: must be more than 0'),
-    ((HOME, HOME, 1.0, -1.0), 'rate: -1.0: must be more than 0'),
-    ((HOME, HOME, 1e6), 'at most 100000 points'),
-    ((HOME, 'home', 1.0), "end: 'home': must be a Pose or a Motion"),
-    ((Pose(np.zeros((2, 3)), np.eye(3)), HOME, 1.0), 'start: shape (2,): must be a single')])
-def test_arguments_that_do_not_fit_are_errors(arguments: tuple[Any, ...], text: str) -> None:
-    with pytest.raises(MotionError) as info:
+@pytest.mark.parametrize('arguments', [
+    (HOME, HOME, 0.0),
+    (HOME, HOME, 1.0, -1.0),
+    (HOME, HOME, 1e6),
+    (HOME, 'home', 1.0),
+    (Pose(np.zeros((2, 3)), np.eye(3)), HOME, 1.0)])
+def test_arguments_that_do_not_fit_are_errors(
+        arguments: tuple[Any, ...], snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         rest_to_rest(*arguments)
-    assert text in str(info.value)
 
 
 @pytest.mark.parametrize('velocity', [0.5, 0.01, None])
@@ -70,11 +71,11 @@ def test_an_approach_slows_down_until_forces_are_within_their_limit() -> None:
     assert approach(limited, HOME, end).times[-1] > 1.4 * approach(PLATFORM, HOME, end).times[-1]
 
 
-@pytest.mark.parametrize(('end', 'text'), [
-    (Pose([0.0, 0.0, 2.5], np.eye(3)), 'limits.length_max'),
-    (Pose.from_euler([0.0, 0.0, 1.1], [0.0, 0.0, np.pi / 2.0]), '')])
-def test_an_approach_that_no_speed_allows_is_rejected(end: Pose, text: str) -> None:
-    with pytest.raises(MotionError, match=f'approach over .* s: rejected: .*{text}'):
+@pytest.mark.parametrize('end', [
+    Pose([0.0, 0.0, 2.5], np.eye(3)),
+    Pose.from_euler([0.0, 0.0, 1.1], [0.0, 0.0, np.pi / 2.0])])
+def test_an_approach_that_no_speed_allows_is_rejected(end: Pose, snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         approach(PLATFORM, HOME, end)
 
 

@@ -9,9 +9,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from snapshot import Snapshot
 
 from stewart_dynamics import BagError
 from stewart_dynamics.bags.find import find_bags, folders_of_results
+
+PROGRAM = 'stewart_replay'
 
 
 def make(folder: Path, *names: str) -> Path:
@@ -87,9 +90,9 @@ def test_results_are_not_bags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert find_bags(tmp_path / 'earlier' / 'x' / 'bag') == [tmp_path / 'earlier' / 'x' / 'bag']
 
 
-def test_a_folder_without_bags_is_an_error(tmp_path: Path) -> None:
+def test_a_folder_without_bags_is_an_error(tmp_path: Path, snapshot: Snapshot) -> None:
     make(tmp_path, 'notes.txt', '.hidden/metadata.yaml', 'old.bag.active')
-    with pytest.raises(BagError, match='contains no bag') as caught:
+    with snapshot.raises(BagError) as caught:
         find_bags(tmp_path)
     assert f'{caught.value}'.startswith(f'{tmp_path}: ')
     assert '\n' not in f'{caught.value}'
@@ -127,16 +130,16 @@ def test_files_keep_their_suffix_if_names_would_be_equal(tmp_path: Path) -> None
         'd/deeper': bags / 'd/deeper'}
 
 
-def test_results_in_the_same_folder_are_rejected(tmp_path: Path) -> None:
+def test_results_in_the_same_folder_are_rejected(tmp_path: Path, snapshot: Snapshot) -> None:
     make(tmp_path, 'one/x/metadata.yaml', 'one/y/metadata.yaml', 'two/x/metadata.yaml',
          'three/a/x/in/metadata.yaml', 'three/a/y/metadata.yaml', 'index.html/metadata.yaml')
     output = tmp_path / 'out'
     for paths in ([tmp_path / 'one', tmp_path / 'two' / 'x'],
                   [tmp_path / 'one' / 'x', tmp_path / 'one' / 'x'],
                   [tmp_path / 'one' / 'x', tmp_path / 'one' / '..' / 'one' / 'x']):
-        with pytest.raises(BagError, match=f'the results of both would be {output / "x"}'):
+        with snapshot.raises(BagError):
             folders_of_results(paths, output)
-    with pytest.raises(BagError, match=f'{output / "x" / "in"}, would be '):
+    with snapshot.raises(BagError):
         folders_of_results([tmp_path / 'three' / 'a', tmp_path / 'two'], output)
-    with pytest.raises(BagError, match='where the table of all bags is written'):
+    with snapshot.raises(BagError):
         folders_of_results([tmp_path / 'index.html', tmp_path / 'one' / 'x'], output)

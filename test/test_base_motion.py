@@ -13,6 +13,7 @@ from referees import (
     each_relative, friction, PinocchioReferee,
     random_base_motion, random_direction, random_motion, random_parameters, random_wrench,
     relative, rng, rotation_about, size_of, STANDARD_GRAVITY)
+from snapshot import Snapshot
 
 from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
@@ -214,23 +215,18 @@ def test_base_motions_are_a_sequence_of_samples() -> None:
         '[0, 0, 0] rad/s, [0, 0, 0] rad/s^2>')
 
 
-@pytest.mark.parametrize(('make', 'text'), [
-    (lambda: BaseMotion([0.0, 0.0]), 'gravity: shape (2,): must end in (3,)'),
-    (lambda: BaseMotion([0.0, 0.0, np.nan]), 'gravity[2]: nan: must be finite'),
-    (lambda: BaseMotion(np.zeros((2, 3)), np.zeros((3, 3))), 'do not fit each other'),
-    (lambda: BaseMotion.from_motion(Motion(np.zeros((4, 3)), np.eye(3)), np.zeros((3, 3))),
-     'do not fit each other: motion (4,), gravity (3,)'),
-    (lambda: BaseMotion.from_pose(np.eye(3)), 'must be a Pose or a Motion'),  # type: ignore
-    (lambda: BaseMotion.from_motion(Pose(np.zeros(3), np.eye(3))),  # type: ignore
-     'must be a Motion'),
-    (lambda: BaseMotion.from_imu(np.zeros(3), np.zeros((2, 3)), np.zeros((4, 3))),
-     'do not fit each other'),
-    (lambda: BaseMotion.from_imu(np.zeros(3), np.zeros(3), rotation=np.zeros((3, 3))),
-     'is not a rotation')])
-def test_wrong_arguments_are_rejected(make: Any, text: str) -> None:
-    with pytest.raises(MotionError) as error:
+@pytest.mark.parametrize('make', [
+    lambda: BaseMotion([0.0, 0.0]),
+    lambda: BaseMotion([0.0, 0.0, np.nan]),
+    lambda: BaseMotion(np.zeros((2, 3)), np.zeros((3, 3))),
+    lambda: BaseMotion.from_motion(Motion(np.zeros((4, 3)), np.eye(3)), np.zeros((3, 3))),
+    lambda: BaseMotion.from_pose(np.eye(3)),  # type: ignore
+    lambda: BaseMotion.from_motion(Pose(np.zeros(3), np.eye(3))),
+    lambda: BaseMotion.from_imu(np.zeros(3), np.zeros((2, 3)), np.zeros((4, 3))),
+    lambda: BaseMotion.from_imu(np.zeros(3), np.zeros(3), rotation=np.zeros((3, 3)))])
+def test_wrong_arguments_are_rejected(make: Any, snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         make()
-    assert text in str(error.value)
 
 
 def test_numbers_that_overflow_are_no_still_base() -> None:
@@ -251,7 +247,7 @@ def test_numbers_that_overflow_are_no_still_base() -> None:
 
 
 @pytest.mark.parametrize('call', ['inverse_dynamics', 'base_wrench', 'force_breakdown'])
-def test_a_base_of_another_type_or_shape_is_rejected(call: str) -> None:
+def test_a_base_of_another_type_or_shape_is_rejected(call: str, snapshot: Snapshot) -> None:
     platform, motion, wrench, base = case(15, 3)
     for wrong, text in ((np.zeros(12), 'must be a BaseMotion'), (base[:2], 'base (2,)')):
         for some in (motion, motion[0]):
@@ -259,7 +255,7 @@ def test_a_base_of_another_type_or_shape_is_rejected(call: str) -> None:
                 with pytest.raises(MotionError) as error:
                     getattr(platform, call)(some, None, wrong)
                 assert text in str(error.value)
-    with pytest.raises(MotionError, match='wrench: a value of type BaseMotion: .* argument base'):
+    with snapshot.raises(MotionError):
         getattr(platform, call)(motion[0], base[0])
     with pytest.raises(MotionError) as error:
         getattr(platform, call)(motion, None, BaseMotion([0.0, 0.0, 0.0], [1e308] * 3,

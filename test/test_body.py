@@ -13,6 +13,7 @@ import pytest
 from referees import (
     random_base_motion, random_direction, random_motion, random_parameters, relative, rng,
     rotation_about)
+from snapshot import Snapshot
 
 from stewart_dynamics import Capability, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.hexapod import Hexapod
@@ -68,12 +69,12 @@ def test_two_bodies_are_the_one_of_all_their_points(seed: int) -> None:
     assert_same(whole.without(second), first)
 
 
-def test_numbers_that_overflow_and_no_mass_left_are_rejected() -> None:
+def test_numbers_that_overflow_and_no_mass_left_are_rejected(snapshot: Snapshot) -> None:
     far = DRIVER._replace(center=np.array([1e200, 0.0, 0.0]))
     for call in (lambda: DRIVER.with_body(far), lambda: DRIVER.without(DRIVER)):
-        with pytest.raises(ParameterError, match='no mass is left, or the numbers overflow'):
+        with snapshot.raises(ParameterError):
             call()
-    with pytest.raises(ParameterError, match=r'^file: payload\.mass: 82 kg, with platform\.mass'):
+    with snapshot.raises(ParameterError):
         FILE.replaced(payload_values(far), 'file')
 
 
@@ -191,10 +192,10 @@ def test_likely_mistakes_in_a_payload(changes: dict[str, object], expected: str)
     assert [each for each in more if each.startswith(expected)], more
 
 
-def test_a_payload_that_is_no_body_is_rejected() -> None:
-    with pytest.raises(ParameterError, match=r'payload\.inertia: .* be positive semidefinite'):
+def test_a_payload_that_is_no_body_is_rejected(snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         FILE.replaced({'payload.inertia': [1.0, 2.0, 0.0, 1.0, 0.0, 1.0]})
-    with pytest.raises(ParameterError, match=r'payload\.mass: -1\.0 kg: must be at least 0'):
+    with snapshot.raises(ParameterError):
         FILE.replaced({'payload.mass': -1.0})
     # A rod has a moment of zero, which rounding may make negative.
     rod = np.diag([2.0, 2.0, 0.0])

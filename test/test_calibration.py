@@ -21,6 +21,8 @@ from stewart_dynamics.calibration.noise import covariances, Noise
 from stewart_dynamics.mechanics.drives.screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 
+pytestmark = pytest.mark.slow
+
 PROGRAM = 'stewart_calibrate'
 
 # M. J. Nategh, M. M. Agheli, "A total solution to kinematic calibration of hexapod machine tools
@@ -377,9 +379,8 @@ def test_all_poses_are_used_where_none_is_held_out_and_some_noise_is_needed(
     lengths, seen = measured(rng, true_values(rng), random_poses(rng, 30), Noise(1e-5, 1e-5, 1e-5))
     assert calibrate(HEXAPOD, lengths, seen, hold_out=0.0).validation is None
     assert calibrate(HEXAPOD, lengths, seen).validation is not None
-    with pytest.raises(StewartError) as caught:
+    with snapshot.raises(StewartError):
         calibrate(HEXAPOD, lengths, seen, noise=(0.0, 0.0, 0.0))
-    snapshot(caught.value)
 
 
 @pytest.mark.parametrize(('what', 'words'), [
@@ -455,8 +456,7 @@ def test_large_play_is_no_outlier_and_no_lack_of_motion(side: str) -> None:
 
 def test_noise_of_any_kind_is_no_lack_of_fit() -> None:
     """Normal, heavy tails, a uniform distribution; single poses, and each measured three times."""
-    noticed = 0
-    for seed in range(48):
+    for seed in range(24):
         rng = np.random.default_rng(seed)
         values = true_values(rng)
         poses = random_poses(rng, (20, 40)[seed % 2])
@@ -468,8 +468,7 @@ def test_noise_of_any_kind_is_no_lack_of_fit() -> None:
                     for shape in (lengths.shape, seen.position.shape))
         found = calibrate(HEXAPOD, lengths + one, Pose(seen.position + two, seen.rotation),
                           hold_out=0.0)
-        noticed += bool(found.lack_of_fit)
-    assert noticed <= 1
+        assert not found.lack_of_fit
 
 
 AXES = universal_axes(HEXAPOD.parameters)
@@ -529,27 +528,22 @@ def test_positions_of_drives_whose_screws_turn_with_their_legs(
         assert [each.what for each in wrong.lack_of_fit] == ['turns']
     # A file that does not say that the screws turn.
     assert calibrate(HEXAPOD, drives, seen, frames=frames).lack_of_fit[0].what == 'turns'
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         calibrate(HEXAPOD, drives, seen, drive_positions=True)
-    snapshot(caught.value)
 
 
 def test_too_little_is_rejected(snapshot: Snapshot) -> None:
     rng = np.random.default_rng(9)
     lengths, seen = measured(rng, true_values(rng), random_poses(rng, 40), Noise(2e-6, 1e-5, 1e-5))
-    with pytest.raises(StewartError) as caught:
+    with snapshot.raises(StewartError):
         calibrate(HEXAPOD, lengths[:7], seen[:7])
-    snapshot(caught.value)
-    with pytest.raises(MotionError) as caught:
+    with snapshot.raises(MotionError):
         calibrate(HEXAPOD, lengths, seen[:7])
-    snapshot(caught.value)
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         calibrate(HEXAPOD, lengths, seen, fixed=['joint_7'])
-    snapshot(caught.value)
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         calibrate(HEXAPOD, lengths, seen,
                   fixed=['base_joints', 'platform_joints', 'geometry.zero_length'])
-    snapshot(caught.value)
     with pytest.raises(StewartError, match='residuals of .* mm: one and the same pose'):
         same = np.zeros(40, dtype=int)
         calibrate(HEXAPOD, lengths[same] + rng.normal(0.0, 1e-6, (40, 6)), Pose(
@@ -559,10 +553,9 @@ def test_too_little_is_rejected(snapshot: Snapshot) -> None:
     with pytest.raises(StewartError, match='the poses do not support a better geometry'):
         calibrate(HEXAPOD, *rough)
     for tilt in ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5)):
-        with pytest.raises(StewartError) as caught:
+        with snapshot.raises(StewartError):
             calibrate(HEXAPOD, *measured(rng, true_values(rng), random_poses(rng, 40, tilt=tilt)),
                       frames='unknown')
-        snapshot(caught.value)
     assert calibrate(HEXAPOD, lengths, seen, noise=(0.0, 1e-5, 0.0)).noise.length == 0.0
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from referees import (
     random_direction, random_motion, random_parameters, rng, rotation_about, size_of)
+from snapshot import Snapshot
 from stewart_dynamics import (
     BaseMotion, Capability, Motion, MotionError, ParameterError, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array
@@ -427,7 +428,8 @@ def test_answers_have_the_leading_shapes_of_poses_and_directions() -> None:
     assert (type(one.value), type(one.limit), type(one.leg)) == (float, str, int)
 
 
-def test_no_poses_have_no_answers_and_a_motion_without_samples_is_rejected() -> None:
+def test_no_poses_have_no_answers_and_a_motion_without_samples_is_rejected(
+        snapshot: Snapshot) -> None:
     driven = StewartPlatform(PLATFORM.parameters.replaced({
         'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01,
         'drive.motor_inertia': 1e-4, 'drive.torque_max': 5.0, 'drive.speed_max': 300.0}))
@@ -445,7 +447,7 @@ def test_no_poses_have_no_answers_and_a_motion_without_samples_is_rejected() -> 
                       lambda c: c.payload(motion, np.zeros(3)),
                       lambda c: c.speed_factor(Motion.from_pose(c.platform.home_pose()),
                                                np.zeros((0, 6)))):
-            with pytest.raises(MotionError, match='samples'):
+            with snapshot.raises(MotionError):
                 whole(capability)
 
 
@@ -492,18 +494,17 @@ def test_a_tilted_base_changes_the_wrench() -> None:
         1.0, abs=1e-12)
 
 
-@pytest.mark.parametrize('ask, text', [
-    (lambda c, home: c.wrench(home, np.eye(6)[0]), 'limits.force_max: not set'),
-    (lambda c, home: c.force(home), 'limits.force_max: not set'),
-    (lambda c, home: c.velocity(home, np.eye(6)[0]), 'limits.velocity_max: not set'),
-    (lambda c, home: c.payload(home, [0.0, 0.0, 0.0]), 'limits.force_max: not set'),
-    (lambda c, home: c.speed_factor(Motion.from_pose(home)),
-     'limits.velocity_max, limits.force_max: not set')])
-def test_a_question_without_a_limit_is_rejected(ask: Any, text: str) -> None:
+@pytest.mark.parametrize('ask', [
+    lambda c, home: c.wrench(home, np.eye(6)[0]),
+    lambda c, home: c.force(home),
+    lambda c, home: c.velocity(home, np.eye(6)[0]),
+    lambda c, home: c.payload(home, [0.0, 0.0, 0.0]),
+    lambda c, home: c.speed_factor(Motion.from_pose(home))])
+def test_a_question_without_a_limit_is_rejected(ask: Any, snapshot: Snapshot) -> None:
     unlimited = StewartPlatform(Parameters({
         name: value for name, value in PLATFORM.parameters.given.items()
         if not name.startswith('limits.')}))
-    with pytest.raises(ParameterError, match=text):
+    with snapshot.raises(ParameterError):
         ask(Capability(unlimited), PLATFORM.home_pose())
 
 
@@ -519,13 +520,13 @@ def test_answers_are_multiples_of_directions_of_any_size(size: float) -> None:
         assert many[1:3] == one[1:3]
 
 
-def test_a_payload_out_of_range_is_rejected() -> None:
-    with pytest.raises(MotionError, match='center_of_mass: out of range'):
+def test_a_payload_out_of_range_is_rejected(snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         Capability(PLATFORM).payload(PLATFORM.home_pose(), [1e308, 0.0, 0.0])
 
 
-def test_a_direction_of_zeros_is_rejected() -> None:
-    with pytest.raises(MotionError, match='all six numbers are zero'):
+def test_a_direction_of_zeros_is_rejected(snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         Capability(PLATFORM).travel(PLATFORM.home_pose(), np.zeros(6))
 
 
@@ -593,8 +594,8 @@ def test_modes_that_do_not_come_back_have_no_frequency() -> None:
     np.testing.assert_allclose(frequencies[1], capability.modes(home, 1e8).frequencies)
 
 
-def test_clearance_needs_the_shape_of_the_legs() -> None:
-    with pytest.raises(ParameterError, match=r'legs\.cylinder\.radius, .*: not set'):
+def test_clearance_needs_the_shape_of_the_legs(snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         Capability(PLATFORM).clearance(PLATFORM.home_pose())
     shaped = StewartPlatform(PLATFORM.parameters.replaced({
         'legs.cylinder.radius': 0.05, 'legs.cylinder.length': 0.8, 'legs.piston.radius': 0.03}))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from referees import rng
 from scipy.spatial.transform import Rotation
+from snapshot import Snapshot
 from stewart_dynamics import (
     BaseMotion, Capability, check_planned_trajectory, Motion, MotionError, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array
@@ -192,14 +193,14 @@ def test_a_motion_that_starts_outside_cannot_grow() -> None:
     assert (found.value, found.limit) == (0.0, 'length_max')
 
 
-@pytest.mark.parametrize('more, text', [
-    ({'times': TIMES[:5]}, r'times: shape \(5,\)'),
-    ({'times': -TIMES}, r'times\[1\]: must be strictly increasing'),
-    ({'times': TIMES, 'wrench': np.zeros((201, 6))}, 'wrench: .* must be a single one'),
-    ({'times': TIMES, 'base': BaseMotion(np.zeros((201, 3)))}, 'base: .* must be a single one')])
-def test_times_that_do_not_fit_are_rejected(more: Any, text: str) -> None:
+@pytest.mark.parametrize('more', [
+    {'times': TIMES[:5]},
+    {'times': -TIMES},
+    {'times': TIMES, 'wrench': np.zeros((201, 6))},
+    {'times': TIMES, 'base': BaseMotion(np.zeros((201, 3)))}])
+def test_times_that_do_not_fit_are_rejected(more: Any, snapshot: Snapshot) -> None:
     for ask in (Capability(PLATFORM).speed_factor, Capability(PLATFORM).amplitude_factor):
-        with pytest.raises(MotionError, match=text):
+        with snapshot.raises(MotionError):
             ask(motion(0), **more)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import Array, random_direction, random_motion, rng, symmetric_parameters
+from snapshot import Snapshot
 
 from stewart_dynamics import (
     Capability, Motion, MotionError, ParameterError, Parameters, StewartPlatform)
@@ -174,19 +175,20 @@ def test_the_tighter_of_two_limits_is_named() -> None:
     assert strong.limit == 'torque_max'
 
 
-def test_drives_without_limits_do_not_limit() -> None:
+def test_drives_without_limits_do_not_limit(snapshot: Snapshot) -> None:
     p: Parameters = driven(0).parameters.replaced({
         'drive.torque_max': None, 'drive.torque_speed': None, 'drive.speed_max': None})
     c = Capability(StewartPlatform(p))
     for ask in (c.wrench, c.velocity, c.acceleration):
-        with pytest.raises(ParameterError, match='not set'):
+        with snapshot.raises(ParameterError):
             ask(c.platform.home_pose(), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    with pytest.raises(ParameterError, match='not set'):
+    with snapshot.raises(ParameterError):
         c.force(c.platform.home_pose())
 
 
 @pytest.mark.parametrize('seed', range(4))
-def test_what_is_held_without_end_ends_at_the_continuous_torque(seed: int) -> None:
+def test_what_is_held_without_end_ends_at_the_continuous_torque(
+        seed: int, snapshot: Snapshot) -> None:
     peak = driven(seed)
     continuous = 0.5 * peak.parameters['drive.torque_max']
     platform = StewartPlatform(peak.parameters.replaced({'drive.torque_continuous': continuous}))
@@ -203,7 +205,7 @@ def test_what_is_held_without_end_ends_at_the_continuous_torque(seed: int) -> No
         pose, center).value
     for ask in (c.force, c.moment):
         assert ask(pose, continuous=True) < ask(pose)
-    with pytest.raises(ParameterError, match='drive.torque_continuous: not set'):
+    with snapshot.raises(ParameterError):
         Capability(peak).payload(pose, center, continuous=True)
-    with pytest.raises(MotionError, match='continuous: must be False for a motion'):
+    with snapshot.raises(MotionError):
         c.payload(Motion.from_pose(pose), center, continuous=True)

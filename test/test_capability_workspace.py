@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import rng, rotation_about, size_of
+from snapshot import Snapshot
 from stewart_dynamics import (
     Capability, Motion, MotionError, ParameterError, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array, Flags
@@ -110,19 +111,23 @@ def test_no_random_pose_of_a_box_has_less_than_the_smallest_value() -> None:
         assert found.value == pytest.approx(float(quantity(found.pose)), rel=1e-12)
 
 
-@pytest.mark.parametrize('ask, error, text', [
-    (lambda c: c.section(normal='w'), MotionError, "must be 'x', 'y' or 'z'"),
-    (lambda c: c.section(Pose(np.zeros((2, 3)), np.eye(3))), MotionError, 'must be a single one'),
-    *((lambda c, name=name, more=more: getattr(c, name)('x', *more), MotionError,
-       "pose: 'x': must be a Pose or a Motion") for name, more in (
-           ('travel', (np.ones(6),)), ('wrench', (np.ones(6),)), ('force', ()),
-           ('stiffness', (1e6,)))),
-    (lambda c: c.tilt(azimuths=2), MotionError, 'azimuths: 2: must be an integer of at least 3'),
-    (lambda c: c.tilt(azimuths='x'), MotionError, 'azimuths: .*x.*: must be an integer'),
-    (lambda c: Capability(StewartPlatform(Parameters({
-        name: value for name, value in PLATFORM.parameters.given.items()
-        if not name.startswith('limits.')}))).section(
-            PLATFORM.home_pose()), ParameterError, 'limits.length_max: not set')])
-def test_a_question_without_sense_is_rejected(ask: Any, error: type[Exception], text: str) -> None:
-    with pytest.raises(error, match=text):
+@pytest.mark.parametrize('ask', [
+    lambda c: c.section(normal='w'),
+    lambda c: c.section(Pose(np.zeros((2, 3)), np.eye(3))),
+    lambda c: c.travel('x', np.ones(6)),
+    lambda c: c.wrench('x', np.ones(6)),
+    lambda c: c.force('x'),
+    lambda c: c.stiffness('x', 1e6),
+    lambda c: c.tilt(azimuths=2),
+    lambda c: c.tilt(azimuths='x')])
+def test_a_question_without_sense_is_rejected(ask: Any, snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         ask(Capability(PLATFORM))
+
+
+def test_without_limits_of_lengths_there_is_no_section(snapshot: Snapshot) -> None:
+    unlimited = StewartPlatform(Parameters({
+        name: value for name, value in PLATFORM.parameters.given.items()
+        if not name.startswith('limits.')}))
+    with snapshot.raises(ParameterError):
+        Capability(unlimited).section(PLATFORM.home_pose())

@@ -21,6 +21,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from running import Sample, wrench_message
 from sensor_msgs.msg import JointState
+from snapshot import Snapshot
 from std_msgs.msg import Bool, Float64, Float64MultiArray, MultiArrayDimension
 from stewart_dynamics.arrays import STAMPS_END
 from stewart_dynamics.messages.cdr import MalformedError
@@ -31,6 +32,8 @@ from stewart_dynamics.messages.setpoint import (
 from stewart_dynamics.messages.standard import (
     boolean, clock, float64, float64_array, float64_values)
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+PROGRAM = 'stewart_dynamics'
 
 SECOND = 1_000_000_000
 READERS = {
@@ -129,15 +132,18 @@ def test_a_pose_written_by_hand_is_read_in_both_orders() -> None:
 
 
 @KINDS
-def test_a_malformed_head_is_rejected(kind: str) -> None:
+def test_a_malformed_head_is_rejected(kind: str, snapshot: Snapshot) -> None:
     good = valid(kind)
     assert good[20] == 0  # behind 'base'
-    bad = [(bytes.fromhex(head) + good[2:], '.') for head in (
+    heads = [bytes.fromhex(head) + good[2:] for head in (
         '0002', '0003', '0006', '0007', '000a', '0100', '0101', 'ffff')]
-    bad += [(good[:8] + nanosec.to_bytes(4, 'little') + good[12:], f'stamp of {nanosec} ns')
-            for nanosec in (SECOND, 2 ** 32 - 1)]
-    for data, words in (*bad, (good[:20] + b'e' + good[21:], 'zero byte')):
-        with pytest.raises(MalformedError, match=words):
+    stamps = [good[:8] + nanosec.to_bytes(4, 'little') + good[12:]
+              for nanosec in (SECOND, 2 ** 32 - 1)]
+    for data in heads:
+        with pytest.raises(MalformedError):
+            READERS[kind](data)
+    for data in (*stamps, good[:20] + b'e' + good[21:]):
+        with snapshot.raises(MalformedError):
             READERS[kind](data)
 
 
@@ -155,19 +161,20 @@ def test_a_message_cut_off_anywhere_is_rejected(
 @pytest.mark.parametrize(('points', 'parts'), [
     (0, (1, 1, 1)), (2, (1, 1, 1)), (1, (0, 1, 1)), (1, (1, 0, 1)), (1, (1, 1, 0)),
     (1, (2, 1, 1)), (1, (1, 2, 1)), (1, (1, 1, 2)), (1, (1, 0, 0))])
-def test_a_combined_setpoint_has_one_of_each(points: int, parts: tuple[int, int, int]) -> None:
+def test_a_combined_setpoint_has_one_of_each(
+        points: int, parts: tuple[int, int, int], snapshot: Snapshot) -> None:
     point = MultiDOFJointTrajectoryPoint(
         transforms=[Transform()] * parts[0], velocities=[Twist()] * parts[1],
         accelerations=[Twist()] * parts[2])
     data = serialize_message(MultiDOFJointTrajectory(points=[point] * points))
-    with pytest.raises(MalformedError, match='a setpoint has one'):
+    with snapshot.raises(MalformedError):
         combined(data)
 
 
-def test_a_combined_setpoint_has_at_most_one_name() -> None:
+def test_a_combined_setpoint_has_at_most_one_name(snapshot: Snapshot) -> None:
     kind = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
     data = serialize_message(message(kind, 5, 'base', [0.0] * 19, ['platform', 'other']))
-    with pytest.raises(MalformedError, match='2 joint_names'):
+    with snapshot.raises(MalformedError):
         combined(data)
 
 
@@ -219,7 +226,7 @@ def test_huge_counts_cost_no_time() -> None:
     assert time.process_time() - begun < 5.0
 
 
-def test_many_entries_are_rejected_before_they_are_read() -> None:
+def test_many_entries_are_rejected_before_they_are_read(snapshot: Snapshot) -> None:
     many = 13_000_000
     header = b'\0\1\0\0' + struct.pack('<iII4x', 0, 0, 1)
     entries = struct.pack('<I', many) + bytes(8 * many)
@@ -232,7 +239,7 @@ def test_many_entries_are_rejected_before_they_are_read() -> None:
             (float64_values, b'\0\1\0\0' + entries),
             (float64_values, b'\0\1\0\0' + 2 * no_name + entries)):
         begun = time.process_time()
-        with pytest.raises(MalformedError, match='must be at most 1000'):
+        with snapshot.raises(MalformedError):
             read(data)
         assert time.process_time() - begun < 0.1
 

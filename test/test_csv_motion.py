@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import csv
 import io
+from itertools import count
 import json
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 import pytest
 from referees import rng, ROOT
 from scipy.spatial.transform import Rotation
+from snapshot import Snapshot
 
 from stewart_dynamics import BagError, Motion, Parameters, read_setpoints, StewartPlatform
 from stewart_dynamics.bags.baseline import integrated
@@ -24,6 +26,8 @@ from stewart_dynamics.bags.csv_motion import _GROUPS, factor, QUATERNION
 from stewart_dynamics.datasheet.datasheet_command_line import main as capability
 from stewart_dynamics.program import EULER
 from stewart_dynamics.replay import main as replay
+
+PROGRAM = 'stewart_replay'
 
 Array = NDArray[np.float64]
 
@@ -192,7 +196,7 @@ def quake(offset: float = 0.0, drift: float = 0.0) -> tuple[Array, Array, Array]
 
 
 def test_the_record_of_an_earthquake_is_integrated_with_its_base_line_corrected(
-        tmp_path: Path) -> None:
+        tmp_path: Path, snapshot: Snapshot) -> None:
     t, x, a = quake(offset=0.02, drift=0.001)
     path = write(tmp_path / 'quake.csv', {
         't': t, 'ax [g]': a[:, 0] / 9.80665, 'az': a[:, 2], 'ay [cm/s^2]': 100.0 * a[:, 1]})
@@ -209,7 +213,7 @@ def test_the_record_of_an_earthquake_is_integrated_with_its_base_line_corrected(
     assert not summary['mistakes']
     notice, = summary['notices']
     assert 'after the base line, a polynomial of second degree' in notice
-    with pytest.raises(BagError, match='needs the parameters of the hexapod'):
+    with snapshot.raises(BagError):
         read_setpoints(path)
 
 
@@ -245,38 +249,36 @@ def rows(*more: str) -> str:
     return '\n'.join([HEAD, *(ROW.format(n) for n in (1, 2)), *more]) + '\n'
 
 
-@pytest.mark.parametrize(('text', 'words'), [
-    ('', 'is empty: row 1 must name the columns'),
-    (HEAD, '0 rows of numbers: must be at least 2'),
-    (rows().replace('t,', 'time,'), 'row 1: has no column t; it has time, x, y'),
-    (rows().replace(',y,', ',why,'), 'row 1: has column x, z but not y'),
-    (rows().replace('qw', 'q4'), 'row 1: has column qx, qy, qz but not qw'),
-    (rows().replace('x,y', 'x [furlong],y', 1),
-     'row 1: column x: unit furlong: must be one of m, mm, cm'),
-    (rows().replace('qx', 'qx [deg]'), 'row 1: column qx: unit deg: must be empty'),
-    (rows().replace('t,', 't [m],'), 'row 1: column t: unit m: must be one of s, ms'),
-    (rows().replace('qw', 'x'), 'row 1: column x: is there twice'),
-    (rows('3,0,0,abc,0,0,0,1'), "row 4: z: 'abc': must be a finite number"),
-    (rows('3,0,nan,1,0,0,0,1'), "row 4: y: 'nan': must be a finite number"),
-    (rows('3,0,0,1_0,0,0,0,1'), "row 4: z: '1_0': must be a finite number"),
-    (rows('3,0,0,1.1,0,0,0'), 'row 4: has 7 cells, row 1 has 8'),
-    (rows('3,0,0,1.1,0,0,0,2'), 'row 4: qx, qy, qz, qw: length 2'),
-    (rows('2,0,0,1.1,0,0,0,1'), 'row 4: t: 2: must be more than that of the row before'),
-    (rows('1e10,0,0,1.1,0,0,0,1'), 'row 4: t: 1e10: must be below 2147483648 s'),
-    ('t,ax\n1,0\n2,x\n', "row 3: ax: 'x': must be a finite number"),
-    ('t,vx,vy,vz\n1,0,0,0\n2,0,0,0\n', 'row 1: has no columns x, y, z; it has t, vx, vy, vz'),
-    ('t,ax,alx\n1,0,1\n2,0,1\n', 'angular accelerations alone are not integrated'),
-    (rows().replace('qw\n', 'qw,roll\n').replace('1\n', '1,0\n'),
-     'row 1: has columns qx and roll: the rotation must be given once'),
-    ('t,x,y,z,roll,pitch,yaw,vx,vy,vz\n' + '1,0,0,1,0,0,0,0,0,0\n' * 2, 'row 3: t: 1: must be'),
-])
+@pytest.mark.parametrize('text', [
+    '',
+    HEAD,
+    rows().replace('t,', 'time,'),
+    rows().replace(',y,', ',why,'),
+    rows().replace('qw', 'q4'),
+    rows().replace('x,y', 'x [furlong],y', 1),
+    rows().replace('qx', 'qx [deg]'),
+    rows().replace('t,', 't [m],'),
+    rows().replace('qw', 'x'),
+    rows('3,0,0,abc,0,0,0,1'),
+    rows('3,0,nan,1,0,0,0,1'),
+    rows('3,0,0,1_0,0,0,0,1'),
+    rows('3,0,0,1.1,0,0,0'),
+    rows('3,0,0,1.1,0,0,0,2'),
+    rows('2,0,0,1.1,0,0,0,1'),
+    rows('1e10,0,0,1.1,0,0,0,1'),
+    't,ax\n1,0\n2,x\n',
+    't,vx,vy,vz\n1,0,0,0\n2,0,0,0\n',
+    't,ax,alx\n1,0,1\n2,0,1\n',
+    rows().replace('qw\n', 'qw,roll\n').replace('1\n', '1,0\n'),
+    't,x,y,z,roll,pitch,yaw,vx,vy,vz\n' + '1,0,0,1,0,0,0,0,0,0\n' * 2,
+], ids=count())
 def test_a_bad_file_is_named_with_row_column_value_and_rule(
-        text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
     path = tmp_path / 'bad.csv'
     path.write_text(text)
     assert replay([str(path), '--params', str(PARAMS), '--output', str(tmp_path / 'r')]) == 2
     error = capsys.readouterr().err
-    assert f'{path}: {words}' in error or (str(path) in error and words in error)
+    snapshot(error)
     assert error.count('\n') == 1 and not (tmp_path / 'r' / 'bad').exists()
 
 

@@ -12,6 +12,7 @@ import pytest
 from referees import PLATFORM
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim, lti
+from snapshot import Snapshot
 from stewart_dynamics import (
     GovernedStream, Motion, MotionCueing, MotionError, ParameterError, Parameters, Pose)
 from stewart_dynamics.arrays import Array
@@ -389,23 +390,22 @@ def test_stop_is_within_the_limits() -> None:
     assert np.abs(again.linear_velocity).max() > 0.05
 
 
-@pytest.mark.parametrize('times, force, rates, text', [
-    ([0.0, 0.0], [AT_REST] * 2, None, 'times[1]: 0 s: must be after 0 s'),
-    ([0.0, -1.0], [AT_REST] * 2, None, 'times[1]: -1 s: must be after 0 s'),
-    ([0.0, np.nan], [AT_REST] * 2, None, 'times[1]: nan: must be finite'),
-    ([0.0, 1.0], [AT_REST, [0.0, np.inf, 0.0]], None, 'specific_force[1, 1]: inf: must be'),
-    ([0.0, 1.0], [AT_REST] * 2, [[0.0] * 3, [0.0, 0.0, np.nan]], 'angular_velocity[1, 2]: nan'),
-    ([0.0, 1.0], [AT_REST, [1e5, 0.0, 0.0]], None, 'specific_force[1]: 100000: must be at most'),
-    ([0.0], [AT_REST] * 2, None, 'times: shape (1,)'),
-    ([0.0, 1.0], [[1.0, 2.0]] * 2, None, 'specific_force: shape (2, 2): must end in (3,)')])
-def test_bad_input_is_named(times: Any, force: Any, rates: Any, text: str) -> None:
-    with pytest.raises(MotionError) as error:
+@pytest.mark.parametrize('times, force, rates', [
+    ([0.0, 0.0], [AT_REST] * 2, None),
+    ([0.0, -1.0], [AT_REST] * 2, None),
+    ([0.0, np.nan], [AT_REST] * 2, None),
+    ([0.0, 1.0], [AT_REST, [0.0, np.inf, 0.0]], None),
+    ([0.0, 1.0], [AT_REST] * 2, [[0.0] * 3, [0.0, 0.0, np.nan]]),
+    ([0.0, 1.0], [AT_REST, [1e5, 0.0, 0.0]], None),
+    ([0.0], [AT_REST] * 2, None),
+    ([0.0, 1.0], [[1.0, 2.0]] * 2, None)])
+def test_bad_input_is_named(times: Any, force: Any, rates: Any, snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         cueing_of().run(times, force, rates)
-    assert str(error.value).startswith(text)
 
 
-def test_home_must_be_within_the_limits() -> None:
-    with pytest.raises(ParameterError, match=r'at home leg_5: force .* above limits.force_max'):
+def test_home_must_be_within_the_limits(snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         cueing_of({'limits.force_max': [100.0]})
     cueing_of({'limits.force_max': [100.0], 'cueing.govern': False})
 
@@ -415,7 +415,7 @@ def test_path_will_do() -> None:
     assert MotionCueing(str(PLATFORM)).parameters == PARAMETERS
 
 
-def test_any_stream_can_be_governed() -> None:
+def test_any_stream_can_be_governed(snapshot: Snapshot) -> None:
     """A demand within the limits is followed, and one beyond them as far as they let it."""
     times = np.arange(6000) * 0.004
     angle = np.outer(times, [0.5, 0.7, 1.1, 0.9, 0.4, 0.6])
@@ -439,33 +439,34 @@ def test_any_stream_can_be_governed() -> None:
     assert exceeded(PARAMETERS, motion) == []
     assert exceeded(PARAMETERS, large) != []
     assert sum(stream.held.values()) > 1.0
-    with pytest.raises(MotionError, match='must be after'):
+    with snapshot.raises(MotionError):
         stream.advance(times[:1], large[:1])
 
 
-def test_changes_under_which_the_stop_would_exceed_a_limit_are_rejected() -> None:
+def test_changes_under_which_the_stop_would_exceed_a_limit_are_rejected(
+        snapshot: Snapshot) -> None:
     times = np.arange(1000) * 0.004
     force, rates = vehicle(times)
     stream = cueing_of(GAIN_1).stream()
     last = stream.advance(times[:500], force[:500], rates[:500])[-1]
     rate = np.abs(StewartPlatform(PARAMETERS).inverse_dynamics(last).rates).max()
-    with pytest.raises(ParameterError, match='limits.velocity_max would be exceeded by the pres'):
+    with snapshot.raises(ParameterError):
         stream.use(cueing_of({**GAIN_1, 'limits.velocity_max': 0.5 * float(rate)}))
     motion = stream.advance(times[500:], force[500:], rates[500:])
     assert np.array_equal(motion.rows, cueing_of(GAIN_1).run(times, force, rates).rows[500:])
 
 
-def test_a_governed_stream_begins_within_the_limits() -> None:
+def test_a_governed_stream_begins_within_the_limits(snapshot: Snapshot) -> None:
     beyond = Pose([0.0, 0.0, 5.0], np.eye(3))
-    with pytest.raises(MotionError, match='start: limits.length_max is exceeded there'):
+    with snapshot.raises(MotionError):
         GovernedStream(PARAMETERS, beyond)
-    with pytest.raises(MotionError, match=r'start: shape \(2,\): must be one sample'):
+    with snapshot.raises(MotionError):
         GovernedStream(PARAMETERS, Pose(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1))))
-    with pytest.raises(MotionError, match=r'parameters: '):
+    with snapshot.raises(MotionError):
         GovernedStream('platform.yaml')  # type: ignore[arg-type]
 
 
-def test_gaps_that_would_take_long_to_compute_are_rejected() -> None:
+def test_gaps_that_would_take_long_to_compute_are_rejected(snapshot: Snapshot) -> None:
     times, force = np.array([0.0, 1.0, 1e6]), np.tile([0.0, 0.0, 9.80665], (3, 1))
-    with pytest.raises(MotionError, match=r'times\[2\]: 1000000 s, 999999 s after the one before'):
+    with snapshot.raises(MotionError):
         cueing_of().run(times, force)

@@ -26,6 +26,8 @@ from stewart_dynamics.cueing.vehicle import vehicle_mistake
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
+pytestmark = pytest.mark.slow
+
 PARAMETERS = Parameters.from_yaml(PLATFORM)
 HOME = home_pose(PARAMETERS)
 RATE = 100.0
@@ -46,7 +48,6 @@ class Cueing:
         self.legs = self.peer.writer(f'{NODE}/measured_legs', JointState)
         self.clock = self.peer.writer('/clock', Clock)
         self.stamp = 1_000_000_000
-        self.read: list[tuple[int, list[float]]] = []
         nodes: list[CueingNode] = []
         self.program: Any = Inside(lambda: nodes.append(CueingNode()) or nodes[0], [
             '--ros-args', '--params-file', PLATFORM, '-p', f'cueing.rate:={RATE}',
@@ -75,29 +76,39 @@ class Cueing:
         self.peer.until(lambda: self.clock.publish(message) or len(self.raw['accel']) >= count,
                         f'{count} setpoints at {now}')
 
+    def row(self, n: int) -> tuple[int, list[float]]:
+        """Return stamp [ns], and position, velocity and acceleration of a setpoint (9,)."""
+        pose, twist, accel = (deserialize_message(self.raw[name][n], kind)
+                              for name, kind in KINDS.items())
+        return nanoseconds(pose.header.stamp), [getattr(three, c) for three in (
+            pose.pose.position, twist.twist.linear, accel.accel.linear) for c in 'xyz']
+
     def rows(self) -> tuple[Array, Array]:
         """Return stamps (N,) [ns], and position, velocity and acceleration (N, 9)."""
-        for n in range(len(self.read), min(map(len, self.raw.values()))):
-            pose, twist, accel = (deserialize_message(self.raw[name][n], kind)
-                                  for name, kind in KINDS.items())
-            self.read.append((nanoseconds(pose.header.stamp), [
-                getattr(three, c) for three in (
-                    pose.pose.position, twist.twist.linear, accel.accel.linear) for c in 'xyz']))
-        return (np.array([stamp for stamp, _ in self.read]),
-                np.array([row for _, row in self.read]).reshape(-1, 9))
+        stamps, rows = zip(*map(self.row, range(self.complete)), strict=True)
+        return np.array(stamps), np.array(rows)
+
+    @property
+    def complete(self) -> int:
+        """The number of setpoints of which all topics have come."""
+        return min(map(len, self.raw.values()))
 
     @property
     def last(self) -> Array:
         """The last row; far away without one."""
-        self.rows()
-        return np.array(self.read[-1][1]) if self.read else np.full(9, np.inf)
+        return np.array(self.row(self.complete - 1)[1] if self.complete else [np.inf] * 9)
 
     def until(self, condition: Any, text: str, force: Any = None) -> None:
-        """Wait for a condition, sending the vehicle's motion meanwhile."""
+        """Wait for a condition, sending the vehicle's motion meanwhile, one for a setpoint."""
+        sent_at = -1
+
         def met() -> bool:
-            if force is not None:
+            nonlocal sent_at
+            if force is not None and self.complete != sent_at:
+                sent_at = self.complete
                 self.send(force)
             return bool(condition())
+
         self.peer.until(met, text)
 
     @property

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 import json
 from pathlib import Path
 import sys
@@ -15,6 +16,7 @@ import pytest
 from referees import PLATFORM, ROOT
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
+from snapshot import Snapshot
 from stewart_dynamics import MotionCueing, Parameters
 from stewart_dynamics.cueing.motion_cueing import AXES, OMCT_FREQUENCIES
 from stewart_dynamics.cueing.recorded_vehicle import read_vehicle
@@ -26,6 +28,8 @@ from stewart_dynamics.messages.setpoint import ImuWriter
 
 sys.path.insert(0, str(ROOT / 'examples'))
 from town_drive import drive, GRAVITY, write_csv  # noqa: E402, I100, I202
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -140,26 +144,25 @@ def test_units_are_those_of_other_recordings(tmp_path: Path) -> None:
     np.testing.assert_allclose(vehicle.rates[1], [1.0, np.pi, 1.0])
 
 
-@pytest.mark.parametrize('text, words', [
-    ('', 'is empty: row 1 must name the columns'),
-    ('t,ax,ay\n0,1,2\n', 'row 1: no column az: t, ax, ay'),
-    ('t,ax [furlong/s^2],ay,az\n0,1,2,3\n',
-     'row 1: column ax: unit furlong/s^2: must be one of m/s^2, mm/s^2'),
-    ('t,ax,ay,az,ax\n0,1,2,3,4\n', 'row 1: column ax: is there twice'),
-    ('t,ax,ay,az\n0,1,2,3\n', '1 samples: must be at least 2'),
-    ('t,ax,ay,az\n0,1,2,3\n0,1,2,3\n', 'row 3: t: 0 s: must be after 0 s'),
-    ('t,ax,ay,az\n0,1,2,3\n1,1,x,3\n', "row 3: ay: 'x': must be a finite number"),
-    ('t,ax,ay,az\n0,1,2,3\n1,1,2\n', "row 3: az: '': must be a finite number"),
-    ('t,ax,ay,az\n0,1,2,inf\n1,1,2,3\n', "row 2: az: 'inf': must be a finite number")])
-def test_bad_file_is_named(tmp_path: Path, text: str, words: str, capsys: Any) -> None:
+@pytest.mark.parametrize('text', [
+    '',
+    't,ax,ay\n0,1,2\n',
+    't,ax [furlong/s^2],ay,az\n0,1,2,3\n',
+    't,ax,ay,az,ax\n0,1,2,3,4\n',
+    't,ax,ay,az\n0,1,2,3\n',
+    't,ax,ay,az\n0,1,2,3\n0,1,2,3\n',
+    't,ax,ay,az\n0,1,2,3\n1,1,x,3\n',
+    't,ax,ay,az\n0,1,2,3\n1,1,2\n',
+    't,ax,ay,az\n0,1,2,inf\n1,1,2,3\n'], ids=count())
+def test_bad_file_is_named(tmp_path: Path, text: str, capsys: Any, snapshot: Snapshot) -> None:
     """Exit code 2, one line, and nothing is written."""
     path = tmp_path / 'motion.csv'
     path.write_text(text, encoding='utf-8')
-    with pytest.raises(StewartError, match='^'):
+    with snapshot.raises(StewartError):
         read_vehicle(path, None)
     assert main([str(path), '--params', str(PLATFORM), '--output', str(tmp_path / 'out')]) == 2
     said = capsys.readouterr().err
-    assert words in said and said.count('\n') == 1
+    assert said.count('\n') == 1
     assert not (tmp_path / 'out').exists()
 
 

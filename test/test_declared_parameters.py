@@ -26,6 +26,7 @@ from rclpy.parameter import Parameter as RosParameter
 from referees import ROOT, symmetric_parameters
 from rosgraph_msgs.msg import Clock
 from running import Inside, Peer, SERVICES
+from snapshot import Snapshot
 
 from stewart_dynamics import ParameterError, Parameters
 from stewart_dynamics.parameters.parameter_set import ParameterSet
@@ -33,6 +34,8 @@ from stewart_dynamics.parameters.table import PARAMETERS
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.declared_parameters import declare_parameters, log_changes
 from stewart_dynamics.ros.rclpy_workarounds import reject_impossible_times
+
+PROGRAM = 'stewart_dynamics'
 
 # Calls a node's service over ROS.
 Ask = Callable[[str, Any], Any]
@@ -120,9 +123,9 @@ def test_a_value_out_of_range_is_left_to_the_node_s_own_check(declared: Any) -> 
         assert set_to(ask, message('platform.mass', value)) == (True, '')
 
 
-def test_a_value_that_ros_drops_silently_is_rejected(declared: Any) -> None:
+def test_a_value_that_ros_drops_silently_is_rejected(declared: Any, snapshot: Snapshot) -> None:
     # rclpy would go on with the file's 150.0.
-    with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
+    with snapshot.raises(ParameterError):
         declared(LifecycleNode, Parameters, 'platform.yaml', 'other:platform.mass:=x',
                  'stewart_dynamics:platform.mass:=0,5')
 

@@ -390,24 +390,22 @@ def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None
     assert status(above, 'singularity', BEGIN).message == 'clear'
 
 
-@pytest.mark.parametrize(('cause', 'condition', 'time', 'message'), [
-    (Cause.CONDITION, 30.0, 9.0, 'condition number 30 exceeds singularity.warn_condition, 20'),
+@pytest.mark.parametrize(('cause', 'condition', 'time'), [
+    (Cause.CONDITION, 30.0, 9.0),
     # The warning ends only below 0.8 of it, and the text is not of the number before.
-    (Cause.CONDITION, 17.5, 9.0, 'condition number 17.5 has exceeded singularity.warn_condition, '
-     '20, and is not yet below 16'),
-    (Cause.PREDICTED, 5.0, 0.25, 'crossing of det(J) = 0 predicted in 0.25 s, '
-     'singularity.warn_time is 0.5 s'),
-    (Cause.PREDICTED, 5.0, 0.6, 'crossing of det(J) = 0 predicted in 0.6 s, '
-     'singularity.warn_time is 0.5 s (the warning ends above 0.625 s)')],
+    (Cause.CONDITION, 17.5, 9.0),
+    (Cause.PREDICTED, 5.0, 0.25),
+    (Cause.PREDICTED, 5.0, 0.6)],
     ids=['exceeds', 'has exceeded', 'predicted', 'predicted later'])
 def test_a_warning_states_its_reason_with_its_own_numbers(
-        cause: Cause, condition: float, time: float, message: str, snapshot: Snapshot) -> None:
+        cause: Cause, condition: float, time: float, snapshot: Snapshot) -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, with_result(
         CLEAR, condition_number=condition)._replace(singularity=Singularity(
             cause=cause, time_to_crossing=time, crossings=4)))
     of = status(diagnostics, 'singularity', BEGIN)
-    assert (of.level, of.message) == (WARN, message)
+    assert of.level == WARN
+    snapshot(of.message)
     assert dict(of.values)['time to crossing (s)'] == f'{time:.3f}'
     assert dict(of.values)['crossings'] == '4'
     answered(diagnostics, BEGIN + 2.0)

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import random_motion, rng, ROOT
+from snapshot import Snapshot
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.export import main
@@ -170,19 +171,18 @@ def test_the_header_has_the_same_units(
                     assert (found > 0.0) == (direction * bad > 0.0)
 
 
-@pytest.mark.parametrize(('changes', 'said'), [
-    ({'drive.rated_torque': None}, 'drive.rated_torque: not set: needed by --drives'),
-    ({'drive.screw_rotation': 'universal'}, 'drive.screw_rotation: universal: must be guided'),
-    ({'drive.rated_torque': 0.01, 'drive.torque_max': None},
-     r'limits.force_max: 6000 N: .* per mille of drive.rated_torque, 0.01 N m')])
+@pytest.mark.parametrize('changes', [
+    {'drive.rated_torque': None},
+    {'drive.screw_rotation': 'universal'},
+    {'drive.rated_torque': 0.01, 'drive.torque_max': None}])
 def test_units_that_are_not_known_or_do_not_fit_are_rejected(
-        changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
+        changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         drive_files(DRIVEN.replaced(changes), 'hexapod')
 
 
-def test_a_direction_is_one_or_minus_one() -> None:
-    with pytest.raises(ParameterError, match=r'drive.direction: .*: must be 1\.0 or -1\.0'):
+def test_a_direction_is_one_or_minus_one(snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         DRIVEN.replaced({'drive.direction': 0.5})
 
 

@@ -15,6 +15,7 @@ from referees import (
     symmetric_parameters)
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from snapshot import Snapshot
 
 from stewart_dynamics import (
     Motion, MotionError, ParameterError, Parameters, SingularityError, StewartPlatform)
@@ -327,31 +328,29 @@ def test_without_a_lead_nothing_is_known_and_a_singular_sample_raises() -> None:
         platform.motors(flat)
 
 
-@pytest.mark.parametrize(('changes', 'text'), [
-    ({'actuator.screw_lead': None}, 'actuator.screw_lead: not set: needed by drive.gear_ratio'),
-    ({'actuator.reflected_mass': 30.0}, 'actuator.reflected_mass: 30 kg: contradicts '
-     'drive.motor_inertia and drive.screw_inertia, with which it is 1947.08 kg'),
-    ({'drive.efficiency': 90.0}, 'drive.efficiency: 90.0: must be more than 0, at most 1'),
-    ({'drive.efficiency': 0.0}, 'drive.efficiency: 0.0: must be more than 0, at most 1'),
-    ({'drive.back_driving_efficiency': 1.1}, 'at most 1'),
-    ({'drive.torque_continuous': 9.0}, 'must be at most drive.torque_max'),
-    ({'drive.torque_speed': [0.0, 8.0, 300.0]}, 'must have 2 n entries, has 3'),
-    ({'drive.torque_speed': [300.0, 8.0, 200.0, 2.0]}, 'must be strictly increasing'),
-    ({'drive.torque_speed': [0.0, -1.0]}, 'must be at least 0'),
-    ({'drive.resistance': 1.0}, 'drive.torque_constant: not set: needed by drive.resistance'),
-    ({'drive.temperature_rise_max': 80.0},
-     'drive.thermal_resistance: not set: needed by drive.temperature_rise_max'),
-    ({'drive.screw_rotation': 'free'}, 'must be one of guided, universal'),
-    ({'drive.base_universal_axes': [0.0] * 18}, 'a direction must not be 0, 0, 0'),
-    ({'actuator.screw_lead': 1e-300}, 'must be finite'),
-    ({'drive.gear_ratio': -3.0}, 'must be more than 0'),
-    ({'drive.torque': 3.0}, 'unknown parameter; do you mean'),
+@pytest.mark.parametrize('changes', [
+    {'actuator.screw_lead': None},
+    {'actuator.reflected_mass': 30.0},
+    {'drive.efficiency': 90.0},
+    {'drive.efficiency': 0.0},
+    {'drive.back_driving_efficiency': 1.1},
+    {'drive.torque_continuous': 9.0},
+    {'drive.torque_speed': [0.0, 8.0, 300.0]},
+    {'drive.torque_speed': [300.0, 8.0, 200.0, 2.0]},
+    {'drive.torque_speed': [0.0, -1.0]},
+    {'drive.resistance': 1.0},
+    {'drive.temperature_rise_max': 80.0},
+    {'drive.screw_rotation': 'free'},
+    {'drive.base_universal_axes': [0.0] * 18},
+    {'actuator.screw_lead': 1e-300},
+    {'drive.gear_ratio': -3.0},
+    {'drive.torque': 3.0},
 ])
-def test_rules(changes: dict[str, Any], text: str) -> None:
+def test_rules(changes: dict[str, Any], snapshot: Snapshot) -> None:
     p = HEXAPOD.replaced({**PUBLISHED, 'actuator.reflected_mass': None})
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError) as caught:
         p.replaced(changes)
-    assert text in str(caught.value) and '\n' not in str(caught.value)
+    assert '\n' not in str(caught.value)
 
 
 def test_a_reflected_mass_that_agrees_is_accepted_and_rounding_too() -> None:
@@ -371,12 +370,12 @@ def test_a_file_has_no_reflected_mass_that_follows(tmp_path: Path) -> None:
     assert Parameters.from_yaml(tmp_path / 'no_drives.yaml').drives == ()
 
 
-def test_axes_along_a_leg_are_rejected() -> None:
+def test_axes_along_a_leg_are_rejected(snapshot: Snapshot) -> None:
     p = HEXAPOD
     p = p.replaced({**PUBLISHED, 'actuator.reflected_mass': None,
                     'drive.screw_rotation': 'universal',
                     'drive.base_universal_axes': home_directions(p).base})
-    with pytest.raises(ParameterError, match='drive.base_universal_axes: leg_1: along the leg'):
+    with snapshot.raises(ParameterError):
         StewartPlatform(p).motors(Motion([0.0, 0.0, 1.0], np.eye(3)))
 
 
@@ -394,7 +393,7 @@ def test_force_breakdown_and_identified_masses_with_drives() -> None:
     assert 'drive.motor_inertia' not in found.given
 
 
-def test_motors_are_columns_and_curves_as_results_are() -> None:
+def test_motors_are_columns_and_curves_as_results_are(snapshot: Snapshot) -> None:
     pytest.importorskip('matplotlib')
     platform = StewartPlatform(driven(symmetric_parameters(), rng()))
     motion = random_motion(platform.parameters, rng(), 5)
@@ -408,5 +407,5 @@ def test_motors_are_columns_and_curves_as_results_are() -> None:
         assert [each.get_text() for each in legend.get_texts()][:2] == ['leg_1', 'leg_2']
         figure.canvas.draw()
         assert legend.get_window_extent().y0 >= figure.axes[0].get_window_extent().y1
-    with pytest.raises(MotionError, match='times: shape'):
+    with snapshot.raises(MotionError):
         motors.plot(np.arange(4.0))

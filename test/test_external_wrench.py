@@ -18,6 +18,7 @@ from referees import (
     random_motion, random_parameters, random_wrench, relative, rng, ROOT,
     smooth_motion)
 from simulated import FRICTIONLESS, simulated
+from snapshot import Snapshot
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
@@ -313,7 +314,7 @@ def test_the_search_begins_at_home_without_a_guess() -> None:
         assert relative(found.motion[:3], pose.position) < 1e-9
 
 
-def test_the_search_begins_at_the_last_pose_and_then_at_the_setpoint() -> None:
+def test_the_search_begins_at_the_last_pose_and_then_at_the_setpoint(snapshot: Snapshot) -> None:
     """Below the base there is a pose of the same lengths."""
     below = Motion([0.0, 0.0, -1.1], np.eye(3))
     step = ExternalWrench(HEXAPOD)
@@ -327,7 +328,7 @@ def test_the_search_begins_at_the_last_pose_and_then_at_the_setpoint() -> None:
     assert relative(step(at, flat, NO_WRENCH, target_of(HOME)).motion[:3],
                     HOME.position) < 1e-9
     # But not within a series.
-    with pytest.raises(SingularityError, match=r'lengths \['):
+    with snapshot.raises(SingularityError):
         step(at, flat._replace(stamp=BEGIN - 1), NO_WRENCH, target_of(HOME))
 
 
@@ -383,21 +384,21 @@ def test_a_setpoint_beyond_a_singularity_that_is_not_followed_changes_nothing() 
 
 # Impossible
 
-def test_lengths_of_no_pose_are_an_error() -> None:
+def test_lengths_of_no_pose_are_an_error(snapshot: Snapshot) -> None:
     at = resting(HEXAPOD, HOME, None, [BEGIN])[0]
     step = ExternalWrench(HEXAPOD)
     for lengths in ((0.1, *at.lengths[1:]), (-1.0,) * 6, (1e300,) * 6):
-        with pytest.raises((PoseError, SingularityError), match=r'lengths \['):
+        with snapshot.raises((PoseError, SingularityError)):
             step(at._replace(lengths=six(lengths)), None, NO_WRENCH, target_of(HOME))
 
 
 @pytest.mark.parametrize('changed', [
     {'rates': (1e308,) * 6}, {'forces': (1e308,) * 6}], ids=str)
-def test_numbers_that_overflow_are_an_error(changed: dict[str, Any]) -> None:
+def test_numbers_that_overflow_are_an_error(changed: dict[str, Any], snapshot: Snapshot) -> None:
     step = ExternalWrench(HEXAPOD)
     first, second = resting(HEXAPOD, HOME, None, [BEGIN, BEGIN + 1])
     before = estimates(step, [first])[0]
-    with pytest.raises(MotionError, match=f'stamp {BEGIN + 1} ns'):
+    with snapshot.raises(MotionError):
         step(second._replace(**changed), before, NO_WRENCH, None)
     # It leaves nothing behind.
     assert step(second, before, NO_WRENCH, None) == estimates(step, [first, second])[1]

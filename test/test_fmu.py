@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from referees import random_base_motion, random_motion, random_wrench, rng
 from rosbags.highlevel import AnyReader
+from snapshot import Snapshot
 from stewart_dynamics import (
     InverseDynamics, Motion, ParameterError, Parameters, StewartPlatform)
 from stewart_dynamics.bags.recording import Recording
@@ -377,11 +378,11 @@ def _recorded_inputs(bag: Path) -> list[list[float]]:
 
 
 def test_without_limits_of_length_it_starts_where_forces_can_be_solved(
-        version: str, tmp_path: Path) -> None:
+        version: str, tmp_path: Path, snapshot: Snapshot) -> None:
     """A file that the node takes is exported; it starts at rest at a pose that is not singular."""
     p = PARAMETERS.replaced({
         'limits.length_min': None, 'limits.length_max': None, 'geometry.zero_length': 0.0})
-    with pytest.raises(ParameterError, match='home pose'):
+    with snapshot.raises(ParameterError):
         StewartPlatform(p).home_pose()
     path = tmp_path / 'hexapod.fmu'
     path.write_bytes(fmu(p, 'hexapod', version, COMPILER))

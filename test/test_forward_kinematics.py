@@ -14,6 +14,7 @@ from referees import (
     QUARTER_TURN, random_direction, random_motion,
     random_parameters, rng, ROOT, rotation_about, size_of, symmetric_parameters)
 from scipy.spatial.transform import Rotation
+from snapshot import Snapshot
 
 from stewart_dynamics import (
     Motion, ParameterError, Parameters, Pose, PoseError, SingularityError, StewartPlatform)
@@ -187,13 +188,13 @@ def test_a_pose_near_singularities_is_found_from_every_guess_on_its_side() -> No
     assert np.abs(rows[:, :12] - Motion.from_pose(poses).rows[same, :12]).max() < 1e-9
 
 
-def test_a_singular_guess_is_rejected() -> None:
+def test_a_singular_guess_is_rejected(snapshot: Snapshot) -> None:
     platform = StewartPlatform(symmetric_parameters())
     lengths = platform.inverse_kinematics(Pose([0.0, 0.0, 1.0], np.eye(3)))
     singular = Pose([0.0, 0.0, 1.0], QUARTER_TURN)
-    with pytest.raises(SingularityError, match='a singular pose after 0 iterations'):
+    with snapshot.raises(SingularityError):
         platform.forward_kinematics(lengths, singular)
-    with pytest.raises(SingularityError, match='condition number'):
+    with snapshot.raises(SingularityError):
         platform.twist(singular, np.ones(6))
 
 
@@ -201,8 +202,8 @@ def test_a_singular_guess_is_rejected() -> None:
     [9.0, 1.0, 1.0, 1.0, 1.0, 1.0],  # two neighbouring legs cannot differ by more than a triangle
     [0.0] * 6, [-1.2] * 6, [1e-300] * 6, [1e200] * 6, [5.0, 0.1, 5.0, 0.1, 5.0, 0.1]])
 def test_lengths_without_a_pose_are_an_error(
-        hexapod: StewartPlatform, lengths: Any) -> None:
-    with pytest.raises(PoseError, match='sample 0: lengths'):
+        hexapod: StewartPlatform, lengths: Any, snapshot: Snapshot) -> None:
+    with snapshot.raises(PoseError):
         hexapod.forward_kinematics(lengths, AT_HOME)
 
 
@@ -239,8 +240,8 @@ def test_a_guess_is_a_motion_or_a_pose(hexapod: StewartPlatform) -> None:
                          - truth.position)) < 1e-15
 
 
-def test_without_a_home_pose_the_error_names_the_guess() -> None:
+def test_without_a_home_pose_the_error_names_the_guess(snapshot: Snapshot) -> None:
     platform = StewartPlatform(symmetric_parameters().replaced({
         'limits.length_min': None, 'limits.length_max': None, 'geometry.zero_length': 0.0}))
-    with pytest.raises(ParameterError, match='home pose: .*; give guess='):
+    with snapshot.raises(ParameterError):
         platform.forward_kinematics(np.ones(6))

@@ -27,6 +27,8 @@ from stewart_dynamics.mechanics.drives.motors import motor_ratio
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
+pytestmark = pytest.mark.slow
+
 PROGRAM = 'stewart_identify'
 Array = NDArray[np.float64]
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 import pytest
 from recorded import fourier, Recorded, write_bag
 from referees import rng, ROOT
+from snapshot import Snapshot
 
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.bags.recording import Recording
@@ -29,6 +30,8 @@ from stewart_dynamics.identification.recorded_legs import find_topics, RecordedL
 from stewart_dynamics.identification.unknowns import regressor_of, Unknowns
 from stewart_dynamics.identification.windows import interpolated, Signal, uniform
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import is_consistent
+
+PROGRAM = 'stewart_identify'
 
 Array = NDArray[np.float64]
 
@@ -222,16 +225,16 @@ def test_windows_end_at_gaps(tmp_path: Path) -> None:
                                rtol=1e-9)
 
 
-@pytest.mark.parametrize(('options', 'changes', 'named'), [
-    (('--measured', '/other'), {}, 'has no topic /other; it contains '),
-    (('--cutoff', '0.5'), {}, 'nothing to identify from: 500 samples, of which no'),
-    (('--identify', 'mass,colour'), {}, "'colour': cannot be identified"),
-    ((), {'base.source': 'imu'}, 'base.source: imu: hexapods are identified'),
-    ((), {'joints': list('abcdef')}, 'no message contains a, b, c, d, e, f'),
+@pytest.mark.parametrize(('options', 'changes'), [
+    (('--measured', '/other'), {}),
+    (('--cutoff', '0.5'), {}),
+    (('--identify', 'mass,colour'), {}),
+    ((), {'base.source': 'imu'}),
+    ((), {'joints': list('abcdef')}),
 ], ids=['topic', 'short', 'unknown', 'base', 'joints'])
 def test_bad_input_is_rejected_in_one_line(
         tmp_path: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...],
-        changes: dict[str, Any], named: str) -> None:
+        changes: dict[str, Any], snapshot: Snapshot) -> None:
     bag = write_bag(tmp_path / 'bag', recording(), GIVEN['joints'])
     GIVEN.replaced(changes).to_yaml(tmp_path / 'params.yaml')
     arguments = [str(bag), '--params', str(tmp_path / 'params.yaml'), '--output',
@@ -240,22 +243,22 @@ def test_bad_input_is_rejected_in_one_line(
         assert main(arguments) == 2
     except SystemExit as exc:  # argparse
         assert exc.code == 2
-    assert named in capsys.readouterr().err
+    snapshot(capsys.readouterr().err)
     assert not (tmp_path / 'found').exists()
 
 
-def test_a_bag_without_measured_legs_is_rejected() -> None:
-    with closing(Recording(ROOT / 'bags' / 'clear')) as read, pytest.raises(
-            BagError, match='has no topic /stewart_dynamics/measured_legs'):
+def test_a_bag_without_measured_legs_is_rejected(snapshot: Snapshot) -> None:
+    with closing(Recording(ROOT / 'bags' / 'clear')) as read, snapshot.raises(BagError):
         find_topics(read, '/stewart_dynamics', None, None)
 
 
 @pytest.mark.parametrize('name', ['leg_states', 'joint_states', 'motor_states'])
-def test_joint_states_of_the_node_are_not_measured_legs(tmp_path: Path, name: str) -> None:
+def test_joint_states_of_the_node_are_not_measured_legs(
+        tmp_path: Path, name: str, snapshot: Snapshot) -> None:
     topic = f'/stewart_dynamics/{name}'
     bag = write_bag(tmp_path / 'bag', recording(), GIVEN['joints'], topic)
     with closing(Recording(bag)) as read:
-        with pytest.raises(BagError, match=f'; {topic}: computed by the node, not measured$'):
+        with snapshot.raises(BagError):
             find_topics(read, '/stewart_dynamics', None, None)
         assert find_topics(read, '/stewart_dynamics', topic, None).legs == topic
 

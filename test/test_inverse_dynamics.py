@@ -25,6 +25,7 @@ from referees import (
     derivative, each_relative, energies, friction, moved,
     PinocchioReferee, QUARTER_TURN, random_base_motion, random_motion, random_parameters,
     random_wrench, relative, rng, rotation_about, smooth_motion, symmetric_parameters)
+from snapshot import Snapshot
 
 import stewart_dynamics
 from stewart_dynamics import (
@@ -253,7 +254,8 @@ def test_forces_stay_finite_through_a_singularity_and_grow_as_one_over_the_dista
 
 
 @pytest.mark.parametrize('legs', ['parallel', 'in one plane', 'one joint', 'one of no length'])
-def test_results_are_finite_where_several_singular_values_are_zero(legs: str) -> None:
+def test_results_are_finite_where_several_singular_values_are_zero(
+        legs: str, snapshot: Snapshot) -> None:
     p = symmetric_parameters()
     base, top = p['geometry.base_joints'].copy(), p['geometry.platform_joints'].copy()
     if legs == 'parallel':
@@ -269,7 +271,7 @@ def test_results_are_finite_where_several_singular_values_are_zero(legs: str) ->
         'singularity.characteristic_length': 0.6}))
     motion = Motion([0.0, 0.0, 1.0], np.eye(3), [0.1, 0.2, 0.3], [0.1, 0.2, 0.3])
     assert np.all(np.isfinite(platform.solve(motion.rows.reshape(1, MOTION))))
-    with pytest.raises(SingularityError, match='sample 0'):
+    with snapshot.raises(SingularityError):
         platform.inverse_dynamics(motion)
 
 
@@ -335,20 +337,20 @@ def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit(
 
 
 @pytest.mark.parametrize('position', [[1e200, 0.0, 1.0], None], ids=['far', 'no length'])
-def test_a_leg_without_a_length_is_rejected(position: Any) -> None:
+def test_a_leg_without_a_length_is_rejected(position: Any, snapshot: Snapshot) -> None:
     p = symmetric_parameters()
     platform = StewartPlatform(p)
     if position is None:
         position = p['geometry.base_joints'][1] - p['geometry.platform_joints'][1]
     for function in (platform.inverse_jacobian, platform.mass_matrix, platform.gravity_vector):
-        with pytest.raises(MotionError, match='leg [1-6] would have a length'):
+        with snapshot.raises(MotionError):
             function(Pose(position, np.eye(3)))
-    with pytest.raises(MotionError, match='leg [1-6] would have a length'):
+    with snapshot.raises(MotionError):
         platform.coriolis_matrix(Motion(position, np.eye(3), np.ones(3), np.ones(3)))
 
 
-def test_a_pose_whose_numbers_overflow_is_rejected() -> None:
-    with pytest.raises(MotionError, match='overflow'):
+def test_a_pose_whose_numbers_overflow_is_rejected(snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         StewartPlatform(symmetric_parameters()).inverse_kinematics(
             Pose([1e200, 0.0, 1.0], np.eye(3)))
 

@@ -13,6 +13,7 @@ import pytest
 from referees import (
     Array, random_motion, random_parameters, rng, rotation_about, smooth_motion,
     symmetric_parameters)
+from snapshot import Snapshot
 
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError
@@ -116,43 +117,39 @@ def test_axes_may_have_any_length(scale: float) -> None:
 
 # Parameters
 
-@pytest.mark.parametrize(('changes', 'said'), [
-    ({BASE_ANGLE_MAX: 25.0}, 'limits.base_joint_angle_max: 25.0 rad: must be more than 0, at most '
-     '3.14159: in degrees?'),
-    ({PLATFORM_ANGLE_MAX: 0.0}, 'must be more than 0'),
-    ({BASE_AXES: [0.0, 0.0, 1.0] * 5 + [0.0] * 3}, 'geometry.base_joint_axes: [[0.0, 0.0, 1.0]'),
-    ({PLATFORM_AXES: [0.0, 0.0, 1.0]}, 'must have 18 entries, has 3'),
+@pytest.mark.parametrize('changes', [
+    {BASE_ANGLE_MAX: 25.0},
+    {PLATFORM_ANGLE_MAX: 0.0},
+    {BASE_AXES: [0.0, 0.0, 1.0] * 5 + [0.0] * 3},
+    {PLATFORM_AXES: [0.0, 0.0, 1.0]},
 ])
-def test_bad_axes_and_limits_are_rejected(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(ParameterError) as caught:
+def test_bad_axes_and_limits_are_rejected(changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         SYMMETRIC.replaced(changes)
-    assert said in str(caught.value)
 
 
-def test_a_limit_needs_axes_or_a_home_pose() -> None:
+def test_a_limit_needs_axes_or_a_home_pose(snapshot: Snapshot) -> None:
     homeless = symmetric_parameters()
     for limit, axes in zip(OF_JOINTS, AXES, strict=True):
         limited = homeless.replaced({limit: 0.5}, 'a.yaml')
-        with pytest.raises(ParameterError, match=f'a.yaml: home pose: .*needed without {axes}'):
+        with snapshot.raises(ParameterError):
             Step(limited)
         # The other axes are not needed.
         Step(limited.replaced({axes: [0.0, 0.0, 1.0] * 6}))
     Step(homeless)
-    with pytest.raises(ParameterError, match=f'needed without {BASE_AXES}'):
+    with snapshot.raises(ParameterError):
         StewartPlatform(homeless).joint_angles(Pose([0.0, 0.0, 1.0], np.eye(3)))
 
 
-@pytest.mark.parametrize(('changes', 'said'), [
-    ({BASE_ANGLE_MAX: 2.5}, 'limits.base_joint_angle_max: 2.5 rad, 143 degrees: more than any '
-     'joint of a leg: in degrees?'),
-    ({PLATFORM_AXES: [0.0, 0.0, -1.0] * 6}, 'geometry.platform_joint_axes: at home leg_1 is 2.'),
-    ({BASE_AXES: [0.0, 0.0, 1.0] * 6, BASE_ANGLE_MAX: 0.3},
-     'limits.base_joint_angle_max: 0.3 rad, but at home leg_'),
+@pytest.mark.parametrize('changes', [
+    {BASE_ANGLE_MAX: 2.5},
+    {PLATFORM_AXES: [0.0, 0.0, -1.0] * 6},
+    {BASE_AXES: [0.0, 0.0, 1.0] * 6, BASE_ANGLE_MAX: 0.3},
 ])
-def test_likely_mistakes_are_found(changes: dict[str, Any], said: str) -> None:
+def test_likely_mistakes_are_found(changes: dict[str, Any], snapshot: Snapshot) -> None:
     assert likely_mistakes(SYMMETRIC) == ()
-    mistakes = likely_mistakes(SYMMETRIC.replaced(changes))
-    assert [said in each for each in mistakes] == [True], mistakes
+    mistake, = likely_mistakes(SYMMETRIC.replaced(changes))
+    snapshot(mistake)
 
 
 # Where they are checked

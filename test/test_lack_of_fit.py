@@ -32,6 +32,8 @@ import wrong_models
 from wrong_models import (
     Case, CAUSES, GIVEN, identify, NOISE, RATE, SECONDS, simulated, true_hexapod)
 
+pytestmark = pytest.mark.slow
+
 Array = NDArray[np.float64]
 
 

@@ -27,8 +27,6 @@ from test_capability import limited, moved, random_travel
 from test_capability_boxes import poses_in, some_ranges
 from test_capability_workspace import inside
 
-PROGRAM = 'library'
-
 SHAPE = dict(zip(LEG_SHAPE, (0.04, 0.7, 0.02), strict=True))
 SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1, **SHAPE})
 
@@ -98,12 +96,10 @@ def test_legs_that_cross_overlap_by_both_radii() -> None:
     {CLEARANCE_MIN: 0.01}, {**SHAPE, CLEARANCE_MIN: -1.0}, {**SHAPE, 'legs.piston.radius': 0.05}])
 def test_parameters_that_do_not_fit_are_rejected(
         changes: dict[str, Any], snapshot: Snapshot) -> None:
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         symmetric_parameters().replaced(changes)
-    snapshot(caught.value)
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         LegClearance(symmetric_parameters())
-    snapshot(caught.value)
 
 
 # Plates
@@ -175,9 +171,8 @@ def test_a_leg_that_pierces_a_plate_overlaps_by_its_radius() -> None:
      for n in range(5) for f in (np.cos, np.sin, lambda _: 0.0)]])
 def test_a_plate_that_is_none_is_rejected(corners: list[float], snapshot: Snapshot) -> None:
     for name in OUTLINES:
-        with pytest.raises(ParameterError) as caught:
+        with snapshot.raises(ParameterError):
             symmetric_parameters().replaced({name: corners})
-        snapshot(caught.value)
 
 
 def test_a_message_names_what_a_leg_is_near_to() -> None:
@@ -355,7 +350,7 @@ def test_legs_that_become_parallel_far_away_do_not_end_a_travel() -> None:
 
 def test_no_pose_of_a_box_that_is_reachable_has_legs_too_near() -> None:
     limiting = 0
-    for seed in range(8):
+    for seed in (4, 5, 10, 24, 27):  # the last two with plates; others take up to 20 s each
         platform, pose, random = near(seed)
         p, capability = platform.parameters, Capability(platform)
         box = some_ranges(random)

@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import Array, random_motion, random_parameters, rng, rotation_about, smooth_motion
+from snapshot import Snapshot
 
 from stewart_dynamics import ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, JOINTS, TreeJoints
+
+PROGRAM = 'stewart_describe'
 
 PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
 X, Y, Z = np.eye(3)
@@ -135,9 +138,9 @@ def test_the_prismatic_joint_has_the_name_and_position_of_the_leg():
     assert row[:6] == pytest.approx([0.05, -0.1, 1.2, 0.3, -0.2, 0.1])
 
 
-def test_two_joints_of_the_same_name_are_rejected():
+def test_two_joints_of_the_same_name_are_rejected(snapshot: Snapshot) -> None:
     p = Parameters.from_yaml(PLATFORM)
-    with pytest.raises(ParameterError, match="two joints of the tree .* 'platform_x'"):
+    with snapshot.raises(ParameterError):
         TreeJoints(p.replaced({'joints': ['platform_x', 'b', 'c', 'd', 'e', 'f']}))
-    with pytest.raises(ParameterError, match="the name 'a_universal_x'"):
+    with snapshot.raises(ParameterError):
         TreeJoints(p.replaced({'joints': ['a', 'a_universal_x', 'c', 'd', 'e', 'f']}))

@@ -13,6 +13,7 @@ from hypothesis import assume, given, strategies as st
 import numpy as np
 import pytest
 from referees import random_parameters, rng, ROOT, scaled
+from snapshot import Snapshot
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of, homes
@@ -413,14 +414,14 @@ def test_the_side_of_the_platform_is_given_by_limits_of_length() -> None:
         assert side * StewartPlatform(limited).home_pose().position[2] > 0.7
 
 
-def test_home_on_the_given_side_must_be_within_the_limits() -> None:
+def test_home_on_the_given_side_must_be_within_the_limits(snapshot: Snapshot) -> None:
     base = uneven_base()
     parameters = PLATFORM.replaced({'geometry.base_joints': base.ravel()})
     lengths = StewartPlatform(parameters).inverse_kinematics(Pose([0.0, 0.0, 1.0], np.eye(3)))
     limited = parameters.replaced({
         'limits.length_min': lengths - 0.005, 'limits.length_max': lengths + 0.005,
         'geometry.platform_side': 'negative'})
-    with pytest.raises(ParameterError, match='on the negative side of the base'):
+    with snapshot.raises(ParameterError):
         StewartPlatform(limited).home_pose()
 
 

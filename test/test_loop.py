@@ -23,6 +23,7 @@ from rclpy.serialization import deserialize_message
 from running import (
     assert_only_log_lines, nanoseconds, own_domain, Peer, PLATFORM, Program, ROOT)
 from sensor_msgs.msg import JointState
+from snapshot import Snapshot
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Motion, StewartPlatform
@@ -115,14 +116,14 @@ def _children(pid: int) -> list[int]:
             Path(f'/proc/{pid}/task/{pid}/children').read_text().split()]
 
 
-@pytest.mark.parametrize('option, value, said', [
-    ('--params', 'nowhere.yaml', 'nowhere.yaml'),
-    ('--motion', ROOT / 'config' / 'trajectory_sine.yaml', 'must begin at rest'),
-    ('--seconds', '-1.0', 'motion.duration: -1.0'),
-    ('--bandwidth', '0.0', 'bandwidth')])
+@pytest.mark.parametrize('option, value', [
+    ('--params', 'nowhere.yaml'),
+    ('--motion', ROOT / 'config' / 'trajectory_sine.yaml'),
+    ('--seconds', '-1.0'),
+    ('--bandwidth', '0.0')])
 def test_a_run_with_bad_options_is_rejected_in_one_line(
         demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
-        value: str | Path, said: str) -> None:
+        value: str | Path, snapshot: Snapshot) -> None:
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):
         monkeypatch.setenv(name, '1')  # main sets missing ones
     monkeypatch.setattr(sys, 'argv', ['loop.py', '--output', str(tmp_path), option, str(value)])
@@ -133,7 +134,7 @@ def test_a_run_with_bad_options_is_rejected_in_one_line(
     assert isinstance(line, str)
     assert line.startswith('demo-loop: ')
     assert '\n' not in line
-    assert said in line
+    snapshot(line)
 
 
 def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import random_parameters, rng, size_of
+from snapshot import Snapshot
 
 from stewart_dynamics import Motion, ParameterError, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
@@ -231,10 +232,10 @@ def test_forces_given_as_torques_of_motors_are_named(efficiency: float) -> None:
         assert 'likely forces at the legs in place of torques or currents' in found['text']
 
 
-def test_torques_of_self_locking_screws_are_rejected() -> None:
+def test_torques_of_self_locking_screws_are_rejected(snapshot: Snapshot) -> None:
     p = case_of().parameters.replaced({
         'actuator.reflected_mass': None, 'actuator.screw_lead': 0.02, 'drive.efficiency': 0.3})
-    with pytest.raises(ParameterError, match=r'^drive\.back_driving_efficiency: -1\.33333: must '):
+    with snapshot.raises(ParameterError):
         force_per_effort(p, torques=True, currents=False)
 
 

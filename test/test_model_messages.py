@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 from referees import Array, random_motion, random_parameters, rng
 from scipy.spatial.transform import Rotation
+from snapshot import Snapshot
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.description.model import JOINT_STATES, MODEL_TYPES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.leg_joints import mounts
+
+PROGRAM = 'stewart_dynamics'
 
 STAMP = 1_700_000_000_123_456_789
 
@@ -101,8 +104,8 @@ def test_the_transform_is_the_pose(frame: str, child: str) -> None:
             rtol=0.0, atol=1e-14)
 
 
-def test_two_joints_of_one_name_are_rejected() -> None:
+def test_two_joints_of_one_name_are_rejected(snapshot: Snapshot) -> None:
     p = random_parameters(rng()).replaced(
         {'joints': ['a', 'a_universal_x', 'c', 'd', 'e', 'f']})
-    with pytest.raises(ParameterError, match="would have the name 'a_universal_x'"):
+    with snapshot.raises(ParameterError):
         ModelMessages(p)

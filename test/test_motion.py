@@ -17,6 +17,7 @@ import pytest
 from referees import (
     derivative, random_direction, random_motion, random_parameters, relative, rng, rotation_about,
     smooth_motion)
+from snapshot import Snapshot
 from stewart_dynamics import Motion, MotionError, Pose
 from stewart_dynamics.mechanics.dynamics.lagrange import skew
 from stewart_dynamics.mechanics.frames.rotation import (
@@ -214,45 +215,33 @@ def test_constructors_take_any_leading_shape() -> None:
     assert Pose(np.zeros((0, 3)), UPRIGHT).shape == (0,)
 
 
-@pytest.mark.parametrize(('make', 'texts'), [
-    (lambda: Motion([0.0, 0.0], UPRIGHT), ['position: shape (2,): must end in (3,)']),
-    (lambda: Motion(ORIGIN, UPRIGHT.ravel()), ['rotation: shape (9,): must end in (3, 3)']),
-    (lambda: Motion([0.0, np.nan, 0.0], UPRIGHT), ['position[1]: nan: must be finite']),
-    (lambda: Motion(ORIGIN, UPRIGHT, [[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]]),
-     ['linear_velocity[1, 2]: inf: must be finite']),
-    (lambda: Motion(ORIGIN, -UPRIGHT), [
-        'rotation: [[-1.0', 'is a reflection: its determinant is -1, must be +1 (is an axis '
-        'mirrored, or are two columns exchanged?)']),
-    (lambda: Motion(ORIGIN, 1.001 * UPRIGHT), ['not a rotation', '0.002', '1e-06']),
-    (lambda: Motion(ORIGIN, 1e200 * UPRIGHT), ['rotation: ', 'not a rotation']),
-    (lambda: Motion(ORIGIN, [UPRIGHT, UPRIGHT, np.zeros((3, 3))]), [
-        'rotation[2]: ', 'not a rotation']),
-    (lambda: Motion(np.zeros((2, 3)), UPRIGHT, np.zeros((3, 3))), [
-        'do not fit', 'position (2,)', 'linear_velocity (3,)']),
-    (lambda: Motion(['a', 'b', 'c'], UPRIGHT), [
-        'position: a value of type list: not an array of real numbers']),
-    (lambda: Motion(None, UPRIGHT), ['position: None: not an array of real numbers']),
-    (lambda: Motion([0.0, 0.0, 1.0 + 2.0j], UPRIGHT), [
-        'position: ', 'real numbers', 'complex128']),
-    (lambda: Motion(ORIGIN, UPRIGHT, {'x': 1.0}), ['linear_velocity: a value of type dict: ']),
-    (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 0.0, 1.01]), ['length 1.01, must be']),
-    (lambda: Pose.from_quaternion(POSITION, [0.0] * 4), [
-        'length 0, must be within 0.001 of 1']),
-    (lambda: Pose.from_quaternion(POSITION, [1e308] * 4), ['length inf, must be']),
-    (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 1.0]), ['quaternion: shape (3,)']),
-    (lambda: Pose.from_matrix(np.eye(3)), ['matrix: shape (3, 3): must end in (4, 4)']),
-    (lambda: Pose.from_matrix([np.eye(4), np.ones((4, 4))]),
-     ['matrix[1]: its last row is [1.0, 1.0, 1.0, 1.0]: must be [0, 0, 0, 1]']),
-    (lambda: Motion.from_euler(POSITION, [0.0, 0.0], None, None), ['angles: shape (2,)']),
-    (lambda: Motion.from_euler(POSITION, [0.0] * 3, None, [0.0, np.inf, 0.0]),
-     ['angle_rates[1]: inf']),
-    (lambda: Motion.from_pose(POSITION), [
-        'pose: a value of type list: must be a Pose or a Motion']),
+@pytest.mark.parametrize('make', [
+    lambda: Motion([0.0, 0.0], UPRIGHT),
+    lambda: Motion(ORIGIN, UPRIGHT.ravel()),
+    lambda: Motion([0.0, np.nan, 0.0], UPRIGHT),
+    lambda: Motion(ORIGIN, UPRIGHT, [[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]]),
+    lambda: Motion(ORIGIN, -UPRIGHT),
+    lambda: Motion(ORIGIN, 1.001 * UPRIGHT),
+    lambda: Motion(ORIGIN, 1e200 * UPRIGHT),
+    lambda: Motion(ORIGIN, [UPRIGHT, UPRIGHT, np.zeros((3, 3))]),
+    lambda: Motion(np.zeros((2, 3)), UPRIGHT, np.zeros((3, 3))),
+    lambda: Motion(['a', 'b', 'c'], UPRIGHT),
+    lambda: Motion(None, UPRIGHT),
+    lambda: Motion([0.0, 0.0, 1.0 + 2.0j], UPRIGHT),
+    lambda: Motion(ORIGIN, UPRIGHT, {'x': 1.0}),
+    lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 0.0, 1.01]),
+    lambda: Pose.from_quaternion(POSITION, [0.0] * 4),
+    lambda: Pose.from_quaternion(POSITION, [1e308] * 4),
+    lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 1.0]),
+    lambda: Pose.from_matrix(np.eye(3)),
+    lambda: Pose.from_matrix([np.eye(4), np.ones((4, 4))]),
+    lambda: Motion.from_euler(POSITION, [0.0, 0.0], None, None),
+    lambda: Motion.from_euler(POSITION, [0.0] * 3, None, [0.0, np.inf, 0.0]),
+    lambda: Motion.from_pose(POSITION),
 ])
-def test_bad_arguments_are_rejected_in_one_line(make: Any, texts: list[str]) -> None:
-    with pytest.raises(MotionError) as caught:
+def test_bad_arguments_are_rejected_in_one_line(make: Any, snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError) as caught:
         make()
-    assert [text for text in texts if text not in str(caught.value)] == []
     assert '\n' not in str(caught.value)
     # no traceback of the fast path before that of the error
     assert caught.value.__context__ is caught.value.__cause__

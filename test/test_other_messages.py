@@ -17,9 +17,12 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from scipy.spatial.transform import Rotation
+from snapshot import Snapshot
 
 from stewart_dynamics import BagError, read_setpoints
 from stewart_dynamics.replay import main as replay
+
+PROGRAM = 'stewart_replay'
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -97,23 +100,23 @@ def check(found: Any) -> None:
 
 
 @pytest.mark.parametrize('name', TYPES)
-def test_poses_of_every_type_are_read(name: str, tmp_path: Path) -> None:
+def test_poses_of_every_type_are_read(name: str, tmp_path: Path, snapshot: Snapshot) -> None:
     bag = write(tmp_path / 'bag', {'/poses': TYPES[name]})
     check(read_setpoints(bag, topics={'pose': '/poses'}))
     # The only topic with poses is found; transforms only if a child is named.
     if name == 'tf':
-        with pytest.raises(BagError, match='no other of type geometry_msgs/msg/PoseStamped'):
+        with snapshot.raises(BagError):
             read_setpoints(bag)
         check(read_setpoints(bag, child='/platform'))
     else:
         check(read_setpoints(bag))
 
 
-def test_a_pose_stamped_comes_before_other_types(tmp_path: Path) -> None:
+def test_a_pose_stamped_comes_before_other_types(tmp_path: Path, snapshot: Snapshot) -> None:
     bag = write(tmp_path / 'bag', {'/odometry': TYPES['odometry'], '/poses': TYPES['stamped']})
     check(read_setpoints(bag))
     bag = write(tmp_path / 'two', {'/odometry': TYPES['odometry'], '/poses': TYPES['covariance']})
-    with pytest.raises(BagError, match='several of type .*: /odometry, /poses: select one by'):
+    with snapshot.raises(BagError):
         read_setpoints(bag)
 
 
@@ -131,15 +134,16 @@ def test_the_child_of_transforms_is_selected(
     assert summary['setpoints']['answered'] == COUNT and not summary['rejected']
 
 
-def test_transforms_in_another_frame_are_rejected_and_counted(tmp_path: Path) -> None:
+def test_transforms_in_another_frame_are_rejected_and_counted(
+        tmp_path: Path, snapshot: Snapshot) -> None:
     bag = write(tmp_path / 'bag', {'/tf': ('tf2_msgs/msg/TFMessage', lambda n: T[
         'tf2_msgs/msg/TFMessage']([transform(n, 'platform', 'world')]))})
-    with pytest.raises(BagError, match='no valid setpoint; setpoint/pose: wrong frame_id'):
+    with snapshot.raises(BagError):
         read_setpoints(bag, child='platform')
 
 
 @pytest.mark.parametrize('name', ['covariance', 'transform', 'odometry', 'tf', 'pose'])
-def test_damaged_messages_are_malformed(name: str, tmp_path: Path) -> None:
+def test_damaged_messages_are_malformed(name: str, tmp_path: Path, snapshot: Snapshot) -> None:
     kind, message = TYPES[name]
     whole = bytes(STORE.serialize_cdr(message(0), kind))
     with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as bag:
@@ -147,7 +151,7 @@ def test_damaged_messages_are_malformed(name: str, tmp_path: Path) -> None:
         for n in range(len(whole)):  # cut anywhere
             bag.write(to, int(STAMPS[0]) + n, whole[:n])
         bag.write(to, int(STAMPS[0]) + len(whole), bytes([7]) + whole[1:])
-    with pytest.raises(BagError, match='has no valid setpoint|no transform has'):
+    with snapshot.raises(BagError):
         found = read_setpoints(tmp_path / 'bag', topics={'pose': '/poses'})
         # A message that was cut behind its pose is complete.
         assert len(found.times) == 1

@@ -9,12 +9,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from snapshot import Snapshot
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.replay_options import Options
 from test_legs_table import motions_of
 from test_output import answered, PARAMETERS, times_of, turning
+
+PROGRAM = 'stewart_replay'
 
 BLOCK = 100
 
@@ -45,7 +48,7 @@ def test_the_process_writes_the_same_files(tmp_path: Path) -> None:
     assert b',,' in rows  # forces or base wrenches that are not known
 
 
-def test_errors_of_the_process_are_raised_here(tmp_path: Path) -> None:
+def test_errors_of_the_process_are_raised_here(tmp_path: Path, snapshot: Snapshot) -> None:
     (tmp_path / 'legs.csv').symlink_to('/dev/full')
     files = started(OutputProcess, tmp_path)
     with pytest.raises(OSError, match='No space left on device'):
@@ -54,16 +57,16 @@ def test_errors_of_the_process_are_raised_here(tmp_path: Path) -> None:
     files.abandon()
     joints = (PARAMETERS['base_frame'], *PARAMETERS['joints'][1:])
     files = started(OutputProcess, tmp_path / 'names', PARAMETERS.replaced({'joints': joints}))
-    with pytest.raises(ParameterError, match='joints'):
+    with snapshot.raises(ParameterError):
         files.close()
 
 
-def test_a_process_that_is_killed_is_reported(tmp_path: Path) -> None:
+def test_a_process_that_is_killed_is_reported(tmp_path: Path, snapshot: Snapshot) -> None:
     files = started(OutputProcess, tmp_path)
     assert isinstance(files, OutputProcess)
     write_block(files)
     files._process.kill()
-    with pytest.raises(StewartError, match='cannot be written: .* ended by signal 9'):
+    with snapshot.raises(StewartError):
         files.close()
 
 

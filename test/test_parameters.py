@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from copy import copy, deepcopy
+from itertools import count
 from operator import attrgetter
 from pathlib import Path
 import pickle
@@ -29,8 +30,6 @@ from stewart_dynamics.parameters.yaml_file import flat, other_nodes, read_yaml
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 import yaml
-
-PROGRAM = 'library'
 
 GOOD = """\
 /**:
@@ -65,13 +64,13 @@ def written(path: Path, text: str) -> Path:
     return file
 
 
-def assert_rejected(path: Path, text: str, said: str,
+def assert_rejected(path: Path, text: str, snapshot: Snapshot,
                     read: Callable[[Path], object] = Parameters.from_yaml) -> None:
-    """Check that a file with this text is rejected in one short line that begins so."""
-    with pytest.raises(ParameterError) as caught:
+    """Check that a file with this text is rejected in one short line that names it."""
+    with snapshot.raises(ParameterError) as caught:
         read(written(path, text))
     message = str(caught.value)
-    assert message.startswith(f'{path / "hexapod.yaml"}: {said}')
+    assert message.startswith(f'{path / "hexapod.yaml"}: ')
     assert message.isprintable()
     assert len(message) < 450 + len(str(path))
 
@@ -131,12 +130,10 @@ def test_replaced_changes_these_alone_and_checks_the_whole(
     assert p['platform.mass'] == 150.0
     for name in set(p) - {'platform.mass'}:
         assert np.array_equal(heavier[name], p[name])
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         p.replaced({'limits.length_max': 0.7})
-    snapshot(caught.value)
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         p.replaced({'platform.mass': -1.0}, 'a node')
-    snapshot(caught.value)
     read = Parameters(GIVEN, 'a file')
     for same in (read.replaced({}), pickle.loads(pickle.dumps(read))):
         assert same.source == 'a file'
@@ -154,99 +151,71 @@ other_node:
     assert Parameters.from_yaml(written(tmp_path, GOOD + later))['platform.mass'] == 160.0
 
 
-# Invalid files: the part of the valid file that is changed, its new text, and the error
+# Invalid files: the part of the valid file that is changed, and its new text
 
 BAD = [
-    ('      mass: 150.0\n', '', 'platform.mass: missing, it has no default'),
-    ('mass: 150.0', 'mass: null', 'platform.mass: missing, it has no default'),
-    ('mass: 150.0', 'mass:', 'platform.mass: has no value'),
+    ('      mass: 150.0\n', ''),
+    ('mass: 150.0', 'mass: null'),
+    ('mass: 150.0', 'mass:'),
     # names
-    ('warn_condition', 'warn_conditions', 'singularity.warn_conditions: unknown parameter; '
-     'do you mean singularity.warn_condition?'),
-    ('visualization_rate: 25.0', 'limits.angle_max: 0.5', 'limits.angle_max: unknown parameter; '
-     'do you mean limits.base_joint_angle_max or limits.platform_joint_angle_max?'),
-    ('visualization_rate: 25.0', 'qqq: 25.0', 'qqq: unknown parameter'),
-    ('visualization_rate', '"two\\nlines\\e[31m"', r"'two\nlines\x1b[31m': unknown parameter"),
-    ('mass: 150.0', 'mass: {kg: 150.0}',
-     'platform.mass.kg: unknown parameter; do you mean platform.mass?'),
-    ('limits: {length_min: 0.8, length_max: 1.4}', 'limits: 0.8', 'limits: unknown parameter'),
-    ('visualization_rate: 25.0', 'platform.mass: 25.0', 'platform.mass: given twice under /**'),
+    ('warn_condition', 'warn_conditions'),
+    ('visualization_rate: 25.0', 'limits.angle_max: 0.5'),
+    ('visualization_rate: 25.0', 'qqq: 25.0'),
+    ('visualization_rate', '"two\\nlines\\e[31m"'),
+    ('mass: 150.0', 'mass: {kg: 150.0}'),
+    ('limits: {length_min: 0.8, length_max: 1.4}', 'limits: 0.8'),
+    ('visualization_rate: 25.0', 'platform.mass: 25.0'),
     # types
-    ('mass: 150.0', 'mass: 150',
-     'platform.mass: 150: is an integer, must be a double: write 150.0'),
-    ('[20.0, 1.0,', '[20.0, 1,',
-     'platform.inertia: 1: is an integer, must be a double: write 1.0'),
-    ('mass: 150.0', "mass: '150.0'", "platform.mass: '150.0': must be a double"),
-    ('joints: [a,', 'joints: [1,', 'joints: 1: must be a string: put it in quotes'),
-    ('visualization_rate: 25.0', 'base_frame: on',
-     'base_frame: True: must be a string: put it in quotes'),
-    ('joints: [a,', 'joints: ["a\\e",', r"joints: 'a\x1b': must be printable text"),
-    ('visualization_rate: 25.0', 'autostart: 1', 'autostart: 1: must be a bool'),
+    ('mass: 150.0', 'mass: 150'),
+    ('[20.0, 1.0,', '[20.0, 1,'),
+    ('mass: 150.0', "mass: '150.0'"),
+    ('joints: [a,', 'joints: [1,'),
+    ('visualization_rate: 25.0', 'base_frame: on'),
+    ('joints: [a,', 'joints: ["a\\e",'),
+    ('visualization_rate: 25.0', 'autostart: 1'),
     # sizes
-    ('mass: 150.0', 'mass: [150.0, 1.0]',
-     'platform.mass: [150.0, 1.0]: must be a single double'),
-    ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: 0.1',
-     'platform.center_of_mass: 0.1 m: must be an array of 3'),
-    ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: [0.01, 0.1]',
-     'platform.center_of_mass: [0.01, 0.1]: must have 3 entries, has 2'),
-    ('[6.0, 6.1, 6.2, 6.3, 6.4, 6.5]', '[]',
-     'legs.piston.mass: []: ROS accepts no empty list: leave the name out'),
-    ('[0.01, 0.0, 0.1]', '[[0.01, 0.0, 0.1]]', 'platform.center_of_mass: [[0.01, 0.0, 0.1]]: '
-     'has a list or a group in the list: write the numbers one after the other'),
-    ('/**:', 'a: {ros__parameters: {b: [[1]]}}\n/**:', 'b: [[1]]: has a list or a group in the '),
+    ('mass: 150.0', 'mass: [150.0, 1.0]'),
+    ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: 0.1'),
+    ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: [0.01, 0.1]'),
+    ('[6.0, 6.1, 6.2, 6.3, 6.4, 6.5]', '[]'),
+    ('[0.01, 0.0, 0.1]', '[[0.01, 0.0, 0.1]]'),
+    ('/**:', 'a: {ros__parameters: {b: [[1]]}}\n/**:'),
     # values
-    ('warn_condition: 40.0', 'warn_condition: 40.0, action: stop',
-     "singularity.action: 'stop': must be one of warn, suppress_forces"),
-    ('[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]',
-     'platform.inertia: [20.0, 0.0, 0.0, 20.0, 0.0, -1.0]: must be positive definite, but its '
-     'smallest principal moment is -1 kg m^2 (the order is ixx ixy ixz iyy iyz izz)'),
-    ('length_max: 1.4', 'length_max: 0.8', 'limits.length_min: [0.8, 0.8, 0.8, 0.8, 0.8, 0.8]: '
-     'must be less than limits.length_max, [0.8, 0.8, 0.8, 0.8, 0.8, 0.8]'),
-    ('length_max: 1.4', 'length_max: [1.4, 1.4, 1.4, 0.7, 1.4, 1.4]',
-     'limits.length_min: [0.8, 0.8, 0.8, 0.8, 0.8, 0.8]: must be less than limits.length_max, '),
-    ('stop_condition: 400.0', 'stop_condition: 39.0', 'singularity.stop_condition: 39.0: '
-     'must be at least singularity.warn_condition, 40.0'),
-    ('mass: 150.0', 'mass: .nan', 'platform.mass: nan kg: must be finite'),
-    ('[a, b, c, d, e, f]', '[a, b, c, d, e, a]',
-     "joints: ['a', 'b', 'c', 'd', 'e', 'a']: six different names needed"),
+    ('warn_condition: 40.0', 'warn_condition: 40.0, action: stop'),
+    ('[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]'),
+    ('length_max: 1.4', 'length_max: 0.8'),
+    ('length_max: 1.4', 'length_max: [1.4, 1.4, 1.4, 0.7, 1.4, 1.4]'),
+    ('stop_condition: 400.0', 'stop_condition: 39.0'),
+    ('mass: 150.0', 'mass: .nan'),
+    ('[a, b, c, d, e, f]', '[a, b, c, d, e, a]'),
     ('platform_joints: [0.4, 0.4, 0.0,  0.2, 0.5, 0.0,  -0.6, 0.1, 0.0,\n'
      '                        -0.6, -0.1, 0.0,  0.2, -0.5, 0.0,  0.4, -0.4, 0.0]',
-     f'platform_joints: {[0.5] * 18}', 'geometry.platform_joints: all six are at one point'),
+     f'platform_joints: {[0.5] * 18}'),
     # YAML
-    ('mass: 150.0', 'mass: [150.0', 'not YAML: line 11, column 21: '),
-    ('      mass: 150.0', '\tmass: 150.0', 'not YAML: line 10, column 1: found character that '
-     'cannot start any token; line 10 is indented with a tab: use spaces'),
-    ('      mass: 150.0', '      mass:150.0', 'not YAML: line 11, column 21: mapping values are '
-     'not allowed in this context; line 10: a space is missing after the colon of mass'),
-    ('{mass: 12.0,', '{mass:12.0,', 'legs.cylinder.mass:12.0: has no value; '
-     'a space is missing after the colon of legs.cylinder.mass'),
-    ('mass: 150.0', 'mass: !!float 150',
-     "not YAML: line 10, column 13: a tag, 'tag:yaml.org,2002:float': ROS ignores it, "),
-    ('mass: 150.0', '? [a]\n      : 150.0',
-     'not YAML: line 10, column 9: a list, a group or an alias in place of a name'),
-    ('      mass: 150.0\n', '      mass: 150.0\n      mass: 160.0\n',
-     "not YAML: line 11, column 7: duplicate key 'mass'"),
-    ('mass: 150.0', 'mass: *m',
-     'not YAML: line 10, column 13: has a YAML alias (*): write the value out'),
+    ('mass: 150.0', 'mass: [150.0'),
+    ('      mass: 150.0', '\tmass: 150.0'),
+    ('      mass: 150.0', '      mass:150.0'),
+    ('{mass: 12.0,', '{mass:12.0,'),
+    ('mass: 150.0', 'mass: !!float 150'),
+    ('mass: 150.0', '? [a]\n      : 150.0'),
+    ('      mass: 150.0\n', '      mass: 150.0\n      mass: 160.0\n'),
+    ('mass: 150.0', 'mass: *m'),
     # sections
-    ('/**:', 'a: 1\n---\n/**:',
-     'not YAML: line 2, column 1: expected a single document in the stream, but found another'),
-    ('/**:', 'other_node:',
-     "holds other_node, but no parameters under '/**:' or 'stewart_dynamics:'"),
-    ('ros__parameters:', 'parameters:', "/**: must hold 'ros__parameters:'"),
-    (GOOD, '', "must begin with '/**:' or a node's name"),
-    (GOOD, 'just words\n', "must begin with '/**:' or a node's name"),
-    (GOOD, '/**: {ros__parameters: [1, 2]}\n',
-     'ros__parameters: [1, 2]: must hold names and values'),
-    (GOOD, '/**: {ros__parameters: }\n', 'holds /**, but no parameters under '),
-    (GOOD, '/**: \x07\n', 'not YAML: line 1: control characters are not allowed')]
+    ('/**:', 'a: 1\n---\n/**:'),
+    ('/**:', 'other_node:'),
+    ('ros__parameters:', 'parameters:'),
+    (GOOD, ''),
+    (GOOD, 'just words\n'),
+    (GOOD, '/**: {ros__parameters: [1, 2]}\n'),
+    (GOOD, '/**: {ros__parameters: }\n'),
+    (GOOD, '/**: \x07\n')]
 
 
-@pytest.mark.parametrize(('old', 'new', 'said'), BAD, ids=[said[:60] for _, _, said in BAD])
+@pytest.mark.parametrize(('old', 'new'), BAD, ids=count())
 def test_the_error_of_a_bad_file_names_parameter_value_and_rule(
-        tmp_path: Path, old: str, new: str, said: str) -> None:
+        tmp_path: Path, old: str, new: str, snapshot: Snapshot) -> None:
     assert GOOD.count(old) == 1
-    assert_rejected(tmp_path, GOOD.replace(old, new), said)
+    assert_rejected(tmp_path, GOOD.replace(old, new), snapshot)
 
 
 @pytest.mark.parametrize(('name', 'value'), [
@@ -289,12 +258,10 @@ def test_the_nearest_name_is_suggested_for_an_unknown_one(
 
 
 def test_a_missing_file_is_named(tmp_path: Path, snapshot: Snapshot) -> None:
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         Parameters.from_yaml(tmp_path / 'nowhere.yaml')
-    snapshot(caught.value)
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         Parameters.from_yaml('a\0b')
-    snapshot(caught.value)
 
 
 @pytest.mark.parametrize('change', [
@@ -318,15 +285,15 @@ def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
         assert parameter.ros_type.startswith(parameter.kind)
 
 
-@pytest.mark.parametrize('text, said', [
-    ('x: &a {b: *a}', 'not YAML: line 3, column 15: has a YAML alias (*): write the value out'),
-    ('a: ' + '{a: ' * 30, 'not YAML: line 3, column 76: nests deeper than 20'),
-    (f'{"a" * 1000}: 1.0', f'{"a" * 77}...: unknown parameter'),
-    (f'platform.mass: {"9" * 90000}', 'platform.mass: inf kg: must be finite'),
-    ('platform: {mass: 0x' + 'f' * 5000 + '}', "platform.mass: '0xfff")])
+@pytest.mark.parametrize('text', [
+    'x: &a {b: *a}',
+    'a: ' + '{a: ' * 30,
+    f'{"a" * 1000}: 1.0',
+    f'platform.mass: {"9" * 90000}',
+    'platform: {mass: 0x' + 'f' * 5000 + '}'], ids=count())
 def test_difficult_yaml_is_rejected_in_one_short_line(
-        tmp_path: Path, text: str, said: str) -> None:
-    assert_rejected(tmp_path, f'/**:\n  ros__parameters:\n    {text}\n', said,
+        tmp_path: Path, text: str, snapshot: Snapshot) -> None:
+    assert_rejected(tmp_path, f'/**:\n  ros__parameters:\n    {text}\n', snapshot,
                     Parameters.check_file)
 
 
@@ -455,9 +422,8 @@ def test_a_bad_value_on_a_command_line_is_rejected(
         name: str, text: str, snapshot: Snapshot) -> None:
     Parameters.read_value('platform.mass', '150.0', 'command line')
     Parameters.read_value('use_sim_time', 'true', 'command line')
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError) as caught:
         Parameters.read_value(name, text, 'command line')
-    snapshot(caught.value)
     assert str(caught.value).isprintable()
 
 
@@ -465,9 +431,8 @@ def test_a_bad_value_on_a_command_line_is_rejected(
 def test_a_value_that_ros_would_ignore_is_rejected(
         tmp_path: Path, value: str, snapshot: Snapshot) -> None:
     path = written(tmp_path, f'/**: {{ros__parameters: {{use_sim_time: {value}}}}}\n')
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         Parameters.check_file(path)
-    snapshot(caught.value)
 
 
 @pytest.mark.parametrize('section, node, meant', [
@@ -484,23 +449,21 @@ def test_sections_are_matched_as_ros_matches_them(
     if meant:
         assert read_yaml(path, node or Parameters.node) == {'platform.mass': 7.0}
     else:
-        with pytest.raises(ParameterError) as caught:
+        with snapshot.raises(ParameterError):
             read_yaml(path, node or Parameters.node)
-        snapshot(caught.value)
 
 
 def test_namespaces_may_nest_in_the_file(tmp_path: Path, snapshot: Snapshot) -> None:
     path = written(tmp_path, 'a:\n  ros__parameters: {x: 1.0}\n  b: {ros__parameters: {y: 2.0}}\n')
     assert read_yaml(path, '/a/b') == {'y': 2.0}
     assert read_yaml(path, 'a') == {'x': 1.0}
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         read_yaml(path, 'b')
-    snapshot(caught.value)
 
 
-def test_many_other_sections_are_named_in_short(tmp_path: Path) -> None:
+def test_many_other_sections_are_named_in_short(tmp_path: Path, snapshot: Snapshot) -> None:
     path = written(tmp_path, ''.join(f'node_{n}: {{}}\n' for n in range(5000)))
-    with pytest.raises(ParameterError, match=r'holds node_0, .*node_8, \.\.\., but no') as caught:
+    with snapshot.raises(ParameterError) as caught:
         Parameters.from_yaml(path)
     assert len(str(caught.value)) < 400 + len(str(path))
 
@@ -515,9 +478,8 @@ def test_parameters_are_taken_from_numpy_and_from_parameters(snapshot: Snapshot)
     rows = parameters['geometry.base_joints'].tolist()
     for same in (rows, [tuple(row) for row in rows], [np.array(row) for row in rows]):
         assert parameters.replaced({'geometry.base_joints': same}) == parameters
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         parameters.replaced({'geometry.base_joints': [*rows[:5], rows[5][:2]]})
-    snapshot(caught.value)
     assert parameters != 1
 
 
@@ -529,25 +491,21 @@ def test_an_integer_is_a_double_from_python_alone(tmp_path: Path, snapshot: Snap
     assert parameters.given['gravity'] == (0.0, 0.0, -10.0)
     assert parameters['limits.force_max'].tolist() == [5.0] * 6
     for wrong in (True, 10 ** 400, 1j, '70'):
-        with pytest.raises(ParameterError) as caught:
+        with snapshot.raises(ParameterError):
             parameters.replaced({'platform.mass': wrong})
-        snapshot(caught.value)
     for read in (lambda: parameters.replaced({'platform.mass': 70}, exact_types=True),
                  lambda: Parameters({**GIVEN, 'platform.mass': 70}, exact_types=True)):
-        with pytest.raises(ParameterError) as caught:
+        with snapshot.raises(ParameterError):
             read()
-        snapshot(caught.value)
 
 
 @pytest.mark.parametrize('wrong', [None, [1.0], 'no.yaml', 3, {1: 2.0}, {None: 1}])
 def test_a_wrong_object_in_place_of_parameters_is_named(wrong: Any, snapshot: Snapshot) -> None:
     for use in (Parameters, Parameters(GIVEN).replaced):
-        with pytest.raises(ParameterError) as caught:
+        with snapshot.raises(ParameterError):
             use(wrong)
-        snapshot(caught.value)
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         Parameters.from_yaml(wrong)
-    snapshot(caught.value)
 
 
 def test_an_error_about_an_argument_is_a_value_error() -> None:
@@ -593,9 +551,8 @@ def test_a_written_file_has_units_and_short_lines(
         assert lines in text
     assert Parameters.from_yaml(tmp_path / 'out.yaml') == parameters
     assert 'force_max' not in text  # not given, and none by default
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         parameters.to_yaml(tmp_path)
-    snapshot(caught.value)
 
 
 TEXTS = st.text(st.characters(codec='utf-8'), min_size=1, max_size=8).filter(str.isprintable)
@@ -727,9 +684,8 @@ def test_rows_that_are_not_those_of_the_parameter_are_rejected(
         p: Parameters, name: str, shape: tuple[int, ...], snapshot: Snapshot) -> None:
     values = np.arange(1.0, 1.0 + np.prod(shape)).reshape(shape)
     for each in (values, values.tolist()):
-        with pytest.raises(ParameterError) as caught:
+        with snapshot.raises(ParameterError):
             p.replaced({name: each})
-        snapshot(caught.value)
 
 
 def test_joints_are_taken_as_rows_and_flat(p: Parameters) -> None:

@@ -29,8 +29,6 @@ from stewart_dynamics.simulator.plant import Plant
 from trajectories import (
     Array, counted, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
 
-PROGRAM = 'library'
-
 Trajectory = tuple[Sequence[int], Array]  # times [ns], and rows as in trajectories
 
 
@@ -68,26 +66,26 @@ def test_at_the_points_the_legs_are_those_of_inverse_dynamics() -> None:
     assert result.leg is None
 
 
-@pytest.mark.parametrize(('change', 'said'), [
-    ({'times': [0.0, 1.0, 1.0, 2.0]}, 'times[2]: 1.0 s after 1.0 s: must be strictly increasing'),
-    ({'times': [0.0, 1.0, 1.0 + 1e-10, 2.0]}, 'times[2]'),
-    ({'times': [-1.0, 1.0, 2.0, 3.0]}, 'times[0]: -1.0 s: must be 0 to 2147483648 s'),
-    ({'times': [0.0, 1.0, 2.0, 1e10]}, 'times[3]: 10000000000.0 s: must be 0 to'),
-    ({'times': [0.0, 1.0, np.nan, 2.0]}, 'times[2]: nan: must be finite'),
-    ({'times': [0.0, 1.0, 2.0]}, 'times: shape (3,): must end in (4,)'),
-    ({'times': [[0.0, 1.0, 2.0, 3.0]]}, 'times: shape (1, 4): must be (4,)'),
-    ({'motion': Motion([0.0, 0.0, 1.1], np.eye(3))}, 'motion: shape (): must be (N,)'),
-    ({'motion': np.zeros((4, 24))}, 'motion: a value of type ndarray: must be a Motion'),
-    ({'wrench': np.zeros((4, 6))}, 'wrench: shape (4, 6): must be (6,)'),
-    ({'wrench': np.zeros(5)}, 'wrench: shape (5,)'),
-    ({'base': np.zeros(12)}, 'must be a BaseMotion'),
-    ({'base': BaseMotion(np.zeros((3, 3)))}, 'base: shape (3,): must be () or (4,)')], ids=str)
-def test_arguments_that_do_not_fit_are_errors(change: dict[str, object], said: str) -> None:
+@pytest.mark.parametrize('change', [
+    {'times': [0.0, 1.0, 1.0, 2.0]},
+    {'times': [0.0, 1.0, 1.0 + 1e-10, 2.0]},
+    {'times': [-1.0, 1.0, 2.0, 3.0]},
+    {'times': [0.0, 1.0, 2.0, 1e10]},
+    {'times': [0.0, 1.0, np.nan, 2.0]},
+    {'times': [0.0, 1.0, 2.0]},
+    {'times': [[0.0, 1.0, 2.0, 3.0]]},
+    {'motion': Motion([0.0, 0.0, 1.1], np.eye(3))},
+    {'motion': np.zeros((4, 24))},
+    {'wrench': np.zeros((4, 6))},
+    {'wrench': np.zeros(5)},
+    {'base': np.zeros(12)},
+    {'base': BaseMotion(np.zeros((3, 3)))}], ids=str)
+def test_arguments_that_do_not_fit_are_errors(
+        change: dict[str, object], snapshot: Snapshot) -> None:
     arguments = {'times': [0.0, 1.0, 2.0, 3.0], 'wrench': None,
                  'motion': Motion(np.tile([0.0, 0.0, 1.1], (4, 1)), np.eye(3)), **change}
-    with pytest.raises(MotionError) as info:
+    with snapshot.raises(MotionError):
         check_planned_trajectory(StewartPlatform(PARAMETERS), **arguments)
-    assert said in str(info.value)
 
 
 # Rejected
@@ -380,9 +378,8 @@ def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded(
             assert bool(output.exceedances) == exceeded
             simulated_parameters = simulated(**{**UNLIMITED, **changes})
             if exceeded:
-                with pytest.raises(ParameterError) as caught:
+                with snapshot.raises(ParameterError):
                     Plant(simulated_parameters)
-                snapshot(caught.value)
             else:
                 assert Plant(simulated_parameters).state.lengths == tuple(lengths.tolist())
 

@@ -17,11 +17,14 @@ from referees import (
     assert_order, energies, friction, random_base_motion, relative, rng,
     rotation_about, size_of, smooth_motion)
 from simulated import FRICTIONLESS, HEXAPOD, MASSLESS, random_simulated, simulated, UNLIMITED
+from snapshot import Snapshot
 from stewart_dynamics import BaseMotion, Motion, ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.simulator.messages import OUTPUT_TYPES, StateMessages
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import largest_eigenvalue, Plant, PlantState, substeps
+
+PROGRAM = 'stewart_simulator'
 
 Array = NDArray[np.float64]
 Six = tuple[float, float, float, float, float, float]
@@ -347,26 +350,22 @@ def test_noise_is_the_same_for_the_same_seed() -> None:
 
 # Parameters
 
-@pytest.mark.parametrize(('changes', 'said'), [
-    ({'rate': 300.0}, 'rate: 300.0 Hz: a period must be a whole number of steps of 0.001 s, not '
-     '3.33333'),
-    ({'rate': 2000.0}, 'rate: 2000.0 Hz: a period must be a whole number of steps'),
-    ({'step': 2e-3}, 'step: 0.002 s: must be at least 1e-05, at most 0.001'),
-    ({'initial_pose': [0.0, 0.0, 2.0, 0.0, 0.0, 0.0]}, 'leg_1: length 2.07'),
-    ({'initial_pose': [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]},
-     'leg_1: length 0.739072 m is 0.210928 m below limits.length_min'),
-    ({'initial_pose': [1e300, 0.0, 0.5, 0.0, 0.0, 0.0], **UNLIMITED}, 'one that overflows'),
-    ({'initial_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], **UNLIMITED,
-      'geometry.platform_joints': HEXAPOD['geometry.base_joints']},
-     'a leg would have no length'),
-    ({'initial_pose': None}, 'initial_pose: missing'),
-    ({'noise.length': -1.0}, 'noise.length: -1.0 m: must be at least 0'),
-    ({'noise.force': 1e308}, 'noise.force: 1e+308 N: must be at least 0, at most 1e+09')],
+@pytest.mark.parametrize('changes', [
+    {'rate': 300.0},
+    {'rate': 2000.0},
+    {'step': 2e-3},
+    {'initial_pose': [0.0, 0.0, 2.0, 0.0, 0.0, 0.0]},
+    {'initial_pose': [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]},
+    {'initial_pose': [1e300, 0.0, 0.5, 0.0, 0.0, 0.0], **UNLIMITED},
+    {'initial_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], **UNLIMITED,
+     'geometry.platform_joints': HEXAPOD['geometry.base_joints']},
+    {'initial_pose': None},
+    {'noise.length': -1.0},
+    {'noise.force': 1e308}],
     ids=str)
-def test_a_broken_rule_is_named(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(ParameterError) as info:
+def test_a_broken_rule_is_named(changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError) as info:
         Plant(simulated(**changes))
-    assert said in str(info.value)
     assert '\n' not in str(info.value)
 
 
@@ -401,18 +400,17 @@ def test_the_bound_of_stiffness_holds_in_every_pose(seed: int) -> None:
         assert bound == 0.0 or worst > 0.05 * bound  # not for nothing
 
 
-@pytest.mark.parametrize(('changes', 'named'), [
-    ({'actuator.coulomb_friction': 1e8}, 'actuator.coulomb_friction'),
-    ({'actuator.coulomb_velocity': 1e-12},
-     r'actuator.coulomb_friction: \[20.0, .* within actuator.coulomb_velocity \[1e-12, '),
-    ({'actuator.viscous_friction': 1e12}, 'actuator.viscous_friction'),
-    ({'actuator.viscous_friction': 1e308}, 'actuator.viscous_friction'),
-    ({'end_stops.frequency': 1e6}, 'end_stops.frequency'),
-    ({'end_stops.frequency': 1e6, 'end_stops.damping_ratio': 1.5}, 'end_stops.damping_ratio'),
-    ({'end_stops.damping_ratio': 1e7}, 'end_stops.damping_ratio')], ids=str)
+@pytest.mark.parametrize('changes', [
+    {'actuator.coulomb_friction': 1e8},
+    {'actuator.coulomb_velocity': 1e-12},
+    {'actuator.viscous_friction': 1e12},
+    {'actuator.viscous_friction': 1e308},
+    {'end_stops.frequency': 1e6},
+    {'end_stops.frequency': 1e6, 'end_stops.damping_ratio': 1.5},
+    {'end_stops.damping_ratio': 1e7}], ids=str)
 def test_parameters_that_need_too_short_steps_are_rejected_by_name(
-        changes: dict[str, Any], named: str) -> None:
-    with pytest.raises(ParameterError, match=f'^{named}.* too large for a platform of 150 kg'):
+        changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         substeps(simulated(actuator__reflected_mass=0.0, **changes))
 
 

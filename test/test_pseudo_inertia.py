@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import derivative, random_parameters, rng
+from snapshot import Snapshot
 
 from stewart_dynamics import ParameterError
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters, PLATFORM
@@ -68,8 +69,9 @@ def test_platforms_are_bodies(hexapod: int) -> None:
     (1.0, (1.0, 1.0, 2.5)),  # positive definite, and yet more than the sum of the others
     (1.0, (-1.0, 1.0, 1.0)),
 ])
-def test_invalid_bodies_are_rejected(mass: float, inertia: tuple[float, float, float]) -> None:
+def test_invalid_bodies_are_rejected(
+        mass: float, inertia: tuple[float, float, float], snapshot: Snapshot) -> None:
     ten = np.array([mass, 0.0, 0.0, 0.0, inertia[0], 0.0, 0.0, inertia[1], 0.0, inertia[2]])
     assert not is_consistent(ten)
-    with pytest.raises(ParameterError, match='no body has these'):
+    with snapshot.raises(ParameterError):
         log_cholesky(ten)

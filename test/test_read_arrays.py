@@ -14,11 +14,14 @@ import numpy as np
 import pytest
 from recorded import fourier, recorded, write_bag
 from referees import ROOT
+from snapshot import Snapshot
 
 from stewart_dynamics import (
     BagError, Parameters, read_legs, read_setpoints, StewartError, StewartPlatform)
 from stewart_dynamics.reference_motion.motion import motion_at, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+
+PROGRAM = 'stewart_replay'
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
@@ -35,7 +38,7 @@ def test_setpoints_of_a_bag_are_those_that_were_recorded() -> None:
         assert len(found.times) == len(found.stamps) == len(found.wrench) == len(wanted)
 
 
-def test_legs_of_a_bag_are_those_that_were_recorded(tmp_path: Path) -> None:
+def test_legs_of_a_bag_are_those_that_were_recorded(tmp_path: Path, snapshot: Snapshot) -> None:
     given = recorded(PARAMETERS, fourier(1), 2.0, 100.0, 1, forces=np.ones((200, 6)))
     bag = write_bag(tmp_path / 'bag', given, PARAMETERS['joints'])
     for joints in (None, PARAMETERS, PARAMETERS['joints']):
@@ -44,20 +47,21 @@ def test_legs_of_a_bag_are_those_that_were_recorded(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found.positions, given.positions)
         np.testing.assert_array_equal(found.velocities, given.rates)
         np.testing.assert_array_equal(found.efforts, given.efforts)
-    with pytest.raises(BagError, match='no message contains a; they contain leg_1'):
+    with snapshot.raises(BagError):
         read_legs(bag, ('a', *PARAMETERS['joints'][1:]))
-    with pytest.raises(BagError, match='has no topic /legs'):
+    with snapshot.raises(BagError):
         read_legs(bag, topic='/legs')
 
 
-@pytest.mark.parametrize(('options', 'words'), [
-    ({'euler': 'rpy'}, "euler: 'rpy': must be one of xyz, xzy"),
-    ({'axes': 'x,y'}, "'x,y': must be x, y and z, each once"),
-    ({'topics': {'position': '/a'}}, "topics: 'position': must be one of pose, twist"),
-    ({'topics': {'pose': '/a'}}, 'has no topic /a'),
-    ({'cutoff': -1.0}, 'cut-off frequency: -1.0 Hz: must be a positive number')])
-def test_options_that_break_a_rule_are_named(options: dict[str, object], words: str) -> None:
-    with pytest.raises(StewartError, match=words):
+@pytest.mark.parametrize('options', [
+    {'euler': 'rpy'},
+    {'axes': 'x,y'},
+    {'topics': {'position': '/a'}},
+    {'topics': {'pose': '/a'}},
+    {'cutoff': -1.0}])
+def test_options_that_break_a_rule_are_named(
+        options: dict[str, object], snapshot: Snapshot) -> None:
+    with snapshot.raises(StewartError):
         read_setpoints(CLEAR, **options)  # type: ignore[arg-type]
 
 

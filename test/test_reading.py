@@ -5,6 +5,7 @@
 """Hexapods in files of other tools: parameters, remarks and rejections."""
 
 from contextlib import suppress
+import itertools
 import os
 import re
 import shutil
@@ -181,39 +182,37 @@ def test_a_start_outside_the_limits_is_reported(tmp_path):
                         remark) for remark in found.remarks)
 
 
-@pytest.mark.parametrize(('text', 'error'), [
-    ('', 'not XML'),
-    ('<robot', 'not XML'),
-    ('<html/>', "begins with 'html': must be URDF"),
-    ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x"><xacro:leg/></robot>',
-     'is xacro: run xacro first'),
-    ('<robot name="x"><xacro:leg/></robot>', 'is xacro: run xacro first'),
-    ('<robot name="x"><link name="${a}"/></robot>', 'is xacro: run xacro first'),
-    ('<robot xmlns:xacro="http://ros.org/wiki/xacro" name="x"/>', 'no hexapod: 0 prismatic'),
-    ('<sdf version="1.9"><%= leg %></sdf>', 'is a template (ERB or Jinja): render it first'),
-    ('#usda 1.0\n', 'is USD (text): convert it'),
-    ('PXR-USDC\0', 'is USD (binary): convert it'),
-    ('PK\3\4', 'is a zip archive, as usdz is'),
-    ('version https://git-lfs.github.com/spec/v1\noid sha256:1\n', 'run git lfs pull first'),
-    ('<!DOCTYPE a [<!ENTITY b "c">]><robot name="x"/>', 'has entities'),
-    ('<robot name="x"><link name="a"/></robot>', 'no hexapod: 0 prismatic joints'),
-    ('<robot name="x"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
-     '<child link="b"/></joint></robot>', "no link 'b'"),
-    ('<robot name="x"><link name="a"/><link name="b"/><joint name="j" type="fixed">'
-     '<origin xyz="1 nan 0"/><parent link="a"/><child link="b"/></joint></robot>',
-     'must be 3 finite numbers'),
-    ('<robot name="x"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
-     '<child link="a"/></joint></robot>', "'a' carries itself"),
-    ('<sdf version="1.9"/>', 'no model'),
-    ('<sdf version="1.9"><model name="m"><link name="a"><pose relative_to="a">0 0 0 0 0 0</pose>'
-     '</link></model></sdf>', 'relative to itself'),
-    ('<sdf version="1.9"><model name="m"><joint name="j" type="fixed"><parent>a</parent></joint>'
-     '</model></sdf>', "joint 'j': no child"),
-])
-def test_a_file_without_a_hexapod_is_rejected_in_one_line(text, error, tmp_path):
+@pytest.mark.parametrize('text', [
+    '',
+    '<robot',
+    '<html/>',
+    '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x"><xacro:leg/></robot>',
+    '<robot name="x"><xacro:leg/></robot>',
+    '<robot name="x"><link name="${a}"/></robot>',
+    '<robot xmlns:xacro="http://ros.org/wiki/xacro" name="x"/>',
+    '<sdf version="1.9"><%= leg %></sdf>',
+    '#usda 1.0\n',
+    'PXR-USDC\0',
+    'PK\3\4',
+    'version https://git-lfs.github.com/spec/v1\noid sha256:1\n',
+    '<!DOCTYPE a [<!ENTITY b "c">]><robot name="x"/>',
+    '<robot name="x"><link name="a"/></robot>',
+    '<robot name="x"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
+    '<child link="b"/></joint></robot>',
+    '<robot name="x"><link name="a"/><link name="b"/><joint name="j" type="fixed">'
+    '<origin xyz="1 nan 0"/><parent link="a"/><child link="b"/></joint></robot>',
+    '<robot name="x"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
+    '<child link="a"/></joint></robot>',
+    '<sdf version="1.9"/>',
+    '<sdf version="1.9"><model name="m"><link name="a"><pose relative_to="a">0 0 0 0 0 0</pose>'
+    '</link></model></sdf>',
+    '<sdf version="1.9"><model name="m"><joint name="j" type="fixed"><parent>a</parent></joint>'
+    '</model></sdf>',
+], ids=itertools.count())
+def test_a_file_without_a_hexapod_is_rejected_in_one_line(text, tmp_path, snapshot):
     path = tmp_path / 'file.xml'
     path.write_text(text, encoding='utf-8')
-    with pytest.raises(StewartError, match=re.escape(error)) as caught:
+    with snapshot.raises(StewartError) as caught:
         read_hexapod(path)
     assert '\n' not in str(caught.value)
     assert str(path) in str(caught.value)
@@ -230,9 +229,8 @@ def test_an_mjcf_that_mujoco_rejects_is_rejected_with_the_reason_of_mujoco(tmp_p
 def test_a_prismatic_joint_across_its_leg_is_rejected(tmp_path, snapshot):
     path = written(PLATFORM, 'xml', tmp_path, lambda text: changed(
         text, '(<joint name="leg_5" type="slide" axis)="0 0 1"', r'\1="1 0 0"'))
-    with pytest.raises(StewartError) as caught:
+    with snapshot.raises(StewartError):
         read_hexapod(path)
-    snapshot(caught.value)
 
 
 def test_a_negative_gear_is_reported(tmp_path, snapshot):
@@ -246,9 +244,8 @@ def test_a_negative_gear_is_reported(tmp_path, snapshot):
 def test_a_leg_without_a_joint_at_one_end_is_rejected(tmp_path, snapshot):
     path = written(PLATFORM, 'sdf', tmp_path, lambda text: re.sub(
         '(<joint name="[^"]*") type="ball"', r'\1 type="fixed"', foreign(text)))
-    with pytest.raises(StewartError) as caught:
+    with snapshot.raises(StewartError):
         read_hexapod(path)
-    snapshot(caught.value)
 
 
 def test_legs_that_are_cut_in_two_are_rejected(tmp_path, snapshot):
@@ -258,9 +255,8 @@ def test_legs_that_are_cut_in_two_are_rejected(tmp_path, snapshot):
             text, '<child>leg_2_piston</child>', '<child>leg_2_end</child>'),
             '<joint name="leg_2"', '<link name="leg_2_end"/><joint name="leg_2"')
 
-    with pytest.raises(StewartError) as caught:
+    with snapshot.raises(StewartError):
         read_hexapod(written(PLATFORM, 'sdf', tmp_path, cut))
-    snapshot(caught.value)
 
 
 @pytest.mark.parametrize('kind', ['urdf', 'sdf'])
@@ -298,9 +294,8 @@ def test_large_models_take_time_in_proportion_to_their_size(text, tmp_path, snap
     path = tmp_path / 'large.xml'
     path.write_text(text)
     begun = time.process_time()
-    with pytest.raises(StewartError) as caught:
+    with snapshot.raises(StewartError):
         read_hexapod(path)
-    snapshot(caught.value)
     assert time.process_time() - begun < 20.0  # quadratic: minutes
 
 
@@ -526,9 +521,8 @@ def test_what_gazebo_and_ros2_control_add_in_a_urdf_is_named_or_taken(tmp_path):
 
 def test_geometry_alone_is_read_without_masses(tmp_path, snapshot):
     text = cad_urdf('<link name="platform"/>', mass=0.0)
-    with pytest.raises(StewartError) as caught:
+    with snapshot.raises(StewartError):
         from_text(text, tmp_path)
-    snapshot(caught.value)
     p = from_text(text, tmp_path, True).parameters
     assert p['geometry.base_joints'] == pytest.approx(PLATFORM['geometry.base_joints'], abs=1e-9)
     machine = StewartPlatform(p)

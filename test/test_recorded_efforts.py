@@ -14,11 +14,13 @@ from hypothesis import strategies as st
 import messages as of_ros
 from messages import STORE
 import numpy as np
-import pytest
 from referees import rng
+from snapshot import Snapshot
 
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.replay.residuals import Efforts
+
+PROGRAM = 'stewart_replay'
 
 SECOND = 1_000_000_000
 JOINTS = [f'leg_{n}' for n in range(1, 7)]
@@ -151,16 +153,15 @@ def test_damaged_bytes_never_raise() -> None:
     assert stamps[0] == 7
 
 
-def test_a_joint_in_no_message_is_named() -> None:
+def test_a_joint_in_no_message_is_named(snapshot: Snapshot) -> None:
     names = ['leg_1', 'leg_2', 'leg_3', 'leg_4', 'leg_5', 'cylinder_6']
     efforts = Efforts(JOINTS)
     stamps, _, rejected = efforts.read(*joined([joint_state(1, names, range(6))]))
     assert not len(stamps) and rejected == {'lacks one of the joints': 1}
-    with pytest.raises(
-            BagError, match='no message contains leg_6; they contain leg_1, .*, cylinder_6:'):
+    with snapshot.raises(BagError):
         efforts.check()
     # also before the end of the bag
-    with pytest.raises(BagError, match='no message contains leg_6'):
+    with snapshot.raises(BagError):
         efforts.read(*joined([joint_state(1, names, range(6))] * 1000))
 
 

@@ -13,12 +13,15 @@ import numpy as np
 import pytest
 from referees import Array, random_motion, random_parameters, rng
 from scipy.spatial.transform import Rotation
+from snapshot import Snapshot
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.replay.output import (
     RECORDED_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
+
+PROGRAM = 'stewart_replay'
 
 STAMP = 1_700_000_000_123_456_789
 SAMPLES = 20
@@ -135,7 +138,7 @@ def test_the_joints_are_those_of_the_node(recorded: Recorded) -> None:
         np.testing.assert_allclose(ours.position, of_node.position, rtol=0.0, atol=2e-15)
 
 
-def test_two_links_of_one_name_are_rejected() -> None:
+def test_two_links_of_one_name_are_rejected(snapshot: Snapshot) -> None:
     p = Parameters({**random_parameters(rng()), 'base_frame': 'leg_1_piston'})
-    with pytest.raises(ParameterError, match="the name 'leg_1_piston' would be there twice"):
+    with snapshot.raises(ParameterError):
         RecordedModel(p, 'hexapod')

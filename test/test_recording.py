@@ -387,9 +387,8 @@ def test_empty_bags(file: Path, snapshot: Snapshot) -> None:
         assert read(file) == ([], [], [])
     for content in (b'', MAGIC[:4], b'\0' * 100, b'MCAP'):
         file.write_bytes(content)
-        with pytest.raises(BagError) as caught:
+        with snapshot.raises(BagError):
             Recording(file)
-        snapshot(caught.value)
     for content in (MAGIC, mcap([])[:30]):
         file.write_bytes(content)
         assert read(file).missing
@@ -722,9 +721,8 @@ def test_tables_that_may_never_end_are_rejected(
         changes: str, tmp_path: Path, snapshot: Snapshot) -> None:
     file = storage(write_bag(tmp_path / 'bag', motion(1)))
     execute(file, changes)
-    with pytest.raises(BagError) as caught:
+    with snapshot.raises(BagError):
         Recording(file)
-    snapshot(caught.value)
 
 
 def test_definitions_that_never_end_are_not_read(tmp_path: Path) -> None:
@@ -938,14 +936,15 @@ def test_only_files_counted_from_0_are_parts_of_one_recording(
     'rosbag2_bagfile_information: {relative_file_paths: {a: b}}',
     'rosbag2_bagfile_information: {relative_file_paths: [elsewhere.mcap]}',
     'rosbag2_bagfile_information: {relative_file_paths: ["\\0"]}'])
-def test_a_bag_with_damaged_metadata_is_read_by_its_files(text: str, tmp_path: Path) -> None:
+def test_a_bag_with_damaged_metadata_is_read_by_its_files(
+        text: str, tmp_path: Path, snapshot: Snapshot) -> None:
     bag = tmp_path / 'bag'
     given_ = split_bag(bag, 2, lambda n: f'bag_{n}.mcap')
     (bag / 'metadata.yaml').write_bytes(text.encode('latin-1'))
     assert read(bag)[:2] == (given_, [])
     for file in bag.glob('*.mcap'):
         file.unlink()
-    with pytest.raises(BagError, match='not a bag that can be read: .*metadata.yaml') as caught:
+    with snapshot.raises(BagError) as caught:
         Recording(bag)
     assert '\n' not in str(caught.value)
 
@@ -962,9 +961,8 @@ def test_no_file_outside_of_the_folder_is_read(tmp_path: Path, snapshot: Snapsho
     for name in ('../outside.mcap', str(outside), 'link.mcap', 'sub/bag.mcap', 'sub', '.',
                  'pipe.mcap'):
         listed(bag, ['bag_0.mcap', name])
-        with pytest.raises(BagError) as caught:
+        with snapshot.raises(BagError):
             Recording(bag)
-        snapshot(caught.value)
     for name in ('circle.mcap', 'x' * 300, 'x/' * 3000):
         listed(bag, ['bag_0.mcap', name])
         try:
@@ -978,12 +976,12 @@ def test_no_file_outside_of_the_folder_is_read(tmp_path: Path, snapshot: Snapsho
     assert read(tmp_path / 'named').messages == given_
 
 
-def test_paths_that_are_not_files(tmp_path: Path) -> None:
+def test_paths_that_are_not_files(tmp_path: Path, snapshot: Snapshot) -> None:
     os.mkfifo(tmp_path / 'pipe.mcap')
     (tmp_path / 'circle').symlink_to(tmp_path / 'circle')
     for path in (tmp_path / 'pipe.mcap', tmp_path / 'circle', tmp_path / 'none', tmp_path,
                  tmp_path / ('x' * 300), tmp_path / '\0'):
-        with pytest.raises(BagError, match='not a bag that can be read'):
+        with snapshot.raises(BagError):
             Recording(path)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from checked_results import checked
 import numpy as np
 import pytest
+from snapshot import Snapshot
 
 from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics.frames import rotation as rotations
@@ -19,6 +20,8 @@ from stewart_dynamics.mechanics.singularity_warning import Singularity
 from stewart_dynamics.reference_motion.motion import motion_at, sample_time, sample_times
 from stewart_dynamics.reference_motion.multisine import multisine
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+
+PROGRAM = 'stewart_trajectory'
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
 FILES = sorted(CONFIG.glob('trajectory_*.yaml'))
@@ -192,8 +195,8 @@ def test_loop_runs_back_the_same_way(name: str) -> None:
     np.testing.assert_allclose(motion_at(p, times + 60.0).rows, forth.rows, atol=1e-13)
 
 
-def test_times_that_are_not_finite_are_rejected() -> None:
-    with pytest.raises(MotionError, match='must be finite'):
+def test_times_that_are_not_finite_are_rejected(snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         motion_at(parameters('quintic'), [0.0, np.nan])
 
 
@@ -220,27 +223,21 @@ def test_samples_are_spaced_exactly() -> None:
     assert sample_time(parameters('sine', rate=3.0), 3_000_001) == 1_000_000_333_333_333
 
 
-@pytest.mark.parametrize(('name', 'changes', 'text'), [
-    ('paper', {'motion.final': None}, 'motion.final: missing, motion.type paper needs it'),
-    ('paper', {'motion.initial': None}, 'motion.initial: missing'),
-    ('paper', {'motion.type': 'cubic'},
-     'must be one of paper, quintic, sine, fourier, response, hold'),
-    ('paper', {'motion.duration': 0.0}, 'must be more than 0'),
-    ('paper', {'output': 'both'}, 'must be one of separate, combined'),
-    ('fourier', {'motion.fourier.cosine': [0.1] * 7},
-     r'motion.fourier.cosine: .* must have 6 n entries, has 7'),
-    ('fourier', {'motion.fourier.cosine': 0.1},
-     'motion.fourier.cosine: 0.1 m, rad: must be an array of 6'),
-    ('fourier', {'motion.fourier.cosine': [0.1] * 18},
-     'sine: 12 entries: must be as many as of motion.fourier.cosine, 18'),
-    ('fourier', {'motion.fourier.cosine': None, 'motion.fourier.sine': []},
-     'cosine, motion.fourier.sine: missing, motion.type fourier '),
-    ('fourier', {'motion.fourier.fade': 1.6},
-     'fade: 1.6 s: must be at most half of motion.duration, 1.5 s'),
-    ('fourier', {'motion.fourier.fade': 0.0}, 'fade: 0.0 s: must be more than 0'),
-    ('fourier', {'motion.fourier.frequency': 0.0}, 'frequency: 0.0 Hz: must be at least 1e-06')])
-def test_a_broken_rule_is_named(name: str, changes: dict[str, object], text: str) -> None:
-    with pytest.raises(ParameterError, match=text):
+@pytest.mark.parametrize(('name', 'changes'), [
+    ('paper', {'motion.final': None}),
+    ('paper', {'motion.initial': None}),
+    ('paper', {'motion.type': 'cubic'}),
+    ('paper', {'motion.duration': 0.0}),
+    ('paper', {'output': 'both'}),
+    ('fourier', {'motion.fourier.cosine': [0.1] * 7}),
+    ('fourier', {'motion.fourier.cosine': 0.1}),
+    ('fourier', {'motion.fourier.cosine': [0.1] * 18}),
+    ('fourier', {'motion.fourier.cosine': None, 'motion.fourier.sine': []}),
+    ('fourier', {'motion.fourier.fade': 1.6}),
+    ('fourier', {'motion.fourier.fade': 0.0}),
+    ('fourier', {'motion.fourier.frequency': 0.0})])
+def test_a_broken_rule_is_named(name: str, changes: dict[str, object], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         parameters(name, **changes)
 
 
@@ -338,28 +335,27 @@ def test_the_motion_response_has_low_peaks() -> None:
             1.0, rel=2e-3)
 
 
-@pytest.mark.parametrize(('changes', 'words'), [
-    ({'motion.response.params_file': ''}, 'motion.amplitude: missing: motion.type response needs'),
-    ({'motion.amplitude': [0.01] * 6}, 'both given: motion.type response needs one of them'),
-    ({'motion.response.periods': 2.5}, 'periods: 2.5: must be a whole number'),
-    ({'motion.response.highest_frequency': 30.0}, '30.0 Hz: must be at most a quarter of rate'),
-    ({'motion.response.period': 0.1}, 'must be at least 2, at most 2000'),
-    ({'motion.response.period': 10.005}, '10.005 s: times rate, 100.0 Hz, must be a whole')])
+@pytest.mark.parametrize('changes', [
+    {'motion.response.params_file': ''},
+    {'motion.amplitude': [0.01] * 6},
+    {'motion.response.periods': 2.5},
+    {'motion.response.highest_frequency': 30.0},
+    {'motion.response.period': 0.1},
+    {'motion.response.period': 10.005}])
 def test_a_motion_response_that_breaks_a_rule_is_rejected(
-        changes: dict[str, object], words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
+        changes: dict[str, object], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         ReferenceMotionParameters({**RESPONSE, **changes})
 
 
-@pytest.mark.parametrize(('given', 'words'), [
-    ({'limits.velocity_max': None, 'limits.force_max': None},
-     'limits.velocity_max, limits.force_max: missing: the motion response needs them'),
-    ({'limits.length_max': 1.0},
-     r'motion.initial: \[0, 0, 1.1, .*: is not within the limits of the hexapod')])
+@pytest.mark.parametrize('given', [
+    {'limits.velocity_max': None, 'limits.force_max': None},
+    {'limits.length_max': 1.0}])
 def test_a_hexapod_whose_limits_do_not_bound_a_motion_is_named(
-        given: dict[str, object], words: str, platform: StewartPlatform, tmp_path: Path) -> None:
+        given: dict[str, object], platform: StewartPlatform, tmp_path: Path,
+        snapshot: Snapshot) -> None:
     path = tmp_path / 'hexapod.yaml'
     platform.parameters.replaced(given).to_yaml(path)
     p = ReferenceMotionParameters({**RESPONSE, 'motion.response.params_file': str(path)})
-    with pytest.raises(ParameterError, match=words):
+    with snapshot.raises(ParameterError):
         sample_times(p)

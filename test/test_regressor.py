@@ -14,6 +14,7 @@ from referees import (
     derivative, PinocchioReferee, QUARTER_TURN,
     random_base_motion, random_motion, random_parameters, rng, rotation_about,
     symmetric_parameters)
+from snapshot import Snapshot
 
 from stewart_dynamics import (
     BaseMotion, Motion, MotionError, ParameterError, Parameters, SingularityError, StewartPlatform)
@@ -136,13 +137,13 @@ def test_names_of_the_legs_are_the_file_s() -> None:
     assert names[OFFSET][5] == 'effort_offset.f'
 
 
-def test_singular_and_wrong_motions_are_rejected() -> None:
+def test_singular_and_wrong_motions_are_rejected(snapshot: Snapshot) -> None:
     platform = StewartPlatform(symmetric_parameters())
-    with pytest.raises(SingularityError, match='sample 0: J_inv cannot be solved'):
+    with snapshot.raises(SingularityError):
         platform.regressor(Motion([[0.0, 0.0, 1.0]], [QUARTER_TURN]))
     with pytest.raises(MotionError):
         platform.regressor(Motion([0.0, 0.0, 1.0], np.eye(3), [1e200, 0.0, 0.0]))
-    with pytest.raises(MotionError, match='must be a Motion'):
+    with snapshot.raises(MotionError):
         platform.regressor(3)  # type: ignore[arg-type]
 
 
@@ -154,7 +155,7 @@ def test_parameters_come_back_from_their_linear_form(hexapod: int) -> None:
         np.testing.assert_allclose(value, p[name], rtol=1e-9, atol=1e-12, err_msg=name)
 
 
-def test_inconsistent_inertia_is_rejected() -> None:
+def test_inconsistent_inertia_is_rejected(snapshot: Snapshot) -> None:
     p = random_parameters(rng(9))
     theta = linear_parameters(p)
 
@@ -163,11 +164,9 @@ def test_inconsistent_inertia_is_rejected() -> None:
         other[at] = value
         return other
 
-    for at, value, text in ((0, 0.0, 'platform.mass: 0 kg: must be more than 0'),
-                            (PISTON_MASS.start + 2, -1.0, 'legs.piston of leg_3: mass -1 kg'),
-                            (CYLINDER_MASS.start, 0.0, 'legs.cylinder of leg_1: mass 0 kg'),
-                            (PISTON_SECOND.start + 5, 1e-6, 'legs.piston of leg_6')):
-        with pytest.raises(ParameterError, match=text):
+    for at, value in ((0, 0.0), (PISTON_MASS.start + 2, -1.0), (CYLINDER_MASS.start, 0.0),
+                      (PISTON_SECOND.start + 5, 1e-6)):
+        with snapshot.raises(ParameterError):
             parameter_values(changed(at, value), p)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import rclpy
 from running import own_domain, PLATFORM, ROOT
+from snapshot import Snapshot
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 
 SECONDS = 0.6
@@ -93,13 +94,13 @@ def test_a_platform_that_is_turned_in_the_world_stays_so(demo: ModuleType) -> No
         np.testing.assert_allclose(base.rotation @ setpoint.rotation, target.rotation, atol=1e-14)
 
 
-@pytest.mark.parametrize('option, value, said', [
-    ('--params', 'nowhere.yaml', 'nowhere.yaml'),
-    ('--ship', 'large', 'the legs would exceed limits.'),
-    ('--ship', 'nowhere.yaml', 'nowhere.yaml')])
+@pytest.mark.parametrize('option, value', [
+    ('--params', 'nowhere.yaml'),
+    ('--ship', 'large'),
+    ('--ship', 'nowhere.yaml')])
 def test_a_run_with_bad_options_is_rejected_in_one_line(
-        demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
-        value: str, said: str) -> None:
+        demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str, value: str,
+        snapshot: Snapshot) -> None:
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):
         monkeypatch.setenv(name, '1')  # main sets missing ones
     if value == 'large':
@@ -113,4 +114,4 @@ def test_a_run_with_bad_options_is_rejected_in_one_line(
     assert isinstance(line, str)
     assert line.startswith('demo-ship: ')
     assert '\n' not in line
-    assert said in line
+    snapshot(line)

@@ -15,6 +15,7 @@ from rclpy.serialization import deserialize_message
 from referees import rotation_about
 from sensor_msgs.msg import Imu
 from simulated import simulated
+from snapshot import Snapshot
 
 from stewart_dynamics import BaseMotion, Motion, ParameterError
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
@@ -190,20 +191,17 @@ def test_the_message_is_what_ros_reads(frame: str) -> None:
 
 # Parameters
 
-@pytest.mark.parametrize('changes, said', [
-    ({'base_motion__source': 'swell'}, "base_motion.source: 'swell': must be one of fixed, "
-     'topics'),
-    ({'base_motion__amplitude': [1e300] + [0.0] * 5}, 'base_motion.amplitude'),
-    ({'base_motion__sea__peak_period': 0.0}, 'base_motion.sea.peak_period: 0.0 s: must be at'),
-    ({'base_motion__source': 'sine', 'imu__rate': 300.0},
-     'imu.rate: 300.0 Hz: rate, 1000 Hz, must be a whole multiple of it, not 3.33333'),
-    ({'base_motion__source': 'sine', 'imu__rate': 4000.0}, 'imu.rate: 4000.0 Hz: rate'),
-    ({'imu__noise__specific_force': -1.0}, 'imu.noise.specific_force: -1.0 m/s^2: must be at')],
+@pytest.mark.parametrize('changes', [
+    {'base_motion__source': 'swell'},
+    {'base_motion__amplitude': [1e300] + [0.0] * 5},
+    {'base_motion__sea__peak_period': 0.0},
+    {'base_motion__source': 'sine', 'imu__rate': 300.0},
+    {'base_motion__source': 'sine', 'imu__rate': 4000.0},
+    {'imu__noise__specific_force': -1.0}],
     ids=str)
-def test_a_broken_rule_is_named(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(ParameterError) as info:
+def test_a_broken_rule_is_named(changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         on(**changes)
-    assert said in str(info.value)
 
 
 def test_the_rate_of_the_imu_is_free_where_the_base_is_fixed() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from referees import (
     random_motion, random_parameters, random_wrench, rng, ROOT)
+from snapshot import Snapshot
 
 from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.single_sample import SingleSample
@@ -147,12 +148,13 @@ def test_samples_of_arrays_and_of_lists_are_the_same(motion: Motion) -> None:
 
 
 @pytest.mark.parametrize('off', [0.85e-6, 0.95e-6, 1.05e-6])
-def test_a_rotation_is_accepted_up_to_the_same_tolerance_by_both_ways(off: float) -> None:
+def test_a_rotation_is_accepted_up_to_the_same_tolerance_by_both_ways(
+        off: float, snapshot: Snapshot) -> None:
     rotation = np.eye(3)
     rotation[0, 1] = off
     if off < 1e-6:
         assert Pose(np.zeros(3), rotation) == Pose([0.0] * 3, rotation.tolist())
     else:
         for at in (np.zeros(3), [0.0] * 3):
-            with pytest.raises(MotionError, match='is not a rotation'):
+            with snapshot.raises(MotionError):
                 Pose(at, rotation)

@@ -27,8 +27,6 @@ from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
 from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 
-PROGRAM = 'library'
-
 Array = NDArray[np.float64]
 
 EXAMPLE = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
@@ -67,7 +65,8 @@ def test_a_motion_is_accepted_in_place_of_a_pose(platform: StewartPlatform) -> N
 @pytest.mark.parametrize('given', [
     None, {'position': 1}, [[0.0, 0.0, 1.0], np.eye(3)], np.zeros(24), 'pose', 1.0, 1 + 2j,
     Motion, (np.zeros(3), np.eye(3))], ids=str)
-def test_other_types_are_rejected(platform: StewartPlatform, given: Any) -> None:
+def test_other_types_are_rejected(
+        platform: StewartPlatform, given: Any, snapshot: Snapshot) -> None:
     for call in (platform.inverse_kinematics, platform.inverse_jacobian, platform.mass_matrix,
                  platform.gravity_vector, platform.inverse_dynamics, platform.force_breakdown,
                  platform.coriolis_matrix, platform.inverse_jacobian_rate,
@@ -77,15 +76,15 @@ def test_other_types_are_rejected(platform: StewartPlatform, given: Any) -> None
                  lambda at: platform.forward_kinematics(np.ones(6), '' if at is None else at),
                  lambda at: platform.stiffness(at, 1e6),
                  lambda at: platform.natural_modes(at, 1e6)):
-        with pytest.raises(MotionError, match='^(pose|motion|guess): .* must be a (Pose|Motion)'):
+        with snapshot.raises(MotionError):
             call(given)
-    with pytest.raises(StewartError, match='must be Parameters; StewartPlatform.from_yaml'):
+    with snapshot.raises(StewartError):
         StewartPlatform(given)
 
 
 @pytest.mark.parametrize('given', [None, {}, EXAMPLE, 'config/platform.yaml'])
-def test_other_types_in_place_of_a_platform_are_rejected(given: Any) -> None:
-    with pytest.raises(MotionError, match='^platform: .*: must be a StewartPlatform'):
+def test_other_types_in_place_of_a_platform_are_rejected(given: Any, snapshot: Snapshot) -> None:
+    with snapshot.raises(MotionError):
         check_planned_trajectory(given, [0.0, 1.0], Motion([[0.0, 0.0, 1.1]] * 2, np.eye(3)))
 
 
@@ -93,9 +92,8 @@ def test_the_error_about_a_pose_in_place_of_a_motion_says_how_to_make_one(
         platform: StewartPlatform, snapshot: Snapshot) -> None:
     pose = Pose([0.0, 0.0, 1.0], np.eye(3))
     for call in (platform.inverse_dynamics, platform.inverse_jacobian_rate, platform.motors):
-        with pytest.raises(MotionError) as caught:
+        with snapshot.raises(MotionError):
             call(pose)
-        snapshot(caught.value)
 
 
 # Singular samples
@@ -104,13 +102,12 @@ def test_a_singular_sample_is_named_or_marked(snapshot: Snapshot) -> None:
     platform = StewartPlatform(symmetric_parameters())
     motion = passing_a_singularity()
     for call in (platform.inverse_dynamics, platform.force_breakdown):
-        with pytest.raises(SingularityError, match=r'^sample \[1, 1\]: J_inv cannot be solved'):
+        with snapshot.raises(SingularityError):
             call(motion)
-        with pytest.raises(SingularityError, match='^sample 1: '):
+        with snapshot.raises(SingularityError):
             call(motion[1])
-        with pytest.raises(MotionError) as caught:
+        with snapshot.raises(MotionError):
             call(motion, singular='skip')
-        snapshot(caught.value)
     bad = np.zeros((2, 3), dtype=bool)
     bad[1, 1] = True
     result = platform.inverse_dynamics(motion, singular='nan')
@@ -202,18 +199,17 @@ def test_natural_modes_of_a_platform_on_vertical_legs_are_the_closed_form() -> N
     assert repr(modes).endswith(' Hz>')
 
 
-@pytest.mark.parametrize(('given', 'text'), [
-    (0.0, '0 N/m: must be more than 0'), ([1e6] * 5 + [-1.0], '-1 N/m: must be more than 0'),
-    ([1e6] * 5, 'leg_stiffness: shape (5,)'), (np.inf, 'must be finite'),
-    ('stiff', 'not an array of real numbers'), (None, 'not an array of real numbers'),
-    (np.full((4, 6), 1e6), 'pose (3,), leg_stiffness (4,)')])
+@pytest.mark.parametrize('given', [
+    0.0, [1e6] * 5 + [-1.0],
+    [1e6] * 5, np.inf,
+    'stiff', None,
+    np.full((4, 6), 1e6)])
 def test_an_invalid_stiffness_is_rejected(
-        platform: StewartPlatform, given: Any, text: str) -> None:
+        platform: StewartPlatform, given: Any, snapshot: Snapshot) -> None:
     poses = random_motion(platform.parameters, rng(), 3).pose
     for call in (platform.stiffness, platform.natural_modes):
-        with pytest.raises(MotionError) as caught:
+        with snapshot.raises(MotionError):
             call(poses, given)
-        assert text in str(caught.value)
 
 
 # Home, likely mistakes, representation
@@ -234,9 +230,8 @@ def test_home_has_the_mean_leg_halfway_between_its_limits() -> None:
     {'limits.length_min': (), 'limits.length_max': (), 'geometry.zero_length': 0.0},
     {'limits.length_min': 0.01, 'limits.length_max': 0.02}])
 def test_an_unknown_home_is_an_error(changes: dict[str, Any], snapshot: Snapshot) -> None:
-    with pytest.raises(ParameterError) as caught:
+    with snapshot.raises(ParameterError):
         StewartPlatform(EXAMPLE.replaced(changes, 'a.yaml')).home_pose()
-    snapshot(caught.value)
 
 
 def test_check_returns_the_likely_mistakes(snapshot: Snapshot) -> None:
@@ -401,12 +396,10 @@ def test_results_are_drawn_where_matplotlib_is_installed(
         lines = each.get_lines()
         assert np.array_equal(lines[0].get_xdata(), times)
         assert np.array_equal(np.stack([line.get_ydata() for line in lines], axis=-1), values)
-    with pytest.raises(MotionError) as caught:
+    with snapshot.raises(MotionError):
         result.plot([0.0, 0.1])
-    snapshot(caught.value)
-    with pytest.raises(MotionError) as caught:
+    with snapshot.raises(MotionError):
         ON_EXAMPLE.inverse_dynamics(Motion(position[0], np.eye(3))).plot()
-    snapshot(caught.value)
     monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
     with pytest.raises(ModuleNotFoundError, match='plot: matplotlib is not installed: pip'):
         result.plot()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from referees import random_motion, relative, rng
 from scipy.optimize import linprog
+from snapshot import Snapshot
 
 from stewart_dynamics import Capability, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import MotionError
@@ -80,12 +81,12 @@ def test_the_payload_is_that_of_a_linear_program() -> None:
         assert relative(np.array([found.payload.value]), solved.x) < 1e-9
 
 
-def test_what_has_no_limit_is_not_answered_and_a_wrong_leg_rejected() -> None:
+def test_what_has_no_limit_is_not_answered_and_a_wrong_leg_rejected(snapshot: Snapshot) -> None:
     free = Capability(StewartPlatform(FILE.replaced({
         'limits.force_max': None, 'limits.velocity_max': None})))
     found = free.stuck_leg(PLATFORM.home_pose(), 2)
     assert (found.velocity, found.load, found.payload) == (None, None, None)
     assert found.motions.shape == (5, 6) and found.lost.shape == (6,)
     for leg in (6, -1, 1.0):
-        with pytest.raises(MotionError, match='leg: .*: must be an index from 0 to 5'):
+        with snapshot.raises(MotionError):
             CAPABILITY.stuck_leg(PLATFORM.home_pose(), leg)  # type: ignore[arg-type]

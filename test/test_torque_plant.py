@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from referees import relative, rng, rotation_about
 from simulated import random_simulated, simulated
+from snapshot import Snapshot
 from stewart_dynamics import Motion, ParameterError, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
@@ -19,6 +20,8 @@ from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant, PlantState
 from test_drives import driven
 from test_plant import motion_of, ZERO
+
+PROGRAM = 'stewart_simulator'
 
 
 def plants(p: SimulatorParameters) -> tuple[Plant, Plant]:
@@ -125,11 +128,10 @@ def test_torques_saturate_at_what_is_available() -> None:
     assert motion_of(state).position[2] < 1.1
 
 
-@pytest.mark.parametrize(('changes', 'text'), [
-    ({'commands': 'torque'}, 'commands: torque: needs drive.*'),
-    ({'commands': 'torque', 'actuator.screw_lead': 0.01, 'drive.efficiency': 0.4},
-     'a self-locking screw can be simulated with commanded forces only'),
-    ({'commands': 'speed'}, 'must be one of force, torque')])
-def test_rules(changes: dict[str, Any], text: str) -> None:
-    with pytest.raises(ParameterError, match=text.replace('*', '.')):
+@pytest.mark.parametrize('changes', [
+    {'commands': 'torque'},
+    {'commands': 'torque', 'actuator.screw_lead': 0.01, 'drive.efficiency': 0.4},
+    {'commands': 'speed'}])
+def test_rules(changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
         simulated().replaced(changes)
