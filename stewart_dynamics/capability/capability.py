@@ -31,6 +31,7 @@ from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, wrong_type)
 from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, PLATFORM, with_point_mass)
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
@@ -716,29 +717,22 @@ class Capability:
         constant, backward = (
             self._frictionless.inverse_dynamics(Motion.of_rows(each), wrench, base).forces
             for each in (still, back))
-        p, rates = self.platform.parameters, self.platform.drive_rates(rows, solved.rates)
-        linear = (solved.forces - backward) / 2.0 + p['actuator.viscous_friction'] * rates
+        friction = Friction.of(self.platform.parameters)
+        rates = self.platform.drive_rates(rows, solved.rates)
+        linear = (solved.forces - backward) / 2.0 + friction.viscous * rates
         square = (solved.forces + backward) / 2.0 - constant
-        coulomb, band = p['actuator.coulomb_friction'], p['actuator.coulomb_velocity']
-        with np.errstate(divide='ignore'):
-            knee = band / np.abs(rates)
-        sign = np.sign(rates)
-        # (forces by powers of k, direction of the drive, begin, end)
-        pieces = (
-            ((constant, linear + coulomb * rates / band, square), 0.0 * sign,
-             np.zeros(()), knee),
-            ((constant + coulomb * sign, linear, square), sign, knee, np.full((), math.inf)))
         found: list[tuple[Array, Any]] = []
-        for forces, direction, begin, end in pieces:
+        for piece in friction.coulomb_by_speed(rates):
+            forces = constant + piece.constant, linear + piece.linear, square
             if strongest is not None:
-                found.append((quadratic_exit(forces, strongest, begin, end),
+                found.append((quadratic_exit(forces, strongest, piece.begin, piece.end),
                               limits.short_name(limits.FORCE_MAX)))
             if self._motors is not None and torques:
                 motors = self._motors.moving(rows, solved.rows)
                 none = np.zeros(6)
                 found.append(self._motors.exits(
                     (*forces[:2], forces[2] - motors.inertial), (none, none, motors.own),
-                    motors.speeds, direction, begin, end, growing=True))
+                    motors.speeds, piece.direction, piece.begin, piece.end, growing=True))
         return found
 
     def _held(self, pose: Pose | Motion, motion: Motion | None = None) -> Motion:
@@ -805,7 +799,7 @@ class Capability:
             accelerated[..., ACCELERATION] += directions
             more = bounds.moving(accelerated, solved.rows)
         rates = self.platform.drive_rates(rows, solved.rates)
-        slow = np.abs(rates) < self.platform.parameters['actuator.coulomb_velocity']
+        slow = Friction.of(self.platform.parameters).is_linear(rates)
         return bounds.exits(
             (forces - motors.inertial, change - (more.inertial - motors.inertial), none),
             (motors.own, more.own - motors.own, none), motors.speeds,

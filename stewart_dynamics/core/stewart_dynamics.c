@@ -126,12 +126,16 @@ static leg_pose pose_of(const stewart_leg * leg, const real position[3], const r
 
 typedef struct { vector force, moment; } load;  /* moment about the platform's origin */
 
+/* Return Coulomb friction by its full force at a rate: -1 to 1, linear below coulomb_velocity. */
+static real slip_at(real rate, double coulomb_velocity) {
+  real slip = rate / coulomb_velocity;
+  return choose(slip < -1.0, number(-1.0), choose(slip > 1.0, number(1.0), slip));
+}
+
 /* Return the force that moves an actuator at a rate and an acceleration of its drive. */
 static real move_actuator(const stewart_leg * leg, real rate, real acceleration) {
-  real slip = rate / leg->coulomb_velocity;
-  slip = choose(slip < -1.0, number(-1.0), choose(slip > 1.0, number(1.0), slip));
   return leg->reflected_mass * acceleration + leg->viscous_friction * rate +
-    leg->coulomb_friction * slip;
+    leg->coulomb_friction * slip_at(rate, leg->coulomb_velocity);
 }
 
 /* Return the load that moves leg i; write its length, its rate, the force that moves its actuator,
@@ -728,6 +732,12 @@ int stewart_step(
 
 /* ---- motors --------------------------------------------------------------------------------- */
 
+/* Return the torque of a screw by that of an ideal one: losses are friction in proportion to the
+   load. Arguments: power that the load takes, slip, and losses of the motor that drives or is
+   driven. */
+static double torque_factor(double power, double slip, double driving, double driven)
+{return 1.0 + (power > 0.0 ? driving : driven) * fabs(slip);}
+
 int stewart_motor_torques(
   const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
   stewart_motors * motors) {
@@ -742,10 +752,11 @@ int stewart_motor_torques(
     found.speeds[i] = ratio * rate;
     found.accelerations[i] = ratio * drive.acceleration;
     double through = forces[i] - leg->reflected_mass * drive.acceleration;  /* the screw */
-    double slip = fabs(rate) / leg->coulomb_velocity;
-    double loss = through * rate > 0.0 ? 1.0 / leg->efficiency : leg->back_driving_efficiency;
+    double factor = torque_factor(
+      through * rate, slip_at(rate, leg->coulomb_velocity), 1.0 / leg->efficiency - 1.0,
+      leg->back_driving_efficiency - 1.0);
     found.torques[i] = leg->reflected_mass / ratio / ratio * found.accelerations[i] +
-      through / ratio * (1.0 + (loss - 1.0) * (slip > 1.0 ? 1.0 : slip));
+      through / ratio * factor;
   }
   if (!all_finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
   *motors = found;

@@ -37,6 +37,7 @@ from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds
 from stewart_dynamics.mechanics.drives.motors import Drives
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, Pose
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
@@ -150,7 +151,7 @@ class Governor:
             limits[field] = (1.0 - part) * bounds.get(name, np.full(6, math.inf))
         limits['length_min'] = bounds.get(LENGTH_MIN, 0.0)
         # Friction changes its sign where a leg reverses between two samples.
-        limits['force_max'] -= 2.0 * parameters['actuator.coulomb_friction']
+        limits['force_max'] -= Friction.of(parameters).largest_change
         margin = _OF_STROKE * _stroke(parameters)
         limits['length_min'] += margin
         limits['length_max'] -= margin

@@ -19,6 +19,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.drives.motor_limits import force_limits, rate_limits
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX
 from stewart_dynamics.mechanics.rows import (
     BASE_ANGULAR_VELOCITY, CONDITION, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
@@ -51,9 +52,7 @@ class Sampling:
         self._tolerance = tolerance
         self._arm = arm = float(parameters['singularity.characteristic_length'])
         self._limits = Limits(parameters)
-        self._viscous = parameters['actuator.viscous_friction']
-        self._coulomb = parameters['actuator.coulomb_friction']
-        self._coulomb_velocity = parameters['actuator.coulomb_velocity']
+        self._friction = Friction.of(parameters)
         self._reflected = parameters['actuator.reflected_mass']
         self._parameters = parameters
         # Rates above which a leg or its motor may exceed a limit.
@@ -125,12 +124,12 @@ class Sampling:
         """Return the number of parts that the forces need (N,)."""
         magnitudes = np.abs(results[:, FORCES])
         rate_deviation = self._rate_deviation(durations, bounds, inverse_radius)
-        deviation = self._viscous * rate_deviation + self._inertia_deviation(
+        deviation = self._friction.viscous * rate_deviation + self._inertia_deviation(
             durations, bounds, inverse_radius, results, bases)
         # Coulomb friction changes where a rate is, or may come, near zero.
-        changes = (_smaller(np.abs(rates)) - rate_deviation < self._coulomb_velocity) | (
+        changes = (_smaller(np.abs(rates)) - rate_deviation < self._friction.coulomb_velocity) | (
             rates[:-1] * rates[1:] < 0.0)
-        friction = np.where(changes, 2.0 * self._coulomb, 0.0)
+        friction = np.where(changes, self._friction.largest_change, 0.0)
         strongest = self._limits.force_max
         if self._parameters.drives:
             # Losses in the screw change there as well. A curve may end at zero.
