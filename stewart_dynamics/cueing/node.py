@@ -5,17 +5,13 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from sensor_msgs.msg import Imu, JointState
@@ -24,10 +20,9 @@ from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.cueing.motion_cueing import CueingStream, MotionCueing
 from stewart_dynamics.cueing.parameters import CueingParameters
 from stewart_dynamics.cueing.vehicle import Vehicle
-from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import quaternion_of
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.limits import short_name
 from stewart_dynamics.mechanics.rows import MOTION, ROTATION, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -36,11 +31,9 @@ from stewart_dynamics.messages.joint_state import JointStateError, JointStateRea
 from stewart_dynamics.messages.setpoint import ImuWriter
 from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, OK, Status, WARN
 from stewart_dynamics.node.publishers_at_rate import diagnostic_array
-from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned.approach import approach
-from stewart_dynamics.ros.declared_parameters import changed, declare_parameters, log_changes
-from stewart_dynamics.ros.rclpy_workarounds import answer_impossible_transitions
-from stewart_dynamics.ros.repeated_log import RepeatedLog
+from stewart_dynamics.ros.due_periods import DuePeriods
+from stewart_dynamics.ros.managed_node import ManagedNode
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
 from stewart_dynamics.setpoints.inputs import VEHICLE
@@ -50,13 +43,12 @@ FELT, DIAGNOSTICS, MEASURED_LEGS = 'felt', '/diagnostics', 'measured_legs'
 _TICK = 0.2  # between two looks at the input [s]
 _TICKS_A_REPORT = 5
 _FADE = 1.0  # in which the motion of the vehicle fades in, or out [s]
-_BACKLOG = 100_000_000  # time that is skipped where it is longer [ns]
 _REST = 1e-4  # velocity of a platform at rest [m/s, rad/s]
 _LONGEST_STOP = 5.0  # [s]
 _AWAY = 1e-3  # legs this near to their lengths at home need no approach [m]
 
 
-class CueingNode(LifecycleNode):
+class CueingNode(ManagedNode[CueingParameters]):
     """
     Moves the platform as the motion of the vehicle demands, within its limits.
 
@@ -64,44 +56,16 @@ class CueingNode(LifecycleNode):
     """
 
     def __init__(self) -> None:
-        super().__init__(
-            CueingParameters.node, automatically_declare_parameters_from_overrides=True,
-            allow_undeclared_parameters=True)
-        self._settings = declare_parameters(self, CueingParameters)
-        self._log = RepeatedLog(self.get_logger())
+        super().__init__(CueingParameters)
         self._rejections = Rejections(self._on_rejection)
-        self._active = self._configured = False
         self._ours: list[Any] = []  # publishers, subscriptions and timers while configured
         self._last: Array | None = None  # the last setpoint
-        self.add_on_set_parameters_callback(self._on_set_parameters)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        answer_impossible_transitions(
-            self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
-        self._starting = self._settings['autostart']
-        if self._starting:
-            if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
-                raise StewartError(f'cannot be configured: {self._fault}')
-            self._starting = False
-            self.trigger_activate()
-        else:
-            self.get_logger().info('unconfigured: autostart is false')
+        self.start()
 
     # -- lifecycle --------------------------------------------------------------------------
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make the filters and open the topics."""
-        try:
-            self._configure()
-        except Exception as exc:
-            # rclpy turns an exception in a transition into ERROR and logs nothing.
-            self._fault = ' '.join(f'{type(exc).__name__}: {exc}'.split())
-            if not self._starting:  # else the program ends with this text
-                self.get_logger().error(f'cannot be configured: {self._fault}')
-            self._close()
-            return TransitionCallbackReturn.FAILURE
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def begin_work(self) -> None:
         """Begin with the approach to the home pose."""
         self._vehicle = Vehicle(self._settings, self._rejections, self._on_notice)
         self._stream: CueingStream | None = None
@@ -110,40 +74,15 @@ class CueingNode(LifecycleNode):
         self._held: dict[str, float] = {}
         self._ticks = 0
         self._due = 0  # index of the next setpoint, from the begin
-        self._begin: int | None = None  # by the steady clock [ns]
+        self._periods = DuePeriods(
+            self._settings['cueing.rate'], lambda text: self._on_notice(f'late: {text}'))
         self._activated = time.monotonic()
-        self._active = True
         if self._last is not None:
             self._start_from(Motion.of_rows(self._last))
-        return TransitionCallbackReturn.SUCCESS
 
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Bring the platform to rest, and publish no more setpoints."""
-        self._end_motion()
-        self._log.write_last()
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Close the topics."""
-        self._close()
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Bring the platform to rest and close the topics."""
-        self._end_motion()
-        self._close()
-        return TransitionCallbackReturn.SUCCESS
-
-    def destroy_node(self) -> None:
-        """Bring the platform to rest, and end."""
-        self._end_motion()
-        self._log.write_last()
-        super().destroy_node()
-
-    def _configure(self) -> None:
+    def open_topics(self) -> None:
+        """Make the filters and open the topics."""
         p = self._settings
-        for mistake in likely_mistakes(p):
-            self.get_logger().warning(mistake)
         self._cueing = MotionCueing(p)
         self._setpoints = SetpointPublisher(self, p['target'], p['output'], p['base_frame'])
         qos = QoSProfile(depth=1000)
@@ -161,17 +100,11 @@ class CueingNode(LifecycleNode):
             (self.destroy_timer, self.create_timer(_TICK, self._on_tick, clock=self._steady)),
             *((self.destroy_publisher, each) for each in (
                 self._felt, self._diagnostics, *self._setpoints.publishers))]
-        self._configured = True
         self.get_logger().info(
             f'motion cueing at {p["cueing.rate"]:g} Hz to {p["target"]}, '
             + ('within the limits of the hexapod' if p['cueing.govern'] else 'not governed'))
-        # The objects that exist now stay: see DynamicsNode.
-        gc.unfreeze()
-        gc.collect()
-        gc.freeze()
 
-    def _close(self) -> None:
-        self._configured = False
+    def close_topics(self) -> None:
         for destroy, each in self._ours:
             destroy(each)
         self._ours = []
@@ -184,7 +117,7 @@ class CueingNode(LifecycleNode):
 
     def _on_legs(self, data: bytes) -> None:
         """Start the approach from where the platform stands."""
-        if not self._active or self._begin is not None:
+        if not self._active or self._periods.begun:
             return
         platform = StewartPlatform(self._settings)
         try:
@@ -211,7 +144,7 @@ class CueingNode(LifecycleNode):
         self._go()
 
     def _go(self) -> None:
-        self._begin, self._stamp = time.monotonic_ns(), self.get_clock().now().nanoseconds
+        self._periods.begin(self.get_clock().now().nanoseconds)
         self._due = 0
         self._stream = self._cueing.stream()
 
@@ -219,25 +152,14 @@ class CueingNode(LifecycleNode):
 
     def _on_time(self) -> None:
         """Publish the setpoints that are due, each with its own stamp."""
-        if not self._active or self._begin is None:
-            return
-        late = time.monotonic_ns() - self._begin - self._time_of(self._due)
-        if late > _BACKLOG:
-            self._begin += late
-            self._stamp += late
-            self._on_notice(f'late: fell behind by {late / SECOND:.3f} s: that time is skipped')
-        while self._time_of(self._due) <= time.monotonic_ns() - self._begin:
-            self._publish_next()
-
-    def _time_of(self, index: int) -> int:
-        """Return the time of a setpoint from the begin on [ns]; rounding does not add up."""
-        rate: float = self._settings['cueing.rate']
-        return round(index * SECOND / rate)
+        if self._active:
+            for _ in self._periods.due(self._due):
+                self._publish_next()
 
     def _publish_next(self) -> None:
         at, stream = self._due, self._stream
         assert stream is not None  # made before the first setpoint
-        stamp = self._stamp + self._time_of(at)
+        stamp = self._periods.stamp_of(at)
         if at < len(self._approach):
             self._last = self._approach[at]
             felt = np.concatenate(self._cueing.felt(Motion.of_rows(self._last))).tolist()
@@ -261,7 +183,7 @@ class CueingNode(LifecycleNode):
         share = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
         self._presence = share
         x, y, z, *rates = vehicle.reading or (0.0, 0.0, gravity, 0.0, 0.0, 0.0)
-        stream.advance_by_one(1e-9 * self._time_of(self._due), (
+        stream.advance_by_one(1e-9 * self._periods.time_of(self._due), (
             share * x, share * y, gravity + share * (z - gravity), *(share * w for w in rates)))
 
     @property
@@ -269,17 +191,15 @@ class CueingNode(LifecycleNode):
         timeout: float = self._settings['vehicle_timeout']
         return timeout
 
-    def _end_motion(self) -> None:
+    def end_work(self) -> None:
         """Bring the platform to rest within its limits, an approach to its end."""
-        active, self._active = self._active, False
-        if not active or self._begin is None or self._stream is None:
+        if not self._periods.begun or self._stream is None:
             return
         self._stream.stop()
         end = time.monotonic() + _LONGEST_STOP
         while time.monotonic() < end and self._last is not None and (
                 self._due < len(self._approach) or np.abs(self._last[TWIST]).max() > _REST):
-            wait = self._time_of(self._due) - (time.monotonic_ns() - self._begin)
-            time.sleep(max(wait, 0) / SECOND)
+            time.sleep(max(self._periods.until(self._due), 0) / SECOND)
             self._publish_next()
 
     # -- diagnostics ------------------------------------------------------------------------
@@ -293,7 +213,7 @@ class CueingNode(LifecycleNode):
         self._vehicle.check(now)
         if self._vehicle.mistake and self._vehicle.mistake != mistake:
             self._log.write([LogLine(WARN, f'vehicle: {self._vehicle.mistake}', 'mistake')])
-        if self._begin is None and now - self._activated > self._settings['start_timeout']:
+        if not self._periods.begun and now - self._activated > self._settings['start_timeout']:
             self.get_logger().warning('no ~/measured_legs: starts at the home pose')
             self._go()
         self._ticks += 1
@@ -310,7 +230,7 @@ class CueingNode(LifecycleNode):
             self._held, shares = total, self._stream.shares
         period = _TICK * _TICKS_A_REPORT
         worst = max(held, key=held.__getitem__, default='')
-        if self._begin is None:
+        if not self._periods.begun:
             level, message = WARN, 'waits for ~/measured_legs'
         elif self._due < len(self._approach):
             message = 'approaches the home pose'
@@ -341,22 +261,14 @@ class CueingNode(LifecycleNode):
 
     # -- parameters -------------------------------------------------------------------------
 
-    def _on_set_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
-        """Change all of these parameters, blended into the motion, or reject all."""
-        ours = {change.name: change.value for change in changes if not is_of_ros(change.name)}
-        try:
-            parameters = changed(self._settings, ours, self._configured)
-            cueing = MotionCueing(parameters)
-            if self._active and self._stream is not None:
-                self._stream.use(cueing)
-        except ParameterError as exc:
-            return SetParametersResult(
-                successful=False, reason=str(exc).removeprefix('parameters: '))
-        self._log.write(log_changes(self._settings, parameters))
-        self._settings, self._cueing = parameters, cueing
+    def use_parameters(self, parameters: CueingParameters) -> None:
+        """Use changed parameters, blended into the motion."""
+        cueing = MotionCueing(parameters)
         if self._active:
+            if self._stream is not None:
+                self._stream.use(cueing)
             self._vehicle.kind = parameters['cueing.input']
-        return SetParametersResult(successful=True)
+        self._cueing = cueing
 
 
 def main() -> int:

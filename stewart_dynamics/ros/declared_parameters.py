@@ -37,13 +37,17 @@ _NUMBERS = (
 
 Kind = TypeVar('Kind', bound=ParameterSet)
 
+# Arguments of a node whose parameters are declared here. Undeclared parameters are allowed so that
+# our own check rejects them, with a better text.
+MADE_WITH: dict[str, Any] = {
+    'automatically_declare_parameters_from_overrides': True, 'allow_undeclared_parameters': True}
+
 
 def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     """
     Return the node's parameters, checked, and declare all of the table.
 
-    The node must have been made with ``automatically_declare_parameters_from_overrides``. Types
-    and ranges are left to the table's own check, whose texts are more precise than those of ROS.
+    The node must have been made with the arguments ``MADE_WITH``. Types and ranges are left to the table's own check, whose texts are more precise than those of ROS.
     A node without a lifecycle accepts no changes.
 
     Raises ParameterError where a rule is broken or a name unknown.
