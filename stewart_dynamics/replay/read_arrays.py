@@ -19,7 +19,7 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.bags.source_axes import axes_matrix
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.leg_curves import columns, data_frame
+from stewart_dynamics.mechanics.leg_columns import columns, data_frame
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import COMBINED, Parameters, POSES_ALONE, SEPARATE

@@ -41,7 +41,7 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
-from stewart_dynamics.mechanics.leg_curves import columns, figure, LEGS
+from stewart_dynamics.mechanics.leg_columns import columns, LEGS
 from stewart_dynamics.mechanics.limits import SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE
 from stewart_dynamics.mechanics.rows import FORCES
 from stewart_dynamics.parameters.table import Parameters
@@ -125,10 +125,8 @@ class Motors(NamedTuple):
 
         Arguments and errors are those of ``InverseDynamics.plot``.
         """
-        curves = {'speed [rad/s]': self.speeds, 'torque [N m]': self.torques,
-                  'current [A]': self.currents, 'power [W]': self.power}
-        known = {name: each for name, each in curves.items() if np.isfinite(each).any()}
-        return figure(known or curves, times, joints)
+        from stewart_dynamics.reporting.result_figures import figure_of_motors
+        return figure_of_motors(self, times, joints)
 
     def __repr__(self) -> str:
         """Return the shape, not the arrays."""
