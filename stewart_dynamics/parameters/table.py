@@ -18,13 +18,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import CONSTANTS
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.circles import (
     BODIES, circle_names, joints_of, without_other)
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.tolerances import (
-    HYSTERESIS, is_unit, REFLECTED_MASS_TOLERANCE, START_TOLERANCE, unit_rule)
+    is_unit, REFLECTED_MASS_TOLERANCE, START_TOLERANCE, unit_rule)
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -37,6 +38,7 @@ _FLAT = 1e-6
 NO_MASS = 1e-15
 """Mass of a platform in a cube on its radius that stands for none: forces are zero [kg/m^3]."""
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s^2]
+_HYSTERESIS = CONSTANTS['HYSTERESIS']
 
 
 def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:
@@ -319,12 +321,12 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'divided in the condition number; default: mean distance of the platform joints '
               'from their center', 'm', minimum=0.0, above=True),
     Parameter('singularity.warn_condition', 'double', 'condition number of J_inv at which the '
-              f'singularity warning begins; it ends below {HYSTERESIS:g} of this', '', 20.0,
+              f'singularity warning begins; it ends below {_HYSTERESIS:g} of this', '', 20.0,
               minimum=1.0,
               while_active=True),
     Parameter('singularity.stop_condition', 'double',
               'condition number at which singularity.action begins; it ends below '
-              f'{HYSTERESIS:g} of this', '',
+              f'{_HYSTERESIS:g} of this', '',
               100.0, minimum=1.0, while_active=True),
     Parameter('singularity.warn_time', 'double',
               'warn when the predicted time to a crossing of det(J) = 0 is shorter than this', 's',

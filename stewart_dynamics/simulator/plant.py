@@ -39,9 +39,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
-from stewart_dynamics.core.binding import function, record, Sample
+from stewart_dynamics.core.binding import CONSTANTS, function, record, Sample
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.limits import Limits, result_values
@@ -63,9 +64,9 @@ def substeps(parameters: Parameters) -> int:
     """
     step = parameters['step']
     with np.errstate(all='ignore'):
-        viscous = parameters['actuator.viscous_friction']
-        coulomb = (parameters['actuator.coulomb_friction'] + screw_friction(parameters)
-                   ) / parameters['actuator.coulomb_velocity']
+        friction = Friction.of(parameters)
+        viscous = friction.viscous
+        coulomb = friction.slope(friction.coulomb + screw_friction(parameters))
         stiffness, damping = stiffness_and_damping(parameters)
         fastest = max(largest_eigenvalue(parameters, viscous + coulomb + damping),
                       math.sqrt(largest_eigenvalue(parameters, stiffness)))
@@ -84,8 +85,7 @@ def substeps(parameters: Parameters) -> int:
     value = parameters[name]
     text = str(value.tolist() if isinstance(value, np.ndarray) else value)
     if name == 'actuator.coulomb_friction':
-        velocity = parameters['actuator.coulomb_velocity'].tolist()
-        text += f' N within actuator.coulomb_velocity {velocity} m/s'
+        text += f' N within actuator.coulomb_velocity {friction.coulomb_velocity.tolist()} m/s'
     raise ParameterError(
         f'{name}: {text}: too large for a '
         f'platform of {parameters.carried.mass:g} kg: the integration would need steps of '
@@ -125,7 +125,7 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
 
 # In one step the platform may turn by at most this [rad], and a platform joint move by at most
 # this part of its leg's length: a larger move would not be resolved.
-LARGEST_MOVE = 0.5
+LARGEST_MOVE = CONSTANTS['LARGEST_MOVE']
 
 
 class PlantState(NamedTuple):
