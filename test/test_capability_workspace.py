@@ -105,7 +105,8 @@ def test_no_random_pose_of_a_box_has_less_than_the_smallest_value() -> None:
     poses = poses_in(box, home, np.zeros(3), rng())
     for quantity in (capability.force, capability.moment, softest):
         found = capability.smallest(quantity, box)
-        assert found.value <= np.min(quantity(poses))
+        # the corners of the box are among both, with other rounding errors
+        assert found.value <= np.min(quantity(poses)) * (1.0 + 1e-12)
         assert found.value == pytest.approx(float(quantity(found.pose)), rel=1e-12)
 
 

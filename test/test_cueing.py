@@ -18,9 +18,9 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.cueing.motion_cueing import AXES, GRAVITY, OMCT_FREQUENCIES
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
-from stewart_dynamics.mechanics.limits import VELOCITY_MAX
+from stewart_dynamics.mechanics.limits import OF_LOADS, result_values, VELOCITY_MAX
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
-from stewart_dynamics.mechanics.rows import CONDITION, FORCES, RATES
+from stewart_dynamics.mechanics.rows import CONDITION, RATES
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 PARAMETERS = Parameters.from_yaml(PLATFORM)
@@ -262,7 +262,8 @@ def exceeded(parameters: Parameters, motion: Motion) -> list[str]:
     if VELOCITY_MAX in limits.limits.bounds:
         values[VELOCITY_MAX] = results[:, RATES]
     found = [name for name, each in values.items() if limits.limits.exceeds(name, each).any()]
-    found += ['loads'] * bool((np.abs(results[:, FORCES]) > limits.limits.force_max).any())
+    found += [name for name, each in result_values(results).items()
+              if name in OF_LOADS and limits.limits.exceeds(name, each).any()]
     if parameters.drives:
         motors = StewartPlatform(parameters).motors(motion)
         found += ['torque'] * bool((motors.margins < 0.0).any())
@@ -276,6 +277,8 @@ LIMITED: dict[str, dict[str, Any]] = {
     'clearance': {'limits.leg_clearance_min': 0.16, 'legs.cylinder.radius': [0.05],
                   'legs.piston.radius': [0.03], 'legs.cylinder.length': [0.8]},
     'forces': {'limits.force_max': [700.0]},
+    'joint forces': {'limits.joint_force_max': [600.0], 'actuator.reflected_mass': [100.0],
+                     'limits.force_max': None},
     'motors': {'actuator.screw_lead': [0.01], 'drive.torque_max': [1.6],
                'drive.speed_max': [250.0], 'drive.efficiency': [0.9]},
     'condition': {'singularity.warn_condition': 3.5, 'singularity.stop_condition': 4.0}}

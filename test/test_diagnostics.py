@@ -11,9 +11,11 @@ from typing import Any
 
 from hypothesis import given, strategies as st
 import messages
+import numpy as np
 import pytest
 from referees import ROOT, symmetric_parameters
 from snapshot import Snapshot
+from stewart_dynamics.core.binding import places
 from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.node.diagnostics.levels import ERROR, OK, STALE, Status, WARN
@@ -27,6 +29,7 @@ from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
 PROGRAM = 'stewart_dynamics'
+RESULTS = places('stewart_result')
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)
@@ -44,6 +47,14 @@ def output_of(setpoint: Setpoint = HOME, before: Singularity | None = None,
 
 
 CLEAR = output_of()
+
+
+def with_result(output: Output, **numbers: Any) -> Output:
+    """Return an output with other numbers in its row of results."""
+    row = np.array(output.result)
+    for name, number in numbers.items():
+        row[RESULTS[name]] = number
+    return output._replace(result=tuple(row.tolist()))
 
 
 def begun(**changes: Any) -> DynamicsDiagnostics:
@@ -392,8 +403,9 @@ def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None
 def test_a_warning_states_its_reason_with_its_own_numbers(
         cause: Cause, condition: float, time: float, message: str, snapshot: Snapshot) -> None:
     diagnostics = begun()
-    answered(diagnostics, BEGIN, CLEAR._replace(condition=condition, singularity=Singularity(
-        cause=cause, time_to_crossing=time, crossings=4)))
+    answered(diagnostics, BEGIN, with_result(
+        CLEAR, condition_number=condition)._replace(singularity=Singularity(
+            cause=cause, time_to_crossing=time, crossings=4)))
     of = status(diagnostics, 'singularity', BEGIN)
     assert (of.level, of.message) == (WARN, message)
     assert dict(of.values)['time to crossing (s)'] == f'{time:.3f}'
@@ -406,14 +418,14 @@ def test_a_warning_states_its_reason_with_its_own_numbers(
 
 def near(condition: float, stamp: int = 0) -> Output:
     """Return an output inside warn_condition."""
-    return CLEAR._replace(stamp=stamp, condition=condition,
-                          singularity=Singularity(cause=Cause.CONDITION))
+    return with_result(CLEAR, condition_number=condition)._replace(
+        stamp=stamp, singularity=Singularity(cause=Cause.CONDITION))
 
 
 def test_a_past_state_is_reported_with_its_own_number_and_since_when(snapshot: Snapshot) -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, near(23.5))
-    answered(diagnostics, BEGIN + 0.4, CLEAR._replace(condition=7.42))
+    answered(diagnostics, BEGIN + 0.4, with_result(CLEAR, condition_number=7.42))
     of = status(diagnostics, 'singularity', BEGIN + 0.4)
     assert of.level == WARN
     snapshot(of.message)
@@ -423,10 +435,11 @@ def test_a_past_state_is_reported_with_its_own_number_and_since_when(snapshot: S
 
 def test_a_crossing_is_one_line_in_the_log_with_stamp_and_time() -> None:
     diagnostics = begun()
-    answered(diagnostics, BEGIN, near(23.5, 1_700_000_000_120_000_000)._replace(determinant=0.3))
+    answered(diagnostics, BEGIN, with_result(
+        near(23.5, 1_700_000_000_120_000_000), determinant=0.3))
     assert [level for level, _ in logged(diagnostics, BEGIN)] == [WARN]
-    crossing = CLEAR._replace(
-        stamp=1_700_000_000_130_000_001, condition=30.0, determinant=-0.1,
+    crossing = with_result(CLEAR, condition_number=30.0, determinant=-0.1)._replace(
+        stamp=1_700_000_000_130_000_001,
         singularity=Singularity(cause=Cause.CROSSED, crossings=1))
     assert answered(diagnostics, BEGIN + 0.01, crossing), 'it is reported at once'
     line = 'det(J) crossed zero 0.0025 s before stamp 1700000000.130000001 s'
@@ -444,8 +457,8 @@ def test_a_crossing_is_one_line_in_the_log_with_stamp_and_time() -> None:
 def test_a_crossing_inside_stop_condition_hides_nothing_and_is_not_hidden(
         snapshot: Snapshot) -> None:
     diagnostics = begun(singularity__action='suppress_forces')
-    inside = CLEAR._replace(condition=1e4, forces=None, singularity=Singularity(
-        cause=Cause.CONDITION, stopped=True))
+    inside = with_result(CLEAR, condition_number=1e4)._replace(
+        forces=None, singularity=Singularity(cause=Cause.CONDITION, stopped=True))
     answered(diagnostics, BEGIN, inside)
     logged(diagnostics, BEGIN)
     assert answered(diagnostics, BEGIN + 0.01, inside._replace(
@@ -484,10 +497,10 @@ def test_the_worst_condition_is_kept_for_a_second_or_two() -> None:
     diagnostics = begun()
     key = 'worst condition number of the last second'
     for condition in (3.0, 40.0, 5.0):
-        answered(diagnostics, BEGIN, CLEAR._replace(condition=condition))
+        answered(diagnostics, BEGIN, with_result(CLEAR, condition_number=condition))
     assert dict(status(diagnostics, 'singularity', BEGIN).values)[key] == '40'
     for second, worst in ((1.0, '40'), (2.0, '40'), (3.0, '4')):
-        answered(diagnostics, BEGIN + second, CLEAR._replace(condition=4.0))
+        answered(diagnostics, BEGIN + second, with_result(CLEAR, condition_number=4.0))
         values = dict(status(diagnostics, 'singularity', BEGIN + second).values)
         assert values[key] == worst
         assert values['worst condition number since activation'] == '40'
@@ -575,13 +588,13 @@ def test_the_largest_force_is_kept_until_the_next_activation() -> None:
     key, leg = 'largest force demanded since activation (N)', 'leg of the largest force demanded'
     for largest, at in ((1e4, 3), (-2.5e4, 5), (2e4, 0)):
         peak = (*forces[:at], largest, *forces[at + 1:])
-        answered(diagnostics, BEGIN, CLEAR._replace(demanded_forces=peak))
+        answered(diagnostics, BEGIN, with_result(CLEAR, forces=peak))
     for after in (0.0, 100.0):
         answered(diagnostics, BEGIN + after)
         values = dict(status(diagnostics, 'limits', BEGIN + after).values)
         assert (values[key], values[leg]) == ('-25000', 'leg_6')
     diagnostics = begun()
-    answered(diagnostics, BEGIN, CLEAR._replace(demanded_forces=None))
+    answered(diagnostics, BEGIN, with_result(CLEAR, forces=np.nan))
     assert key not in dict(status(diagnostics, 'limits', BEGIN).values)
 
 

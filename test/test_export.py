@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.frames.rotation import (
 from stewart_dynamics.mechanics.hexapod_structure import (
     FIELDS_BEFORE_LEGS, hexapod_structure, LEG_FIELDS)
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
-from stewart_dynamics.mechanics.limits import JUMP, LIMITS, TOLERANCE
+from stewart_dynamics.mechanics.limits import JUMP, LIMITS, OF_LEGS, TOLERANCE
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, DETERMINANT, FORCES, JOINT_FORCES, LENGTHS, MOTION, RESULT,
     UNIT_LOAD_FORCES, WRENCH)
@@ -213,7 +213,8 @@ def limited(random: np.random.Generator) -> Parameters:
             'limits.length_min': 0.7 * random.uniform(0.5, 1.2),
             'limits.length_max': random.uniform(1.2, 2.0, 6),
             'limits.velocity_max': random.uniform(0.3, 3.0, 6),
-            'limits.force_max': random.uniform(300.0, 3000.0, 6)}
+            'limits.force_max': random.uniform(300.0, 3000.0, 6),
+            'limits.joint_force_max': random.uniform(300.0, 3000.0, 6)}
     if random.random() < 0.4:
         axes = random.normal([0.0, 0.0, 2.0], 0.3, (12, 3))
         given |= {
@@ -275,7 +276,7 @@ def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
             warned = output.singularity
             exceeded = [0] * 6
             for each in output.exceedances:
-                exceeded[each.leg] |= 1 << (*LIMITS, JUMP).index(each.limit)
+                exceeded[each.leg] |= LIMITS[each.limit].bit
             found = states[n]
             assert codes[0, n] == code
             assert outputs['forces'][n].tolist() == list(output.forces or [0.0] * 6)
@@ -293,7 +294,7 @@ def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
             np.testing.assert_array_equal(motors['all'], drives(motions, results)[:, MECHANICAL])
     assert seen >= {*(('code', code) for code in (OK, SUPPRESSED)), *(
         ('warning', cause) for cause in range(4)), *(
-        ('limit', limit) for limit in (*LIMITS, JUMP))}, seen
+        ('limit', limit) for limit in (*OF_LEGS, JUMP))}, seen
 
 
 def test_rotations_of_quaternions_are_those_of_the_node(library: ctypes.CDLL) -> None:

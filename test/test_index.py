@@ -41,6 +41,7 @@ def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
         'length_margin_m': None, 'rate_margin_m_s': 0.1 * n,
         **{f'{joint}_joint_angle_{key}': None for joint in ('base', 'platform')
            for key in ('max_rad', 'max_at_s', 'margin_rad')},
+        'joint_force_peak_n': peak, 'joint_force_margin_n': None,
         'clearance_min_m': None, 'clearance_min_at_s': None, 'clearance_margin_m': None,
         'force_rms_n': None if peak is None else 0.5 * abs(peak),
         'power_peak_w': None if peak is None else -peak} for n, peak in enumerate(peaks)}

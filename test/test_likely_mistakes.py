@@ -576,6 +576,11 @@ def test_a_good_drive_gives_no_warning() -> None:
     assert drive_mistakes(drive__speed_max=None, drive__torque_speed=None) == ()
     assert drive_mistakes(drive__torque_max=None, drive__torque_continuous=None) == ()
     assert drive_mistakes(drive__gear_ratio=1.0, actuator__screw_lead=0.005) == ()
+    # the thrust rating of the cylinder under its own name, or of a rotor that weighs little
+    assert drive_mistakes(limits__force_max=None, limits__joint_force_max=1500.0) == ()
+    assert drive_mistakes(limits__force_max=1500.0, limits__joint_force_max=1500.0) == ()
+    assert drive_mistakes(limits__force_max=1500.0, drive__motor_inertia=2e-6,
+                          drive__screw_inertia=0.0) == ()
     # the published machine: 8.2 N m, lead 5 mm, 3 : 1, for a slower and heavier hexapod
     assert drive_mistakes(drive__gear_ratio=3.0, actuator__screw_lead=0.005, drive__torque_max=8.2,
                           drive__motor_inertia=1.37e-4, drive__torque_speed=None,
@@ -606,6 +611,8 @@ def test_a_good_drive_gives_no_warning() -> None:
     ({'drive__torque_max': 0.06, 'drive__torque_continuous': None, 'drive__torque_speed': None,
       'drive__motor_inertia': 3e-7, 'drive__screw_inertia': 0.0, 'limits__force_max': None},
      'drive.torque_max: 0.06 N m', 'less than a sixth of the weight'),
+    ({'limits__force_max': 1500.0}, 'limits.force_max: 1.5e+03 N: the motors can push ',
+     'It is limits.joint_force_max'),
 ])
 def test_a_mistake_in_a_drive_is_reported(changes: dict[str, Any], begin: str, end: str) -> None:
     found = drive_mistakes(**changes)

@@ -18,7 +18,7 @@ from scipy.integrate import trapezoid
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
-from stewart_dynamics.mechanics.limits import LIMITS
+from stewart_dynamics.mechanics.limits import OF_LEGS
 from stewart_dynamics.replay.index import row_of, write_fleet
 from stewart_dynamics.replay.motor_charts import Deliverable, motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import MARGIN, needed
@@ -166,7 +166,7 @@ def test_the_card_of_the_motors_says_whether_their_limits_are_held() -> None:
     assert any(each.line.startswith('drive.torque_max, ') for each in exceeded.statements)
     assert card(**dict.fromkeys([*limits, 'torque_continuous'])).level == 'none'
     # a continuous torque bounds the RMS: it is no limit
-    unlimited = P.replaced(dict.fromkeys(name for name in LIMITS if P[name] is not None))
+    unlimited = P.replaced(dict.fromkeys(name for name in OF_LEGS if P[name] is not None))
     for continuous, level in ((1e-3, 'warn'), (1e2, 'good')):
         found = of_limits(unlimited, **dict.fromkeys(limits), torque_continuous=continuous)
         assert (found['limits'].level, found['motors'].level) == ('none', level)

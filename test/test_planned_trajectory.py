@@ -20,7 +20,7 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatfo
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, POSITION, RATES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, POSITION, RATES)
 from stewart_dynamics.planned.checks import LIMIT, SINGULAR
 from stewart_dynamics.planned.interpolation import Interpolation
 from stewart_dynamics.planned.trajectory import check_planned_trajectory, PlannedTrajectory
@@ -210,25 +210,28 @@ def test_no_force_or_rate_is_missed_by_a_hundredth(
                 assert check_planned_trajectory(limited, times, motion).accepted
 
 
+@pytest.mark.parametrize(('limit', 'columns'), [
+    ('limits.force_max', FORCES), ('limits.joint_force_max', JOINT_FORCES)])
 @pytest.mark.parametrize('duration', [SECOND, SECOND // 100])
-def test_a_force_exceeded_between_points_alone_is_found(duration: int) -> None:
+def test_a_force_exceeded_between_points_alone_is_found(
+        duration: int, limit: str, columns: slice) -> None:
     """At rest at both ends, 10 cm or 0.2 mm apart: what moves it lies between."""
     times = [0, duration]
     rows = heave(0.1 if duration == SECOND else 2e-4)
     dense, results = between_points(times, rows)
-    forces = np.abs(results[:, FORCES])
+    forces = np.abs(results[:, columns])
     points = forces[[0, -1]].max()
-    assert forces.max() > 1.2 * points
+    assert forces.max() > 1.05 * points
     bound = 0.5 * (forces.max() + points)
-    result = check((times, rows), FREE.replaced({'limits.force_max': [bound]}))
+    result = check((times, rows), FREE.replaced({limit: [bound]}))
     assert result.reason == LIMIT
     time, leg = result.time, result.leg
     broken = dense[forces[:, leg] > bound]
     assert broken[0] <= time <= broken[-1]
-    assert ' limits.force_max' in result.message
+    assert f' {limit}' in result.message
     assert 'clipped' not in result.message
     assert check((times, rows), FREE.replaced(
-        {'limits.force_max': [1.001 * forces.max()]})).accepted
+        {limit: [1.001 * forces.max()]})).accepted
 
 
 def test_a_limit_at_a_point_is_found_with_its_leg(snapshot: Snapshot) -> None:

@@ -21,10 +21,11 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import (
-    angle_values, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JUMP,
-    LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA, OF_RESULTS, PLATFORM_ANGLE_MAX, result_values,
+    BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JOINT_FORCE_MAX, JUMP, LENGTH_MAX,
+    LENGTH_MIN, LIMITS, Limits, OF_LEGS, OF_LOADS, OF_RESULTS, PLATFORM_ANGLE_MAX, result_values,
     TOLERANCE, VELOCITY_MAX)
-from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, NO_BASE, RATES, RESULT
+from stewart_dynamics.mechanics.rows import (
+    FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import LEG_SHAPE
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
@@ -376,28 +377,29 @@ def test_at_rest_it_is_the_weight_also_where_the_forces_cannot_be_solved(
 # The limits of the legs: one rule for a row, a sample and an array, and its tolerance
 
 GIVEN = {LENGTH_MIN: [0.9, 0.91, 0.92, 0.93, 0.94, 0.95], LENGTH_MAX: 1.5, VELOCITY_MAX: 0.5,
-         FORCE_MAX: 6000.0, BASE_ANGLE_MAX: 0.5,
+         FORCE_MAX: 6000.0, JOINT_FORCE_MAX: [5000.0, 5100.0, 5200.0, 5300.0, 5400.0, 5500.0],
+         BASE_ANGLE_MAX: 0.5,
          PLATFORM_ANGLE_MAX: [0.3, 0.4, 0.5, 0.6, 0.7, 0.8], CLEARANCE_MIN: 0.05,
          **dict.fromkeys(LEG_SHAPE, 0.01)}
 WITHIN = {LENGTH_MIN: 1.2, LENGTH_MAX: 1.2, CLEARANCE_MIN: 0.1}  # others 0.0
 
 
-@pytest.mark.parametrize('limit', LIMITS)
+@pytest.mark.parametrize('limit', OF_LEGS)
 @pytest.mark.parametrize('leg', range(6))
 def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: int) -> None:
     parameters = symmetric_parameters().replaced(GIVEN)
     limits = Limits(parameters)
     bound = float(limits.bounds[limit][leg])
-    outward = -1.0 if limit in MINIMA else 1.0
-    signs = (1.0, -1.0) if limit in (VELOCITY_MAX, FORCE_MAX) else (1.0,)
+    outward = -1.0 if LIMITS[limit].minimum else 1.0
+    signs = (1.0, -1.0) if limit in (VELOCITY_MAX, *OF_LOADS) else (1.0,)
     for (excess, exceeded), sign in product((
             (0.0, False), (0.5 * TOLERANCE, False), (-0.01, False), (2.0 * TOLERANCE, True),
             (0.1, True)), signs):
-        values = {name: np.full(6, WITHIN.get(name, 0.0)) for name in LIMITS}
+        values = {name: np.full(6, WITHIN.get(name, 0.0)) for name in OF_LEGS}
         values[limit][leg] = value = sign * bound * (1.0 + excess * outward)
         if limit in (LENGTH_MIN, LENGTH_MAX):
             values[LENGTH_MIN] = values[LENGTH_MAX] = values[limit]
-        for name in LIMITS:
+        for name in OF_LEGS:
             expected = [exceeded and name == limit and n == leg for n in range(6)]
             assert limits.exceeds(name, values[name]).tolist() == expected
         other = (1, 2, 3, 4, 5, 0)[leg] if limit == CLEARANCE_MIN else -1
@@ -405,34 +407,38 @@ def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: i
                                (1, 2, 3, 4, 5, 0)) == (
             (Exceedance(limit, leg, value, bound, other),) if exceeded else ())
         result = np.zeros(RESULT)
-        result[LENGTHS], result[RATES], result[FORCES] = (
-            values[name] for name in (LENGTH_MAX, VELOCITY_MAX, FORCE_MAX))
+        for name in OF_RESULTS:
+            result[LIMITS[name].columns] = values[name]
         assert checked(parameters, result)[1] == (exceeded and limit in OF_RESULTS)
 
 
 def test_values_of_a_sample_are_those_of_their_limits() -> None:
-    a, b, c = (0.1,) * 6, (0.2,) * 6, (0.3,) * 6
-    assert result_values(a, b, c) == {
-        LENGTH_MIN: a, LENGTH_MAX: a, VELOCITY_MAX: b, FORCE_MAX: c}
-    assert angle_values(a + b) == {BASE_ANGLE_MAX: a, PLATFORM_ANGLE_MAX: b}
+    row = np.arange(float(RESULT))
+    found = {name: values.tolist() for name, values in result_values(row).items()}
+    assert found == {
+        LENGTH_MIN: row[LENGTHS].tolist(), LENGTH_MAX: row[LENGTHS].tolist(),
+        VELOCITY_MAX: row[RATES].tolist(), FORCE_MAX: row[FORCES].tolist(),
+        JOINT_FORCE_MAX: row[JOINT_FORCES].tolist()}
 
 
 def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
     limits = Limits(symmetric_parameters())
     huge = rng().choice([-1e300, 1e300], (5, 6))
-    assert not any(limits.exceeds(limit, huge).any() for limit in LIMITS)
+    assert not any(limits.exceeds(limit, huge).any() for limit in OF_LEGS)
     for value in (1e300, -1e300):
-        assert limits.exceeded(dict.fromkeys(LIMITS, (value,) * 6)) == ()
+        assert limits.exceeded(dict.fromkeys(OF_LEGS, (value,) * 6)) == ()
     assert np.isinf(limits.force_max).all() and not limits.bounds
 
 
 def test_unknown_forces_exceed_no_limit() -> None:
-    limited = symmetric_parameters().replaced({FORCE_MAX: 1.0})
-    limits, result = Limits(limited), np.zeros(RESULT)
-    result[LENGTHS], result[FORCES] = 1.2, 5.0
-    assert checked(limited, result)[1]
-    assert not checked(limited, result, base_known=False)[1]
-    assert limits.exceeded(result_values((1.2,) * 6, (0.0,) * 6, None)) == ()
+    for limit in OF_LOADS:
+        limited = symmetric_parameters().replaced({limit: 1.0})
+        limits, result = Limits(limited), np.zeros(RESULT)
+        result[LENGTHS], result[LIMITS[limit].columns] = 1.2, 5.0
+        assert checked(limited, result)[1]
+        assert not checked(limited, result, base_known=False)[1]
+        result[LIMITS[limit].columns] = np.nan
+        assert limits.exceeded(result_values(result)) == ()
 
 
 @pytest.mark.parametrize(('exceedance', 'words'), [

@@ -42,6 +42,7 @@ LIMITS = {
     'limits.length_max': [1.5, 1.4, 1.3, 1.5, 1.4, 9.0],
     'limits.velocity_max': [0.9, 0.8, 0.7, 0.9, 0.8, 9.0],
     'limits.force_max': [90.0, 80.0, 70.0, 90.0, 80.0, 900.0],
+    'limits.joint_force_max': [80.0, 90.0, 60.0, 95.0, 70.0, 800.0],
     'limits.base_joint_angle_max': [0.5, 0.4, 0.3, 0.5, 0.4, 3.0],
     'limits.platform_joint_angle_max': [0.9, 0.8, 0.7, 0.9, 0.8, 3.0],
     'limits.leg_clearance_min': 0.05, 'legs.cylinder.radius': 0.02, 'legs.cylinder.length': 0.4,
@@ -70,6 +71,7 @@ class Samples:
         self.stamps = np.round((1000.0 + self.seconds) * SECOND).astype(np.int64)
         self.lengths, self.rates = numbers('lengths', 6), numbers('rates', 6)
         self.demanded = numbers('demanded', 6)
+        self.joint_forces = numbers('joint_forces', 6, default=0.5) * self.demanded
         self.forces = numbers('forces', 6, default=math.nan)
         self.forces = np.where(np.isnan(self.forces), self.demanded, self.forces)
         self.joint_angles = numbers('joint_angles', 12, default=0.1)
@@ -89,7 +91,8 @@ class Samples:
         many = len(self.seconds)
         results = np.concatenate([
             self.lengths, self.rates, self.demanded, self.det[:, None],
-            np.zeros((many, 1)), self.condition[:, None], self.unit_load, self.demanded], axis=1)
+            np.zeros((many, 1)), self.condition[:, None], self.unit_load, self.joint_forces,
+            ], axis=1)
         assert results.shape == (many, RESULT)
         states = np.zeros((many, STATE))
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
@@ -236,6 +239,11 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'length_margin_m': min(min(length) - low, high - max(length)),
             'rate_margin_m_s': fastest - max(map(abs, rate)),
             'force_margin_n': None if none else strongest - abs(peak[0])}
+        carried, carried_at = first_peak(s.joint_forces[:, leg].tolist(), t)
+        legs[name] |= {
+            'joint_force_peak_n': carried, 'joint_force_peak_at_s': carried_at,
+            'joint_force_margin_n': None if carried is None else p[
+                'limits.joint_force_max'][leg] - abs(carried)}
         for joint, first in (('base', 0), ('platform', 6)):
             widest, at = first_peak(s.joint_angles[:, first + leg].tolist(), t)
             legs[name] |= {
@@ -258,6 +266,8 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             ('limits.length_max', lambda x, bound: x > bound * (1.0 + 1e-9), s.lengths),
             ('limits.velocity_max', lambda x, bound: abs(x) > bound * (1.0 + 1e-9), s.rates),
             ('limits.force_max', lambda x, bound: abs(x) > bound * (1.0 + 1e-9), s.demanded),
+            ('limits.joint_force_max', lambda x, bound: abs(x) > bound * (1.0 + 1e-9),
+             s.joint_forces),
             ('limits.base_joint_angle_max', lambda x, bound: x > bound * (1.0 + 1e-9),
              s.joint_angles[:, :6]),
             ('limits.platform_joint_angle_max', lambda x, bound: x > bound * (1.0 + 1e-9),
@@ -274,7 +284,8 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
                 limits.append({
                     'limit': limit, 'leg': name, 'setpoints': len(found),
                     'worst': numbers[far, leg], 'bound': bound, 'first_at_s': t[found[0]]})
-    not_checked = ['limits.force_max'] if np.isnan(s.demanded).any() else []
+    not_checked = (['limits.force_max', 'limits.joint_force_max']
+                   if np.isnan(s.demanded).any() else [])
     crossings = []
     last = None
     for n, det in enumerate(s.det.tolist()):

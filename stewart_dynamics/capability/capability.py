@@ -24,7 +24,7 @@ from stewart_dynamics.capability.quantities import (
     Angles, Conditioning, Lengths, starts_at)
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
 from stewart_dynamics.capability.stuck_leg import remaining
-from stewart_dynamics.capability.travel import ENDS, LIMITS
+from stewart_dynamics.capability.travel import ENDS
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
@@ -32,15 +32,15 @@ from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, wrong_type)
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.friction import Friction
-from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    about_origin, PLATFORM, with_point_mass)
+from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
-from stewart_dynamics.mechanics.rows import ACCELERATION, DETERMINANT, MOTION, POSE, RESULT, TWIST
+from stewart_dynamics.mechanics.rows import (
+    ACCELERATION, DETERMINANT, FORCES, MOTION, POSE, RESULT, TWIST)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, NaturalModes
 
@@ -169,7 +169,8 @@ class Capability:
         self._limits = self._pose_limits.limits
         bounds = self._limits.bounds
         self._bounds = np.array([
-            bounds.get(name, np.full(6, _UNLIMITED.get(name, math.inf))) for name in LIMITS])
+            bounds.get(name, np.full(6, _UNLIMITED.get(name, math.inf)))
+            for name in limits.OF_POSES])
         clearance, angles = self._pose_limits.clearance, self._pose_limits.angles
         none = np.empty((0, 3))
         self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes
@@ -397,7 +398,7 @@ class Capability:
         directions, sizes = _directions(direction)
         still = self._held(pose)
         return _divided(self._multiple(
-            still, self._forces(still, base), self._per_wrench(pose, directions),
+            still, self._results(still, base), self._change(pose, wrench=-directions),
             continuous=continuous), sizes)
 
     def stuck_leg(self, pose: Pose | Motion, leg: int,
@@ -426,7 +427,7 @@ class Capability:
         if isinstance(leg, bool) or not (isinstance(leg, int | np.integer) and 0 <= leg < 6):
             raise MotionError(f'leg: {leg!r}: must be an index from 0 to 5')
         still = self._held(pose)
-        forces = self._forces(still, None)
+        results = self._results(still, None)
         found = remaining(self.platform.drive_jacobian(pose), leg, float(
             self.platform.parameters['singularity.characteristic_length']))
         one = Motion.of_rows(still.rows[..., None, :])
@@ -435,11 +436,11 @@ class Capability:
             both = np.stack([found.wrenches, -found.wrenches], axis=-2)
             two = Motion.of_rows(still.rows[..., None, None, :])
             wrenches = self._multiple(
-                two, forces[..., None, None, :], self._per_wrench(two, both), stuck=leg)
+                two, results[..., None, None, :], self._change(two, wrench=-both), stuck=leg)
         return StuckLeg(
             leg, found.motions, found.wrenches, found.lost,
             self.velocity(one, found.motions) if self.limits_rates else None, wrenches,
-            self._added_mass(still, forces, center_of_mass, stuck=leg)
+            self._added_mass(still, results, center_of_mass, stuck=leg)
             if self.limits_forces else None)
 
     def clearance(self, pose: Pose | Motion) -> Array | float:
@@ -457,7 +458,8 @@ class Capability:
         check_kind(pose, Pose, Motion)
         legs = lagrange.legs(self.platform.parameters, pose.position, pose.rotation)
         return self.platform.stiffness(pose, leg_stiffness) + geometric_stiffness(
-            legs, self._forces(self._held(pose), None), pose.rotation, self.platform.screws)
+            legs, self._results(self._held(pose), None)[..., FORCES], pose.rotation,
+            self.platform.screws)
 
     def modes(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> NaturalModes:
         """
@@ -525,10 +527,9 @@ class Capability:
 
         """
         directions, sizes = _directions(direction)
-        inertial = np.einsum('...ij,...j->...i', self.platform.mass_matrix(pose), directions)
         moving = self._held(pose, motion)
         return _divided(self._multiple(
-            moving, self._forces(moving, None), self._per_wrench(pose, inertial),
+            moving, self._results(moving, None), self._change(pose, acceleration=directions),
             directions=directions), sizes)
 
     def payload(self, motion: Pose | Motion, center_of_mass: ArrayLike,
@@ -557,18 +558,21 @@ class Capability:
                              self.platform.parameters, mass, center_of_mass)), motion.rows, 1.0))
         moving = motion if isinstance(motion, Motion) else Motion.from_pose(motion)
         return self._added_mass(
-            moving, self.platform.inverse_dynamics(moving).forces, center_of_mass,
+            moving, self.platform.inverse_dynamics(moving).rows, center_of_mass,
             whole=isinstance(motion, Motion), continuous=continuous)
 
-    def _added_mass(self, moving: Motion, forces: Array, center_of_mass: ArrayLike,
+    def _added_mass(self, moving: Motion, results: Array, center_of_mass: ArrayLike,
                     **how: Any) -> Extent:
-        """Return the largest point mass [kg] beside leg forces; ``how`` as in ``_multiple``."""
+        """Return the largest point mass [kg] beside results; ``how`` as in ``_multiple``."""
         center = as_array('center_of_mass', center_of_mass, (3,))
-        matrix = self.platform.regressor(moving).matrix[..., PLATFORM]
         with np.errstate(over='ignore', invalid='ignore'):
-            mass = np.array([1.0, *center, *about_origin(1.0, center, np.zeros(6))])
-            per_mass = check_finite('center_of_mass', matrix @ mass, 0)
-        return self._multiple(moving, forces, per_mass, **how)
+            arm = moving.rotation @ center
+            turning = np.cross(moving.angular_velocity, arm)
+            force = self.platform.parameters['gravity'] - moving.linear_acceleration - np.cross(
+                moving.angular_acceleration, arm) - np.cross(moving.angular_velocity, turning)
+            load = check_finite(
+                'center_of_mass', np.concatenate([force, np.cross(arm, force)], axis=-1), 0)
+        return self._multiple(moving, results, self._change(moving, wrench=load), **how)
 
     def speed_factor(self, motion: Motion, wrench: ArrayLike | None = None,
                      base: BaseMotion | None = None, times: ArrayLike | None = None) -> Extent:
@@ -691,11 +695,10 @@ class Capability:
 
     def _of_rates(self, motion: Motion, solved: InverseDynamics) -> list[tuple[Array, Any]]:
         """Return multiples (..., 6) of the twist at which legs and motors are too fast."""
-        found: list[tuple[Array, Any]] = []
-        if limits.VELOCITY_MAX in self._limits.bounds:
-            found.append((largest_multiple(
-                np.zeros(6), solved.rates, self._limits.bounds[limits.VELOCITY_MAX]),
-                limits.short_name(limits.VELOCITY_MAX)))
+        found: list[tuple[Array, Any]] = [
+            (largest_multiple(np.zeros(6), solved.rows[..., limits.LIMITS[name].columns],
+                              self._limits.bounds[name]), limits.short_name(name))
+            for name in limits.OF_RATES if name in self._limits.bounds]
         if self._motors is not None and self._motors.limits_speeds:
             found.append((largest_multiple(
                 np.zeros(6), self._motors.moving(motion.rows, solved.rows).speeds,
@@ -705,23 +708,27 @@ class Capability:
     def _speed_of_forces(self, motion: Motion, wrench: ArrayLike | None,
                          base: BaseMotion | None) -> list[tuple[Array, Any]]:
         """Return factors (..., 6) at which forces and torques are too large."""
-        strongest = self._limits.bounds.get(limits.FORCE_MAX)
         torques = self._motors is not None and self._motors.limited
-        if strongest is None and not torques:
+        if not (self._limits.of_loads or torques):
             return []
         rows = motion.rows
         still, back = rows.copy(), rows.copy()
         still[..., TWIST.start:] = 0.0
         back[..., TWIST] = -rows[..., TWIST]
         solved = self._frictionless.inverse_dynamics(motion, wrench, base)
-        constant, backward = (
-            self._frictionless.inverse_dynamics(Motion.of_rows(each), wrench, base).forces
+        at_rest, backward = (
+            self._frictionless.inverse_dynamics(Motion.of_rows(each), wrench, base).rows
             for each in (still, back))
+        powers = at_rest, (solved.rows - backward) / 2.0, (solved.rows + backward) / 2.0 - at_rest
+        found: list[tuple[Array, Any]] = [(quadratic_exit(
+            _of_limit(name, powers), self._limits.bounds[name], np.zeros(()),
+            np.full((), math.inf)), limits.short_name(name))
+            for name in self._limits.of_loads if name != limits.FORCE_MAX]
+        strongest = self._limits.bounds.get(limits.FORCE_MAX)
+        constant, linear, square = _of_limit(limits.FORCE_MAX, powers)
         friction = Friction.of(self.platform.parameters)
         rates = self.platform.drive_rates(rows, solved.rates)
-        linear = (solved.forces - backward) / 2.0 + friction.viscous * rates
-        square = (solved.forces + backward) / 2.0 - constant
-        found: list[tuple[Array, Any]] = []
+        linear = linear + friction.viscous * rates
         for piece in friction.coulomb_by_speed(rates):
             forces = constant + piece.constant, linear + piece.linear, square
             if strongest is not None:
@@ -748,37 +755,41 @@ class Capability:
             rows[..., TWIST] = motion.rows[..., TWIST]
         return Motion.of_rows(rows)
 
-    def _forces(self, motion: Motion, base: BaseMotion | None) -> Array:
-        return self.platform.inverse_dynamics(motion, base=base).forces
+    def _results(self, motion: Motion, base: BaseMotion | None) -> Array:
+        return self.platform.inverse_dynamics(motion, base=base).rows
 
-    def _per_wrench(self, pose: Pose | Motion, wrenches: Array) -> Array:
-        """Return the leg forces (..., 6) that balance wrenches (..., 6) alone."""
-        transposed = np.swapaxes(self.platform.drive_jacobian(pose), -1, -2)
-        # numpy 1.26 would take an array of fewer dimensions for vectors.
-        whole = np.broadcast_to(wrenches, np.broadcast_shapes(
-            wrenches.shape, transposed.shape[:-1]))[..., None]
-        return np.asarray(np.linalg.solve(transposed, whole)[..., 0], dtype=float)
+    def _change(self, pose: Pose | Motion, wrench: ArrayLike | None = None,
+                acceleration: Array | None = None) -> Array:
+        """Return the results (..., RESULT) of a wrench or acceleration alone, without weight."""
+        still = self._held(pose)
+        if acceleration is not None:
+            rows = np.zeros((*np.broadcast_shapes(still.shape, acceleration.shape[:-1]), MOTION))
+            rows[..., POSE], rows[..., ACCELERATION] = still.rows[..., POSE], acceleration
+            still = Motion.of_rows(rows)
+        return self.platform.inverse_dynamics(still, wrench, BaseMotion(np.zeros(3))).rows
 
-    def _multiple(self, motion: Motion, forces: Array, change: Array, whole: bool = False,
+    def _multiple(self, motion: Motion, results: Array, change: Array, whole: bool = False,
                   directions: Array | None = None, continuous: bool = False,
                   stuck: int | None = None) -> Extent:
         """
-        Return the largest multiple of a change of leg forces that forces and torques permit.
+        Return the largest multiple of a change of results that forces and torques permit.
 
+        results, change (..., RESULT): of the motion, and of a load or acceleration alone.
         ``directions`` (..., 6): the change is that of this acceleration.
         continuous: the load is held without end.
         stuck: index of a leg whose limits do not count.
         """
+        forces, added = results[..., FORCES], change[..., FORCES]
         found: list[tuple[Array, Any]] = []
         if continuous:
-            found.append((largest_multiple(forces, change, self._continuous_forces),
+            found.append((largest_multiple(forces, added, self._continuous_forces),
                           limits.short_name(limits.TORQUE_CONTINUOUS)))
-        if limits.FORCE_MAX in self._limits.bounds:
-            found.append((largest_multiple(
-                forces, change, self._limits.bounds[limits.FORCE_MAX]),
-                limits.short_name(limits.FORCE_MAX)))
+        for name in self._limits.of_loads:
+            here, more = _of_limit(name, (results, change))
+            found.append((largest_multiple(here, more, self._limits.bounds[name]),
+                          limits.short_name(name)))
         if self._motors is not None and self._motors.limited:
-            found.append(self._torques(self._motors, motion, forces, change, directions))
+            found.append(self._torques(self._motors, motion, forces, added, directions))
         if not found:
             raise self._unlimited((limits.FORCE_MAX,))
         multiples, names = _tightest(found)
@@ -808,15 +819,8 @@ class Capability:
     @property
     def limits_rates(self) -> bool:
         """Return whether there is a limit of the legs' rates or of the motors' speeds."""
-        return limits.VELOCITY_MAX in self._limits.bounds or (
+        return any(name in self._limits.bounds for name in limits.OF_RATES) or (
             self._motors is not None and self._motors.limits_speeds)
-
-    @property
-    def forces_at_rest(self) -> Array:
-        """Return the largest leg forces at rest (6,) [N]; infinite without a limit."""
-        forces = self._limits.bounds.get(limits.FORCE_MAX, np.full(6, math.inf))
-        return forces if self._motors is None else np.minimum(
-            forces, self._motors.forces_at_rest)
 
     @property
     def limits_held(self) -> bool:
@@ -830,31 +834,48 @@ class Capability:
             raise self._unlimited((limits.TORQUE_CONTINUOUS,))
         return held
 
-    def holding_forces(self, continuous: bool = False) -> Array:
-        """Return the largest leg forces (6,) [N] at rest, or those that are held without end."""
-        return np.minimum(
-            self.forces_at_rest, self._continuous_forces) if continuous else self.forces_at_rest
+    def holding_loads(self, continuous: bool = False) -> list[tuple[slice, Array]]:
+        """
+        Return the largest loads (6,) of legs at rest, or those that are held without end.
+
+        Each with its columns in a row of results. Motors limit the forces by their torques.
+        """
+        found = [(limits.LIMITS[name].columns, self._limits.bounds[name])
+                 for name in self._limits.of_loads]
+        if self._motors is not None and self._motors.limited:
+            found.append((FORCES, self._motors.forces_at_rest))
+        if continuous:
+            found.append((FORCES, self._continuous_forces))
+        return found
 
     @property
     def limits_forces(self) -> bool:
-        """Return whether there is a limit of the legs' forces or of the motors' torques."""
-        return self.limits_held or bool(np.isfinite(self.forces_at_rest).any())
+        """Return whether there is a limit of the legs' loads or of the motors' torques."""
+        return self.limits_held or bool(self.holding_loads())
 
     def _in_every_direction(self, pose: Pose | Motion, part: slice, continuous: bool,
                             ) -> Array | float:
         if not (self.limits_forces or continuous):
             raise self._unlimited((limits.FORCE_MAX,))
-        strongest = self.holding_forces(continuous)
-        forces = self._forces(self._held(pose), None)
-        inverse = np.linalg.inv(np.swapaxes(self.platform.drive_jacobian(pose), -1, -2))
-        reach = np.linalg.norm(inverse[..., part], axis=-1)
-        with np.errstate(divide='ignore'):
-            values = np.maximum((strongest - np.abs(forces)) / reach, 0.0).min(axis=-1)
+        still = self._held(pose)
+        results = self._results(still, None)
+        per_wrench = self._change(Motion.of_rows(still.rows[..., None, :]), np.eye(6)[part])
+        values: Array = np.full(still.shape, math.inf)
+        for columns, strongest in self.holding_loads(continuous):
+            reach = np.linalg.norm(per_wrench[..., columns], axis=-2)
+            with np.errstate(divide='ignore'):
+                room = (strongest - np.abs(results[..., columns])) / reach
+            values = np.minimum(values, np.maximum(room, 0.0).min(axis=-1))
         return float(values) if values.ndim == 0 else values
 
     def _unlimited(self, names: Sequence[str]) -> ParameterError:
         return ParameterError(f'parameters: {", ".join(names)}: not set: without a limit there is '
                               'no answer')
+
+
+def _of_limit(name: str, rows: Sequence[Array]) -> list[Array]:
+    """Return the values (..., 6) of the quantity of a limit in rows of results."""
+    return [each[..., limits.LIMITS[name].columns] for each in rows]
 
 
 def _directions(value: ArrayLike) -> tuple[Array, Array]:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from stewart_dynamics.arrays import Array
@@ -26,7 +28,7 @@ def largest_multiple(values: Array, changes: Array, bounds: Array) -> Array:
     return np.where(exceeds(values, bounds), 0.0, np.maximum(multiples, 0.0))
 
 
-def quadratic_exit(values: tuple[Array, ...], bounds: Array, begin: Array, end: Array,
+def quadratic_exit(values: Sequence[Array], bounds: Array, begin: Array, end: Array,
                    slopes: Array | float = 0.0) -> Array:
     """
     Return the first k in [begin, end] with ``|c + k b + k^2 a| > bound + k slope``.

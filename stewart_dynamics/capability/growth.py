@@ -22,8 +22,8 @@ from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.limits import FORCE_MAX, short_name, SPEED_MAX, VELOCITY_MAX
-from stewart_dynamics.mechanics.rows import BASE, FORCES, RATES, WRENCH
+from stewart_dynamics.mechanics.limits import LIMITS, OF_LOADS, OF_RATES, short_name, SPEED_MAX
+from stewart_dynamics.mechanics.rows import BASE, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 STEPS = 64
@@ -76,7 +76,7 @@ class Growth:
                  motors: MotorBounds | None, deviations: Deviations,
                  wrench: ArrayLike | None = None, base: BaseMotion | None = None) -> None:
         self._platform, self._motors, self._deviations = platform, motors, deviations
-        self._limits = {name: limits[name] for name in (VELOCITY_MAX, FORCE_MAX) if name in limits}
+        self._limits = {name: limits[name] for name in (*OF_RATES, *OF_LOADS) if name in limits}
         self.names = [short_name(name) for name in self._limits] + (
             [] if motors is None else [short_name(SPEED_MAX), 'torque'])
         self._count = len(deviations.changes)
@@ -179,7 +179,7 @@ class Growth:
         results = self._platform.inverse_dynamics(
             Motion.of_rows(rows), self._wrench[which], BaseMotion.of_rows(self._base[which]),
             singular='nan').rows
-        ratios = [results[:, RATES if name == VELOCITY_MAX else FORCES] / bound
+        ratios = [results[:, LIMITS[name].columns] / bound
                   for name, bound in self._limits.items()]
         if self._motors is not None:
             ratios += self._motors.ratios(rows, results)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.capability.quantities import Moved, Quantity, Starts
 from stewart_dynamics.capability.travel import (
-    ENDS, Ends, LIMITS, NOTHING, PoseMargins, SINGULARITY as SINGULAR)
+    ENDS, Ends, NOTHING, PoseMargins, SINGULARITY as SINGULAR)
 from stewart_dynamics.capability.workspace import smallest
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, LENGTH_MAX, Limits, OF_JOINTS, SINGULARITY, TOLERANCE)
+    CLEARANCE_MIN, LENGTH_MAX, Limits, OF_JOINTS, OF_POSES, SINGULARITY, TOLERANCE)
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
@@ -255,7 +255,7 @@ class Boxes:
             if not solved.determinant * self._starts.sides[0] > 0.0:
                 excess = math.inf
             return Worst(pose, -1, SINGULARITY, excess)
-        name = LIMITS[code]
+        name = OF_POSES[code]
         if name == CLEARANCE_MIN:
             values = LegClearance(self._platform.parameters)(Motion.from_pose(pose).rows[None])[0]
         elif name in OF_JOINTS:

@@ -28,9 +28,8 @@ from stewart_dynamics.mechanics import limits
 
 CLEARANCE_MIN, SINGULARITY, NOTHING = 4, 5, 6
 """Codes of the limit that ends a travel, behind those of lengths and angles."""
-LIMITS = (limits.LENGTH_MIN, limits.LENGTH_MAX, *limits.OF_JOINTS, limits.CLEARANCE_MIN)
-ENDS = (*map(limits.short_name, LIMITS), limits.SINGULARITY, '')
-"""Limits that end a travel, and names of all ends, by their codes."""
+ENDS = (*map(limits.short_name, limits.OF_POSES), limits.SINGULARITY, '')
+"""Names of all ends of travels by their codes: limits of poses first."""
 
 LENGTH_MAX = 1
 # Pieces of a travel at first, and largest number of pieces of a block of travels.

@@ -100,19 +100,19 @@ static void put_motion(
   }
 }
 
-/* The first of the limits, counted from 1, that six values exceed; nan exceeds. */
-static int above(int limit, const double * values, const double * most, double share) {
+/* Whether one of six values is above a share of its bound; nan is. */
+static int one_above(const double * values, const double * most, double share) {
   for (int i = 0; i < 6; i++) {
-    if (!(fabs(values[i]) <= share * most[i])) {return limit + 1;}
+    if (!(fabs(values[i]) <= share * most[i])) {return 1;}
   }
   return 0;
 }
 
-static int below(int limit, const double * values, const double * least_values) {
-  for (int i = 0; i < 6; i++) {
-    if (!(values[i] >= least_values[i])) {return limit + 1;}
-  }
-  return 0;
+/* The lowest of some bits, counted from 1; 0 if there is none. */
+static int lowest(unsigned bits) {
+  int bit = 1;
+  while (bits && !(bits & 1u)) {bits >>= 1, bit++;}
+  return bits ? bit : 0;
 }
 
 /* The limit, counted from 1, that a motion exceeds, 0 if none; of rates and loads a share of it. */
@@ -120,41 +120,36 @@ static int exceeded_by(
   const governed * on, const stewart_motion * motion, const stewart_result * result,
   double share) {
   const governor_limits * g = on->limits;
-  int found = 0;
-  if ((found = below(GOVERNED_LENGTH_MIN, result->lengths, g->length_min))) {return found;}
-  if ((found = above(GOVERNED_LENGTH_MAX, result->lengths, g->length_max, 1.0))) {return found;}
-  if ((found = above(GOVERNED_VELOCITY_MAX, result->rates, g->velocity_max, share))) {return found;}
+  const stewart_leg * legs = on->platform->legs;
+  unsigned exceeded = 0;
   if (!(result->condition_number < g->condition_max && result->determinant * g->side > 0.0)) {
     return GOVERNED_SINGULARITY + 1;
   }
-  if ((found = above(GOVERNED_FORCE_MAX, result->forces, g->force_max, share))) {return found;}
-  if (g->with_angles != 0.0) {
+  for (int i = 0; i < 6; i++) {exceeded |= check_leg(&legs[i], result, i, share);}
+  if (!exceeded && g->with_angles != 0.0) {
     double angles[12];
     joint_angles_many(on->platform, g->joint_axes, 1, motion, angles);
-    if ((found = above(GOVERNED_BASE_JOINT_ANGLE_MAX, angles, g->base_joint_angle_max, 1.0)) ||
-        (found = above(GOVERNED_PLATFORM_JOINT_ANGLE_MAX, angles + 6,
-                       g->platform_joint_angle_max, 1.0))) {return found;}
+    for (int i = 0; i < 6; i++) {exceeded |= check_angles(&legs[i], angles[i], angles[i + 6]);}
   }
-  if (g->with_clearance != 0.0) {
+  if (!exceeded && g->with_clearance != 0.0) {
     double clearances[6];
     int64_t nearest[6];
     clearances_many(on->platform, on->n_base, on->base, on->n_moving, on->moving, 1, motion,
                     clearances, nearest);
-    if ((found = below(GOVERNED_LEG_CLEARANCE_MIN, clearances, g->clearance_min))) {return found;}
-  }
-  if (g->with_motors != 0.0) {
-    motor_row row;
-    leg_drives at_any_rate = *on->drives;  /* breakaway torques, as if each leg could reverse */
-    for (int i = 0; i < 6; i++) {at_any_rate.legs[i].slow = HUGE_VAL;}
-    put_motors(on->platform, &at_any_rate, on->n_curve, on->curve, motion, result->forces,
-               result->forces, &row);
-    for (int i = 0; i < 6; i++) {row.available_torques[i] *= g->load_share;}
-    if ((found = above(GOVERNED_SPEED_MAX, row.speeds, g->speed_max, share)) ||
-        (found = above(GOVERNED_TORQUE_MAX, row.breakaway_torques, row.available_torques, share))) {
-      return found;
+    for (int i = 0; i < 6; i++) {
+      exceeded |= below(
+        clearances[i], on->platform->leg_clearance_min, STEWART_LEG_CLEARANCE_MIN);
     }
   }
-  return 0;
+  if (exceeded || g->with_motors == 0.0) {return lowest(exceeded);}
+  motor_row row;
+  leg_drives at_any_rate = *on->drives;  /* breakaway torques, as if each leg could reverse */
+  for (int i = 0; i < 6; i++) {at_any_rate.legs[i].slow = HUGE_VAL;}
+  put_motors(on->platform, &at_any_rate, on->n_curve, on->curve, motion, result->forces,
+             result->forces, &row);
+  for (int i = 0; i < 6; i++) {row.available_torques[i] *= g->load_share;}
+  return one_above(row.speeds, g->speed_max, share) ? GOVERNED_SPEED_MAX + 1
+    : one_above(row.breakaway_torques, row.available_torques, share) ? GOVERNED_TORQUE_MAX + 1 : 0;
 }
 
 /* The limit, counted from 1, that one of some motions exceeds, 0 if none. */

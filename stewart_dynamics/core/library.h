@@ -122,21 +122,17 @@ typedef struct {
    R = Rz Ry Rx, both from home and in its axes [m, rad]. */
 typedef struct { double value[6], rate[6], acceleration[6]; } coordinates;
 
-/* The limits that a governor keeps, in the order of governor_state.held. */
-enum {
-  GOVERNED_LENGTH_MIN = 0, GOVERNED_LENGTH_MAX = 1, GOVERNED_VELOCITY_MAX = 2,
-  GOVERNED_FORCE_MAX = 3, GOVERNED_BASE_JOINT_ANGLE_MAX = 4, GOVERNED_PLATFORM_JOINT_ANGLE_MAX = 5,
-  GOVERNED_LEG_CLEARANCE_MIN = 6, GOVERNED_TORQUE_MAX = 7, GOVERNED_SPEED_MAX = 8,
-  GOVERNED_SINGULARITY = 9
-};
+/* Where governor_state.held has the limits of the drives and singularity, after those of the legs:
+   bit n of stewart_output.exceeded is there n. */
+enum { GOVERNED_TORQUE_MAX = 16, GOVERNED_SPEED_MAX = 17, GOVERNED_SINGULARITY = 18 };
 
-/* What a governor keeps: see mechanics/governor.py. Bounds have its margins; flags are 0 or 1. */
+/* What a governor keeps besides the limits of the platform's legs: see mechanics/governor.py. All
+   have its margins; flags are 0 or 1. */
 typedef struct {
   stewart_pose home;
   double head[3];                     /* platform frame [m] */
   double stop_rate, return_rate;      /* of the stop, and of the return to the demand [1/s] */
-  double length_min[6], length_max[6], velocity_max[6], force_max[6];
-  double base_joint_angle_max[6], platform_joint_angle_max[6], joint_axes[36], clearance_min[6];
+  double joint_axes[36];
   double speed_max[6], load_share;    /* of motors; part of the available torque that is used */
   double condition_max, side;         /* side: sign of det(J) at home */
   double with_angles, with_clearance, with_motors;
@@ -146,7 +142,7 @@ typedef struct {
 typedef struct {
   coordinates now;
   double share[6];                    /* of the demand, at last */
-  double held[10];                    /* time in which each limit held the demand back [s] */
+  double held[19];                    /* time in which each limit held the demand back [s] */
   double following;
   double stopping;                    /* it is brought to rest, whatever the demand is */
 } governor_state;

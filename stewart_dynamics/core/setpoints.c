@@ -34,17 +34,12 @@ static int check_setpoint(
   advance_warning(platform, result, state);
   int solved = result->condition_number < UNSOLVABLE_CONDITION && base_known;
   for (int i = 0; i < 6; i++) {
+    const stewart_leg * leg = &platform->legs[i];
     if (!solved) {result->forces[i] = result->joint_forces[i] = NAN;}
-    any_limit |= check_leg(
-      &platform->legs[i], result->lengths[i], result->rates[i], result->forces[i],
-      result->lengths[i] - followed[i], elapsed);
+    any_limit |= check_leg(leg, result, i, 1.0) |
+      above(fabs(result->lengths[i] - followed[i]), leg->velocity_max * elapsed, STEWART_JUMP);
   }
-  int suppressed = (state->stopped && platform->suppress_near_singularity) ||
-    ((any_limit & ~(unsigned)STEWART_FORCE_MAX) && platform->suppress_at_limits);
-  for (int i = 0; i < 6; i++) {
-    double force = result->forces[i], most = platform->legs[i].force_max;
-    forces[i] = solved && !suppressed ? least(largest(force, -most), most) : NAN;
-  }
+  command_forces(platform, result, solved, state->stopped, any_limit, NAN, forces);
   *exceeding = any_limit != 0, *jumped = (any_limit & STEWART_JUMP) != 0;
   return 1;
 }

@@ -631,31 +631,39 @@ static double clearance_of(
   return clearance;
 }
 
+/* Return the bit of a limit if a value is past it, above rounding errors; nan never is. */
+static unsigned above(double value, double most, unsigned bit) {
+  return value > most * (1.0 + LIMIT_TOLERANCE) ? bit : 0u;
+}
+
+static unsigned below(double value, double minimum, unsigned bit) {
+  return value < minimum * (1.0 - LIMIT_TOLERANCE) ? bit : 0u;
+}
+
+/* Return which limits of its joints a leg exceeds. */
+static unsigned check_angles(const stewart_leg * leg, double base_angle, double platform_angle) {
+  return above(base_angle, leg->base_joint_angle_max, STEWART_BASE_JOINT_ANGLE_MAX) |
+    above(platform_angle, leg->platform_joint_angle_max, STEWART_PLATFORM_JOINT_ANGLE_MAX);
+}
+
 /* Write for each leg which limits of its joints and of clearance a motion exceeds. */
 static void check_joints(
   const stewart_platform * platform, const stewart_motion * motion, unsigned exceeded[6]) {
+  const stewart_leg * legs = platform->legs;
   leg_pose at[6];
   for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &platform->legs[i];
+    const stewart_leg * leg = &legs[i];
     at[i] = pose_of(leg, motion->position, motion->rotation);
     vector s = at[i].direction, s_p = rotate_back(motion->rotation, s);
-    double base_max = leg->base_joint_angle_max * (1.0 + LIMIT_TOLERANCE);
-    double platform_max = leg->platform_joint_angle_max * (1.0 + LIMIT_TOLERANCE);
-    exceeded[i] = 0;
-    if (isfinite(base_max) && joint_angle(leg->base_joint_axis, s) > base_max) {
-      exceeded[i] |= STEWART_BASE_JOINT_ANGLE_MAX;
-    }
-    if (isfinite(platform_max) && joint_angle(leg->platform_joint_axis, s_p) > platform_max) {
-      exceeded[i] |= STEWART_PLATFORM_JOINT_ANGLE_MAX;
-    }
+    exceeded[i] = check_angles(
+      leg, isfinite(leg->base_joint_angle_max) ? joint_angle(leg->base_joint_axis, s) : 0.0,
+      isfinite(leg->platform_joint_angle_max) ? joint_angle(leg->platform_joint_axis, s_p) : 0.0);
   }
-  double clearance_min = platform->leg_clearance_min * (1.0 - LIMIT_TOLERANCE);
-  for (int i = 0; isfinite(clearance_min) && i < 6; i++) {
+  for (int i = 0; isfinite(platform->leg_clearance_min) && i < 6; i++) {
     for (int j = i + 1; j < 6; j++) {
-      const stewart_leg * legs = platform->legs;
-      if (clearance_of(&legs[i], &legs[j], &at[i], &at[j]) < clearance_min) {
-        exceeded[i] |= STEWART_LEG_CLEARANCE_MIN, exceeded[j] |= STEWART_LEG_CLEARANCE_MIN;
-      }
+      unsigned near = below(clearance_of(&legs[i], &legs[j], &at[i], &at[j]),
+                            platform->leg_clearance_min, STEWART_LEG_CLEARANCE_MIN);
+      exceeded[i] |= near, exceeded[j] |= near;
     }
   }
 }
@@ -681,17 +689,29 @@ static void advance_warning(
   state->determinant = det != 0.0 ? det : state->determinant;
 }
 
-/* Return which limits of length, rate, force and jump a leg exceeds. */
+/* Return which limits a leg exceeds by its result; of rates and loads, a share of them. */
 static unsigned check_leg(
-  const stewart_leg * leg, double length, double rate, double force, double jump, double elapsed) {
-  double velocity_max = leg->velocity_max * (1.0 + LIMIT_TOLERANCE);
-  unsigned exceeded = 0;
-  if (length < leg->length_min * (1.0 - LIMIT_TOLERANCE)) {exceeded |= STEWART_LENGTH_MIN;}
-  if (length > leg->length_max * (1.0 + LIMIT_TOLERANCE)) {exceeded |= STEWART_LENGTH_MAX;}
-  if (fabs(rate) > velocity_max) {exceeded |= STEWART_VELOCITY_MAX;}
-  if (fabs(force) > leg->force_max * (1.0 + LIMIT_TOLERANCE)) {exceeded |= STEWART_FORCE_MAX;}
-  if (fabs(jump) > velocity_max * elapsed) {exceeded |= STEWART_JUMP;}
-  return exceeded;
+  const stewart_leg * leg, const stewart_result * result, int i, double share) {
+  return below(result->lengths[i], leg->length_min, STEWART_LENGTH_MIN) |
+    above(result->lengths[i], leg->length_max, STEWART_LENGTH_MAX) |
+    above(fabs(result->rates[i]), share * leg->velocity_max, STEWART_VELOCITY_MAX) |
+    above(fabs(result->forces[i]), share * leg->force_max, STEWART_FORCE_MAX) |
+    above(fabs(result->joint_forces[i]), share * leg->joint_force_max, STEWART_JOINT_FORCE_MAX);
+}
+
+/* Write the forces to command: clipped; without_force where they are suppressed or not solved.
+ * Return whether they are suppressed. */
+static int command_forces(
+  const stewart_platform * platform, const stewart_result * result, int solved, int stopped,
+  unsigned exceeded, double without_force, double forces[6]) {
+  int suppressed = (stopped && platform->suppress_near_singularity) ||
+    ((exceeded & ~(unsigned)STEWART_FORCE_MAX) && platform->suppress_at_limits);
+  for (int i = 0; i < 6; i++) {
+    double most = platform->legs[i].force_max;
+    forces[i] = solved && !suppressed
+      ? least(largest(result->forces[i], -most), most) : without_force;
+  }
+  return suppressed;
 }
 
 int stewart_step(
@@ -710,22 +730,20 @@ int stewart_step(
     elapsed = (double)(stamp - state->stamp) * 1e-9 + (JITTER + platform->sync_tolerance);
   }
   for (int i = 0; i < 6; i++) {
-    double jump = state->followed ? found.result.lengths[i] - state->lengths[i] : 0.0;
-    found.exceeded[i] |= check_leg(&platform->legs[i], found.result.lengths[i],
-      found.result.rates[i], found.result.forces[i], jump, elapsed);
+    const stewart_leg * leg = &platform->legs[i];
+    double way = state->followed ? found.result.lengths[i] - state->lengths[i] : 0.0;
+    found.exceeded[i] |=
+      check_leg(leg, &found.result, i, 1.0) |
+      above(fabs(way), leg->velocity_max * elapsed, STEWART_JUMP);
     any |= found.exceeded[i];
   }
   if (!(any & STEWART_JUMP)) {
     state->followed = 1, state->stamp = stamp;
     for (int i = 0; i < 6; i++) {state->lengths[i] = found.result.lengths[i];}
   }
-  int suppressed = (state->stopped && platform->suppress_near_singularity) ||
-    ((any & ~(unsigned)STEWART_FORCE_MAX) && platform->suppress_at_limits);
+  int suppressed = command_forces(platform, &found.result, code == STEWART_OK, state->stopped,
+                                  any, 0.0, found.forces);
   code = code == STEWART_OK && suppressed ? STEWART_SUPPRESSED : code;
-  for (int i = 0; i < 6; i++) {
-    double force = found.result.forces[i], most = platform->legs[i].force_max;
-    found.forces[i] = code == STEWART_OK ? least(largest(force, -most), most) : 0.0;
-  }
   *output = found;
   return code;
 }

@@ -47,7 +47,8 @@ enum {
   STEWART_CROSSED = 3    /* det(J) has changed its sign since the last call */
 };
 
-/* Limits that a leg exceeds: bits of stewart_output.exceeded. */
+/* Limits that a leg exceeds: bits of stewart_output.exceeded. All but _FORCE_MAX suppress forces
+ * where limits.action says so. */
 enum {
   STEWART_LENGTH_MIN = 1,
   STEWART_LENGTH_MAX = 2,
@@ -56,7 +57,8 @@ enum {
   STEWART_BASE_JOINT_ANGLE_MAX = 16,
   STEWART_PLATFORM_JOINT_ANGLE_MAX = 32,
   STEWART_LEG_CLEARANCE_MIN = 64,
-  STEWART_JUMP = 128 /* too far from the last setpoint for limits.velocity_max */
+  STEWART_JUMP = 128, /* too far from the last setpoint for limits.velocity_max */
+  STEWART_JOINT_FORCE_MAX = 256
 };
 
 /* A leg, with the names of the parameter file; its inertias are transverse, about the CoM. */
@@ -68,6 +70,7 @@ typedef struct {
   double reflected_mass, viscous_friction, coulomb_friction;       /* [kg], [N s/m], [N] */
   double coulomb_velocity; /* rate below which Coulomb friction is linear [m/s], above 0 */
   double length_min, length_max, velocity_max, force_max; /* 0 or infinite if not set */
+  double joint_force_max;                                 /* [N] */
   double base_joint_axis[3], base_joint_angle_max; /* unit vector, base axes; [rad] or infinite */
   double platform_joint_axis[3], platform_joint_angle_max;  /* platform axes */
   double cylinder_radius, cylinder_length, piston_radius;   /* for leg_clearance_min [m] */
@@ -133,7 +136,7 @@ typedef struct {
 typedef struct {
   stewart_result result;
   double forces[6];     /* to command [N]: clipped to force_max; zero unless STEWART_OK */
-  unsigned exceeded[6]; /* limits that each leg exceeds: bits STEWART_LENGTH_MIN to _JUMP */
+  unsigned exceeded[6]; /* limits that each leg exceeds: bits STEWART_LENGTH_MIN, ... */
 } stewart_output;
 
 /* Motors: zero where the published leg position is zero, + extends; [rad], ..., [N m]. */

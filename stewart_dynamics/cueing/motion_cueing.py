@@ -35,7 +35,7 @@ from stewart_dynamics.core.binding import function, record
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
-from stewart_dynamics.mechanics.governor import check_gaps, Governor, KEPT
+from stewart_dynamics.mechanics.governor import check_gaps, Governor, held_times
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE, STANDARD_GRAVITY
 
@@ -295,4 +295,4 @@ class CueingStream:
     @property
     def held(self) -> dict[str, float]:
         """Return the time by which each limit has held the demand back [s], all axes together."""
-        return dict(zip(KEPT, self._state['governor']['held'].tolist(), strict=True))
+        return held_times(self._state['governor'])

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.capability.travel import LIMITS
 from stewart_dynamics.datasheet.ratings import AXES
-from stewart_dynamics.mechanics.limits import QUANTITIES, short_name, SINGULARITY
+from stewart_dynamics.mechanics.limits import (
+    LIMITS, OF_POSES, short_name, SINGULARITY, TORQUE_CONTINUOUS)
 from stewart_dynamics.parameters.table import FIXED
 from stewart_dynamics.reporting.pages import MOST_PLAIN, typeset
 
@@ -37,21 +37,15 @@ class Unit(NamedTuple):
 
 MM, DEGREE = Unit('mm', 1e3), Unit('°', math.degrees(1.0))
 # Units in which the excesses of limits are written.
-_OF_LIMITS = {short_name(limit): {'m': MM, 'rad': DEGREE}[QUANTITIES[limit].unit]
-              for limit in LIMITS}
+_OF_LIMITS = {short_name(limit): {'m': MM, 'rad': DEGREE}[LIMITS[limit].quantity.unit]
+              for limit in OF_POSES}
 LINEAR = {'travel': MM, 'velocity': Unit('mm/s', 1e3), 'acceleration': Unit('m/s²', 1.0),
           'force': Unit('N', 1.0), 'stiffness': Unit('N/µm', 1e-6)}
 ANGULAR = {'travel': DEGREE, 'velocity': Unit('°/s', DEGREE.factor),
            'acceleration': Unit('°/s²', DEGREE.factor), 'moment': Unit('N m', 1.0),
            'stiffness': Unit('N m/mrad', 1e-3)}
-_NAMES = {
-    'length_max': 'longest leg', 'length_min': 'shortest leg', 'velocity_max': 'speed of a leg',
-    'force_max': 'force of a leg', 'torque_max': 'torque of a motor',
-    'torque_continuous': 'continuous torque of a motor',
-    'torque_speed': 'torque of a motor at its speed', 'speed_max': 'speed of a motor',
-    'base_joint_angle_max': 'joint angle at the base',
-    'platform_joint_angle_max': 'joint angle at the platform',
-    'leg_clearance_min': 'clearance between legs'}
+_NAMES = {short_name(name): limit.phrase for name, limit in LIMITS.items()} | {
+    short_name(TORQUE_CONTINUOUS): 'continuous torque of a motor'}
 
 
 def limit_name(limit: str) -> str:

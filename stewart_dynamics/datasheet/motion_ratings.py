@@ -22,9 +22,8 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.replay.recorded_motion import RecordedMotion
 from stewart_dynamics.reporting.block_statistics import finite
 
-LENGTH, RATE, FORCE, SPEED, TORQUE, ANGLE, CLEARANCE, SINGULARITY = (
-    'length', 'rate', 'force', 'motor speed', 'motor torque', 'joint angle', 'leg clearance',
-    'singularity')
+LENGTH, SPEED, TORQUE, ANGLE, CLEARANCE, SINGULARITY = (
+    'length', 'motor speed', 'motor torque', 'joint angle', 'leg clearance', 'singularity')
 # Largest number of samples of which the amplitude is computed, and the motion between them, which
 # takes 0.6 ms for each.
 _MOST, _MOST_BETWEEN = 100_000, 10_000
@@ -46,11 +45,11 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
         found[LENGTH] = np.abs(2.0 * result.lengths - high - shortest) / (high - shortest)
     elif low is not None:
         found[LENGTH] = low / result.lengths
-    if p[limits.VELOCITY_MAX] is not None:
-        found[RATE] = np.abs(result.rates) / p[limits.VELOCITY_MAX]
-    if p[limits.FORCE_MAX] is not None:
-        forces = np.where(np.isfinite(result.forces), np.abs(result.forces), np.inf)
-        found[FORCE] = forces / p[limits.FORCE_MAX]
+    for limit in (*limits.OF_RATES, *limits.OF_LOADS):
+        if p[limit] is not None:
+            values = np.abs(result.rows[..., limits.LIMITS[limit].columns])
+            found[limits.LIMITS[limit].quantity.name] = np.where(
+                np.isfinite(values), values, np.inf) / p[limit]
     if p.drives:
         motors = MotorBounds(p)
         speeds, torques = motors.ratios(recorded.motion.rows, result.rows)

@@ -18,7 +18,7 @@ from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
-from stewart_dynamics.mechanics.limits import LIMITS
+from stewart_dynamics.mechanics.limits import OF_LEGS
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -59,8 +59,8 @@ class RatedHexapod:
 
     def __init__(self, parameters: Parameters, pose: Pose | None = None,
                  pivot: Array | None = None, payload: Payload | None = None) -> None:
-        if all(parameters[name] is None for name in LIMITS):
-            raise ParameterError(f'parameters: {", ".join(LIMITS)}: none of them is set: without '
+        if all(parameters[name] is None for name in OF_LEGS):
+            raise ParameterError(f'parameters: {", ".join(OF_LEGS)}: none of them is set: without '
                                  'a limit there is no datasheet')
         self.pivot = np.zeros(3) if pivot is None else np.asarray(pivot, dtype=float)
         self.given = parameters if payload is None else with_point_mass(

@@ -15,7 +15,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability, Extent
 from stewart_dynamics.capability.force_intervals import largest_multiple
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
-from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters, PLATFORM
+from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 
 
@@ -33,15 +33,22 @@ class Payloads:
 
     def __init__(self, capability: Capability, poses: Pose, continuous: bool = False) -> None:
         platform = capability.platform
-        p = platform.parameters
-        self._largest = capability.holding_forces(continuous)
-        self._gravity = np.asarray(p['gravity'])
-        rows = Motion.from_pose(poses).rows
-        matrices = np.stack([platform.regressors_at_rest(rows, each[None]) for each in np.eye(3)])
-        # (N, 6, 3) of the hexapod, and (N, 6, 3, 4) of a mass of 1 kg: itself, its first moment
-        self._own = np.moveaxis(matrices @ linear_parameters(p), 0, -1)
-        added = matrices[..., PLATFORM.start:PLATFORM.start + 4]
-        self._added = np.moveaxis(added, 0, -2)
+        self._gravity = np.asarray(platform.parameters['gravity'])
+        # of a gravity of 1 along each axis: loads of the hexapod, (N, 3, RESULT), and of a mass of
+        # 1 kg, itself and its first moment, (N, 3, 4, RESULT)
+        along = np.eye(3)
+        own = platform.inverse_dynamics(
+            Motion.from_pose(poses[:, None]), base=BaseMotion(along)).rows
+        arms = np.concatenate([np.zeros((len(poses), 1, 3)),
+                               np.swapaxes(poses.rotation, 1, 2)], axis=1)[:, None]
+        weights = np.zeros((len(poses), 3, 4, 6))
+        weights[..., 0, :3] = along
+        weights[..., 3:] = np.cross(arms, along[:, None])
+        added = platform.inverse_dynamics(
+            Motion.from_pose(poses[:, None, None]), weights, BaseMotion(np.zeros(3))).rows
+        self._loads = [
+            (np.swapaxes(own[..., columns], 1, 2), np.moveaxis(added[..., columns], -1, 1), most)
+            for columns, most in capability.holding_loads(continuous)]
 
     def level(self, offset: float = 0.0, height: float = 0.0) -> float:
         """
@@ -51,21 +58,25 @@ class Payloads:
             [m].
         """
         masses = self._masses(offset, height)
-        return float(largest_multiple(
-            (self._own @ self._gravity)[..., None, :],
-            np.einsum('nikc,mc,k->nmi', self._added, masses, self._gravity), self._largest).min())
+        return min(float(largest_multiple(
+            (own @ self._gravity)[..., None, :],
+            np.einsum('nikc,mc,k->nmi', added, masses, self._gravity), most).min())
+            for own, added, most in self._loads)
 
     def any_orientation(self, offset: float = 0.0, height: float = 0.0) -> float:
         """Return the same for all directions of gravity: a base that hangs, or on a wall."""
-        # |own + m added| |g| <= largest for each leg: a quadratic in m
-        own = self._own[:, None]
-        added = np.einsum('nikc,mc->nmik', self._added, self._masses(offset, height))
-        bound = self._largest / np.linalg.norm(self._gravity)
-        a, b = (added * added).sum(axis=-1), (own * added).sum(axis=-1)
-        c = (own * own).sum(axis=-1) - bound * bound
-        with np.errstate(divide='ignore', invalid='ignore'):
-            found = np.where(c > 0.0, 0.0, -c / (b + np.sqrt(np.maximum(b * b - a * c, 0.0))))
-        return float(np.where(np.isnan(found), np.inf, found).min())
+        # |own + m added| |g| <= most for each leg: a quadratic in m
+        least = math.inf
+        for of_hexapod, of_mass, most in self._loads:
+            own = of_hexapod[:, None]
+            added = np.einsum('nikc,mc->nmik', of_mass, self._masses(offset, height))
+            bound = most / np.linalg.norm(self._gravity)
+            a, b = (added * added).sum(axis=-1), (own * added).sum(axis=-1)
+            c = (own * own).sum(axis=-1) - bound * bound
+            with np.errstate(divide='ignore', invalid='ignore'):
+                found = np.where(c > 0.0, 0.0, -c / (b + np.sqrt(np.maximum(b * b - a * c, 0.0))))
+            least = min(least, float(np.where(np.isnan(found), np.inf, found).min()))
+        return least
 
     def _masses(self, offset: float, height: float) -> Array:
         """Return mass and first moment (M, 4) of 1 kg, for each azimuth."""

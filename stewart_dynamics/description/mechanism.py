@@ -24,6 +24,11 @@ FIXED, HINGE, UNIVERSAL, BALL, SLIDE, OTHER = (
     'fixed', 'hinge', 'universal', 'ball', 'slide', 'other')
 
 
+OF_SLIDE = {'limits.length_min': 'lower', 'limits.length_max': 'upper',
+            'limits.velocity_max': 'velocity_max', 'limits.force_max': 'force_max'}
+"""Parameters of limits that formats have on the slide of a leg, and the fields of ``Joint``."""
+
+
 class DescriptionError(StewartError):
     """A file that cannot be read, or in which there is no hexapod."""
 

@@ -22,7 +22,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, HERE, HINGE, Joint, Mechanism, MechanismBody, Placement, UNIVERSAL)
+    BALL, DescriptionError, HERE, HINGE, Joint, Mechanism, MechanismBody, OF_SLIDE, Placement,
+    UNIVERSAL)
 from stewart_dynamics.description.read_mjcf import read_mjcf
 from stewart_dynamics.description.read_sdf import read_sdf
 from stewart_dynamics.description.read_urdf import read_urdf
@@ -30,7 +31,7 @@ from stewart_dynamics.description.topology import Chain, LegJoint, Topology, top
 from stewart_dynamics.description.xml_text import NOT_CHECKED
 from stewart_dynamics.errors import one_line, shown
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of
-from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, OF_RESULTS
+from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
 from stewart_dynamics.parameters.table import (
     mean_radius, NEGATIVE, NO_MASS, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
 from stewart_dynamics.whole_file import read_text
@@ -204,7 +205,7 @@ def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
         'geometry.zero_length': max(zero, 0.0),
         'actuator.reflected_mass': slide.armature, 'actuator.viscous_friction': slide.damping,
         'actuator.coulomb_friction': slide.friction}
-    for name, value in zip(OF_RESULTS, [*ends, slide.velocity_max, slide.force_max], strict=True):
+    for name, value in zip(OF_SLIDE, [*ends, slide.velocity_max, slide.force_max], strict=True):
         least = 0.0 if name == 'limits.length_min' else np.finfo(float).tiny
         if value is not None and value < least:
             said.append(f'{name}: {value:.3g}: cannot be: left out')
@@ -400,8 +401,7 @@ def _missing(given: Mapping[str, Any], mechanism: Mechanism, found: Topology,
              legs: list[dict[str, Any]]) -> list[str]:
     """Return one line for each limit that is not in the file, or not of all legs."""
     said = []
-    for name, field in zip(OF_RESULTS, ('lower', 'upper', 'velocity_max', 'force_max'),
-                           strict=True):
+    for name, field in OF_SLIDE.items():
         if name in given or name in mechanism.carried:
             continue
         without = [leg['joints'] for leg in legs if leg[name] is None]

@@ -14,7 +14,7 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.description.hexapod import RigidBody
-from stewart_dynamics.mechanics.limits import OF_RESULTS
+from stewart_dynamics.description.mechanism import OF_SLIDE
 from stewart_dynamics.parameters.circles import CIRCLE_NAMES
 from stewart_dynamics.parameters.table import INERTIA, Parameters
 
@@ -25,7 +25,7 @@ LEG_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',
 _GROUPS = ('actuator.', 'drive.', 'geometry.', 'legs.', 'limits.')
 # Parameters of these groups that formats have elements for.
 _IN_ELEMENTS = frozenset((
-    *OF_RESULTS, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
+    *OF_SLIDE, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
     *CIRCLE_NAMES, 'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
     'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'))
 NOT_CHECKED = 'none'  # value there of a limit that is not checked
@@ -65,7 +65,7 @@ def carried(parameters: Parameters, names: Iterable[str]) -> Mapping[str, str]:
     These are the given ones that no format has elements for, those named, and limits that are not
     set.
     """
-    names = [*names, *(name for name in OF_RESULTS if parameters[name] is None),
+    names = [*names, *(name for name in OF_SLIDE if parameters[name] is None),
              *(name for name in parameters.given
                if name.startswith(_GROUPS) and name not in _IN_ELEMENTS)]
     return {name: _text(parameters[name]) for name in names}

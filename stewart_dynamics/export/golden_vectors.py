@@ -22,7 +22,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
-from stewart_dynamics.mechanics.limits import JUMP, LIMITS, OF_MOTORS
+from stewart_dynamics.mechanics.limits import LIMITS, OF_MOTORS
 from stewart_dynamics.mechanics.rows import BASE, FORCES, MOTION, POSE, RESULT, WRENCH
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
@@ -30,8 +30,6 @@ from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 # Return codes of the C source.
 OK, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = (CODES[f'STEWART_{name}'] for name in (
     'OK', 'SINGULAR', 'SUPPRESSED', 'NO_POSE', 'NO_MOTORS'))
-# Bits of stewart_output.exceeded, from the lowest one.
-_BITS = (*LIMITS, JUMP)
 
 _COUNT = 40
 _PERIOD = 20_000_000  # of the setpoints [ns]
@@ -127,7 +125,7 @@ def _motions(parameters: Parameters) -> Array:
 def _results(output: Output) -> list[float]:
     """Return the columns from CODE to WARNING."""
     code = SINGULAR if not output.solvable else OK if output.forces else SUPPRESSED
-    exceeded = [sum(1 << _BITS.index(each.limit) for each in output.exceedances
+    exceeded = [sum(LIMITS[each.limit].bit for each in output.exceedances
                     if each.leg == leg) for leg in range(6)]
     state = output.singularity
     return [code, *output.lengths, *output.rates, *(output.demanded_forces or (0.0,) * 6),

@@ -31,11 +31,11 @@ from stewart_dynamics.identification.unknowns import (
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, MINIMA, OF_JOINTS, OF_RESULTS,
-    VELOCITY_MAX)
+    CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, LIMITS, OF_JOINTS, OF_LOADS, OF_RATES, OF_RESULTS,
+    USUAL)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, FORCES, MOTION, POSE, POSITION, RATES, ROTATION)
+    CONDITION, MOTION, POSE, POSITION, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.motion import motion_at
@@ -63,7 +63,7 @@ class DesignLimits:
     def __init__(self, platform: StewartPlatform, amplitude: float | None = None,
                  center: Sequence[float] | None = None) -> None:
         p = platform.parameters
-        missing = [name for name in OF_RESULTS if p[name] is None]
+        missing = [name for name in USUAL if p[name] is None]
         if missing and amplitude is None:
             raise ParameterError(
                 f'{", ".join(missing)}: missing: a motion is designed within the limits of the '
@@ -82,7 +82,8 @@ class DesignLimits:
         self._there = {name: values[0, 0] for name, values in self._values(row).items()}
         for name, there in self._there.items():
             bound = self._bounds[name]
-            if np.any(there <= bound if name in MINIMA else there >= bound):
+            minimum = name in LIMITS and LIMITS[name].minimum
+            if np.any(there <= bound if minimum else there >= bound):
                 raise ParameterError(f'{name}: at the center of the motion the hexapod exceeds '
                                      'it, or is within its margin')
 
@@ -118,7 +119,8 @@ class DesignLimits:
         motions = rows.reshape(-1, MOTION)
         results = self._platform.solve(motions)
         found = {**self._limits.values(motions, results),
-                 VELOCITY_MAX: np.abs(results[:, RATES]), FORCE_MAX: np.abs(results[:, FORCES]),
+                 **{name: np.abs(results[:, LIMITS[name].columns])
+                    for name in (*OF_RATES, *OF_LOADS)},
                  _WARN_CONDITION: results[:, CONDITION, None]}
         if CLEARANCE_MIN in found:
             found[CLEARANCE_MIN] = found[CLEARANCE_MIN].min(axis=1, keepdims=True)
@@ -127,13 +129,14 @@ class DesignLimits:
 
 def _bounds(p: Parameters) -> dict[str, Any]:
     """Return the limits less their margins; infinite if not given."""
-    low, high, rate, force = (
-        np.full(6, -np.inf if name == LENGTH_MIN else np.inf) if p[name] is None else p[name]
-        for name in OF_RESULTS)
+    given = {name: np.full(6, -np.inf if LIMITS[name].minimum else np.inf) if p[name] is None
+             else p[name] for name in OF_RESULTS}
+    low, high = given[LENGTH_MIN], given[LENGTH_MAX]
     stroke = np.where(np.isfinite(high - low), high - low, 0.0)
     return {
         LENGTH_MIN: low + _STROKE * stroke, LENGTH_MAX: high - _STROKE * stroke,
-        VELOCITY_MAX: (1.0 - _RATE) * rate, FORCE_MAX: (1.0 - _FORCE) * force,
+        **{name: (1.0 - _RATE) * given[name] for name in OF_RATES},
+        **{name: (1.0 - _FORCE) * given[name] for name in OF_LOADS},
         _WARN_CONDITION: _CONDITION * p[_WARN_CONDITION],
         **{name: (1.0 - _ANGLE) * p[name] for name in OF_JOINTS if p[name] is not None},
         CLEARANCE_MIN: (1.0 + _ANGLE) * (p[CLEARANCE_MIN] or 0.0)}

@@ -24,6 +24,7 @@ with which they are checked. The computation is ``core/governor.c``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import math
 from typing import Any
 
@@ -31,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.core.binding import function, record
+from stewart_dynamics.core.binding import CODES, function, record
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
@@ -45,16 +46,18 @@ from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.limits import (
-    BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, PLATFORM_ANGLE_MAX,
-    SINGULARITY, SPEED_MAX, TORQUE_MAX, VELOCITY_MAX)
+    CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, LOAD, OF_LEGS, short_name, SINGULARITY,
+    SPEED_MAX, TORQUE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import DETERMINANT, MOTION, POSE
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.parameters.table import Parameters
 
-KEPT = (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX,
-        CLEARANCE_MIN, TORQUE_MAX, SPEED_MAX, SINGULARITY)
-"""The limits that a governor keeps, in the order of ``governor_state.held``."""
+KEPT: Mapping[int, str] = {
+    **{LIMITS[name].bit.bit_length() - 1: name for name in OF_LEGS},
+    CODES['GOVERNED_TORQUE_MAX']: TORQUE_MAX, CODES['GOVERNED_SPEED_MAX']: SPEED_MAX,
+    CODES['GOVERNED_SINGULARITY']: SINGULARITY}
+"""The limits that a governor keeps, by their places in ``governor_state.held``."""
 
 # Margins: of lengths a part of the stroke; of forces, torques and the condition number, which
 # change fastest between two samples, and of the other limits, parts of themselves.
@@ -81,9 +84,9 @@ class Governor:
 
     def __init__(self, parameters: Parameters, head: Array) -> None:
         home = home_pose(parameters)
-        hexapod = hexapod_structure(parameters)
+        within = _within(parameters)
         row = Motion.from_pose(home).rows
-        result = batch.solve(hexapod, row[None])[0]
+        result = batch.solve(within, row[None])[0]
         limits: Any = np.zeros((), record('governor_limits'))
         limits['home'] = np.ascontiguousarray(row[POSE]).view(record('stewart_pose'))[0]
         limits['head'] = head
@@ -91,15 +94,24 @@ class Governor:
         limits['condition_max'] = (1.0 - _OF_LOADS) * stop_condition_of(parameters)
         limits['side'] = math.copysign(1.0, result[DETERMINANT])
         limits['load_share'] = 1.0 - _OF_LOADS
-        self._put_bounds(parameters, limits)
-        base, platform = self._put_clearance(parameters, limits)
+        angles = angles_to_check(parameters, Limits(parameters).of_joints)
+        limits['with_angles'] = angles is not None
+        if angles is not None:
+            # Angles that no limit needs have no axes, and are not compared: infinite bounds.
+            limits['joint_axes'] = np.nan_to_num(angles.axes).reshape(36)
+        limits['with_clearance'] = parameters[CLEARANCE_MIN] is not None
+        base, platform = (np.empty((0, 3)),) * 2
+        if limits['with_clearance']:
+            shape = LegClearance(parameters)
+            base, platform = shape.base, shape.platform
         drives = Drives(parameters)
         limits['with_motors'] = bool(parameters.drives)
         if parameters.drives:
             limits['speed_max'] = (1.0 - _OF_OTHERS) * largest_speeds(parameters)
         self.limits: Records = limits
         self.home = home
-        self.arguments = (*drives.arguments, len(base), base, len(platform), platform, limits)
+        self.arguments = (within, *drives.arguments[1:], len(base), base, len(platform), platform,
+                          limits)
         self._at_home = row, result
 
     def coordinates(self, motion: Motion) -> Records:
@@ -139,37 +151,6 @@ class Governor:
         words = (f'{limit} is nearer than the margin of the governor' if found is None
                  else found.words(parameters['joints']))
         raise ParameterError(f'{parameters.source}: cueing.govern: at home {words}')
-
-    def _put_bounds(self, parameters: Parameters, limits: Any) -> None:
-        known = Limits(parameters)
-        bounds = known.bounds
-        for field, name, part in (
-                ('length_max', LENGTH_MAX, 0.0), ('velocity_max', VELOCITY_MAX, _OF_OTHERS),
-                ('force_max', FORCE_MAX, _OF_LOADS),
-                ('base_joint_angle_max', BASE_ANGLE_MAX, _OF_OTHERS),
-                ('platform_joint_angle_max', PLATFORM_ANGLE_MAX, _OF_OTHERS)):
-            limits[field] = (1.0 - part) * bounds.get(name, np.full(6, math.inf))
-        limits['length_min'] = bounds.get(LENGTH_MIN, 0.0)
-        # Friction changes its sign where a leg reverses between two samples.
-        limits['force_max'] -= Friction.of(parameters).largest_change
-        margin = _OF_STROKE * _stroke(parameters)
-        limits['length_min'] += margin
-        limits['length_max'] -= margin
-        angles = angles_to_check(parameters, known.of_joints)
-        limits['with_angles'] = angles is not None
-        if angles is not None:
-            # Angles that no limit needs have no axes, and are not compared: infinite bounds.
-            limits['joint_axes'] = np.nan_to_num(angles.axes).reshape(36)
-
-    def _put_clearance(self, parameters: Parameters, limits: Any) -> tuple[Array, Array]:
-        """Put the bound of the clearance; return the corners of the plates."""
-        if parameters[CLEARANCE_MIN] is None:
-            return np.empty((0, 3)), np.empty((0, 3))
-        shape = LegClearance(parameters)
-        limits['with_clearance'] = True
-        limits['clearance_min'] = parameters[CLEARANCE_MIN] + _OF_CLEARANCE * parameters[
-            'singularity.characteristic_length']
-        return shape.base, shape.platform
 
 
 class GovernedStream:
@@ -230,7 +211,13 @@ class GovernedStream:
     @property
     def held(self) -> dict[str, float]:
         """Return the time by which each limit has held the demand back [s], all axes together."""
-        return dict(zip(KEPT, self._stream['governor']['held'].tolist(), strict=True))
+        return held_times(self._stream['governor'])
+
+
+def held_times(state: Records) -> dict[str, float]:
+    """Return the time by which each limit has held the demand back [s], of a governor_state."""
+    held = state['held'].tolist()
+    return {limit: held[place] for place, limit in KEPT.items()}
 
 
 def check_gaps(times: Array, before: Array) -> None:
@@ -239,6 +226,25 @@ def check_gaps(times: Array, before: Array) -> None:
         n = int(np.argmax(long))
         raise MotionError(f'times[{n}]: {times[n]:.9g} s, {times[n] - before[n]:.6g} s after the '
                           f'one before: must be at most {_LONGEST_GAP:g} s')
+
+
+def _within(parameters: Parameters) -> Records:
+    """Return the structure of a hexapod whose limits have the margins of a governor."""
+    found: Any = hexapod_structure(parameters)
+    legs = found['legs']
+    for name in OF_LEGS:
+        limit = LIMITS[name]
+        if limit.quantity.unit == 'm':
+            continue
+        part = _OF_LOADS if limit.depends == LOAD else _OF_OTHERS
+        legs[short_name(name)] *= 1.0 - part
+    # Friction changes its sign where a leg reverses between two samples.
+    legs['force_max'] -= Friction.of(parameters).largest_change
+    margin = _OF_STROKE * _stroke(parameters)
+    legs['length_min'] += margin
+    legs['length_max'] -= margin
+    found['leg_clearance_min'] += _OF_CLEARANCE * parameters['singularity.characteristic_length']
+    return found  # type: ignore[no-any-return]
 
 
 def _stroke(parameters: Parameters) -> Array:

@@ -16,8 +16,9 @@ from stewart_dynamics.mechanics.drives.screws import motor_turns, screw_constant
 from stewart_dynamics.mechanics.rows import BASE_AXIS, PLATFORM_AXIS
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
 
-# Fields of stewart_leg and stewart_platform in their order, and the parameters that they hold.
-LEG_FIELDS = {
+# Fields of stewart_leg and stewart_platform in their order, and the parameters that they hold; the
+# other fields of a leg are its limits.
+_OF_LEG = {
     'base_joint': 'geometry.base_joints', 'platform_joint': 'geometry.platform_joints',
     'zero_length': 'geometry.zero_length', 'cylinder_mass': 'legs.cylinder.mass',
     'cylinder_center_of_mass': 'legs.cylinder.center_of_mass',
@@ -26,18 +27,17 @@ LEG_FIELDS = {
     'piston_inertia': 'legs.piston.inertia', 'reflected_mass': 'actuator.reflected_mass',
     'viscous_friction': 'actuator.viscous_friction',
     'coulomb_friction': 'actuator.coulomb_friction',
-    'coulomb_velocity': 'actuator.coulomb_velocity', 'length_min': 'limits.length_min',
-    'length_max': 'limits.length_max', 'velocity_max': 'limits.velocity_max',
-    'force_max': 'limits.force_max', 'base_joint_axis': 'geometry.base_joint_axes',
-    'base_joint_angle_max': 'limits.base_joint_angle_max',
+    'coulomb_velocity': 'actuator.coulomb_velocity',
+    'base_joint_axis': 'geometry.base_joint_axes',
     'platform_joint_axis': 'geometry.platform_joint_axes',
-    'platform_joint_angle_max': 'limits.platform_joint_angle_max',
     'cylinder_radius': 'legs.cylinder.radius', 'cylinder_length': 'legs.cylinder.length',
     'piston_radius': 'legs.piston.radius', 'screw_lead': 'actuator.screw_lead',
     'gear_ratio': 'drive.gear_ratio', 'efficiency': 'drive.efficiency',
     'back_driving_efficiency': 'drive.back_driving_efficiency',
     'twist_ratio': 'drive.screw_rotation', 'base_universal_axis': 'drive.base_universal_axes',
     'platform_universal_axis': 'drive.platform_universal_axes'}
+LEG_FIELDS = {field: _OF_LEG.get(field, f'limits.{field}')
+              for field in record('stewart_leg').names or ()}
 FIELDS_BEFORE_LEGS = {
     'gravity': 'gravity', 'mass': 'platform.mass', 'center_of_mass': 'platform.center_of_mass',
     'inertia': 'platform.inertia'}

@@ -17,9 +17,9 @@ from stewart_dynamics.mechanics.drives.motors import Drives
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, TORQUE_MAX,
+    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, TORQUE_MAX,
     TORQUE_SPEED)
-from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, LENGTHS
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, LENGTHS
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.parameters.table import Parameters
 
@@ -71,11 +71,12 @@ class PoseLimits:
 
         At rest torques are breakaway torques: the leg must be able to move off either way.
         """
-        forces: Array = results[:, FORCES]
-        found = {FORCE_MAX: (forces, np.broadcast_to(self.limits.force_max, forces.shape))}
+        shape = len(results), 6
+        found = {name: (results[:, LIMITS[name].columns],
+                        np.broadcast_to(self.limits.bounds[name], shape))
+                 for name in self.limits.of_loads}
         if self._drives is not None:
-            of_motors = self._motors.excesses(
-                self._drives(motions, results), np.zeros(forces.shape))
+            of_motors = self._motors.excesses(self._drives(motions, results), np.zeros(shape))
             found.update((name, of_motors[name]) for name in (TORQUE_MAX, TORQUE_SPEED))
         return found
 

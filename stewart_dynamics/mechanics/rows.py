@@ -34,6 +34,9 @@ BASE: int = BASE_ANGULAR_ACCELERATION.stop
 NO_BASE: tuple[float, ...] = (math.nan,) * BASE
 
 # A row of a result.
+DETERMINANT: int
+DETERMINANT_RATE: int
+CONDITION: int
 (LENGTHS, RATES, FORCES, DETERMINANT, DETERMINANT_RATE, CONDITION,
  UNIT_LOAD_FORCES, JOINT_FORCES) = places('stewart_result').values()
 RESULT: int = JOINT_FORCES.stop

@@ -20,9 +20,9 @@ from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiAr
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability
-from stewart_dynamics.capability.travel import LIMITS
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.limits import OF_POSES
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.diagnostics.levels import OK, Status
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
@@ -42,7 +42,7 @@ _SWITCH = 2e-4  # after which another thread of Python may go on [s]
 _LAYOUT = MultiArrayLayout(dim=[
     MultiArrayDimension(label='x y z rx ry rz', size=6, stride=12),
     MultiArrayDimension(label='minus plus', size=2, stride=2)])
-NO_LIMIT = (f'~/travel: none of {", ".join(LIMITS)} is set: it ends '
+NO_LIMIT = (f'~/travel: none of {", ".join(OF_POSES)} is set: it ends '
             'at singularity.stop_condition alone')
 
 
@@ -105,7 +105,7 @@ class TravelPublisher(PublisherAtRate):
         self._read = self._publisher.get_subscription_count() > 0
         if not self._read:
             return ''
-        unlimited = all(self._parameters[name] is None for name in LIMITS)
+        unlimited = all(self._parameters[name] is None for name in OF_POSES)
         said, self._said = self._said, True
         return NO_LIMIT if unlimited and not said else ''
 

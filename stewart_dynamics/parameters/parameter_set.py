@@ -185,6 +185,8 @@ def _similar(text: str, names: Collection[str]) -> list[str]:
 
     words = set(re.findall('[a-z]+', text))
     with_words = [each for each in names if words <= set(re.findall('[a-z]+', each))]
+    with_words = [each for each in with_words if words == set(re.findall('[a-z]+', each))
+                  ] or with_words
     certain = words and 1 <= len(with_words) <= _MOST_SUGGESTED
     return nearest(_MISSPELT) or (with_words if certain else nearest(_SIMILAR))
 

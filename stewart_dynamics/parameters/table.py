@@ -303,6 +303,9 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     _legs('limits.force_max',
           'maximum force of a leg, to which forces are clipped; unlimited if not set', 'N', (),
           minimum=0.0, above=True),
+    _legs('limits.joint_force_max', 'maximum force along a leg that its joints and its rod carry, '
+          'the thrust rating of a cylinder: without friction and reflected mass of the actuator; '
+          'unlimited if not set', 'N', (), minimum=0.0, above=True),
     _legs('limits.base_joint_angle_max', 'maximum angle between a leg and its '
           'geometry.base_joint_axes; unlimited if not set', 'rad', (), minimum=0.0, above=True,
           maximum=math.pi),
@@ -313,10 +316,10 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'cylinder and a thinner piston, from that of another leg, and from the outlines of '
               'geometry that are given; unlimited if not set', 'm',
               minimum=0.0),
-    Parameter('limits.action', 'string', 'action while a limit of length, rate, joint angle or '
-              'clearance, or of speed or temperature of a motor, is exceeded, or a setpoint is '
-              'too far from the last one for limits.velocity_max: warn only, or publish no forces '
-              'and torques', '', WARN, choices=ACTIONS, while_active=True),
+    Parameter('limits.action', 'string', 'action while a limit of length, rate, joint force, '
+              'joint angle or clearance, or of speed or temperature of a motor, is exceeded, or a '
+              'setpoint is too far from the last one for limits.velocity_max: warn only, or '
+              'publish no forces and torques', '', WARN, choices=ACTIONS, while_active=True),
     Parameter('singularity.characteristic_length', 'double', 'length by which moments are '
               'divided in the condition number; default: mean distance of the platform joints '
               'from their center', 'm', minimum=0.0, above=True),

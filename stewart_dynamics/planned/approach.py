@@ -22,7 +22,7 @@ from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import optional_array, wrong_type
 from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
-from stewart_dynamics.mechanics.limits import FORCE_MAX, VELOCITY_MAX
+from stewart_dynamics.mechanics.limits import OF_LOADS, OF_RATES, VELOCITY_MAX
 from stewart_dynamics.mechanics.rows import MOTION, POSE, RATES, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.interpolation import Interpolation
@@ -137,7 +137,7 @@ def approach_in_pieces(platform: StewartPlatform, start: Array, end: Array, wren
             yield found
             return
         message = f'approach over {duration:.3g} s: {result.message}'
-        if result.limit not in (VELOCITY_MAX, FORCE_MAX):
+        if result.limit not in (*OF_RATES, *OF_LOADS):
             break
         duration *= _SLOWER
     raise MotionError(message)

@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, Limits, result_values,
+    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, result_values,
     SPEED_MAX, TEMPERATURE_RISE_MAX, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
@@ -125,8 +125,7 @@ class Checks:
             samples = samples.until(n)
         results = samples.results
         self._keep_largest_force(results[:, FORCES])
-        for limit, values in result_values(
-                results[:, LENGTHS], results[:, RATES], results[:, FORCES]).items():
+        for limit, values in result_values(results).items():
             self._check_limit(limit, values, _of_legs(samples.times))
         self._name_mistake(samples)
         self._check_cubics(samples)
@@ -232,7 +231,7 @@ class Checks:
             lowest = 0.5 * (nearest[:-1] + nearest[1:]) - samples.ways
         self._check_limit(CLEARANCE_MIN, clearances, _of_legs(samples.times), others)
         bound = float(self._limits.bounds[CLEARANCE_MIN][0])
-        held = np.minimum(nearest[:-1], nearest[1:]) >= self._limits.threshold(CLEARANCE_MIN)[0]
+        held = np.minimum(nearest[:-1], nearest[1:]) >= self._limits.thresholds[CLEARANCE_MIN][0]
         unclear: list[int] = np.flatnonzero(
             samples.near & held & (lowest < bound - self._clearance_tolerance)).tolist()
         return unclear
@@ -314,8 +313,8 @@ class Checks:
         low, high = cubics.bounds()
         with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
             middle = np.abs(cubics.middle_rate() / durations[:, None])
-        shortest, longest, fastest = map(
-            self._limits.threshold, (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX))
+        shortest, longest, fastest = (
+            self._limits.thresholds[name] for name in (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX))
         suspect = np.flatnonzero(samples.joined & (
             (low < shortest) | (high > longest) | (middle > fastest)).any(axis=1))
         if not len(suspect):
@@ -362,11 +361,19 @@ class Checks:
         lowest = np.fmin.reduce([smaller, *map(cubics.at, cubics.extrema())])
         # The condition number grows about as det(J) falls.
         predicted = np.maximum(condition[dips], condition[dips + 1]) * smaller
-        forces = np.abs(results[:, FORCES])
-        forces = np.maximum(forces[dips], forces[dips + 1]) * (smaller / lowest)[:, None]
+        here, there = np.abs(results[dips]), np.abs(results[dips + 1])
+        loads = np.maximum(here, there) * (smaller / lowest)[:, None]
         unclear: list[int] = dips[(lowest < DIP * smaller) | ((lowest < smaller) & (
-            (predicted >= self._stop * lowest) | self._exceed_known(forces)))].tolist()
+            (predicted >= self._stop * lowest) | self._exceed_known(loads[:, FORCES])
+            | self._may_exceed(loads)))].tolist()
         return unclear
+
+    def _may_exceed(self, results: Array) -> Flags:
+        """Return which rows of results (M, RESULT) exceed a limit of loads."""
+        found = np.zeros(len(results), dtype=bool)
+        for name in self._limits.of_loads:
+            found |= self._limits.exceeds(name, results[:, LIMITS[name].columns]).any(axis=1)
+        return found
 
     def _singular(self, time: float, result: Array, words: str) -> None:
         leg = int(np.argmax(result[UNIT_LOAD_FORCES]))

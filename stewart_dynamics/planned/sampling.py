@@ -20,7 +20,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.drives.motor_limits import force_limits, rate_limits
 from stewart_dynamics.mechanics.dynamics.friction import Friction
-from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX
+from stewart_dynamics.mechanics.limits import (
+    FORCE_MAX, JOINT_FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     BASE_ANGULAR_VELOCITY, CONDITION, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.parameters.table import Parameters
@@ -56,7 +57,7 @@ class Sampling:
         self._reflected = parameters['actuator.reflected_mass']
         self._parameters = parameters
         # Rates above which a leg or its motor may exceed a limit.
-        self._fastest = self._limits.threshold(VELOCITY_MAX)
+        self._fastest = self._limits.thresholds[VELOCITY_MAX]
         if parameters.drives:
             self._fastest = np.minimum(self._fastest, rate_limits(parameters))
         # Largest speed of a platform joint at a speed |v| + arm |w| of the platform.
@@ -102,7 +103,8 @@ class Sampling:
         """Return in which intervals a length or a rate may exceed its limit (N,)."""
         square = durations ** 2 / 8.0
         length = bounds.position_deviation + square * bounds.speed ** 2 * inverse_radius
-        shortest, longest = map(self._limits.threshold, (LENGTH_MIN, LENGTH_MAX))
+        shortest, longest = (
+            self._limits.thresholds[name] for name in (LENGTH_MIN, LENGTH_MAX))
         lengths, length_deviation = results[:, LENGTHS], self._lever * length[:, None]
         exceeding: Flags = (
             (_smaller(lengths) - length_deviation < shortest)
@@ -124,8 +126,10 @@ class Sampling:
         """Return the number of parts that the forces need (N,)."""
         magnitudes = np.abs(results[:, FORCES])
         rate_deviation = self._rate_deviation(durations, bounds, inverse_radius)
-        deviation = self._friction.viscous * rate_deviation + self._inertia_deviation(
-            durations, bounds, inverse_radius, results, bases)
+        acceleration = self._acceleration_deviation(
+            durations, bounds, inverse_radius, results, bases)[:, None]
+        gains = self._gains(results)
+        deviation = self._friction.viscous * rate_deviation + gains[FORCE_MAX] * acceleration
         # Coulomb friction changes where a rate is, or may come, near zero.
         changes = (_smaller(np.abs(rates)) - rate_deviation < self._friction.coulomb_velocity) | (
             rates[:-1] * rates[1:] < 0.0)
@@ -139,17 +143,31 @@ class Sampling:
             still = force_limits(self._parameters, np.zeros(6))
             strongest = np.minimum(strongest, np.maximum(of_motors, _LEAST * still))
         allowed = self._tolerance * np.minimum(largest, strongest)
-        relevant = _larger(magnitudes) + deviation + friction > np.minimum(
-            largest, strongest) + allowed
-        needed = relevant & (deviation + friction > allowed)
-        ratio = np.where(deviation == 0.0, 0.0, deviation / allowed)
-        enough = np.ceil(np.sqrt(ratio)).clip(_FEWEST, _ENOUGH)
-        parts: Array = np.where(needed, enough, 1.0).max(axis=1)
+        parts = _parts(magnitudes, deviation, friction, np.minimum(largest, strongest), allowed)
+        for name in self._limits.of_loads:
+            if name != FORCE_MAX:
+                bound = self._limits.bounds[name]
+                parts = np.maximum(parts, _parts(
+                    np.abs(results[:, LIMITS[name].columns]), gains[name] * acceleration, 0.0,
+                    bound, self._tolerance * bound))
         return parts
 
-    def _inertia_deviation(self, durations: Array, bounds: Bounds, inverse_radius: Array,
-                           results: Array, bases: Array | None) -> Array:
-        """Return how far the forces of all masses may be from the straight line (N, 6) [N]."""
+    def _gains(self, results: Array) -> dict[str, Array]:
+        """
+        Return bounds of loads (N, 6) for an acceleration |a| + arm |alpha| of the platform of 1.
+
+        For all masses that move with it, by the name of the limit of each load.
+        """
+        length = _smaller(results[:, LENGTHS])
+        legs = self._piston_mass + (self._joint_inertia + self._piston_mass * (
+            _larger(results[:, LENGTHS]) - self._piston_center) ** 2) / length ** 2
+        mass = self._platform_mass + (legs * self._lever ** 2).sum(axis=1)
+        joints: Array = _larger(results[:, UNIT_LOAD_FORCES]) * mass[:, None]
+        return {FORCE_MAX: joints + self._reflected * self._lever, JOINT_FORCE_MAX: joints}
+
+    def _acceleration_deviation(self, durations: Array, bounds: Bounds, inverse_radius: Array,
+                                results: Array, bases: Array | None) -> Array:
+        """Return how far accelerations of masses may be from the straight line (N,) [m/s^2]."""
         # Beside the acceleration's own: speeds that change the directions, a pose that changes
         # what a changing acceleration asks for, and a base that turns.
         h, speed = durations, bounds.speed
@@ -163,14 +181,23 @@ class Sampling:
             turning = np.sqrt((bases[:, BASE_ANGULAR_VELOCITY] ** 2).sum(axis=1))
             turning = np.nan_to_num(_larger(turning) if len(turning) > 1 else turning)
             acceleration += 2.0 * turning * bounds.velocity_deviation
-        length = _smaller(results[:, LENGTHS])
-        legs = self._piston_mass + (self._joint_inertia + self._piston_mass * (
-            _larger(results[:, LENGTHS]) - self._piston_center) ** 2) / length ** 2
-        mass = self._platform_mass + (legs * self._lever ** 2).sum(axis=1)
-        deviation: Array = (
-            _larger(results[:, UNIT_LOAD_FORCES]) * mass[:, None] + self._reflected * self._lever
-            ) * acceleration[:, None]
-        return deviation
+        return acceleration
+
+
+def _parts(magnitudes: Array, deviation: Array, jumps: Array | float, known: Array,
+           allowed: Array) -> Array:
+    """
+    Return the number of parts in which a load needs each interval (N,).
+
+    magnitudes (N + 1, 6): at the points. deviation (N, 6): from the straight line between them.
+    jumps: by which it may change at once. known (6,): larger values matter, by more than allowed.
+    """
+    relevant = _larger(magnitudes) + deviation + jumps > known + allowed
+    needed = relevant & (deviation + jumps > allowed)
+    ratio = np.where(deviation == 0.0, 0.0, deviation / allowed)
+    enough = np.ceil(np.sqrt(ratio)).clip(_FEWEST, _ENOUGH)
+    parts: Array = np.where(needed, enough, 1.0).max(axis=1)
+    return parts
 
 
 def _smaller(values: Array) -> Array:

@@ -18,6 +18,7 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import listed, Motion, Pose
+from stewart_dynamics.mechanics.limits import USUAL
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.multisine import multisine
@@ -30,7 +31,6 @@ _FADE, _REST = 0.5, 2.5
 _SAMPLES = 16
 # Amplitude from which the largest one is found, of the characteristic length.
 _SMALL = 1e-3
-_LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 
 
 def duration(parameters: ReferenceMotionParameters) -> float:
@@ -110,7 +110,7 @@ def _amplitudes_within(path: str, initial: tuple[float, ...], part: float, highe
     from stewart_dynamics.capability.capability import Capability  # slow, other motions need none
 
     platform = StewartPlatform(Parameters.from_yaml(path))
-    if missing := [name for name in _LIMITS if platform.parameters[name] is None]:
+    if missing := [name for name in USUAL if platform.parameters[name] is None]:
         raise ParameterError(f'{path}: {", ".join(missing)}: missing: the motion response needs '
                              'them, or motion.amplitude in place of motion.response.params_file')
     capability = Capability(platform)

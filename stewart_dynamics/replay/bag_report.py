@@ -27,7 +27,7 @@ from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, LIMITS, OF_JOINTS, QUANTITIES, Quantity)
+    LIMITS, OF_JOINTS, OF_LEGS, Quantity)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, PARTS_OF_WRENCH,
     POSE, POSITION, ROTATION)
@@ -42,7 +42,7 @@ from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
     base64_of, link, link_to_other, page, plotly_script)
 from stewart_dynamics.reporting.plots import (
-    base_wrench_plots, measured_plots, motion_plots, spectrum_plots)
+    base_wrench_plots, measured_plots, motion_plots, plotted, spectrum_plots)
 from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
@@ -69,6 +69,7 @@ class Report:
                  folder: Path | None = None) -> None:
         self._parameters = parameters
         self._legs: tuple[str, ...] = parameters['joints']
+        self._plotted = plotted(parameters)
         self._sources = len(sources_of(parameters))
         timeout = parameters['setpoint.timeout']
         self._curves = Curves(timeout)
@@ -96,9 +97,8 @@ class Report:
             'angular_velocity': np.degrees(motions[:, ANGULAR_VELOCITY]),
             'acceleration': motions[:, LINEAR_ACCELERATION],
             'angular_acceleration': np.degrees(motions[:, ANGULAR_ACCELERATION]),
-            'lengths': outputs.lengths,
-            'rates': outputs.rates,
-            'forces': forces,
+            **{LIMITS[name].quantity.key: outputs.results[:, LIMITS[name].columns]
+               for name in self._plotted},
             'powers': powers,
             'determinant': outputs.determinants[:, None],
             'condition': outputs.conditions[:, None],
@@ -150,7 +150,8 @@ class Report:
             data=self._data(summary), sources=sources_of(self._parameters),
             cards=cards(summary), margins=smallest_margins(summary),
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
-            date=date(summary['setpoints']['first_stamp_ns']), quantities=QUANTITIES,
+            date=date(summary['setpoints']['first_stamp_ns']),
+            quantities={name: limit.quantity for name, limit in LIMITS.items()},
             units={name: each.unit or '' for name, each in PARAMETERS.items()},
             most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
             unit_key=unit_key, percent=PERCENT, **_response_charts(followed),
@@ -251,23 +252,20 @@ def margin_columns(parameters: Parameters) -> list[tuple[Quantity, str, list[str
     """
     Return the quantities with limits, each with the key of its margin and its limits.
 
-    Joint angles and clearance are left out if none of their limits is given.
+    Those that are not usual are left out if no limit is given; of joints, none at both ends.
     """
-    left_out: set[str] = set()
-    for names in (OF_JOINTS, (CLEARANCE_MIN,)):
-        if all(parameters[name] is None for name in names):
-            left_out.update(names)
     limits: dict[Quantity, list[str]] = {}
-    for limit in LIMITS:
-        if limit not in left_out:
-            limits.setdefault(QUANTITIES[limit], []).append(limit)
+    for limit in OF_LEGS:
+        together = OF_JOINTS if limit in OF_JOINTS else (limit,)
+        if LIMITS[limit].usual or any(parameters[name] is not None for name in together):
+            limits.setdefault(LIMITS[limit].quantity, []).append(limit)
     return [(quantity, margin_key(quantity), names) for quantity, names in limits.items()]
 
 
 def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the smallest margins of all quantities with a limit, each with its leg."""
     found = []
-    for quantity in dict.fromkeys(QUANTITIES[limit] for limit in LIMITS):
+    for quantity in dict.fromkeys(LIMITS[limit].quantity for limit in OF_LEGS):
         if margins := values_of(summary['legs'], margin_key(quantity)):
             value, joint = min(margins, key=FIRST)
             found.append({'name': quantity.name, 'value': value, 'unit': quantity.unit,

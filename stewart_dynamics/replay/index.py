@@ -18,7 +18,7 @@ from urllib.parse import quote
 
 from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, OF_JOINTS, OF_RESULTS, QUANTITIES, VELOCITY_MAX)
+    CLEARANCE_MIN, LENGTH_MAX, LIMITS, OF_JOINTS, OF_LOADS, OF_RATES)
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.legs_table import harmless
 from stewart_dynamics.replay.motor_loads import needed
@@ -125,9 +125,9 @@ COLUMNS = (
     Column('force_worst_leg', 'of leg', '', _of_worst_force(1), number=False),
     Column('force_worst_at_s', 'at', 's', _of_worst_force(2)),
     *(Column(margin_key(quantity), f'{quantity.name} margin', quantity.unit,
-             _of_legs(margin_key(quantity), min), optional=limit not in OF_RESULTS)
-      for limit in (FORCE_MAX, LENGTH_MAX, VELOCITY_MAX, *OF_JOINTS, CLEARANCE_MIN)
-      for quantity in [QUANTITIES[limit]]),
+             _of_legs(margin_key(quantity), min), optional=not LIMITS[limit].usual)
+      for limit in (*OF_LOADS, LENGTH_MAX, *OF_RATES, *OF_JOINTS, CLEARANCE_MIN)
+      for quantity in [LIMITS[limit].quantity]),
     Column('limits_exceeded', 'limits exceeded', '', _exceeded, number=False),
     Column('force_rms_n', 'RMS force', 'N', _of_legs('force_rms_n', max)),
     Column('power_peak_w', 'peak power', 'W', _of_legs('power_peak_w', _largest), size=True),

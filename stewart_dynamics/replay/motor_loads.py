@@ -19,7 +19,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.limits import (
-    CLIPPED, OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
+    LIMITS, OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.block_statistics import Exceeded, Extreme, finite, Integral
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
@@ -89,7 +89,7 @@ class MotorLoads:
     def not_checked(self, without_forces: bool) -> list[str]:
         """Return the limits that need velocities, or forces where some are not known."""
         return [limit for limit in OF_MOTORS if self._parameters[limit] is not None and (
-            limit not in self._exceeded or without_forces and limit in CLIPPED)]
+            limit not in self._exceeded or without_forces and LIMITS[limit].clips)]
 
     def exceeded(self, legs: Sequence[str]) -> list[dict[str, Any]]:
         """Return the entries of ``limits`` in summary.json."""

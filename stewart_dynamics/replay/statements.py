@@ -16,8 +16,8 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from stewart_dynamics.mechanics.limits import (
-    BASE_ANGLE_MAX, CLIPPED, Exceedance, LENGTH_MAX, OF_MOTORS, PLATFORM_ANGLE_MAX, QUANTITIES,
-    SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
+    BASE_ANGLE_MAX, Exceedance, LENGTH_MAX, LIMITS as ALL_LIMITS, LOAD, OF_MOTORS,
+    PLATFORM_ANGLE_MAX, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.summary import margin_key, unit_key
@@ -162,7 +162,7 @@ def _limits(summary: Summary) -> Iterator[Statement]:
         most = max(of_legs, key=lambda each: Exceedance(
             name, 0, each['worst'], each['bound']).excess)
         others = f' and {plural(len(of_legs) - 1, "other leg")}' if len(of_legs) > 1 else ''
-        quantity = QUANTITIES[name]
+        quantity = ALL_LIMITS[name].quantity
         at_worst = ' at that speed' if name == TORQUE_SPEED else ''
         yield Statement(
             _topic(name), 'bad', f'{name}, {most["bound"]:g} {quantity.unit}{at_worst}, exceeded '
@@ -171,13 +171,14 @@ def _limits(summary: Summary) -> Iterator[Statement]:
     if points['jumps']:
         yield Statement(
             LIMITS, 'bad', f'{plural(points["jumps"], "jump")}, first',
-            points['jumps_first_at_s'], QUANTITIES[LENGTH_MAX].key,
+            points['jumps_first_at_s'], ALL_LIMITS[LENGTH_MAX].quantity.key,
             ': the legs cannot follow within limits.velocity_max')
     for name in summary['limits_not_checked']:
         why = ': velocities are not known; --differentiate computes them from the poses'
         causes = ((summary['singularity']['unsolved'], 'J_inv cannot be solved'),
                   (points['base_unknown'], BASE_NOT_KNOWN))
-        if name in CLIPPED and any(number for number, _ in causes):
+        of_forces = ALL_LIMITS[name].clips or ALL_LIMITS[name].depends == LOAD
+        if of_forces and any(number for number, _ in causes):
             why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
                                   for number, cause in causes if number)
         yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
@@ -212,7 +213,7 @@ def _topic(limit: str) -> str:
 def _joints(legs: Summary) -> Iterator[Statement]:
     """Yield the largest angles of the joints at both ends, and the smallest clearance."""
     for joint, limit in (('base', BASE_ANGLE_MAX), ('platform', PLATFORM_ANGLE_MAX)):
-        quantity = QUANTITIES[limit]
+        quantity = ALL_LIMITS[limit].quantity
         angles = values_of(legs, f'{quantity.key}_max_rad')
         margins = values_of(legs, margin_key(quantity))
         if angles and margins:
@@ -261,7 +262,7 @@ def _motors(summary: Summary) -> Iterator[Statement]:
         yield _held(summary, MOTOR_LIMITS, 'all limits of the motors')
     for name, peak, of in ((TORQUE_MAX, 'torque_peak', ''), (SPEED_MAX, 'speed_peak', ''),
                            (TEMPERATURE_RISE_MAX, 'temperature_rise_max', ' of the winding')):
-        quantity = QUANTITIES[name]
+        quantity = ALL_LIMITS[name].quantity
         if values := values_of(legs, f'{peak}_{unit_key(quantity.unit)}'):
             value, most = max(values, key=lambda each: abs(each[0]))
             yield Statement(

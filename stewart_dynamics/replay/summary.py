@@ -19,8 +19,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, MINIMA,
-    OF_RESULTS, QUANTITIES, Quantity, result_values, VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, OF_LEGS,
+    OF_LOADS, OF_RATES, POSE, Quantity, result_values, USUAL, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -85,8 +85,8 @@ class Summary:
         self._timeout: float = parameters['setpoint.timeout']
         self._limits = Limits(parameters)
         self._exceeded = {
-            name: Exceeded(name in MINIMA)
-            for name in self._limits.bounds if not (quasi_static and name == VELOCITY_MAX)}
+            name: Exceeded(LIMITS[name].minimum)
+            for name in self._limits.bounds if not (quasi_static and name in OF_RATES)}
         self._held: list[Answered] = []
         self._gap: float | None = None
         self._stamps: tuple[int, int] | None = None
@@ -98,7 +98,7 @@ class Summary:
         self._seconds = self._gap_seconds = 0.0
         # of the quantity of each limit, the value nearest to it or farthest beyond it
         self._peaks = {
-            name: Extreme(6, np.negative if name in MINIMA else np.abs) for name in LIMITS}
+            name: Extreme(6, np.negative if LIMITS[name].minimum else np.abs) for name in OF_LEGS}
         self._published, self._power = Extreme(6, np.abs), Extreme(6, np.abs)
         # squares of the forces; driving power; braking power
         self._means = Integral(18)
@@ -140,7 +140,7 @@ class Summary:
     def _add(self, block: Answered) -> None:
         seconds, setpoints, outputs, base_wrenches, power, breakdown = block
         steps = self._steps(seconds, setpoints)
-        lengths, rates, demanded = outputs.lengths, outputs.rates, outputs.demanded_forces
+        demanded = outputs.demanded_forces
         without = with_nan(demanded)
         unknown = ~setpoints.base_known
         unsolved = without & ~(unknown & (outputs.conditions < UNSOLVABLE_CONDITION))
@@ -161,7 +161,7 @@ class Summary:
                 (demanded ** 2, np.maximum(power, 0.0), np.maximum(-power, 0.0)), axis=1))
         self._published.add(seconds, outputs.forces)
         self._power.add(seconds, power)
-        values = result_values(lengths, rates, demanded)
+        values = result_values(outputs.results)
         for name in self._limits.of_joints:
             values[name] = outputs.joint_angles[:, ANGLES[name]]
         if CLEARANCE_MIN in self._limits.bounds:
@@ -208,7 +208,7 @@ class Summary:
         limits = [entry for name, exceeded in self._exceeded.items()
                   for entry in exceeded.entries(name, self._legs)]
         not_checked = [name for name in self._limits.bounds if name not in self._exceeded
-                       or name == FORCE_MAX and self._without_force]
+                       or name in OF_LOADS and self._without_force]
         motors = None
         if self._motors is not None:
             limits += self._motors.exceeded(self._legs)
@@ -253,10 +253,11 @@ class Summary:
             'energy_driving_j': finite(energy_driving) if solved else None,
             'energy_braking_j': finite(energy_braking) if solved else None}
         for name, peak in peaks.items():
-            quantity, bound = QUANTITIES[name], self._limits.bounds.get(name)
-            if name not in OF_RESULTS:
-                kind = 'min' if name in MINIMA else 'max'
-                found |= peak.named(leg, f'{quantity.key}_{kind}', quantity.unit)
+            limit, bound = LIMITS[name], self._limits.bounds.get(name)
+            quantity = limit.quantity
+            if name not in USUAL:
+                kind = 'min' if limit.minimum else 'max' if limit.depends == POSE else 'peak'
+                found |= peak.named(leg, f'{quantity.key}_{kind}', unit_key(quantity.unit))
             key, margin = margin_key(quantity), None
             if bound is not None:
                 margin = finite(

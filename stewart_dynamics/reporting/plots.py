@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.colors import AXIS_COLORS, LEG_COLORS, ROLES
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS,
-    QUANTITIES, short_name, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
+    ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, LIMITS, LOAD, OF_JOINTS,
+    OF_LOADS, OF_RATES, OF_RESULTS, POSE, short_name, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.spectrum import Density
 
@@ -90,7 +90,7 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
         Plot('angular_acceleration', 'Angular acceleration of the platform', 'deg/s²',
              _of_axes(at['angular_acceleration'], 'dw/dt x', 'dw/dt y', 'dw/dt z'), 'base axes')]
     of_rates = [
-        _bounded(p, [VELOCITY_MAX], 'Leg rates', at['rates'], '+ extends', both=True),
+        *_of_results(p, at, OF_RATES),
         Plot('powers', 'Mechanical power of the legs', 'W', _of_legs(joints, at['powers']),
              'demanded force times rate; + drives, − brakes', spikes=True)]
     return [
@@ -101,8 +101,7 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
         Plot('angles', 'Inputs: orientation of the platform', 'deg',
              _of_axes(at['angles'], 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
         *(of_motion if velocities_known else ()),
-        _bounded(p, [LENGTH_MIN, LENGTH_MAX], 'Leg lengths', at['lengths'],
-                 'between the joint centers'),
+        *_of_results(p, at, (LENGTH_MIN, LENGTH_MAX)),
         *(_of_joints(p, limit, at['joint_angles'].start) for limit in OF_JOINTS
           if p[limit] is not None),
         *([] if p[CLEARANCE_MIN] is None else [
@@ -117,21 +116,35 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
              'dimensionless; 1 is best', [
                  Bound(p['singularity.warn_condition'], 'warn', ROLES['near']),
                  Bound(p['singularity.stop_condition'], 'stop', ROLES['singular'])], log=True),
-        _bounded(p, [FORCE_MAX], 'Leg forces', at['forces'], 'demanded by the motion, + pushes',
-                 both=True, spikes=True),
+        *_of_results(p, at, OF_LOADS),
         *(of_rates if velocities_known else ()),
         *(_of_motors(p, at, velocities_known) if p.drives else ()),
         Plot('force_breakdown', 'Leg force by source', 'N', {
-            leg: [Curve('sum', ROLES['zero'], at['forces'].start + n, width=4.5),
+            leg: [Curve('sum', ROLES['zero'], at['force'].start + n, width=4.5),
                   *(Curve(source, _SOURCE_COLORS[source], at['breakdown'].start + 6 * k + n)
                     for k, source in enumerate(sources_of(p)))]
             for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
 
 
+def plotted(p: Parameters) -> list[str]:
+    """Return the limits in OF_RESULTS whose quantities are plotted."""
+    return [name for name in OF_RESULTS if LIMITS[name].usual or p[name] is not None]
+
+
+def _of_results(p: Parameters, at: Places, names: Sequence[str]) -> Iterator[Plot]:
+    """Yield the plots of quantities in a row of results, each with its limits."""
+    shown = [LIMITS[name] for name in names if name in plotted(p)]
+    for quantity in dict.fromkeys(limit.quantity for limit in shown):
+        limits = [limit for limit in shown if limit.quantity == quantity]
+        yield _bounded(
+            p, [limit.name for limit in limits], limits[0].title, at[quantity.key],
+            limits[0].note, both=limits[0].depends != POSE, spikes=limits[0].depends == LOAD)
+
+
 def _bounded(p: Parameters, limits: Sequence[str], title: str, channels: slice, note: str,
              both: bool = False, spikes: bool = False) -> Plot:
     """Return the plot of a quantity with limits, the lower one first; both: of either sign."""
-    quantity = QUANTITIES[limits[0]]
+    quantity = LIMITS[limits[0]].quantity
     return Plot(quantity.key, title, quantity.unit, _of_legs(p['joints'], channels), note,
                 [bound for limit in limits for bound in _bounds(limit, p[limit], both)],
                 spikes=spikes)
@@ -141,7 +154,7 @@ def _of_joints(p: Parameters, limit: str, first: int) -> Plot:
     """Return the plot of the angles of the joints that a limit bounds, in degrees."""
     which, joint = ANGLES[limit], 'base' if limit == BASE_ANGLE_MAX else 'platform'
     return Plot(
-        QUANTITIES[limit].key, f'Angles of the {joint} joints', 'deg',
+        LIMITS[limit].quantity.key, f'Angles of the {joint} joints', 'deg',
         _of_legs(p['joints'], slice(first + which.start, first + which.stop)),
         f'between the leg and geometry.{joint}_joint_axes, by default its direction at home',
         _bounds(limit, np.degrees(p[limit])))

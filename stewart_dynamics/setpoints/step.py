@@ -11,7 +11,7 @@ setpoints and for batches.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, cast, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from stewart_dynamics.core.binding import function, Sample
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    angle_values, ANGLES, CLEARANCE_MIN, Exceedance, Limits, result_values)
+    ANGLES, CLEARANCE_MIN, Exceedance, Limits, result_values)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES,
     UNIT_LOAD_FORCES)
@@ -69,18 +69,10 @@ class Output(NamedTuple):
     """Result of the step for one setpoint."""
 
     stamp: int
-    lengths: Six
-    rates: Six
-    demanded_forces: Six | None
-    """Unclipped [N]; None if J_inv cannot be solved or the base's motion is unknown."""
+    result: tuple[float, ...]
+    """Row of results (RESULT,); forces are nan where they cannot be computed."""
     forces: Six | None
     """As published [N], clipped to limits.force_max; None if suppressed or not computed."""
-    joint_forces: Six | None
-    """Of rods and joints [N], under the demanded forces; None without these."""
-    unit_load_forces: Six
-    determinant: float
-    determinant_rate: float
-    condition: float
     singularity: Singularity
     warning_changed: bool
     exceedances: tuple[Exceedance, ...]
@@ -93,8 +85,48 @@ class Output(NamedTuple):
     state: State = State()  # for the next setpoint
 
     @property
+    def lengths(self) -> Six:
+        """Lengths of the legs [m]."""
+        return cast(Six, self.result[LENGTHS])
+
+    @property
+    def rates(self) -> Six:
+        """Rates of the legs [m/s]."""
+        return cast(Six, self.result[RATES])
+
+    @property
+    def demanded_forces(self) -> Six | None:
+        """Unclipped [N]; None if J_inv cannot be solved or the base's motion is unknown."""
+        return _known(self.result[FORCES])
+
+    @property
+    def joint_forces(self) -> Six | None:
+        """Forces of rods and joints [N], under the demanded forces; None without these."""
+        return _known(self.result[JOINT_FORCES])
+
+    @property
+    def unit_load_forces(self) -> Six:
+        """Largest force of each leg under a unit load on the platform."""
+        return cast(Six, self.result[UNIT_LOAD_FORCES])
+
+    @property
+    def determinant(self) -> float:
+        """det(J_inv) [m^3]."""
+        return self.result[DETERMINANT]
+
+    @property
+    def determinant_rate(self) -> float:
+        """Its time derivative [m^3/s]."""
+        return self.result[DETERMINANT_RATE]
+
+    @property
+    def condition(self) -> float:
+        """Condition number of J_inv."""
+        return self.result[CONDITION]
+
+    @property
     def solvable(self) -> bool:
-        """Return whether J_inv can be solved."""
+        """Whether J_inv can be solved."""
         return self.condition < UNSOLVABLE_CONDITION
 
 
@@ -204,6 +236,10 @@ class Outputs(NamedTuple):
         return self.states[:, CAUSE] > 0.0
 
 
+def _known(forces: tuple[float, ...]) -> Six | None:
+    return None if math.isnan(forces[0]) else cast(Six, forces)
+
+
 _FIRST = Singularity()
 _NO_LENGTHS = (math.nan,) * 6  # no setpoint is a jump from these
 
@@ -221,10 +257,8 @@ class Step:
         self._platform = StewartPlatform(parameters)
         self._limits = Limits(parameters)
         self._sample = sample = Sample(
-            'one_setpoint', 'base_known', 'answered', 'exceeding', 'jumped', 'result.lengths',
-            'result.rates', 'result.forces', 'forces', 'result.joint_forces',
-            'result.unit_load_forces', 'result.determinant', 'result.determinant_rate',
-            'result.condition_number', 'after')
+            'one_setpoint', 'base_known', 'answered', 'exceeding', 'jumped', 'result', 'forces',
+            'after')
         self._limits_suppress = parameters['limits.action'] == SUPPRESS_FORCES
         # Margin by which the time between two setpoints may exceed that between their stamps [s].
         self._slack = JITTER + parameters['setpoint.sync_tolerance']
@@ -257,14 +291,12 @@ class Step:
             *(before.singularity or _FIRST), *(before.lengths or _NO_LENGTHS), elapsed,
             setpoint.restart, -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
         self._solve()
-        (answered, exceeding, jumped, lengths, rates, demanded, forces, joint_forces,
-         unit_load_forces, determinant, determinant_rate, condition, after) = self._sample.read()
+        answered, exceeding, jumped, result, commanded, after = self._sample.read()
         if not answered:
             return None
-        demanded = None if math.isnan(demanded[0]) else demanded
-        forces = None if math.isnan(forces[0]) else forces
+        forces, lengths = _known(commanded), result[LENGTHS]
         singularity = Singularity.of(after)
-        exceedances = (self._limits.exceeded(result_values(lengths, rates, demanded))
+        exceedances = (self._limits.exceeded(result_values(self._sample['result']))
                        if exceeding else ())
         if jumped and before.lengths:
             exceedances += self._limits.jumps(lengths, before.lengths, elapsed)
@@ -273,7 +305,8 @@ class Step:
         angles: tuple[float, ...] = ()
         if self._angles_of_one is not None:
             angles = self._angles_of_one()
-            of_pose = self._limits.exceeded(angle_values(angles))
+            of_pose = self._limits.exceeded(
+                {name: angles[where] for name, where in ANGLES.items()})
         clearances: tuple[float, ...] = ()
         if self._clearance_of_one is not None:
             clearances, nearest = self._clearance_of_one()
@@ -283,8 +316,7 @@ class Step:
         if self._limits_suppress and (of_pose or of_motors and motors[RUNNING]):
             forces = None
         return Output(
-            stamp, lengths, rates, demanded, forces, joint_forces if demanded else None,
-            unit_load_forces, determinant, determinant_rate, condition, singularity,
+            stamp, result, forces, singularity,
             before.singularity is None or singularity.warning != before.singularity.warning,
             exceedances + of_pose + of_motors, angles, clearances, motors,
             before._replace(singularity=singularity) if jumped

@@ -14,6 +14,7 @@ import math
 from types import MappingProxyType
 
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.limits import FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_LEGS
 from stewart_dynamics.parameters.parameter_set import Parameter
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
@@ -89,8 +90,8 @@ _OF_THE_NODE = ('autostart', 'cueing.', 'drive.resistance', 'drive.speed_max',
                 'drive.torque_continuous', 'external_wrench.', 'geometry.base_joint_axes',
                 'geometry.platform_joint_axes', 'joint_states.', 'legs.cylinder.length',
                 'legs.cylinder.radius',
-                'legs.piston.radius', 'limits.base_joint_angle_max', 'limits.leg_clearance_min',
-                'limits.platform_joint_angle_max', 'limits.velocity_max', 'meshes.',
+                'legs.piston.radius', 'meshes.', *(
+                    name for name in OF_LEGS if name not in (LENGTH_MIN, LENGTH_MAX, FORCE_MAX)),
                 'platform_frame', 'publish_tf', 'setpoint.', 'singularity.', 'trajectory.',
                 'visualization_rate')
 

@@ -45,7 +45,7 @@ from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
 from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
-from stewart_dynamics.mechanics.limits import Limits, result_values
+from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits
 
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 from stewart_dynamics.simulator.end_stops import stiffness_and_damping, stops_of
@@ -256,7 +256,7 @@ class Plant:
         if self.fault:
             raise ParameterError(
                 f'initial_pose: {pose}: a leg would have no length, or one that overflows')
-        for exceedance in self._limits.exceeded(result_values(
-                self.state.lengths, NO_WRENCH, None)):
+        for exceedance in self._limits.exceeded(
+                dict.fromkeys((LENGTH_MIN, LENGTH_MAX), self.state.lengths)):
             raise ParameterError(
                 f'initial_pose: {pose}: {exceedance.words(self.parameters["joints"])}')

@@ -118,9 +118,12 @@ stewart_leg leg_of(const Params & p, std::size_t n)
   leg.length_max = of_leg("limits.length_max", limits.length_max, n, kInfinite);
   leg.velocity_max = of_leg("limits.velocity_max", limits.velocity_max, n, kInfinite);
   leg.force_max = of_leg("limits.force_max", limits.force_max, n, kInfinite);
+  leg.joint_force_max =
+    of_leg("limits.joint_force_max", limits.joint_force_max, n, kInfinite);
   check(leg.length_min < leg.length_max, "limits.length_min: must be less than limits.length_max");
   check(leg.velocity_max > 0.0, "limits.velocity_max: must be more than 0");
   check(leg.force_max > 0.0, "limits.force_max: must be more than 0");
+  check(leg.joint_force_max > 0.0, "limits.joint_force_max: must be more than 0");
   leg.base_joint_angle_max =
     of_leg("limits.base_joint_angle_max", limits.base_joint_angle_max, n, kInfinite);
   leg.platform_joint_angle_max =

@@ -66,6 +66,7 @@ stewart_platform hexapod()
     leg.coulomb_velocity = 1e-3;
     leg.length_max = leg.velocity_max = kInfinite;
     leg.force_max = 5000.0;
+    leg.joint_force_max = kInfinite;
     leg.base_joint_angle_max = leg.platform_joint_angle_max = kInfinite;
   }
   p.leg_clearance_min = -kInfinite;

@@ -37,6 +37,9 @@ _HOTTEST = 1500.0  # [K]
 _BACK = 0.1
 # How far drive and legs may miss each other's limits, and how well they must fit if corrected.
 _MISSED, _FITS = 1.5, 1.2
+# Force of the motors by limits.force_max: of a drive 0.7 to 1.5, of a thrust rating 3 and more
+# where the rotor, not the rod, takes most of it.
+_OF_A_CYLINDER = 2.5
 
 
 def likely_mistakes(p: Parameters) -> Iterator[str]:
@@ -75,6 +78,8 @@ def likely_mistakes(p: Parameters) -> Iterator[str]:
     weight = p.carried.mass * float(np.linalg.norm(p['gravity'])) / 6.0
     force = np.full(6, weight) if force is None else force
     # The reserve of both: above one, the drive cannot reach the limit of the leg.
+    if most.min() > _OF_A_CYLINDER * force.max():
+        yield from _thrust_rating(p, float(most.min()))
     loads = force / most
     speeds = np.zeros(6) if rate is None or speed is None else rate * k / speed
     if max(loads.max(), speeds.max()) <= _MISSED:
@@ -93,6 +98,18 @@ def likely_mistakes(p: Parameters) -> Iterator[str]:
             return
     if weight > most.min():
         yield (f'drive.torque_max: {torque.min():g} N m: {said}: less than a sixth of the weight')
+
+
+def _thrust_rating(p: Parameters, pushed: float) -> Iterator[str]:
+    """Yield that the limit of the actuators' forces looks like one of the forces in the joints."""
+    force, reflected = p['limits.force_max'], p['actuator.reflected_mass']
+    carried = p.carried.mass / 6.0 + p['legs.piston.mass']
+    if p['limits.joint_force_max'] is not None or force is None or np.any(reflected < carried):
+        return
+    yield (f'limits.force_max: {force.max():.3g} N: the motors can push {pushed:.3g} N, of which '
+           f'actuator.reflected_mass, {reflected.max():.3g} kg, takes more than the '
+           f'{carried.max():.3g} kg that a leg carries: the thrust rating of a cylinder? It is '
+           'limits.joint_force_max')
 
 
 def _heat(p: Parameters) -> Iterator[str]:

@@ -19,8 +19,8 @@ from statistics import median
 from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, CLIPPED, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS,
-    OF_MOTORS, QUANTITIES, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, Exceedance, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS, OF_LOADS, OF_RESULTS,
+    SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX)
 from stewart_dynamics.mechanics.singularity_warning import Cause, HYSTERESIS
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
@@ -32,8 +32,7 @@ from stewart_dynamics.setpoints.step import Output
 _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singularity
 # Where the values of limits are in a row of motors.
 _OF_MOTORS = {SPEED_MAX: SPEEDS, TORQUE_MAX: DEMANDED_TORQUES, TEMPERATURE_RISE_MAX: RISES}
-_DEMANDED = FORCE_MAX, TORQUE_MAX
-_LIMITS = *LIMITS, *OF_MOTORS, JUMP
+_DEMANDED = *OF_LOADS, TORQUE_MAX
 _OF_POSE = LENGTH_MIN, LENGTH_MAX, JUMP  # those that a wrong pose exceeds
 
 
@@ -228,7 +227,7 @@ class LimitsDiagnostics(StatusPart):
     name = 'limits'
 
     def __init__(self, answers: Answers) -> None:
-        super().__init__(*_LIMITS)
+        super().__init__(*LIMITS)
         self._answers = answers
         self._joints: tuple[str, ...] = answers.parameters['joints']
         self._setpoints = Counter[str]()  # that exceed each limit
@@ -259,14 +258,14 @@ class LimitsDiagnostics(StatusPart):
             # At most once in a second: it may take a millisecond.
             self._mistake = pose_mistake(
                 self._answers.parameters, motion, first=self._answers.number == 1)
-        for name in _LIMITS:
+        for name in LIMITS:
             exceeded = [each for each in output.exceedances if each.limit == name]
             if not exceeded:
                 self.held.see(OK_LEVEL, now, name)
                 continue
             worst = max(exceeded, key=_excess)
             words = self._words(worst, len(exceeded) - 1)
-            if suppressed and name not in CLIPPED:
+            if suppressed and not LIMITS[name].clips:
                 words += '; forces suppressed'
             if self._mistake and name in _OF_POSE:
                 words = f'{self._mistake}; {words}'
@@ -286,7 +285,7 @@ class LimitsDiagnostics(StatusPart):
             values += [
                 ('largest force demanded since activation (N)', f'{self._largest_force:.6g}'),
                 ('leg of the largest force demanded', self._joints[self._its_leg])]
-        for name in (each for each in _LIMITS if each in self._worst):
+        for name in (each for each in LIMITS if each in self._worst):
             values += [('jumps' if name == JUMP else f'setpoints that exceed {name}',
                         str(self._setpoints[name])),
                        (f'worst since activation, {name}', self._words(self._worst[name]))]
@@ -297,13 +296,13 @@ class LimitsDiagnostics(StatusPart):
     def _of_legs(self, output: Output) -> list[tuple[str, Sequence[float]]]:
         """Return each quantity with its unit, and six numbers, where they are computed or not."""
         numbers: dict[str, Sequence[float]] = {
-            LENGTH_MAX: output.lengths, VELOCITY_MAX: output.rates,
-            FORCE_MAX: output.demanded_forces or (),
+            **{limit: output.result[LIMITS[limit].columns] for limit in OF_RESULTS
+               if limit != LENGTH_MIN},
             **{limit: output.joint_angles[where] for limit, where in ANGLES.items()},
             CLEARANCE_MIN: output.clearances,
             **{limit: output.motors[where] for limit, where in _OF_MOTORS.items()}}
-        return [(f'{QUANTITIES[limit].name}{" demanded" * (limit in _DEMANDED)} '
-                 f'({QUANTITIES[limit].unit})', each) for limit, each in numbers.items()]
+        return [(f'{LIMITS[limit].quantity.name}{" demanded" * (limit in _DEMANDED)} '
+                 f'({LIMITS[limit].quantity.unit})', each) for limit, each in numbers.items()]
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """Return the changes of each kind of limit."""
@@ -316,7 +315,7 @@ class LimitsDiagnostics(StatusPart):
         return lines
 
     def _words(self, worst: Exceedance, others: int = 0) -> str:
-        words = worst.words(self._joints) + ', clipped' * (worst.limit in CLIPPED)
+        words = worst.words(self._joints) + ', clipped' * LIMITS[worst.limit].clips
         return words + (f', and {others} other leg{"s" * (others > 1)}' if others else '')
 
 
