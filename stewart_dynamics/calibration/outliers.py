@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Outliers among measured poses: what is left out of a calibration."""
+"""Outliers among measured poses, which a calibration leaves out."""
 
 from __future__ import annotations
 

@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
-from stewart_dynamics.mechanics.drives.motors import Motors
-from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,24 +21,13 @@ if TYPE_CHECKING:
 _HEIGHT = 2.6  # of one plot [in]
 
 
-def figure_of_legs(result: InverseDynamics, times: ArrayLike | None, joints: Sequence[str],
-                   ) -> Figure:
-    """Return lengths, rates and forces; arguments and errors: ``InverseDynamics.plot``."""
-    return _figure({'length [m]': result.lengths, 'rate [m/s]': result.rates,
-                    'force [N]': result.forces}, times, joints)
+def figure_of_legs(quantities: Mapping[str, Array], times: ArrayLike | None,
+                   joints: Sequence[str]) -> Figure:
+    """
+    Return a figure of quantities (N, 6), by their titles, with units.
 
-
-def figure_of_motors(motors: Motors, times: ArrayLike | None, joints: Sequence[str]) -> Figure:
-    """Return speeds and torques, and currents and power where they are known, likewise."""
-    curves = {'speed [rad/s]': motors.speeds, 'torque [N m]': motors.torques,
-              'current [A]': motors.currents, 'power [W]': motors.power}
-    known = {name: each for name, each in curves.items() if np.isfinite(each).any()}
-    return _figure(known or curves, times, joints)
-
-
-def _figure(quantities: Mapping[str, Array], times: ArrayLike | None, joints: Sequence[str],
-            ) -> Figure:
-    """Return a figure of quantities (N, 6), by their titles, with units."""
+    Arguments and errors are those of ``InverseDynamics.plot``.
+    """
     try:
         from matplotlib.figure import Figure
     except ImportError as exc:

@@ -47,8 +47,9 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     """
     Return the node's parameters, checked, and declare all of the table.
 
-    The node must have been made with the arguments ``MADE_WITH``. Types and ranges are left to the table's own check, whose texts are more precise than those of ROS.
-    A node without a lifecycle accepts no changes.
+    The node must have been made with the arguments ``MADE_WITH``. Types and ranges are left to the
+    table's own check, whose texts are more precise than those of ROS. A node without a
+    lifecycle accepts no changes.
 
     Raises ParameterError where a rule is broken or a name unknown.
     """

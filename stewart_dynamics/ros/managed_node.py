@@ -27,7 +27,7 @@ Kind = TypeVar('Kind', bound=Parameters)
 
 class ManagedNode(LifecycleNode, Generic[Kind]):
     """
-    A node with a lifecycle; a subclass says what is opened, begun, ended and closed.
+    A node with a lifecycle; a subclass opens and closes its topics, and begins and ends its work.
 
     Its constructor ends with ``start``.
 

@@ -125,8 +125,11 @@ class Motors(NamedTuple):
 
         Arguments and errors are those of ``InverseDynamics.plot``.
         """
-        from stewart_dynamics.reporting.result_figures import figure_of_motors
-        return figure_of_motors(self, times, joints)
+        from stewart_dynamics.reporting.result_figures import figure_of_legs
+        curves = {'speed [rad/s]': self.speeds, 'torque [N m]': self.torques,
+                  'current [A]': self.currents, 'power [W]': self.power}
+        known = {name: each for name, each in curves.items() if np.isfinite(each).any()}
+        return figure_of_legs(known or curves, times, joints)
 
     def __repr__(self) -> str:
         """Return the shape, not the arrays."""

@@ -139,7 +139,8 @@ class InverseDynamics:
 
         """
         from stewart_dynamics.reporting.result_figures import figure_of_legs
-        return figure_of_legs(self, times, joints)
+        return figure_of_legs({'length [m]': self.lengths, 'rate [m/s]': self.rates,
+                               'force [N]': self.forces}, times, joints)
 
     def __repr__(self) -> str:
         """Return the numbers of a single sample, or the shape."""
