@@ -352,7 +352,7 @@ static void put_regressor(
     }
     row[REFLECTED_MASS + i] = columns[i].acceleration;
     row[VISCOUS_FRICTION + i] = columns[i].rate;
-    row[COULOMB_FRICTION + i] = slip_at(columns[i].rate, platform->legs[i].coulomb_velocity);
+    row[COULOMB_FRICTION + i] = slip(columns[i].rate / platform->legs[i].coulomb_velocity);
     row[OFFSET + i] = 1.0;
   }
 }

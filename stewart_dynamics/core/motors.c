@@ -50,7 +50,7 @@ static double clipped(double torque, double available)
 
 /* Return c for a rate of the drive and the power that its load takes. */
 static double factor_of(const leg_drive * drive, double power, double rate)
-{return torque_factor(power, slip_at(rate, drive->slow), drive->driving, drive->driven);}
+{return torque_factor(power, slip(rate / drive->slow), drive->driving, drive->driven);}
 
 static double screw_torque(const leg_drive * drive, double through, double rate)
 {return through / drive->ratio * factor_of(drive, through * rate, rate);}
