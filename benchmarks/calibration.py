@@ -44,7 +44,7 @@ class Bench:
         self.start = values_of(parameters)
         self.home = self.platform.home_pose()
         self.unknowns = Unknowns.of(
-            self.start, parameters['singularity.characteristic_length'],
+            self.start, parameters.singularity.characteristic_length,
             np.zeros(GEOMETRY, dtype=bool), False)
 
     def measured(self, seed: int, count: int, noise: Noise = NOISE,

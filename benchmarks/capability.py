@@ -90,7 +90,7 @@ def wrenches(options: argparse.Namespace) -> Rows:
         forces = platform.inverse_dynamics(
             Motion.from_pose(pose), wrench=-found.value * direction).forces
         worst = max(worst, abs(float(
-            (np.abs(forces) / platform.parameters['limits.force_max']).max()) - 1.0))
+            (np.abs(forces) / platform.parameters.limits.force_max).max()) - 1.0))
     return [(f'static wrench at the limit, {options.hexapods} hexapods: max f / f_max, from 1',
              f'{worst:.1e}')]
 
@@ -132,7 +132,7 @@ def relative_excesses(platform: StewartPlatform, poses: Pose, start: Pose) -> di
         found['leg_clearance_min'] = sizes['leg_clearance_min'] - clearances
         # a clearance may have to be 0
         sizes['leg_clearance_min'] = size_of(platform.parameters)
-    sizes['singularity'] = platform.parameters['singularity.stop_condition']
+    sizes['singularity'] = platform.parameters.singularity.stop_condition
     return {name: excess / sizes[name] for name, excess in found.items()}
 
 
@@ -168,8 +168,8 @@ def speeds(_options: argparse.Namespace) -> Rows:
             continue
         between = Capability(PLATFORM).speed_factor(motion, times=times)
         solved = PLATFORM.inverse_dynamics(Motion.of_rows(faster(motion.rows, found.value)))
-        ratio = max(float((np.abs(solved.rates) / p['limits.velocity_max']).max()),
-                    float((np.abs(solved.forces) / p['limits.force_max']).max()))
+        ratio = max(float((np.abs(solved.rates) / p.limits.velocity_max).max()),
+                    float((np.abs(solved.forces) / p.limits.force_max).max()))
         rows += [(f'speed factor of bags/{name}', f'{found.value:.6f} ({found.limit}, leg '
                   f'{found.leg + 1}); between the samples, too: {between.value:.6f}'),
                  ('largest part of a limit at it, from 1', f'{abs(ratio - 1.0):.1e}')]

@@ -53,8 +53,8 @@ def legal_poses(platform: StewartPlatform, random: np.random.Generator, many: in
             HOME + random.uniform(-0.6, 0.6, (many, 3)),
             from_euler(random.uniform(-1.0, 1.0, (many, 3)) * np.radians([20.0, 20.0, 30.0])))
         lengths = platform.inverse_kinematics(motion)
-        legal = np.all((lengths >= p['limits.length_min'])
-                       & (lengths <= p['limits.length_max']), axis=-1)
+        legal = np.all((lengths >= p.limits.length_min)
+                       & (lengths <= p.limits.length_max), axis=-1)
         found.append(motion.rows[legal])
     rows = np.concatenate(found)[:many]
     return Motion(rows[:, :3], rows[:, 3:12].reshape(-1, 3, 3))

@@ -116,7 +116,7 @@ def accuracy(folder: Path) -> list[str]:
     seconds = memory = 0.0
     for with_rates in (True, False):
         given = recorded(TRUE, motion, SECONDS, RATE, 1, NOISE, forces, with_rates)
-        bag = write_bag(folder / f'minute {with_rates}', given, GIVEN['joints'])
+        bag = write_bag(folder / f'minute {with_rates}', given, GIVEN.joints)
         found, took, peak, said = identify(folder, [bag])
         assert found is not None, said
         seconds, memory = max(seconds, took), max(memory, peak)
@@ -184,7 +184,7 @@ def not_identifiable(folder: Path) -> list[str]:
     for name, motion in (('at rest', at_rest), ('about x', about([1.0, 0.0, 0.0])),
                          ('about (1, 1, 0)', about([1.0, 1.0, 0.0]))):
         given = recorded(TRUE, motion, 20.0, 250.0, 1, NOISE)
-        bag = write_bag(folder / name, given, GIVEN['joints'])
+        bag = write_bag(folder / name, given, GIVEN.joints)
         found, _, _, said = identify(folder, [bag], '--no-report')
         assert found is not None, said
         sums = '; '.join(f'`{each["words"]}`' for each in found['combinations'])
@@ -198,13 +198,13 @@ def five_masses(folder: Path) -> list[str]:
     """Return the lines of the differences as five masses are taken off one by one."""
     found = []
     for masses in range(5, -1, -1):
-        mass = TRUE['platform.mass'] + masses * MASS
-        center = (TRUE['platform.mass'] * TRUE['platform.center_of_mass']
+        mass = TRUE.platform.mass + masses * MASS
+        center = (TRUE.platform.mass * TRUE.platform.center_of_mass
                   + masses * MASS * np.array([0.0, 0.0, HEIGHT])) / mass
         loaded = TRUE.replaced({'platform.mass': mass, 'platform.center_of_mass': center})
         given = recorded(loaded, fourier(SEED), SECONDS, 250.0, 10 + masses,
                          NOISE._replace(effort=2.5, length=5e-6, rate=5e-4))
-        bag = write_bag(folder / f'{masses} masses', given, GIVEN['joints'])
+        bag = write_bag(folder / f'{masses} masses', given, GIVEN.joints)
         result, _, _, said = identify(folder, [bag], '--no-report')
         assert result is not None, said
         found.append(result['parameters'][0])
@@ -230,12 +230,12 @@ def volume(folder: Path) -> list[str]:
         random = rng(int(part[0]))
         result = platform.inverse_dynamics(fourier(SEED)(times[part]))
         shape = len(part), 6
-        made.positions[part] = result.lengths - GIVEN['geometry.zero_length'] + (
+        made.positions[part] = result.lengths - GIVEN.geometry.zero_length + (
             NOISE.length * random.normal(size=shape))
         assert made.rates is not None
         made.rates[part] = result.rates + NOISE.rate * random.normal(size=shape)
         made.efforts[part] = forces + NOISE.effort * random.normal(size=shape)
-    bag = write_bag(folder / 'ten minutes', made, GIVEN['joints'])
+    bag = write_bag(folder / 'ten minutes', made, GIVEN.joints)
     size = sum(file.stat().st_size for file in bag.iterdir()) / 1e6
     rows = [('bags of ten minutes at 1 kHz', 'MB', 's', 'peak memory (MB)')]
     for many in (1, 10):

@@ -153,7 +153,7 @@ def came_out(found: Outcome, *names: str) -> str:
 
 
 MASS, X, Y = 'platform.mass', 'platform.center_of_mass.x', 'platform.center_of_mass.y'
-LOW = FILE.changed(platform__center_of_mass=GIVEN['platform.center_of_mass'] + [0.0, 0.0, 0.06])
+LOW = FILE.changed(platform__center_of_mass=GIVEN.platform.center_of_mass + [0.0, 0.0, 0.06])
 LIGHT_LEGS = FILE.changed(**{f'legs__{part}__mass': GIVEN[f'legs.{part}.mass'] / 1.2
                              for part in ('cylinder', 'piston')})
 HEAVY = FILE.changed(platform__mass=172.0)

@@ -136,25 +136,25 @@ class Tree:
         p = parameters
         self.parameters = p
         self.model = pin.Model()
-        self.model.gravity.linear = np.array(p['gravity'])
+        self.model.gravity.linear = np.array(p.gravity)
         x, y, here = np.eye(3)[0], np.eye(3)[1], pin.SE3.Identity()
         self.tips = []
         for i in range(6):
-            base = pin.SE3(np.eye(3), p['geometry.base_joints'][i])
+            base = pin.SE3(np.eye(3), p.geometry.base_joints[i])
             cylinder = self.model.addJoint(0, pin.JointModelUniversal(x, y), base, f'base_{i}')
             self.model.appendBodyToJoint(cylinder, _rod(
-                p['legs.cylinder.mass'][i], p['legs.cylinder.center_of_mass'][i],
-                p['legs.cylinder.inertia'][i]), here)
+                p.legs.cylinder.mass[i], p.legs.cylinder.center_of_mass[i],
+                p.legs.cylinder.inertia[i]), here)
             piston = self.model.addJoint(cylinder, pin.JointModelPZ(), here, f'leg_{i}')
             self.model.appendBodyToJoint(piston, _rod(
-                p['legs.piston.mass'][i], -p['legs.piston.center_of_mass'][i],
-                p['legs.piston.inertia'][i]), here)
-            self.model.armature[3 * i + 2] = p['actuator.reflected_mass'][i]
+                p.legs.piston.mass[i], -p.legs.piston.center_of_mass[i],
+                p.legs.piston.inertia[i]), here)
+            self.model.armature[3 * i + 2] = p.actuator.reflected_mass[i]
             self.tips.append(piston)
         body = self.model.addJoint(0, pin.JointModelFreeFlyer(), here, 'platform')
         self.model.appendBodyToJoint(body, pin.Inertia(
-            p['platform.mass'], p['platform.center_of_mass'],
-            inertia_matrix(p['platform.inertia'])), here)
+            p.platform.mass, p.platform.center_of_mass,
+            inertia_matrix(p.platform.inertia)), here)
         self.data = self.model.createData()
 
     def state(self, motion: Motion) -> tuple[Array, Array, Array, Array]:
@@ -204,9 +204,9 @@ def _rod(mass: float, center_of_mass: float, inertia: float) -> Any:
 
 
 def _friction(parameters: Parameters, rates: Array) -> Array:
-    slip = np.clip(rates / parameters['actuator.coulomb_velocity'], -1.0, 1.0)
-    force: Array = (parameters['actuator.viscous_friction'] * rates
-                    + parameters['actuator.coulomb_friction'] * slip)
+    slip = np.clip(rates / parameters.actuator.coulomb_velocity, -1.0, 1.0)
+    force: Array = (parameters.actuator.viscous_friction * rates
+                    + parameters.actuator.coulomb_friction * slip)
     return force
 
 

@@ -111,7 +111,7 @@ def _longer(right: Recorded, random: np.random.Generator) -> Recorded:
 def _tilted(seed: int) -> Truth:
     turn = rng(seed).uniform(0.0, 2.0 * np.pi)
     angles = np.radians(2.0) * np.cos(turn), np.radians(2.0) * np.sin(turn)
-    return drawn(seed)._replace(tilt=angles).changed(gravity=tilted(GIVEN['gravity'], *angles))
+    return drawn(seed)._replace(tilt=angles).changed(gravity=tilted(GIVEN.gravity, *angles))
 
 
 def _light_legs(seed: int) -> Truth:

@@ -270,9 +270,9 @@ def legs(parameters: Parameters, first: int) -> list[bytes]:
     motion = motion_at(ReferenceMotionParameters(MOTION), np.arange(REPEATED) * (PERIOD * 1e-9))
     result = StewartPlatform(parameters).inverse_dynamics(motion)
     stamps = first + PERIOD * np.arange(REPEATED)
-    layout = JointStateWriter(parameters['joints']).layout(True)
+    layout = JointStateWriter(parameters.joints).layout(True)
     return [each.tobytes() for each in layout.write(
-        stamps, result.lengths - parameters['geometry.zero_length'], result.rates,
+        stamps, result.lengths - parameters.geometry.zero_length, result.rates,
         result.forces)]
 
 

@@ -94,7 +94,7 @@ def motion_of(kind: str) -> Callable[[float], Motion]:
 def gain_of_the_line(platform: StewartPlatform) -> list[str]:
     """Return a table of the errors of leg forces: by the last sample, and by the line."""
     parameters = platform.parameters.replaced({'base.source': 'motion'})
-    writers = {topic: StampedWriter(parameters['world_frame'], many) for topic, many in (
+    writers = {topic: StampedWriter(parameters.world_frame, many) for topic, many in (
         (BASE_POSE, 7), (BASE_TWIST, 6), (BASE_ACCEL, 6))}
     still = Motion.from_pose(Pose([0.0, 0.0, 1.1], np.eye(3)))
     weight = platform.inverse_dynamics(still).forces

@@ -41,8 +41,8 @@ GIVEN = Parameters.from_yaml(PARAMETERS)
 TRUE = GIVEN.replaced({
     'platform.mass': 172.0, 'platform.center_of_mass': [0.05, 0.02, 0.16],
     'platform.inertia': [15.0, 0.1, -0.6, 15.5, 0.3, 23.0]})
-VALUES = np.array([TRUE['platform.mass'], *TRUE['platform.center_of_mass'],
-                   *TRUE['platform.inertia']])
+VALUES = np.array([TRUE.platform.mass, *TRUE.platform.center_of_mass,
+                   *TRUE.platform.inertia])
 RATE = 1000.0  # [Hz]
 WINDOW = 10.0  # [s]
 # Standard deviations of rates [m/s] and forces [N]; forces also with noise of 0.05 s.

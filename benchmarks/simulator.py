@@ -66,7 +66,7 @@ IDEAL = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0, **d
 
 def holding(parameters: SimulatorParameters) -> Six:
     """Return the forces that hold the hexapod in its initial pose."""
-    pose = parameters['initial_pose']
+    pose = parameters.initial_pose
     motion = Motion.from_euler(pose[:3], pose[3:])
     first, second, third, fourth, fifth, sixth = StewartPlatform(
         parameters).inverse_dynamics(motion).forces.tolist()
@@ -202,7 +202,7 @@ def balance_of_a_minute(step: float) -> float:
     p = plant.parameters
     times = np.arange(MINUTE * round(RATE)) / RATE
     wanted = StewartPlatform(p).inverse_dynamics(smooth_motion(p, rng())(times))
-    carried = p['platform.mass'] / 6.0 + p['actuator.reflected_mass']
+    carried = p.platform.mass / 6.0 + p.actuator.reflected_mass
     state, before = plant.state, energy_of(plant)
     work = exchanged = 0.0
     for n in range(len(times)):

@@ -72,9 +72,9 @@ class Soak(Node):
         platform = StewartPlatform.from_yaml(CONFIG / 'platform.yaml')
         pose = platform.home_pose()
         self._legs = JointState(
-            name=platform.parameters['joints'], velocity=[0.0] * 6, effort=[300.0] * 6,
-            position=platform.inverse_kinematics(pose) - platform.parameters[
-                'geometry.zero_length'])
+            name=platform.parameters.joints, velocity=[0.0] * 6, effort=[300.0] * 6,
+            position=(platform.inverse_kinematics(pose)
+                      - platform.parameters.geometry.zero_length))
         self._measured = self.create_publisher(JointState, f'{NODE}/measured_legs', 100)
         self.create_timer(1.0 / LEGS_RATE, self._measure)
 

@@ -93,9 +93,9 @@ def values(document: Mapping[str, Any], true: Parameters) -> list[Value]:
     for each in document['parameters']:
         name, _, last = each['name'].rpartition('.')
         if name.startswith('actuator.'):
-            truth = true[name][true['joints'].index(last)]
+            truth = true[name][true.joints.index(last)]
         elif name == 'platform':
-            name, truth = each['name'], true['platform.mass']
+            name, truth = each['name'], true.platform.mass
         else:
             axes = {'platform.center_of_mass': ('x', 'y', 'z'),
                     'platform.inertia': ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')}[name]

@@ -84,13 +84,13 @@ class Loop:
         parameters = Parameters.from_yaml(hexapod)
         trajectory = {'output': 'combined', 'rate': RATE, 'loop': False,
                       'motion.hold_at_end': False, 'motion.duration': seconds,
-                      'base_frame': parameters['base_frame']}
+                      'base_frame': parameters.base_frame}
         settings = ReferenceMotionParameters.from_yaml(motion).replaced(trajectory, str(motion))
         platform = StewartPlatform(parameters)
         self.times = sample_times(settings)
         self._motion = motion_at(settings, self.times * 1e-9)
         self._lengths = (platform.inverse_kinematics(self._motion)
-                         - parameters['geometry.zero_length'])
+                         - parameters.geometry.zero_length)
         if not 0.0 < bandwidth < math.inf:
             raise Failure(f'bandwidth: {bandwidth} Hz: must be more than 0')
         start = motion_at(settings, 0.0)
@@ -100,7 +100,7 @@ class Loop:
         omega = 2.0 * math.pi * bandwidth
         self.gains = {'proportional_gain': self.leg_mass * omega ** 2,
                       'derivative_gain': 2.0 * self.leg_mass * omega}
-        self._payload = parameters['platform.mass'], parameters['platform.inertia']
+        self._payload = parameters.platform.mass, parameters.platform.inertia
         self._files = {
             'stewart_simulator': [hexapod, ROOT / 'config' / 'simulator.yaml'],
             'stewart_dynamics': [hexapod], 'stewart_trajectory': [motion]}

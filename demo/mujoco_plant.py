@@ -36,16 +36,16 @@ class MuJoCoPlant:
     """The hexapod in MuJoCo, with the calls of ``stewart_dynamics.simulator.plant.Plant``."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
-        if parameters['commands'] != FORCE:
-            raise ParameterError(f'commands: {parameters["commands"]}: must be {FORCE} in MuJoCo')
+        if parameters.commands != FORCE:
+            raise ParameterError(f'commands: {parameters.commands}: must be {FORCE} in MuJoCo')
         self.parameters = parameters
         self.fault = ''
         self._model = mujoco.MjModel.from_xml_string(mjcf(Hexapod(parameters), 'hexapod'))
         self._data = mujoco.MjData(self._model)
-        self.steps = max(1, round(1.0 / (parameters['rate'] * self._model.opt.timestep)))
-        self._model.opt.timestep = 1.0 / (parameters['rate'] * self.steps)
-        self._zero_length = parameters['geometry.zero_length']
-        pose = parameters['initial_pose']
+        self.steps = max(1, round(1.0 / (parameters.rate * self._model.opt.timestep)))
+        self._model.opt.timestep = 1.0 / (parameters.rate * self.steps)
+        self._zero_length = parameters.geometry.zero_length
+        pose = parameters.initial_pose
         rotation = from_euler(pose[3:])
         qpos = self._data.qpos
         qpos[:18] = TreeJoints(parameters).positions(pose[:3], rotation)[6:]

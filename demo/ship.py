@@ -103,14 +103,14 @@ class Ship:
             file, 'stewart_simulator').items()}
         parameters = SimulatorParameters({**given, 'rate': RATE})
         platform = StewartPlatform(parameters)
-        pose = parameters['initial_pose']
+        pose = parameters.initial_pose
         self.target = Pose.from_euler(pose[:3], pose[3:])
         self.times = np.arange(round(seconds * RATE) + 1) * round(1e9 / RATE)
         self.base = GeneratedBaseMotion(parameters).at(self.times * 1e-9)
         self.motion = joined([seen_from(each, self.target) for each in self.base])
         result = platform.inverse_dynamics(
-            self.motion, base=BaseMotion.from_motion(self.base, parameters['gravity']))
-        self.lengths = result.lengths - parameters['geometry.zero_length']
+            self.motion, base=BaseMotion.from_motion(self.base, parameters.gravity))
+        self.lengths = result.lengths - parameters.geometry.zero_length
         self._check(parameters, result)
         mass = leg_mass(platform, self.motion[0])
         omega = 2.0 * np.pi * BANDWIDTH
@@ -121,14 +121,15 @@ class Ship:
                                'derivative_gain': 2.0 * mass * omega},
             'motion_compensation': {'use_sim_time': True, 'position': pose[:3].tolist(),
                                     'angles': pose[3:].tolist(),
-                                    'base_frame': parameters['base_frame']}}
+                                    'base_frame': parameters.base_frame}}
 
     def _check(self, parameters: SimulatorParameters, result: Any) -> None:
         """Raise Failure where the hexapod cannot keep its platform still."""
-        for name, values, sign in (
-                ('length_min', result.lengths, -1.0), ('length_max', result.lengths, 1.0),
-                ('velocity_max', np.abs(result.rates), 1.0)):
-            limit = parameters[f'limits.{name}']
+        limits = parameters.limits
+        for name, limit, values, sign in (
+                ('length_min', limits.length_min, result.lengths, -1.0),
+                ('length_max', limits.length_max, result.lengths, 1.0),
+                ('velocity_max', limits.velocity_max, np.abs(result.rates), 1.0)):
             if limit is not None and np.any(sign * values > sign * limit):
                 raise Failure(f'the legs would exceed limits.{name}: a smaller sea, or less time')
 

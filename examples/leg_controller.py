@@ -100,7 +100,7 @@ class LegController(Node):
                                  'hexapod when desired states stop')
             return None
         platform = StewartPlatform.from_yaml(file)
-        self.zero_length = platform.parameters['geometry.zero_length']
+        self.zero_length = platform.parameters.geometry.zero_length
         self.guess = platform.home_pose()
         lengths = platform.inverse_kinematics(self.guess)
         platform.inverse_dynamics(

@@ -142,11 +142,11 @@ def ask(planner: Planner, motion: MultiDOFJointTrajectory, timeout: float) -> Jo
 def present_pose(planner: Planner, params: Path, timeout: float) -> list:
     """Return X Y Z alpha beta gamma of the measured legs; exit with one line without them."""
     platform = StewartPlatform.from_yaml(params)
-    names = platform.parameters['joints']
+    names = platform.parameters.joints
     if not planner.until(lambda: set(names) <= set(planner.legs), timeout):
         sys.exit(f'no measured legs {", ".join(names)} on {planner.measured.topic_name} within '
                  f'{timeout:g} s; give --from, or remap the topic')
-    lengths = platform.parameters['geometry.zero_length'] + [planner.legs[name] for name in names]
+    lengths = platform.parameters.geometry.zero_length + [planner.legs[name] for name in names]
     pose = platform.forward_kinematics(lengths, platform.home_pose())
     return [*pose.position.tolist(), *to_euler(pose.rotation).tolist()]
 

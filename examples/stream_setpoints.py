@@ -82,13 +82,13 @@ class Stream(Node):
 
     def present_pose(self, timeout: float) -> Pose:
         """Return the pose of the measured legs; exit with one line without them."""
-        names = self.platform.parameters['joints']
+        names = self.platform.parameters.joints
         if not self.until(lambda: set(names) <= set(self.legs), timeout):
             sys.exit(f'no measured legs {", ".join(names)} on {self.measured.topic_name} within '
                      f'{timeout:g} s; is the topic remapped? See --help')
         positions = [self.legs[name] for name in names]
         return self.platform.forward_kinematics(
-            self.platform.parameters['geometry.zero_length'] + positions)
+            self.platform.parameters.geometry.zero_length + positions)
 
     def begin(self, timeout: float) -> None:
         """Publish the approach and then the stream; exit with one line without an answer."""
@@ -111,7 +111,7 @@ class Stream(Node):
         stamp = Time(nanoseconds=self.first_stamp + round(self.sent * 1e9 / RATE)).to_msg()
         for message in messages:
             message.header.stamp = stamp
-            message.header.frame_id = self.platform.parameters['base_frame']
+            message.header.frame_id = self.platform.parameters.base_frame
         p, q = pose.pose.position, pose.pose.orientation
         p.x, p.y, p.z = motion.position.tolist()
         q.x, q.y, q.z, q.w = motion.quaternion.tolist()

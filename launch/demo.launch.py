@@ -52,8 +52,8 @@ def nodes(context: LaunchContext) -> list[Action]:
     """Return the four nodes, all in one namespace: setpoints go to stewart_dynamics/setpoint/."""
     files, factor = checked(context)
     parameters = Parameters.from_yaml(files['params_file'])
-    payload = {'platform.mass': factor * parameters['platform.mass'],
-               'platform.inertia': (factor * parameters['platform.inertia']).tolist()}
+    payload = {'platform.mass': factor * parameters.platform.mass,
+               'platform.inertia': (factor * parameters.platform.inertia).tolist()}
     common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen'}
     package = FindPackageShare('stewart_dynamics')
     return [

@@ -149,8 +149,8 @@ def test_capability_counts_the_payload() -> None:
 
 def test_point_masses_add_up_in_the_payload() -> None:
     p = with_point_mass(with_point_mass(FILE, 30.0, [0.1, 0.0, 0.2]), 20.0, [-0.1, 0.3, 0.2])
-    assert p.empty.mass == FILE['platform.mass']
-    assert_same(p.payload, of_points(
+    assert p.platform.body.mass == FILE['platform.mass']
+    assert_same(p.payload.body, of_points(
         np.array([30.0, 20.0]), np.array([[0.1, 0.0, 0.2], [-0.1, 0.3, 0.2]])))
 
 

@@ -30,8 +30,7 @@ from running import Inside, Peer, SERVICES
 from stewart_dynamics import ParameterError, Parameters
 from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.parameters.table import PARAMETERS
-from stewart_dynamics.reference_motion.parameters import (
-    REFERENCE_MOTION_PARAMETERS, ReferenceMotionParameters)
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.declared_parameters import declare_parameters, log_changes
 from stewart_dynamics.ros.rclpy_workarounds import reject_impossible_times
 
@@ -171,8 +170,8 @@ def force_max(arguments: list[str], domain: int) -> tuple[Any, Any]:
 
 def test_the_trajectory_s_parameters_are_read_once(declared: Any) -> None:
     ask = declared(Node, ReferenceMotionParameters, 'trajectory_sine.yaml')
-    for parameter, each in zip(REFERENCE_MOTION_PARAMETERS.values(), described(
-            ask, *REFERENCE_MOTION_PARAMETERS), strict=True):
+    for parameter, each in zip(ReferenceMotionParameters.table.values(), described(
+            ask, *ReferenceMotionParameters.table), strict=True):
         assert each.read_only
         assert each.description.startswith(parameter.text)
         assert each.additional_constraints.endswith('set only when the node starts')

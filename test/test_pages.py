@@ -81,7 +81,7 @@ def test_the_example_of_the_readme_runs(
 def test_the_examples_of_the_library_run(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     blocks = re.findall(r'```python\n(.*?)```', TEXTS['docs/library.md'], flags=re.DOTALL)
-    assert len(blocks) == 7
+    assert len(blocks) == 8
     monkeypatch.chdir(ROOT)
     names: dict[str, object] = {}
     exec(compile(''.join(blocks), 'library.md', 'exec'), names)
@@ -95,6 +95,7 @@ def test_the_examples_of_the_library_run(
     assert [line.split()[1] for line in printed[-3:-1]] == ['length_max', 'force_max']
     assert [np.shape(names[name]) for name in ('mass', 'gravity', 'coriolis')] == [
         (6, 6), (6,), (1000, 6, 6)]
+    assert names['same'] is True
 
 
 def links(page: str) -> list[tuple[str, str]]:

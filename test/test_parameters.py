@@ -6,10 +6,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import copy, deepcopy
+from operator import attrgetter
 from pathlib import Path
 import pickle
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
@@ -19,6 +21,9 @@ from referees import ROOT
 from snapshot import Snapshot
 from stewart_dynamics import (
     MotionError, ParameterError, Parameters, PoseError, StewartError)
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.cueing.parameters import CueingParameters
+from stewart_dynamics.parameters.parameter_set import declare, ParameterGroup, ParameterSet
 from stewart_dynamics.parameters.table import PARAMETERS
 from stewart_dynamics.parameters.yaml_file import flat, other_nodes, read_yaml
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
@@ -624,6 +629,86 @@ def test_the_given_values_cannot_be_changed() -> None:
     assert parameters.replaced({'platform.mass': 2.0})['platform.mass'] == 2.0
     with pytest.raises(TypeError):
         parameters.given['platform.mass'] = 3.0  # type: ignore[index]
+
+
+# Typed attributes
+
+EACH_KIND = [
+    Parameters(GIVEN), Parameters.from_yaml(ROOT / 'config' / 'platform.yaml'),
+    SimulatorParameters({**GIVEN, 'initial_pose': np.zeros(6)}),
+    CueingParameters(GIVEN), ReferenceMotionParameters({
+        'motion.type': 'sine', 'motion.initial': np.zeros(6)})]
+
+
+def declared_types(kind: type[ParameterGroup], path: str = '') -> Iterator[tuple[str, Any]]:
+    """Yield the names of parameters, and the types with which they are declared."""
+    for name, hint in get_type_hints(kind).items():
+        if isinstance(hint, type) and issubclass(hint, ParameterGroup):
+            yield from declared_types(hint, f'{path}{name}.')
+        elif name in kind._declarations:
+            yield path + name, hint
+
+
+@pytest.mark.parametrize('parameters', EACH_KIND)
+def test_every_parameter_is_an_attribute_of_the_declared_type(parameters: ParameterSet) -> None:
+    types = dict(declared_types(type(parameters)))
+    assert list(types) == list(parameters.table) == list(parameters)
+    for name, hint in types.items():
+        value, parameter = attrgetter(name)(parameters), parameters.table[name]
+        assert value is parameters[name]
+        optional = type(None) in get_args(hint)
+        if value is None:
+            assert optional, name
+        elif parameter.sizes and parameter.kind == 'double':
+            assert value.dtype == np.float64
+            assert hint in (Array, Array | None)
+        elif parameter.sizes:
+            assert hint == tuple[str, ...]
+            assert all(type(each) is str for each in value)
+        else:
+            assert hint in (type(value), type(value) | None)
+        assert not optional or not parameter.required and parameter.default in (None, ()), name
+
+
+@pytest.mark.parametrize(('wrong', 'said'), [
+    ('limits.force_mx', '; do you mean limits.force_max?'),
+    ('cueing.tilt.rate', '; do you mean cueing.tilt.rate_max?'),
+    ('legs.cylinder.mas', '; do you mean legs.cylinder.mass?'),
+    ('gravitation', '')])
+def test_a_misspelt_attribute_is_an_error_with_the_nearest_name(wrong: str, said: str) -> None:
+    with pytest.raises(AttributeError) as caught:
+        attrgetter(wrong)(Parameters(GIVEN))
+    assert str(caught.value).startswith(f'parameters: {wrong}: unknown parameter{said}')
+
+
+def test_attributes_are_those_of_a_copy_and_cannot_be_set(p: Parameters) -> None:
+    later = p.replaced({'limits.force_max': 3.0, 'payload.mass': 2.0})
+    assert p.limits.force_max is None
+    for each in (later, pickle.loads(pickle.dumps(later)), deepcopy(later), copy(later)):
+        assert each == later
+        assert hash(each) == hash(later)
+        assert each.limits.force_max is not None
+        assert each.limits.force_max.tolist() == [3.0] * 6
+        assert each.payload.body.mass == 2.0
+    for group, name in ((p, 'gravity'), (p, 'limits'), (p.limits, 'force_max'),
+                        (p.legs.cylinder, 'mass')):
+        with pytest.raises(AttributeError, match=f'{name}: parameters are immutable'):
+            setattr(group, name, None)
+    assert 'velocity_max=None' in repr(p.limits)
+    assert 'cylinder.mass=array' in repr(p.legs)
+
+
+def test_values_that_follow_from_others_are_attributes_as_well(p: Parameters) -> None:
+    driven = p.replaced({'actuator.screw_lead': 0.01, 'drive.motor_inertia': 1e-4})
+    assert driven.actuator.reflected_mass is driven['actuator.reflected_mass']
+    assert driven.actuator.reflected_mass.min() > 0.0
+    assert driven.drive.back_driving_efficiency.tolist() == [1.0] * 6
+
+
+def test_a_parameter_has_no_name_of_a_method() -> None:
+    with pytest.raises(TypeError, match='Wrong.items: the name of a method'):
+        class Wrong(ParameterSet):
+            items: float = declare('something', 'm', 0.0)  # type: ignore[assignment]
 
 
 @pytest.mark.parametrize(('name', 'shape'), [

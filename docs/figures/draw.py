@@ -91,9 +91,9 @@ def draw_forces(axes: Any, recorded: Recorded) -> None:
     """Draw the demanded forces, the axis cut at three times the limit, and the warning."""
     time = recorded.seconds
     at, crossing = recorded.crossing
-    limit = recorded.parameters['limits.force_max'][0] / 1e3
+    limit = recorded.parameters.limits.force_max[0] / 1e3
     forces = recorded.outputs.demanded_forces / 1e3
-    for leg, force, color in zip(recorded.parameters['joints'], forces.T, LEG_COLORS, strict=True):
+    for leg, force, color in zip(recorded.parameters.joints, forces.T, LEG_COLORS, strict=True):
         # No line between the two branches.
         axes.plot(np.insert(time, at + 1, crossing), np.insert(force, at + 1, np.nan),
                   label=leg.replace('_', ' '), linewidth=1.4, color=color)
@@ -111,11 +111,11 @@ def draw_forces(axes: Any, recorded: Recorded) -> None:
 def draw_platform(axes: Any, recorded: Recorded) -> None:
     """Draw the platform in its initial and its final pose."""
     p = recorded.parameters
-    base = p['geometry.base_joints']
+    base = p.geometry.base_joints
     axes.plot(*np.vstack([base, base[:1]]).T, color='0.35')
     for n, (name, style) in enumerate((('initial', '-'), ('final', '--'))):
         row = recorded.motions[-n]
-        joints = row[:3] + p['geometry.platform_joints'] @ row[3:12].reshape(3, 3).T
+        joints = row[:3] + p.geometry.platform_joints @ row[3:12].reshape(3, 3).T
         axes.plot(*np.vstack([joints, joints[:1]]).T, color='black', linestyle=style, label=name)
         for leg, color in enumerate(LEG_COLORS):
             axes.plot(*np.stack([base[leg], joints[leg]]).T, color=color, linestyle=style,
@@ -151,7 +151,7 @@ def draw_figures(path: Path, recorded: Recorded) -> None:
         ('14: angular acceleration', 'dω/dt  [deg/s²]', np.degrees(motions[:, 21:24]),
          ('x', 'y', 'z')),
         ('15: leg lengths', 'length  [m]', outputs.lengths,
-         [leg.replace('_', ' ') for leg in recorded.parameters['joints']])]
+         [leg.replace('_', ' ') for leg in recorded.parameters.joints])]
     for n, (title, label, values, names) in enumerate(panels, start=1):
         axes = figure.add_subplot(5, 2, n)
         for name, column, color in zip(

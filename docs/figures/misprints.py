@@ -114,8 +114,8 @@ def random_states(p: Parameters) -> States:
         for name, broken in (('limits.length_min', np.less), ('limits.length_max', np.greater)):
             if p[name] is not None:
                 within &= ~np.any(broken(lengths, p[name]), axis=-1)
-        if p['limits.velocity_max'] is not None:
-            within &= ~np.any(rates > p['limits.velocity_max'], axis=-1)
+        if p.limits.velocity_max is not None:
+            within &= ~np.any(rates > p.limits.velocity_max, axis=-1)
         if not np.any(within):
             raise SystemExit(f'{HEXAPOD}: no state of this script is within its limits')
         kept.append(drawn[within])
@@ -125,8 +125,8 @@ def random_states(p: Parameters) -> States:
 
 def _jacobian(p: Parameters, at: States) -> tuple[Array, Array, Array, Array]:
     """Return the matrix of (3), lengths, directions and R P_i, by (1) and (2)."""
-    arms = np.einsum('njk,ik->nij', from_euler(at.angles), p['geometry.platform_joints'])
-    legs = at.position[:, None] + arms - p['geometry.base_joints']
+    arms = np.einsum('njk,ik->nij', from_euler(at.angles), p.geometry.platform_joints)
+    legs = at.position[:, None] + arms - p.geometry.base_joints
     lengths = np.linalg.norm(legs, axis=-1)
     directions = legs / lengths[..., None]
     return (np.concatenate([directions, np.cross(arms, directions)], axis=-1), lengths,
@@ -151,13 +151,13 @@ def leg_forces(p: Parameters, at: States, printed: Collection[str] = ()) -> Arra
     j_inv, lengths, u, arms = _jacobian(p, at)
     x_rate, x_acc = _twist(at, printed)
     omega, alpha = x_rate[:, 3:], x_acc[:, 3:]
-    gravity = p['gravity']
-    m1, s1 = p['legs.cylinder.mass'], p['legs.cylinder.center_of_mass']
-    m2, s2 = p['legs.piston.mass'], p['legs.piston.center_of_mass']
-    i_eq = p['legs.cylinder.inertia'] + p['legs.piston.inertia']
+    gravity = p.gravity
+    m1, s1 = p.legs.cylinder.mass, p.legs.cylinder.center_of_mass
+    m2, s2 = p.legs.piston.mass, p.legs.piston.center_of_mass
+    i_eq = p.legs.cylinder.inertia + p.legs.piston.inertia
 
     # the platform joints' motion by J_i and its derivative
-    joints = p['geometry.platform_joints'] if 'local joint' in printed else arms
+    joints = p.geometry.platform_joints if 'local joint' in printed else arms
     joint_arm_rates = np.cross(omega[:, None], joints)
     joint_rate = at.velocity[:, None] + joint_arm_rates
     joint_acc = (at.acceleration[:, None] + np.cross(alpha[:, None], joints)
@@ -186,9 +186,9 @@ def leg_forces(p: Parameters, at: States, printed: Collection[str] = ()) -> Arra
 
     # (5), (6), for a center of mass anywhere
     rotation = from_euler(at.angles)
-    com = rotation @ p['platform.center_of_mass']
-    inertia = rotation @ inertia_matrix(p['platform.inertia']) @ np.swapaxes(rotation, -1, -2)
-    weight = p['platform.mass'] * (
+    com = rotation @ p.platform.center_of_mass
+    inertia = rotation @ inertia_matrix(p.platform.inertia) @ np.swapaxes(rotation, -1, -2)
+    weight = p.platform.mass * (
         at.acceleration + np.cross(alpha, com) + np.cross(omega, np.cross(omega, com)) - gravity)
     spin = np.cross(omega, np.einsum('nij,nj->ni', inertia, omega))
     moment = (np.einsum('nij,nj->ni', inertia, alpha)

@@ -164,7 +164,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     refuse(mistakes_of_input(p, measured, unknown, angles, degrees))
     known = find_frames(p, measured) if unknown else SAME
     measured = measured._replace(frames=known)
-    size = p['singularity.characteristic_length']
+    size = p.singularity.characteristic_length
     unknowns = Unknowns.of(values_of(p, known), size, held, unknown)
     first = outliers(measured, unknowns)
     sound: Flags = ~first.left_out
@@ -184,7 +184,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     states = tuple(FIXED if each else state for each, state in zip(
         held, states_of(what), strict=True))
     refuse(mistakes_of_result(p, found.values, found.lin.residuals, size))
-    missing = not_identified(p['joints'], what.shares, LARGEST_SHARE, used, size)
+    missing = not_identified(p.joints, what.shares, LARGEST_SHARE, used, size)
     before, after = (np.sqrt(np.mean(each ** 2, axis=0)) for each in (
         used.at(_with_frames(used, unknowns)).residuals, found.lin.residuals))
     if IDENTIFIED not in states:
@@ -229,7 +229,7 @@ def _checked(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion
 def _screws(p: Parameters, drive_positions: bool) -> Array:
     """Return the screws, with a pitch if positions are those of drives."""
     if drive_positions:
-        if p['drive.screw_rotation'] != UNIVERSAL:
+        if p.drive.screw_rotation != UNIVERSAL:
             raise ParameterError('drive positions: with drive.screw_rotation: guided they are '
                                  'those of the legs')
         return screw_constants(p)

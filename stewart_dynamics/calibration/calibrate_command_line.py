@@ -107,7 +107,7 @@ def _run(given: argparse.Namespace) -> int:
             given.poses, parameters, given.node, given.measured, given.pose,
             Reading.given(given))
     else:
-        measured = read_poses(given.poses, parameters['joints'], given.mm, given.degrees)
+        measured = read_poses(given.poses, parameters.joints, given.mm, given.degrees)
     _PROGRAM.prepare(likely_mistakes(parameters))
     result = run(measured, str(given.poses), parameters, output, options)
     for each in result['likely_mistakes']:

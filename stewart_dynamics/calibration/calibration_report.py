@@ -73,7 +73,7 @@ def _changes(found: Calibration) -> str:
             picture.line([x, low], [x, high], css='whisker')
             picture.text([x, 270.0], axes[axis], 'middle', css='tick')
             if axis == len(axes) // 2:
-                picture.text([x, 288.0], found.parameters['joints'][leg], 'end', 45.0, css='tick')
+                picture.text([x, 288.0], found.parameters.joints[leg], 'end', 45.0, css='tick')
         left += width + 28.0
     return picture.svg()
 
@@ -128,7 +128,7 @@ def _view(found: Calibration, part: slice, title: str, times: float) -> str:
             picture.line(at, to, css=f'edge leg{leg}')
             picture.circle(to, 2.6, fill=f'var(--leg{leg})')
     for leg, at in enumerate(points[0]):
-        text = (f'{found.parameters["joints"][leg]}: '
+        text = (f'{found.parameters.joints[leg]}: '
                 f'{_MM * np.linalg.norm(moved[leg]):.3g} mm')
         corner = _free(at, np.array([_CHARACTER * len(text), _LINE]), at - chart.at(middle),
                        np.concatenate(taken), picture)

@@ -26,7 +26,6 @@ from stewart_dynamics.calibration.measured_poses import POSITION, QUATERNION
 from stewart_dynamics.calibration.noise import covariances, Noise, whitening
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
-from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.frames.motion import Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR
@@ -69,7 +68,7 @@ def design_poses(platform: StewartPlatform, count: int, noise: Noise = NOISE, se
     if len(candidates) < 3 * count:
         raise StewartError(f'{len(candidates)} of {_TRIES * _CANDIDATES} random poses are within '
                            f'the limits: too few to choose {count}')
-    size = p['singularity.characteristic_length']
+    size = p.singularity.characteristic_length
     values = values_of(p)
     unknowns = Unknowns.of(values, size, np.zeros(GEOMETRY, dtype=bool), False)
     lin = Equations(np.zeros((len(candidates), 6)), candidates).at(values)
@@ -90,20 +89,20 @@ def design_poses(platform: StewartPlatform, count: int, noise: Noise = NOISE, se
     others = [half_widths(random.choice(len(candidates), count, replace=False))
               for _ in range(_RANDOM)]
     found = candidates[_in_order(candidates[chosen], platform.home_pose(), size, chosen)]
-    return PoseDesign(found, platform.inverse_kinematics(found) - p['geometry.zero_length'],
+    return PoseDesign(found, platform.inverse_kinematics(found) - p.geometry.zero_length,
                       half_widths(chosen), np.median(others, axis=0), names_of(p))
 
 
 def _within_limits(platform: StewartPlatform, random: np.random.Generator, count: int) -> Pose:
     """Return random poses within all limits, on home's side of singularities."""
     p = platform.parameters
-    low, high = p[limits.LENGTH_MIN], p[limits.LENGTH_MAX]
+    low, high = p.limits.length_min, p.limits.length_max
     if low is None or high is None:
         raise ParameterError('limits.length_min and limits.length_max: needed for a design')
     home, stroke = platform.home_pose(), high - low
     tries = _TRIES * count
     spread = float(stroke.max())
-    angle = min(spread / p['singularity.characteristic_length'], _LARGEST_ANGLE)
+    angle = min(spread / p.singularity.characteristic_length, _LARGEST_ANGLE)
     poses = Pose(home.position + random.uniform(-0.5, 0.5, (tries, 3)) * spread,
                  from_euler(random.uniform(-angle, angle, (tries, 3))) @ home.rotation)
     lengths = platform.inverse_kinematics(poses)
@@ -113,7 +112,7 @@ def _within_limits(platform: StewartPlatform, random: np.random.Generator, count
     side, results = (platform.solve(rows) for rows in (motion_rows(home), motions))
     exceeded = known.exceeded(known.values(motions, results), len(poses))
     return poses[known.regular(results, side[0, DETERMINANT]) & (
-        results[:, CONDITION] < p['singularity.warn_condition'])
+        results[:, CONDITION] < p.singularity.warn_condition)
         & ~exceeded & ~known.overloaded(motions, results)]
 
 

@@ -53,7 +53,7 @@ def run(given: argparse.Namespace, parameters: Parameters, folder: Path) -> str:
     with whole_folder(folder, options, DESIGNED_POSES, before) as partial:
         write_files({
             partial / DESIGNED_POSES: poses_csv(
-                parameters['joints'], found.lengths, found.poses),
+                parameters.joints, found.lengths, found.poses),
             partial / WAY_THROUGH_POSES: trajectory_csv(motion)})
     lines = [f'predicted {INTERVAL}s, widest of the legs, for noise of '
              f'{1e6 * noise.length:.3g} um, {1e6 * noise.position:.3g} um and '

@@ -162,8 +162,8 @@ def inverse(pose: Pose) -> Pose:
 def values_of(parameters: Parameters, frames: Frames = SAME) -> Array:
     """Return the values (ALL,) of a parameter file, with positions of frames, angles zero."""
     return np.concatenate([
-        parameters[BASE_JOINTS].ravel(), parameters[PLATFORM_JOINTS].ravel(),
-        np.broadcast_to(parameters[ZERO_LENGTH], 6),
+        parameters.geometry.base_joints.ravel(), parameters.geometry.platform_joints.ravel(),
+        np.broadcast_to(parameters.geometry.zero_length, 6),
         *(np.concatenate([each.position, np.zeros(3)]) for each in frames)])
 
 
@@ -176,7 +176,7 @@ def with_geometry(parameters: Parameters, values: Array) -> Parameters:
 
 def names_of(parameters: Parameters) -> tuple[str, ...]:
     """Return the names of the geometry's 42 numbers."""
-    joints = parameters['joints']
+    joints = parameters.joints
     return (*(f'{name}.{joint}.{axis}' for name in (BASE_JOINTS, PLATFORM_JOINTS)
               for joint in joints for axis in 'xyz'),
             *(f'{ZERO_LENGTH}.{joint}' for joint in joints))

@@ -60,7 +60,7 @@ def pose_errors(parameters: Parameters, equations: Equations, frames: Frames) ->
 def poses_of(parameters: Parameters, positions: Array, guess: Pose) -> tuple[Pose, Flags]:
     """Return the poses (N,) of leg positions (N, 6), and where there is one; else the guess."""
     platform = StewartPlatform(parameters)
-    lengths = positions + parameters['geometry.zero_length']
+    lengths = positions + parameters.geometry.zero_length
     rows = np.array(np.broadcast_to(guess.rows, (len(lengths), guess.rows.shape[-1])))
     try:
         return platform.forward_kinematics(lengths, guess), np.ones(len(lengths), dtype=bool)

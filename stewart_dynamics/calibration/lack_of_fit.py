@@ -179,7 +179,7 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
             equations.lengths.std(axis=0).max() < _MOVE * deviation):
         return ()  # rounding errors, or one and the same pose
     terms, sides = _terms(platform, equations, found, fixed)
-    names = platform.parameters['joints']
+    names = platform.parameters.joints
     rms = 1e6 * np.sqrt(np.mean(found.lin.residuals ** 2, axis=0))  # [um]
     scatter = [f'{name} (residuals of {each:.3g} um, {np.median(rms):.3g} um in the median leg)'
                for name, each in zip(names, rms, strict=True)]

@@ -85,8 +85,8 @@ def _on_other_side(parameters: Parameters, equations: Equations, unknown_frames:
             'side', 'the poses are on the other side of the base than at home: likely a mirrored '
             '(left-handed) frame, with one axis of the opposite sign'
             + ('; or geometry.platform_side, which is not given'
-               if parameters['geometry.platform_side'] == AUTO else
-               f'; or geometry.platform_side, {parameters["geometry.platform_side"]}, is wrong'))
+               if parameters.geometry.platform_side == AUTO else
+               f'; or geometry.platform_side, {parameters.geometry.platform_side}, is wrong'))
 
 
 def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, size: float,
@@ -96,7 +96,7 @@ def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, 
     if left > _UNEXPLAINED * size:
         yield LikelyMistake('misfit', f'no geometry explains the poses: residuals of {_mm(left)} '
                             'mm remain; lengths and poses must be of the same instants')
-    start, joints = values_of(parameters), parameters['joints']
+    start, joints = values_of(parameters), parameters.joints
     zero = start[ZERO]
     moved = np.linalg.norm((values - start)[:PLATFORM.stop].reshape(12, 3), axis=1)
     if moved.max() > _FARTHEST * size:
@@ -147,7 +147,7 @@ def _without_mistakes(parameters: Parameters, given: Equations,
         'needed'), given._replace(pose=Pose(pose.position, np.swapaxes(pose.rotation, 1, 2)))
     yield LikelyMistake('sign', 'leg positions have the opposite sign: they must increase as a '
                         'leg extends'), given._replace(lengths=-lengths)
-    joints = parameters['joints']
+    joints = parameters.joints
     for a, b in combinations(range(6), 2):
         order = [{a: b, b: a}.get(leg, leg) for leg in range(6)]
         yield LikelyMistake('swapped', f'{joints[a]} and {joints[b]} are swapped'), given._replace(

@@ -46,11 +46,11 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
 
     Raises BagError: the bag cannot be read, a topic is not found, or nothing was measured at rest.
     """
-    with closing(Recording(path, reading, parameters['platform_frame'])) as recording:
+    with closing(Recording(path, reading, parameters.platform_frame)) as recording:
         legs_topic, commanded = find_calibrated_legs(recording, node, measured)
         pose_topic = recording.find_topic(type_names.POSE_STAMPED, pose, '', '--pose')
         topics = {legs_topic: 'legs', pose_topic: 'pose'}
-        reader = JointStateReader(parameters['joints'], ['position'])
+        reader = JointStateReader(parameters.joints, ['position'])
         leg_stamps: list[Stamps] = []
         leg_values: list[Array] = []
         poses: list[tuple[int, tuple[float, ...]]] = []
@@ -85,7 +85,7 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
     seen = np.array([values for _, values in poses])
     rows, names = [], []
     for first, last in _rests(stamps, lengths,
-                              _STILL * parameters['singularity.characteristic_length']):
+                              _STILL * parameters.singularity.characteristic_length):
         margin = round(_SETTLING * (stamps[last] - stamps[first]))
         begin, end = stamps[first] + margin, stamps[last] - margin
         part = seen[np.searchsorted(at, begin):np.searchsorted(at, end, 'right')]

@@ -29,7 +29,7 @@ VERSION = 1
 def document(found: Calibration, measured: MeasuredPoses, source: str, options: Mapping[str, Any],
              ) -> dict[str, Any]:
     """Return the content of calibration.json."""
-    what, joints = found.identifiability, found.parameters['joints']
+    what, joints = found.identifiability, found.parameters.joints
     lack = found.lack_of_fit
     legs, pose = measured.topics or (None, None)
     units = ['m'] * len(found.names)

@@ -176,7 +176,7 @@ class Capability:
         self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes
         self._plates = (none, none) if clearance is None else (clearance.base, clearance.platform)
         self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
-        size = float(platform.parameters['singularity.characteristic_length'])
+        size = float(platform.parameters.singularity.characteristic_length)
         nearest = float(self._bounds[travel.CLEARANCE_MIN, 0])
         self._margins = travel.PoseMargins(
             Lengths(self._bounds[:2]) if (self._bounds[0] > 0.0).any() or np.isfinite(
@@ -429,7 +429,7 @@ class Capability:
         still = self._held(pose)
         results = self._results(still, None)
         found = remaining(self.platform.drive_jacobian(pose), leg, float(
-            self.platform.parameters['singularity.characteristic_length']))
+            self.platform.parameters.singularity.characteristic_length))
         one = Motion.of_rows(still.rows[..., None, :])
         wrenches = None
         if self.limits_forces:
@@ -568,7 +568,7 @@ class Capability:
         with np.errstate(over='ignore', invalid='ignore'):
             arm = moving.rotation @ center
             turning = np.cross(moving.angular_velocity, arm)
-            force = self.platform.parameters['gravity'] - moving.linear_acceleration - np.cross(
+            force = self.platform.parameters.gravity - moving.linear_acceleration - np.cross(
                 moving.angular_acceleration, arm) - np.cross(moving.angular_velocity, turning)
             load = check_finite(
                 'center_of_mass', np.concatenate([force, np.cross(arm, force)], axis=-1), 0)

@@ -84,7 +84,7 @@ class Growth:
         self._wrench = np.broadcast_to(
             np.asarray(0.0 if wrench is None else wrench, dtype=float), (self._count, WRENCH))
         self._base = np.broadcast_to(
-            (BaseMotion(p['gravity']) if base is None else base).rows, (self._count, BASE))
+            (BaseMotion(p.gravity) if base is None else base).rows, (self._count, BASE))
 
     def first_exit(self, most: float) -> Exit | None:
         """

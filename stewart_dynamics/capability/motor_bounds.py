@@ -16,7 +16,7 @@ from stewart_dynamics.mechanics.drives.motor_limits import bound_of, largest_tor
 from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS, drive_constants, Drives, MOTORS, Motors, SPEEDS)
 from stewart_dynamics.mechanics.limits import (
-    short_name, SPEED_MAX, TORQUE_CONTINUOUS, TORQUE_MAX, TORQUE_SPEED)
+    short_name, SPEED_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import MOTION, RESULT
 from stewart_dynamics.parameters.table import Parameters
 
@@ -55,8 +55,8 @@ class MotorBounds:
         self.inertia = self._mass / self.ratio ** 2
         self._strongest, self.fastest = bound_of(p, TORQUE_MAX), bound_of(p, SPEED_MAX)
         self.limits_speeds = bool(np.isfinite(self.fastest).any())
-        self._curve = p[TORQUE_SPEED]
-        self.limited = p[TORQUE_MAX] is not None or self._curve is not None
+        self._curve = p.drive.torque_speed
+        self.limited = p.drive.torque_max is not None or self._curve is not None
         self._knees = np.empty((6, 0))  # speeds at which the largest torque has kinks
         if self._curve is not None:
             speeds, torques = self._curve.T
@@ -101,7 +101,7 @@ class MotorBounds:
     @property
     def continuous_forces(self) -> Array | None:
         """Return leg forces (6,) [N] that can be held without end, without losses as published."""
-        continuous = self._parameters[TORQUE_CONTINUOUS]
+        continuous = self._parameters.drive.torque_continuous
         return None if continuous is None else np.asarray(continuous * self.ratio)
 
     def exits(self, load: tuple[Array, ...], own: tuple[Array, ...], speeds: Array,

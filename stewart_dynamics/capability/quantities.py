@@ -65,9 +65,9 @@ def starts_at(parameters: Parameters, axes: Array, plates: Sequence[Array], rows
     plates: corners of the plates of base and platform (M, 3).
     """
     turn = np.swapaxes(rows[:, ROTATION].reshape(-1, 3, 3), 1, 2)
-    joints, pivots = parameters['geometry.platform_joints'], pivots[:, None]
+    joints, pivots = parameters.geometry.platform_joints, pivots[:, None]
     centers = rows[:, None, POSITION] + pivots @ turn
-    to_centers, arms = centers - parameters['geometry.base_joints'], (joints - pivots) @ turn
+    to_centers, arms = centers - parameters.geometry.base_joints, (joints - pivots) @ turn
     lines, levers = to_centers + arms, joints @ turn
     with np.errstate(all='ignore'):
         sides = np.linalg.det(np.concatenate([lines, np.cross(levers, lines)], axis=2))

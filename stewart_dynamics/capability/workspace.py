@@ -102,7 +102,7 @@ class _Plane:
         self._limits = PoseLimits(platform.parameters)
         # all lengths are within this range
         p = platform.parameters
-        tips = p['geometry.base_joints'] - p['geometry.platform_joints'] @ start.rotation.T
+        tips = p.geometry.base_joints - p.geometry.platform_joints @ start.rotation.T
         longest = self._limits.limits.bounds[LENGTH_MAX][:, None]
         self._low, self._high = (tips - longest).max(axis=0), (tips + longest).min(axis=0)
         self._side = float(platform.solve(start.rows[None])[0, DETERMINANT])
@@ -227,7 +227,7 @@ def _curves(platform: StewartPlatform, axes: Array, start: Motion, normal: int,
     p = platform.parameters
     bounds = Limits(p).bounds
     rotation, height = start.rotation, start.position[normal]
-    tips = p['geometry.base_joints'] - p['geometry.platform_joints'] @ rotation.T
+    tips = p.geometry.base_joints - p.geometry.platform_joints @ rotation.T
     i, j = (n for n in range(3) if n != normal)
     above = height - tips[:, normal]
     circles: list[tuple[str, int, float]] = []

@@ -86,8 +86,8 @@ class MotionCueing:
         if not isinstance(parameters, Parameters):
             raise wrong_type('parameters', parameters, 'Parameters or the path of their file')
         self.parameters = parameters
-        self.governed: bool = parameters['cueing.govern']
-        self.governor = Governor(parameters, parameters['cueing.head'])
+        self.governed = parameters.cueing.govern
+        self.governor = Governor(parameters, parameters.cueing.head)
         if self.governed:
             self.governor.check_home(parameters)
         filters: Any = np.zeros((), record('washout_filters'))
@@ -96,7 +96,7 @@ class MotionCueing:
         self._constants = *self.governor.arguments, self.governed, filters
         # The input that is rest.
         self.at_rest: Array = np.zeros(3)
-        if parameters['cueing.input'] == SPECIFIC_FORCE:
+        if parameters.cueing.input == SPECIFIC_FORCE:
             self.at_rest[2] = GRAVITY
 
     def run(self, times: ArrayLike, specific_force: ArrayLike,
@@ -137,7 +137,7 @@ class MotionCueing:
         check_kind(motion, Motion)
         rows = np.ascontiguousarray(motion.rows.reshape(-1, MOTION))
         felt = np.empty((len(rows), 6))
-        function('felt_many')(self.parameters['cueing.head'], len(rows), rows, felt)
+        function('felt_many')(self.parameters.cueing.head, len(rows), rows, felt)
         forces, rates = (felt[:, part].reshape(*motion.shape, 3)
                          for part in (slice(0, 3), slice(3, 6)))
         return Felt(forces, rates)
@@ -150,20 +150,23 @@ class MotionCueing:
         governor and the limit of the rate of tilt are idle.
         """
         s = 1j * as_array('frequencies', frequencies, np.shape(frequencies))
-        p = {name.removeprefix('cueing.'): value for name, value in self.parameters.items()
-             if name.startswith('cueing.')}
+        of, rotation = self.parameters.cueing.translation, self.parameters.cueing.rotation
         found: dict[str, Array] = {}
         for n, axis in enumerate(AXES[:3]):
-            w, zeta, slow, gain = (p[f'translation.{name}'][n] for name in (
-                'natural_frequency', 'damping', 'washout_frequency', 'gain'))
-            found[axis] = gain * s ** 3 / ((s ** 2 + 2.0 * zeta * w * s + w ** 2) * (s + slow))
+            w, zeta, slow = of.natural_frequency[n], of.damping[n], of.washout_frequency[n]
+            found[axis] = of.gain[n] * s ** 3 / (
+                (s ** 2 + 2.0 * zeta * w * s + w ** 2) * (s + slow))
         for n, axis in enumerate(AXES[:2]):
-            w, zeta, gain = (p[f'tilt.{name}'][n] for name in (
-                'natural_frequency', 'damping', 'gain'))
-            found[axis] = found[axis] + gain * w ** 2 / (s ** 2 + 2.0 * zeta * w * s + w ** 2)
+            found[axis] = found[axis] + self._tilt(n, s)
         for n, axis in enumerate(AXES[3:]):
-            found[axis] = p['rotation.gain'][n] * s / (s + p['rotation.natural_frequency'][n])
+            found[axis] = rotation.gain[n] * s / (s + rotation.natural_frequency[n])
         return found
+
+    def _tilt(self, n: int, s: Any) -> Any:
+        """Return the response of the tilt for surge, 0, or sway, 1."""
+        of = self.parameters.cueing.tilt
+        w, zeta = of.natural_frequency[n], of.damping[n]
+        return of.gain[n] * w ** 2 / (s ** 2 + 2.0 * zeta * w * s + w ** 2)
 
     def cross_response(self, frequencies: ArrayLike) -> dict[tuple[str, str], Array]:
         """
@@ -172,15 +175,12 @@ class MotionCueing:
         Tilt is felt as rotation [rad/s by m/s^2], and rotation tilts gravity [m/s^2 by rad/s].
         """
         s = 1j * as_array('frequencies', frequencies, np.shape(frequencies))
-        p, found = self.parameters, {}
+        rotation, found = self.parameters.cueing.rotation, {}
         for n, (axis, turn, sign) in enumerate((('surge', 'pitch', -1.0), ('sway', 'roll', 1.0))):
-            w, zeta, gain = (p[f'cueing.tilt.{name}'][n] for name in (
-                'natural_frequency', 'damping', 'gain'))
-            tilt = sign * gain * w ** 2 / (s ** 2 + 2.0 * zeta * w * s + w ** 2) / GRAVITY
-            found[axis, turn] = s * tilt
+            found[axis, turn] = s * sign * self._tilt(n, s) / GRAVITY
             k = AXES.index(turn) - 3
-            found[turn, axis] = sign * GRAVITY * p['cueing.rotation.gain'][k] / (
-                s + p['cueing.rotation.natural_frequency'][k])
+            found[turn, axis] = sign * GRAVITY * rotation.gain[k] / (
+                s + rotation.natural_frequency[k])
         return found
 
     def inputs(self, specific_force: ArrayLike, angular_velocity: ArrayLike | None) -> Array:
@@ -209,7 +209,7 @@ class MotionCueing:
               ) -> tuple[Callable[[], Any], Callable[[], Any]]:
         """Return functions that advance by one sample, and that write the felt quantities then."""
         return (function('cue_many').bound(*self._constants, 1, time, inputs, state, row),
-                function('felt_many').bound(self.parameters['cueing.head'], 1, row, felt))
+                function('felt_many').bound(self.parameters.cueing.head, 1, row, felt))
 
 
 class CueingStream:

@@ -75,7 +75,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._ticks = 0
         self._due = 0  # index of the next setpoint, from the begin
         self._periods = DuePeriods(
-            self._settings['cueing.rate'], lambda text: self._on_notice(f'late: {text}'))
+            self._settings.cueing.rate, lambda text: self._on_notice(f'late: {text}'))
         self._activated = time.monotonic()
         if self._last is not None:
             self._start_from(Motion.of_rows(self._last))
@@ -84,25 +84,25 @@ class CueingNode(ManagedNode[CueingParameters]):
         """Make the filters and open the topics."""
         p = self._settings
         self._cueing = MotionCueing(p)
-        self._setpoints = SetpointPublisher(self, p['target'], p['output'], p['base_frame'])
+        self._setpoints = SetpointPublisher(self, p.target, p.output, p.base_frame)
         qos = QoSProfile(depth=1000)
         self._felt = self.create_publisher(Imu, f'~/{FELT}', qos)
-        self._felt_writer = ImuWriter(p['platform_frame'], 0.0, 0.0)
+        self._felt_writer = ImuWriter(p.platform_frame, 0.0, 0.0)
         self._diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS, qos)
-        self._legs = JointStateReader(p['joints'], ('position',))
+        self._legs = JointStateReader(p.joints, ('position',))
         self._ours = [
             (self.destroy_subscription, self.create_subscription(
                 Imu, f'~/{VEHICLE}', self._on_vehicle, qos, raw=True)),
             (self.destroy_subscription, self.create_subscription(
                 JointState, f'~/{MEASURED_LEGS}', self._on_legs, qos, raw=True)),
             (self.destroy_timer, self.create_timer(
-                1.0 / p['cueing.rate'], self._on_time, clock=self._steady)),
+                1.0 / p.cueing.rate, self._on_time, clock=self._steady)),
             (self.destroy_timer, self.create_timer(_TICK, self._on_tick, clock=self._steady)),
             *((self.destroy_publisher, each) for each in (
                 self._felt, self._diagnostics, *self._setpoints.publishers))]
         self.get_logger().info(
-            f'motion cueing at {p["cueing.rate"]:g} Hz to {p["target"]}, '
-            + ('within the limits of the hexapod' if p['cueing.govern'] else 'not governed'))
+            f'motion cueing at {p.cueing.rate:g} Hz to {p.target}, '
+            + ('within the limits of the hexapod' if p.cueing.govern else 'not governed'))
 
     def close_topics(self) -> None:
         for destroy, each in self._ours:
@@ -122,7 +122,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         platform = StewartPlatform(self._settings)
         try:
             _, positions = self._legs.read_one(data)
-            lengths = np.array(positions) + self._settings['geometry.zero_length']
+            lengths = np.array(positions) + self._settings.geometry.zero_length
             away = np.abs(lengths - platform.inverse_kinematics(self._cueing.governor.home))
             pose = (self._cueing.governor.home if away.max() < _AWAY
                     else platform.forward_kinematics(lengths))
@@ -135,7 +135,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         """Begin with the approach from a pose to home."""
         p, home = self._settings, self._cueing.governor.home
         try:
-            found = approach(StewartPlatform(p), pose, home, rate=p['cueing.rate'])
+            found = approach(StewartPlatform(p), pose, home, rate=p.cueing.rate)
         except StewartError as exc:
             self._log.write([LogLine(ERROR, f'no approach to the home pose: {exc}', 'approach')])
             return
@@ -179,7 +179,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         vehicle, gravity = self._vehicle, float(self._cueing.at_rest[2])
         heard = (vehicle.reading is not None and not vehicle.mistake
                  and time.monotonic() - vehicle.heard < self._silence)
-        change = 1.0 / (_FADE * self._settings['cueing.rate'])
+        change = 1.0 / (_FADE * self._settings.cueing.rate)
         share = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
         self._presence = share
         x, y, z, *rates = vehicle.reading or (0.0, 0.0, gravity, 0.0, 0.0, 0.0)
@@ -188,7 +188,7 @@ class CueingNode(ManagedNode[CueingParameters]):
 
     @property
     def _silence(self) -> float:
-        timeout: float = self._settings['vehicle_timeout']
+        timeout = self._settings.vehicle_timeout
         return timeout
 
     def end_work(self) -> None:
@@ -213,7 +213,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._vehicle.check(now)
         if self._vehicle.mistake and self._vehicle.mistake != mistake:
             self._log.write([LogLine(WARN, f'vehicle: {self._vehicle.mistake}', 'mistake')])
-        if not self._periods.begun and now - self._activated > self._settings['start_timeout']:
+        if not self._periods.begun and now - self._activated > self._settings.start_timeout:
             self.get_logger().warning('no ~/measured_legs: starts at the home pose')
             self._go()
         self._ticks += 1
@@ -267,7 +267,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         if self._active:
             if self._stream is not None:
                 self._stream.use(cueing)
-            self._vehicle.kind = parameters['cueing.input']
+            self._vehicle.kind = parameters.cueing.input
         self._cueing = cueing
 
 

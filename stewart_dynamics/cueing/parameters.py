@@ -5,23 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
-from stewart_dynamics.parameters.parameter_set import Parameter
+from stewart_dynamics.parameters.parameter_set import declare
 from stewart_dynamics.parameters.table import COMBINED, PARAMETERS, Parameters, SEPARATE
-
-_OWN = (
-    Parameter('target', 'string', 'node that receives the setpoints, on <target>/setpoint/...',
-              default=Parameters.node),
-    Parameter('output', 'string', 'pose, twist and accel on three topics, or combined in one '
-              'message', default=SEPARATE, choices=(SEPARATE, COMBINED)),
-    Parameter('vehicle_timeout', 'double', 'time without ~/vehicle after which its motion is '
-              'washed out, to rest', 's', 0.2, minimum=0.0, above=True, maximum=60.0),
-    Parameter('start_timeout', 'double', 'the approach to the home pose starts with the first of '
-              '~/measured_legs; without them, motion cueing starts at home after this time', 's',
-              5.0, minimum=0.0, maximum=86400.0),
-)
 
 # Beginnings of names without an effect here.
 _NOT_USED = ('drive.resistance', 'drive.temperature_rise_max', 'drive.thermal_',
@@ -30,13 +15,21 @@ _NOT_USED = ('drive.resistance', 'drive.temperature_rise_max', 'drive.thermal_',
              'limits.action', 'singularity.action', 'singularity.warn_', 'visualization_rate',
              'uncertainty.', 'payload.')
 
-CUEING_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({
-    **PARAMETERS, **{own.name: own for own in _OWN}})
-
 
 class CueingParameters(Parameters):
     """The parameters of the hexapod, of motion cueing, and of its node."""
 
-    table = CUEING_PARAMETERS
+    target: str = declare(
+        'node that receives the setpoints, on <target>/setpoint/...', default=Parameters.node)
+    output: str = declare(
+        'pose, twist and accel on three topics, or combined in one message', default=SEPARATE,
+        choices=(SEPARATE, COMBINED))
+    vehicle_timeout: float = declare(
+        'time without ~/vehicle after which its motion is washed out, to rest', 's', 0.2,
+        minimum=0.0, above=True, maximum=60.0)
+    start_timeout: float = declare(
+        'the approach to the home pose starts with the first of ~/measured_legs; without them, '
+        'motion cueing starts at home after this time', 's', 5.0, minimum=0.0, maximum=86400.0)
+
     node = 'stewart_cueing'
     unused = frozenset(name for name in PARAMETERS if name.startswith(_NOT_USED))

@@ -66,10 +66,10 @@ def measured_response(cueing: MotionCueing) -> Array:
     """
     p = cueing.parameters.replaced({'cueing.govern': False, 'cueing.input': 'acceleration'})
     free = MotionCueing(p)
-    slowest = min(p['cueing.translation.washout_frequency'].min(),
-                  p['cueing.rotation.natural_frequency'].min(),
-                  p['cueing.translation.natural_frequency'].min() / 2.0,
-                  p['cueing.tilt.natural_frequency'].min() / 2.0)
+    slowest = min(p.cueing.translation.washout_frequency.min(),
+                  p.cueing.rotation.natural_frequency.min(),
+                  p.cueing.translation.natural_frequency.min() / 2.0,
+                  p.cueing.tilt.natural_frequency.min() / 2.0)
     found = np.empty((len(OMCT_FREQUENCIES), 6, 6), dtype=complex)
     for n, frequency in enumerate(OMCT_FREQUENCIES):
         period = 2.0 * np.pi / frequency

@@ -75,7 +75,7 @@ def _run(given: argparse.Namespace) -> int:
     _PROGRAM.prepare(likely_mistakes(parameters))
     first = vehicle.times <= 2.0
     mistake = vehicle_mistake(vehicle.times[first], vehicle.forces[first], vehicle.rates[first],
-                              parameters['cueing.input'])
+                              parameters.cueing.input)
     for text in (*vehicle.notices, *([f'vehicle: {mistake}'] if mistake else ())):
         _PROGRAM.complain(f'warning: {text}')
     gains: list[report.Gain] = []

@@ -86,7 +86,7 @@ class Vehicle:
         self._notice = notice
         self._stamp: int | None = None
         self._recent: deque[tuple[float, ...]] = deque()
-        self.kind: str = parameters['cueing.input']
+        self.kind = parameters.cueing.input
 
     def take(self, data: bytes, now: float) -> None:
         """Take a message at a time of a steady clock [s]."""

@@ -215,7 +215,7 @@ def check_order(order: Order, parameters: Parameters) -> None:
 
 def leg_of(name: str, parameters: Parameters) -> int:
     """Return the index of a leg by its name."""
-    joints: tuple[str, ...] = parameters['joints']
+    joints: tuple[str, ...] = parameters.joints
     if name not in joints:
         raise StewartError(f'--stuck: {shown(name)}: must be one of {", ".join(joints)}')
     return joints.index(name)

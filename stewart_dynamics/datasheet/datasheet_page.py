@@ -87,7 +87,7 @@ class Pictures(NamedTuple):
         """Return the largest payload over the distance of its center of mass from the pivot."""
         loads = self.hexapod.loads
         radius = float(np.linalg.norm(
-            loads.platform.parameters['geometry.platform_joints'], axis=1).mean())
+            loads.platform.parameters.geometry.platform_joints, axis=1).mean())
         offsets = np.linspace(0.0, 1.5 * radius, 31, dtype=float)
         here = Payloads(loads, self.hexapod.pose[None])
         curves = {'at the pose': np.array([here.level(each) for each in offsets])}
@@ -141,8 +141,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
 def _summary(hexapod: RatedHexapod) -> str:
     p = hexapod.given
     parts = [f'{p.carried.mass:.4g} kg on six legs']
-    if p['limits.length_min'] is not None and p['limits.length_max'] is not None:
-        low, high = p['limits.length_min'].min(), p['limits.length_max'].max()
+    if p.limits.length_min is not None and p.limits.length_max is not None:
+        low, high = p.limits.length_min.min(), p.limits.length_max.max()
         parts.append(f'{1e3 * low:.5g} to {1e3 * high:.5g} mm long')
     for name, key in (('base', 'geometry.base_joints'), ('platform', 'geometry.platform_joints')):
         diameter = circle_of(p[key])
@@ -268,8 +268,8 @@ def _joints(hexapod: RatedHexapod) -> list[dict[str, Any]]:
     p = hexapod.given
     lengths = hexapod.platform.inverse_kinematics(hexapod.pose)
     return [{
-        'leg': name, 'base': 1e3 * p['geometry.base_joints'][n],
-        'platform': 1e3 * p['geometry.platform_joints'][n], 'length': 1e3 * float(lengths[n]),
+        'leg': name, 'base': 1e3 * p.geometry.base_joints[n],
+        'platform': 1e3 * p.geometry.platform_joints[n], 'length': 1e3 * float(lengths[n]),
         'range': ' to '.join('–' if p[limit] is None else f'{1e3 * p[limit][n]:.6g}' for limit in (
             'limits.length_min', 'limits.length_max'))} for n, name in enumerate(hexapod.joints)]
 
@@ -286,13 +286,13 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
         ('Pivot, platform frame', numbers(sheet['pivot'], 1e3, ' mm')),
         *([('Pivot at the rated pose', numbers(sheet['pose']['pivot_position'], 1e3, ' mm'))]
           if any(sheet['pivot']) else []),
-        ('Platform' + (' with payload' if p['payload.mass'] > 0.0 else ''),
+        ('Platform' + (' with payload' if p.payload.mass > 0.0 else ''),
          f'{p.carried.mass:.5g} kg at {numbers(p.carried.center, 1e3, " mm")}'),
         ('Its inertia, xx yy zz', numbers(np.diagonal(inertia), 1.0, ' kg m²')),
-        ('Leg: cylinder, piston', f'{numbers(p["legs.cylinder.mass"])}, '
-         f'{numbers(p["legs.piston.mass"], 1.0, " kg")}'),
-        ('Reflected mass of an actuator', numbers(p['actuator.reflected_mass'], 1.0, ' kg')),
-        ('Gravity', numbers(p['gravity'], 1.0, ' m/s²'))]
+        ('Leg: cylinder, piston', f'{numbers(p.legs.cylinder.mass)}, '
+         f'{numbers(p.legs.piston.mass, 1.0, " kg")}'),
+        ('Reflected mass of an actuator', numbers(p.actuator.reflected_mass, 1.0, ' kg')),
+        ('Gravity', numbers(p.gravity, 1.0, ' m/s²'))]
     for name, value in p.items():
         if name.startswith('limits.') and name != 'limits.action' and value is not None and (
                 not name.startswith('limits.length_m')):
@@ -308,5 +308,5 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
     if sheet['leg_clearance'] is not None:
         rows.append(('Clearance between legs at the pose',
                      numbers(sheet['leg_clearance'], 1e3, ' mm')))
-    rows.append(('singularity.stop_condition', f'{p["singularity.stop_condition"]:g}'))
+    rows.append(('singularity.stop_condition', f'{p.singularity.stop_condition:g}'))
     return rows

@@ -17,7 +17,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
-from stewart_dynamics.parameters.table import BASE_OUTLINE, Parameters, PLATFORM_OUTLINE
+from stewart_dynamics.parameters.table import Parameters, six_of
 from stewart_dynamics.reporting.vector_picture import hull, Picture, ticks
 
 # Radii of parts without a given one, relative to the hexapod's size, and the part of a retracted
@@ -79,16 +79,16 @@ class Drawing:
     def __init__(self, parameters: Parameters, pose: Pose, ends: tuple[Pose, ...] = (),
                  pivot: Array | None = None) -> None:
         self._p, self._poses = parameters, (pose, *ends)
-        self._upright = upright(parameters['gravity'])
-        self._arms = np.asarray(parameters['geometry.platform_joints'])
-        self._base = np.asarray(parameters['geometry.base_joints']) @ self._upright.T
+        self._upright = upright(parameters.gravity)
+        self._arms = np.asarray(parameters.geometry.platform_joints)
+        self._base = np.asarray(parameters.geometry.base_joints) @ self._upright.T
         self._platform = self._placed(pose, self._arms)
         self._pivot: Array = np.empty((0, 3))
         if pivot is not None and np.any(pivot):
             self._pivot = self._placed(pose, pivot[None])
         everything = np.concatenate([self._base, self._platform])
         self._size = float(np.linalg.norm(np.ptp(everything, axis=0))) / 2.0
-        base = parameters[BASE_OUTLINE]
+        base = parameters.geometry.base_outline
         self._base_plate = (self._plate(self._base) if base is None else base @ self._upright.T)
         below = self._platform[:, 2].mean() < self._base[:, 2].mean() - _PLATE * self._size
         self._plan = BOTTOM if below else TOP
@@ -147,7 +147,7 @@ class Drawing:
 
     def _moving_plate(self, pose: Pose) -> Array:
         """Return the corners of the platform's plate at a pose."""
-        outline = self._p[PLATFORM_OUTLINE]
+        outline = self._p.geometry.platform_outline
         return (self._plate(self._placed(pose, self._arms)) if outline is None
                 else self._placed(pose, outline))
 
@@ -176,9 +176,9 @@ class Drawing:
         plates.sort(key=lambda each: each[0])
         for _, points, css in plates[:1]:
             picture.path(hull(place(view.of(points))), closed=True, css=css)
-        radii = (_given(p.get('legs.cylinder.radius'), _CYLINDER * self._size),
-                 _given(p.get('legs.piston.radius'), _PISTON * self._size))
-        shortest = p['limits.length_min']
+        radii = (six_of(p.legs.cylinder.radius, _CYLINDER * self._size),
+                 six_of(p.legs.piston.radius, _PISTON * self._size))
+        shortest = p.limits.length_min
         for _, n in sorted(legs):
             begin, end = self._base[n], self._platform[n]
             length = float(np.linalg.norm(end - begin))
@@ -289,10 +289,6 @@ def circle_of(joints: Array) -> float | None:
     radii = np.linalg.norm(joints - joints.mean(axis=0), axis=1)
     mean = float(radii.mean())
     return 2.0 * mean if float(np.ptp(radii)) < 0.01 * mean else None
-
-
-def _given(values: Array | None, otherwise: float) -> Array:
-    return np.full(6, otherwise) if values is None else values
 
 
 def _dimension(picture: Picture, begin: list[float], end: list[float]) -> None:

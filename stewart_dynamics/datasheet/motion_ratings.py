@@ -39,7 +39,7 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
     result = platform.inverse_dynamics(
         recorded.motion, recorded.wrench, recorded.base, singular='nan')
     found: dict[str, Array] = {}
-    low, high = p[limits.LENGTH_MIN], p[limits.LENGTH_MAX]
+    low, high = p.limits.length_min, p.limits.length_max
     if high is not None:
         shortest = np.zeros(6) if low is None else low
         found[LENGTH] = np.abs(2.0 * result.lengths - high - shortest) / (high - shortest)
@@ -61,12 +61,11 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
     if known:
         angles = dict(zip(limits.OF_JOINTS, platform.joint_angles(recorded.motion), strict=True))
         found[ANGLE] = np.max([angles[name] / p[name] for name in known], axis=0)
-    clearances = clearance_to_check(p)
-    if clearances is not None:
+    clearances, least = clearance_to_check(p), p.limits.leg_clearance_min
+    if clearances is not None and least is not None:
         distances = clearances(recorded.motion.rows)
         with np.errstate(divide='ignore'):
-            found[CLEARANCE] = np.where(
-                distances > 0.0, p[limits.CLEARANCE_MIN] / distances, np.inf)
+            found[CLEARANCE] = np.where(distances > 0.0, least / distances, np.inf)
     found = {name: each.max(axis=-1) for name, each in found.items()}
     condition = result.condition_number / stop_condition_of(p)
     crossed = np.diff(np.sign(result.determinant), prepend=np.sign(result.determinant[0])) != 0.0
@@ -78,7 +77,7 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
            used: dict[str, Array]) -> dict[str, Any]:
     """Return whether a motion is possible, how much faster it could be, and its payload."""
     c, p = Capability(platform), platform.parameters
-    joints = p['joints']
+    joints = p.joints
     worst = max(used, key=lambda name: float(used[name].max()))
     sample = int(used[worst].argmax())
     singular = used[SINGULARITY].max() >= 1.0

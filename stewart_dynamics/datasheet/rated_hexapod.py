@@ -149,9 +149,10 @@ def _moved(p: Parameters, pivot: Array) -> Parameters:
     """Return the parameters with the platform frame at the pivot."""
     if not pivot.any():
         return p
+    outline = p.geometry.platform_outline
     return p.replaced({
-        'geometry.platform_joints': p['geometry.platform_joints'] - pivot,
-        PLATFORM_OUTLINE: None if p[PLATFORM_OUTLINE] is None else p[PLATFORM_OUTLINE] - pivot,
-        'platform.center_of_mass': p['platform.center_of_mass'] - pivot,
-        'payload.center_of_mass': p['payload.center_of_mass'] - pivot,
-        'singularity.characteristic_length': p['singularity.characteristic_length']})
+        'geometry.platform_joints': p.geometry.platform_joints - pivot,
+        PLATFORM_OUTLINE: None if outline is None else outline - pivot,
+        'platform.center_of_mass': p.platform.center_of_mass - pivot,
+        'payload.center_of_mass': p.payload.center_of_mass - pivot,
+        'singularity.characteristic_length': p.singularity.characteristic_length})

@@ -33,7 +33,7 @@ class Payloads:
 
     def __init__(self, capability: Capability, poses: Pose, continuous: bool = False) -> None:
         platform = capability.platform
-        self._gravity = np.asarray(platform.parameters['gravity'])
+        self._gravity = np.asarray(platform.parameters.gravity)
         # of a gravity of 1 along each axis: loads of the hexapod, (N, 3, RESULT), and of a mass of
         # 1 kg, itself and its first moment, (N, 3, 4, RESULT)
         along = np.eye(3)

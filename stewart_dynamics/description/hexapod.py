@@ -96,12 +96,12 @@ class Hexapod:
         self.joints = joint_names(parameters)
         positions, rotations = homes(parameters)
         self.position, self.rotation = positions[0], rotations[0]
-        self.base, self.platform = parameters['base_frame'], parameters['platform_frame']
+        self.base, self.platform = parameters.base_frame, parameters.platform_frame
         self.base_body = f'{WORLD}_base' if self.base == WORLD else self.base
         """The name of the base where a format has a world of its own, whose name is taken."""
         self.platform_body = RigidBody(
-            self.platform, parameters['platform.mass'], parameters['platform.center_of_mass'],
-            inertia_matrix(parameters['platform.inertia']))
+            self.platform, parameters.platform.mass, parameters.platform.center_of_mass,
+            inertia_matrix(parameters.platform.inertia))
         directions = mounts(parameters)
         self.legs = tuple(self._leg(n, directions[n]) for n in range(6))
         self._check_names()
@@ -115,29 +115,29 @@ class Hexapod:
         if twice:
             raise ParameterError(
                 f'base_frame: {shown(self.base)}, platform_frame: {shown(self.platform)}, joints: '
-                f'{shown(list(self.parameters["joints"]))}: the name {shown(twice[0])} would be '
+                f'{shown(list(self.parameters.joints))}: the name {shown(twice[0])} would be '
                 'there twice')
 
     def _leg(self, n: int, mount: Array) -> LegDescription:
         p = self.parameters
         first, second, name = self.joints[len(PLATFORM_JOINTS) + 3 * n:][:3]
-        base, platform = p['geometry.base_joints'][n], p['geometry.platform_joints'][n]
+        base, platform = p.geometry.base_joints[n], p.geometry.platform_joints[n]
         length = float(np.linalg.norm(self.position + self.rotation @ platform - base))
         return LegDescription(
             name, f'{name}_cross', (first, second),
             f'{name}_platform_joint', f'{name}_tip', base, platform, mount,
-            float(p['geometry.zero_length'][n]), length,
+            float(p.geometry.zero_length[n]), length,
             self._part(n, 'cylinder', 1.0), self._part(n, 'piston', -1.0),
-            float(p['actuator.reflected_mass'][n]), float(p['actuator.viscous_friction'][n]),
-            float(p['actuator.coulomb_friction'][n]),
+            float(p.actuator.reflected_mass[n]), float(p.actuator.viscous_friction[n]),
+            float(p.actuator.coulomb_friction[n]),
             LegLimits(*(None if p[f'limits.{each}'] is None else float(p[f'limits.{each}'][n])
                         for each in LegLimits._fields)))
 
     def _part(self, n: int, part: str, sign: float) -> RigidBody:
-        p = self.parameters
-        across = float(p[f'legs.{part}.inertia'][n])
-        center = sign * float(p[f'legs.{part}.center_of_mass'][n])
-        return RigidBody(f'{p["joints"][n]}_{part}', float(p[f'legs.{part}.mass'][n]),
+        of_part = self.parameters.legs.parts[part]
+        across = float(of_part.inertia[n])
+        center = sign * float(of_part.center_of_mass[n])
+        return RigidBody(f'{self.parameters.joints[n]}_{part}', float(of_part.mass[n]),
                          np.array([0.0, 0.0, center + 0.0]), np.diag([across, across, 0.0]))
 
     def solid(self, body: RigidBody, leg: LegDescription) -> RigidBody:
@@ -177,7 +177,7 @@ class VisualShape(NamedTuple):
 def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[VisualShape, ...]]:
     """Return the shapes of each body, by its name; without ``uris`` only meshes that are paths."""
     p = hexapod.parameters
-    base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
+    base, platform = p.geometry.base_joints, p.geometry.platform_joints
     size = mean_radius(platform)
     found = {}
     for name, kind, joints in ((hexapod.base, 'base', base),
@@ -215,9 +215,9 @@ def _plate(kind: str, joints: Array, thickness: float) -> VisualShape:
 
 def _mesh(hexapod: Hexapod, kind: str, uris: bool) -> tuple[VisualShape, ...]:
     p = hexapod.parameters
-    file = p[f'meshes.{kind}']
+    file: str = p[f'meshes.{kind}']
     if not file or (not uris and '://' in file):
         return ()
-    offset = p[f'meshes.{kind}_offset']
+    offset: Array = p[f'meshes.{kind}_offset']
     return (VisualShape('mesh', kind, offset[:3], from_euler(offset[3:]), file=file,
-                        scale=p['meshes.scale']),)
+                        scale=p.meshes.scale),)

@@ -44,7 +44,7 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     root = ET.Element('mujoco', {'model': name})
     p = hexapod.parameters
     add(root, 'compiler', angle='radian', autolimits='true')
-    add(root, 'option', timestep=numbers(_TIMESTEP), gravity=numbers(p['gravity']),
+    add(root, 'option', timestep=numbers(_TIMESTEP), gravity=numbers(p.gravity),
         integrator='implicitfast', solver='Newton', tolerance=numbers(_TOLERANCE))
     # Other bodies collide with the hexapod, but its parts do not collide with each other.
     hexapods = add(add(root, 'default'), 'default', class_=_CLASS)
@@ -76,7 +76,7 @@ def scene(hexapod: Hexapod, name: str) -> str:
     """Return a scene around the MJCF of a hexapod, with light and a floor under the base."""
     root = ET.Element('mujoco', {'model': f'{name}_scene'})
     add(root, 'include', file=f'{name}.xml')
-    size = mean_radius(hexapod.parameters['geometry.base_joints'])
+    size = mean_radius(hexapod.parameters.geometry.base_joints)
     add(root, 'statistic', center=numbers(0.5 * hexapod.position), extent=numbers(3.0 * size))
     assets = add(root, 'asset')
     add(assets, 'texture', type='skybox', builtin='gradient', rgb1='0.3 0.5 0.7', rgb2='0 0 0',
@@ -85,12 +85,12 @@ def scene(hexapod: Hexapod, name: str) -> str:
         rgb2='0.1 0.2 0.3', width='300', height='300')
     add(assets, 'material', name='floor', texture='floor', texrepeat='5 5', reflectance='0.2')
     world = add(root, 'worldbody')
-    gravity = hexapod.parameters['gravity']
+    gravity = hexapod.parameters.gravity
     up = -gravity / np.linalg.norm(gravity) if gravity.any() else np.array([0.0, 0.0, 1.0])
     above = hexapod.position + 4.0 * size * up
     add(world, 'light', pos=numbers(above), dir=numbers(-up), type='directional')
     lowest = min(float(each @ up) for each in (
-        *hexapod.parameters['geometry.base_joints'], hexapod.position - 2.0 * size * np.abs(up)))
+        *hexapod.parameters.geometry.base_joints, hexapod.position - 2.0 * size * np.abs(up)))
     add(world, 'geom', name='floor', type='plane', size='0 0 0.05', material='floor',
         pos=numbers((lowest - PLATE * size) * up), zaxis=numbers(up))
     return text_of(root, 'A scene around the hexapod.')

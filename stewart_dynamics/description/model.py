@@ -40,7 +40,7 @@ class ModelMessages:
     def __init__(self, parameters: Parameters) -> None:
         self._joints = TreeJoints(parameters)
         self._positions = joint_state_layout(self._joints.names, ['position'])
-        self._transform = transforms([(parameters['base_frame'], parameters['platform_frame'])])
+        self._transform = transforms([(parameters.base_frame, parameters.platform_frame)])
 
     def joint_states(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the sensor_msgs/JointState of all joints at a pose, as in a row of motion."""

@@ -41,8 +41,8 @@ def picture(hexapod: Hexapod, name: str) -> str:
     add(root, 'title', f'{name}: joints as read, at home')
     add(root, 'rect', width='100%', height='100%', fill='white')
     p = hexapod.parameters
-    base = p['geometry.base_joints']
-    platform = hexapod.position + p['geometry.platform_joints'] @ hexapod.rotation.T
+    base = p.geometry.base_joints
+    platform = hexapod.position + p.geometry.platform_joints @ hexapod.rotation.T
     for at, (title, axes) in zip((0.0, 0.5 * _WIDTH), _VIEWS, strict=True):
         _view(root, at, title, base[:, axes], platform[:, axes])
     x, y, z = hexapod.position

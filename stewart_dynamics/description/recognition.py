@@ -370,7 +370,7 @@ def _with_side(p: Parameters, found: Topology) -> Parameters:
     """Return parameters whose home pose is on the side of the base where the platform is."""
     home = home_of(p)
     middle = found.base.placement.inside(found.platform.placement.point(
-        p['geometry.platform_joints'].mean(axis=0))) - p['geometry.base_joints'].mean(axis=0)
+        p.geometry.platform_joints.mean(axis=0))) - p.geometry.base_joints.mean(axis=0)
     height = float(home.shape.axes[2] @ middle)
     if abs(height) < _FLAT * home.shape.radius or height * home.side > 0.0:
         return p

@@ -48,7 +48,7 @@ def sdf(hexapod: Hexapod, name: str) -> str:
     root = ET.Element('sdf', {'version': _VERSION, f'xmlns:{CARRIED}': _NAMESPACE})
     model = add(root, 'model', name=name, canonical_link=hexapod.base_body)
     p = hexapod.parameters
-    _pose(model, np.zeros(3), upright(p['gravity']))
+    _pose(model, np.zeros(3), upright(p.gravity))
     add(model, 'self_collide', 'false')
     looks = shapes(hexapod)
     base = _link(model, hexapod.base_body, '', np.zeros(3), np.eye(3))

@@ -75,8 +75,8 @@ def _platform(root: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) 
     """Write the chain of virtual joints, the platform and the frames of its joints."""
     parent = hexapod.base
     reach = sum(np.linalg.norm(joints, axis=1).max() for joints in (
-        hexapod.parameters['geometry.base_joints'],
-        hexapod.parameters['geometry.platform_joints']))
+        hexapod.parameters.geometry.base_joints,
+        hexapod.parameters.geometry.platform_joints))
     reach += max(leg.limits.lengths(leg.home_length)[1] for leg in hexapod.legs)
     for each, name in zip(PLATFORM_JOINTS, hexapod.joints, strict=False):
         axis, bound = _VIRTUAL.get(each, (each, reach))

@@ -50,7 +50,7 @@ def usd(hexapod: Hexapod, name: str) -> str:
     stage.SetDefaultPrim(root.GetPrim())
     UsdPhysics.ArticulationRootAPI.Apply(root.GetPrim())
     scene = UsdPhysics.Scene.Define(stage, '/physicsScene')
-    gravity = hexapod.parameters['gravity']
+    gravity = hexapod.parameters.gravity
     size = float(np.linalg.norm(gravity))
     scene.CreateGravityMagnitudeAttr(size)
     scene.CreateGravityDirectionAttr(Gf.Vec3f(*(gravity / size if size else (0.0, 0.0, -1.0))))

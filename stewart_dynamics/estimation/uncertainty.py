@@ -31,9 +31,9 @@ def root_of_covariance(p: Parameters, body: Body, others: Array) -> Array:
         of a parameter of the legs it counts where that has the deviation 0.
     """
     deviations = others.copy()
-    deviations[MASS] = p['uncertainty.platform_mass'] * body.mass
-    deviations[FIRST_MOMENT] = p['uncertainty.center_of_mass']
-    deviations[INERTIA] = p['uncertainty.inertia'] * np.mean(body.inertia[[0, 3, 5]])
+    deviations[MASS] = p.uncertainty.platform_mass * body.mass
+    deviations[FIRST_MOMENT] = p.uncertainty.center_of_mass
+    deviations[INERTIA] = p.uncertainty.inertia * np.mean(body.inertia[[0, 3, 5]])
     covariance = _of_legs(p)
     known = np.diag(covariance) > 0.0
     covariance += np.diag(np.where(known, 0.0, deviations ** 2))
@@ -47,17 +47,16 @@ def root_of_covariance(p: Parameters, body: Body, others: Array) -> Array:
 def _of_legs(p: Parameters) -> Array:
     """Return the covariance (LINEAR, LINEAR) of masses and moments of legs and rotors."""
     theta, covariance = linear_parameters(p), np.zeros((LINEAR, LINEAR))
-    rotors = (p['uncertainty.reflected_mass'] * theta[REFLECTED_MASS]) ** 2
+    rotors = (p.uncertainty.reflected_mass * theta[REFLECTED_MASS]) ** 2
     covariance[REFLECTED_MASS, REFLECTED_MASS] = np.diag(rotors)
-    legs, relative = np.arange(6), p['uncertainty.leg_mass']
-    for part, (of_mass, first, second) in _PARTS.items():
-        inertia = p[f'legs.{part}.inertia']
-        turning = theta[second] - inertia  # m S^2
-        masses, none = p[f'legs.{part}.mass'], np.zeros(6)
+    legs, relative = np.arange(6), p.uncertainty.leg_mass
+    for name, (of_mass, first, second) in _PARTS.items():
+        part, none = p.legs.parts[name], np.zeros(6)
+        turning = theta[second] - part.inertia  # m S^2
         # by a relative change of mass, center of mass and inertia
         changes = [(first, (theta[first], theta[first], none)),
-                   (second, (turning, 2.0 * turning, inertia)),
-                   *([] if of_mass is None else [(of_mass, (masses, none, none))])]
+                   (second, (turning, 2.0 * turning, part.inertia)),
+                   *([] if of_mass is None else [(of_mass, (part.mass, none, none))])]
         for n in range(3):
             of_all, of_each = np.zeros((LINEAR, 1)), np.zeros((LINEAR, 6))
             for where, of in changes:

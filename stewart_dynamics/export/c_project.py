@@ -94,7 +94,7 @@ def exported_values(parameters: Parameters) -> dict[str, Any]:
         clearance of the legs is limited, and a plate is given, which the C source does not know.
     """
     plates = [name for name in OUTLINES if parameters[name] is not None]
-    if plates and parameters['limits.leg_clearance_min'] is not None:
+    if plates and parameters.limits.leg_clearance_min is not None:
         raise ParameterError(
             f'{", ".join(plates)}: must not be set with limits.leg_clearance_min: the exported '
             'source has the clearance between legs, not that from plates')
@@ -120,7 +120,7 @@ def platform_source(parameters: Parameters, name: str) -> str:
     lines = [f'const stewart_platform {name} = {{']
     lines += (_field(each, values[each], '  ') for each in FIELDS_BEFORE_LEGS.values())
     lines.append('  {')
-    for leg, joint in enumerate(parameters['joints']):
+    for leg, joint in enumerate(parameters.joints):
         lines.append(f'    {{  /* leg {leg + 1}: {in_comment(joint)} */')
         lines += (_field(each, values[each][leg], '      ') for each in LEG_FIELDS.values())
         lines.append('    },')

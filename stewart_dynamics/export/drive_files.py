@@ -56,12 +56,12 @@ def amplifiers(parameters: Parameters) -> list[Amplifier]:
     missing = [name for name in _NEEDED if parameters[name] is None]
     if missing:
         raise ParameterError(f'{", ".join(missing)}: not set: needed by --drives')
-    if parameters['drive.screw_rotation'] != GUIDED:
+    if parameters.drive.screw_rotation != GUIDED:
         raise ParameterError(
-            f'drive.screw_rotation: {parameters["drive.screw_rotation"]}: must be {GUIDED} for '
+            f'drive.screw_rotation: {parameters.drive.screw_rotation}: must be {GUIDED} for '
             '--drives: the angle of a motor depends on the pose; use ~/motor_states')
     found = [Amplifier(*row) for row in zip(
-        parameters['joints'], motor_ratio(parameters).tolist(), *(
+        parameters.joints, motor_ratio(parameters).tolist(), *(
             parameters[f'drive.{name}'].tolist()
             for name in ('rated_torque', 'counts_per_turn', 'direction')), strict=True)]
     for name, unit, per_mille in (

@@ -78,12 +78,12 @@ def variables(parameters: Parameters) -> list[Variable]:
     which the forces can be solved. The last variables are those of the motors, with drives.
     """
     position, rotation = _start_pose(parameters)
-    start = [*position, *to_quaternion(rotation), *np.zeros(18), *parameters['gravity'],
-             *np.zeros(9), *_numbers(parameters.payload), *_numbers(parameters.empty),
-             parameters['singularity.warn_condition'],
-             parameters['singularity.stop_condition'], parameters['singularity.warn_time'],
-             parameters['singularity.action'] == SUPPRESS_FORCES,
-             parameters['limits.action'] == SUPPRESS_FORCES]
+    start = [*position, *to_quaternion(rotation), *np.zeros(18), *parameters.gravity,
+             *np.zeros(9), *_numbers(parameters.payload.body), *_numbers(parameters.platform.body),
+             parameters.singularity.warn_condition,
+             parameters.singularity.stop_condition, parameters.singularity.warn_time,
+             parameters.singularity.action == SUPPRESS_FORCES,
+             parameters.limits.action == SUPPRESS_FORCES]
     given = [*_inputs(), *_tunable()]
     return [*(each._replace(start=float(value))
               for each, value in zip(given, start, strict=True)), *_outputs(),

@@ -75,13 +75,13 @@ def golden_vectors(parameters: Parameters) -> Array:
     # The C source checks no limits of motors.
     step = Step(parameters.replaced(dict.fromkeys(OF_MOTORS)))
     hexapod = hexapod_structure(parameters)
-    drives = None if parameters['actuator.screw_lead'] is None else Drives(parameters)
+    drives = None if parameters.actuator.screw_lead is None else Drives(parameters)
     motions = _motions(parameters)
     weight = parameters.carried.mass * 10.0 + 1.0
     phases = np.arange(_COUNT)[:, None] + np.arange(WRENCH + BASE)
     wrenches = weight * np.sin(phases[:, :WRENCH]) * (np.arange(_COUNT) % 4 > 0)[:, None]
     bases = np.sin(phases[:, WRENCH:])
-    bases[:, :3] += parameters['gravity']
+    bases[:, :3] += parameters.gravity
     guess = np.zeros((1, MOTION))
     guess[0, :POSE.stop] = motions[0, :POSE.stop]
     rows, state = [], None
@@ -106,7 +106,7 @@ def golden_vectors(parameters: Parameters) -> Array:
 def _motions(parameters: Parameters) -> Array:
     """Return rows of motion (_COUNT, MOTION)."""
     positions, rotations = homes(parameters)
-    size = parameters['singularity.characteristic_length']
+    size = parameters.singularity.characteristic_length
     times = NANOSECOND * _PERIOD * np.arange(_COUNT)[:, None]
     omega = 2.0 * math.pi * np.array([0.9, 1.1, 1.3, 1.5, 1.7, 1.9])
     growth = times / times[-1]

@@ -152,9 +152,9 @@ class ExternalWrench:
         self._sample = Sample('one_measurement', 'target', *_Result._fields)
         self._bound = function('estimate_one').bound(
             hexapod_structure(parameters), self._sample.numbers)
-        self._size = parameters['singularity.characteristic_length']
-        self._longest_gap = round(parameters['setpoint.timeout'] * SECOND)
-        self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
+        self._size = parameters.singularity.characteristic_length
+        self._longest_gap = round(parameters.setpoint.timeout * SECOND)
+        self._rate = 2.0 * math.pi * parameters.external_wrench.cutoff
         self._bounds = [(limit, part, parameters[limit]) for limit, part in WRENCH_LIMITS.items()
                         if parameters[limit] is not None]
 

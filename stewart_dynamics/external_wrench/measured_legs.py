@@ -118,9 +118,9 @@ class MeasuredLegs:
             noticed: Callable[[str], object], history: LegHistory | None = None) -> None:
         self._step = step
         self._efforts = EffortCheck(parameters)
-        self._reader = JointStateReader(parameters['joints'])
-        self._zero_lengths = tuple(parameters['geometry.zero_length'].tolist())
-        self._timeout = round(parameters['setpoint.timeout'] * SECOND)
+        self._reader = JointStateReader(parameters.joints)
+        self._zero_lengths = tuple(parameters.geometry.zero_length.tolist())
+        self._timeout = round(parameters.setpoint.timeout * SECOND)
         self._rejected = rejected
         self._noticed = noticed
         self._history = history

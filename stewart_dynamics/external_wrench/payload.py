@@ -100,7 +100,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     Measurements may be added to the history meanwhile; those from now on are not used.
     """
     p = platform.parameters
-    begin, end = _range(history, p['payload.window'])
+    begin, end = _range(history, p.payload.window)
     rows = np.empty((end - begin, OF_BASE.stop))
     for some in _pieces(len(rows), _COPIED):
         rows[some] = history.rows(begin + some.start, begin + some.stop)
@@ -121,7 +121,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
     seconds = float(work.seconds[-1])
     if not work.found_means():
         needed = LEAST_WINDOWS * work.half_width
-        more = '' if needed < p['payload.window'] else ', more than payload.window'
+        more = '' if needed < p.payload.window else ', more than payload.window'
         yield PayloadOutcome(
             f'too short: {seconds:.1f} s of measured legs, {needed:.1f} s without gaps are needed'
             f'{more}{_excluded(work.excluded)}')
@@ -148,7 +148,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         yield PayloadOutcome(f'the model does not explain the measured forces: residual '
                              f'{fitted.residual:.3g} N of {samples.measured:.4g} N (RMS)')
         return
-    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, p.empty))
+    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, p.platform.body))
 
 
 def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
@@ -177,13 +177,13 @@ class _Windows:
         self._platform, self._rows = platform, rows
         stamps = stamps_of(rows)
         self.stamp, self.seconds = int(stamps[-1]), (stamps - stamps[0]) * NANOSECOND
-        self._force_max, self._shortest, self._longest = (
-            default if p[f'limits.{name}'] is None else p[f'limits.{name}'] for name, default in (
-                ('force_max', math.inf), ('length_min', 0.0), ('length_max', math.inf)))
+        self._force_max = table.six_of(p.limits.force_max, math.inf)
+        self._shortest = table.six_of(p.limits.length_min, 0.0)
+        self._longest = table.six_of(p.limits.length_max, math.inf)
         self._friction = Friction.of(p)
         self.excluded = 0
         self._steps = np.diff(self.seconds)
-        self._sound = self._steps <= p['setpoint.timeout']
+        self._sound = self._steps <= p.setpoint.timeout
         interval = float(np.median(self._steps)) if len(self._steps) else 0.0
         self.half_width = max(_HALF_WIDTH, _MEASUREMENTS * interval)
         # Noise of an acceleration divided by the noise of a twist: the window's slope.
@@ -315,8 +315,8 @@ class _Windows:
         weight = self.scale * modelled
         parts = (means[..., :LINEAR] @ root,
                  (standing * _STATIC * self._friction.coulomb)[..., None] * np.eye(6),
-                 p['uncertainty.tilt'] * by_tilt,
-                 p['uncertainty.effort_gain'] * weight[..., None], differences[..., None])
+                 p.uncertainty.tilt * by_tilt,
+                 p.uncertainty.effort_gain * weight[..., None], differences[..., None])
         columns = np.zeros((len(full), 6, sum(part.shape[-1] for part in parts)))
         columns[full] = np.concatenate(parts, axis=-1)
         yield
@@ -331,7 +331,7 @@ class _Windows:
     def _by_tilt(self, motions: Array, bases: Array) -> Array:
         """Return the forces (N, 6, 2) by turns of gravity about two base axes [N/rad]."""
         p = self._platform.parameters
-        gravity = np.where(np.isnan(bases[:, GRAVITY]), p['gravity'], bases[:, GRAVITY])
+        gravity = np.where(np.isnan(bases[:, GRAVITY]), p.gravity, bases[:, GRAVITY])
         across = np.argsort(np.abs(gravity.mean(axis=0)))[:2]
         theta = self.scale * linear_parameters(p)  # as heavy as the forces
         by_tilt: Array = np.stack([self._platform.regressors_at_rest(

@@ -90,9 +90,9 @@ class Causes:
                 np.abs(extract.efforts[..., 0]).max(initial=0.0)))
         between = [begin / self.samples for begin in begins.values() if begin]
         self._changes = sorted({*_CHANGES, *(between if len(between) < _MOST_BAGS else ())})
-        self._size = float(p['singularity.characteristic_length'])
+        self._size = p.singularity.characteristic_length
         self._whole = unknowns.linear(fit.values)
-        self._each = [(f' of {leg}', slice(n, n + 1)) for n, leg in enumerate(p['joints'])]
+        self._each = [(f' of {leg}', slice(n, n + 1)) for n, leg in enumerate(p.joints)]
         self._each_and_all = [*self._each, ('', slice(None))]
 
     def columns(self, extract: Extract, at: Array) -> tuple[Array, tuple[Cause, ...]]:

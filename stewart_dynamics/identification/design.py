@@ -69,7 +69,7 @@ class DesignLimits:
                 f'{", ".join(missing)}: missing: a motion is designed within the limits of the '
                 'parameter file, or with --amplitude')
         self._platform, self._amplitude = platform, amplitude
-        self._size = p['singularity.characteristic_length']
+        self._size = p.singularity.characteristic_length
         if center is None:
             digits = 6 - round(math.log10(self._size))
             center = [*platform.home_pose().position.round(digits).tolist(), 0.0, 0.0, 0.0]
@@ -137,9 +137,9 @@ def _bounds(p: Parameters) -> dict[str, Any]:
         LENGTH_MIN: low + _STROKE * stroke, LENGTH_MAX: high - _STROKE * stroke,
         **{name: (1.0 - _RATE) * given[name] for name in OF_RATES},
         **{name: (1.0 - _FORCE) * given[name] for name in OF_LOADS},
-        _WARN_CONDITION: _CONDITION * p[_WARN_CONDITION],
+        _WARN_CONDITION: _CONDITION * p.singularity.warn_condition,
         **{name: (1.0 - _ANGLE) * p[name] for name in OF_JOINTS if p[name] is not None},
-        CLEARANCE_MIN: (1.0 + _ANGLE) * (p[CLEARANCE_MIN] or 0.0)}
+        CLEARANCE_MIN: (1.0 + _ANGLE) * (p.limits.leg_clearance_min or 0.0)}
 
 
 # Samples per period of the highest harmonic: in the search, and in the final check.
@@ -247,7 +247,7 @@ class _Search:
         self._bases = (np.hstack([c, s]), np.hstack([-omega * s, omega * c]),
                        np.hstack([-omega ** 2 * c, -omega ** 2 * s]))
         # Equal ratios give equal velocities, and equal displacements at the joints.
-        self._length = size = parameters['singularity.characteristic_length']
+        self._length = size = parameters.singularity.characteristic_length
         self._units = (1.0 / np.tile(np.arange(1, harmonics + 1), 2)[:, None]
                        / np.array([1.0, 1.0, 1.0, size, size, size]))
         self._first = 0.02 * size
@@ -297,7 +297,7 @@ class _Search:
         rounded = np.hstack([
             coefficients[:, :3].round(digits), coefficients[:, 3:].round(_DIGITS)])
         given: dict[str, Any] = {
-            'base_frame': self.platform.parameters['base_frame'], 'rate': options.rate,
+            'base_frame': self.platform.parameters.base_frame, 'rate': options.rate,
             'motion.type': 'fourier', 'motion.duration': options.duration,
             'motion.hold_at_end': False, 'motion.initial': self.limits.center,
             'motion.fourier.frequency': self._base,

@@ -171,8 +171,8 @@ class Extraction:
                  of_motors: bool = False) -> None:
         self.platform, self._unknowns, self._period = platform, unknowns, period
         self._losses = of_motors and has_losses(platform.parameters)
-        self._coulomb_velocity = platform.parameters['actuator.coulomb_velocity']
-        self._size = float(platform.parameters['singularity.characteristic_length'])
+        self._coulomb_velocity = platform.parameters.actuator.coulomb_velocity
+        self._size = platform.parameters.singularity.characteristic_length
         self._wide = LowPass.of(period, WIDE * cutoff, _TRANSITION * cutoff)
         self._narrow = LowPass.of(period, cutoff, _TRANSITION * cutoff)
         self.cutoff, self.speeds = cutoff, speeds
@@ -296,7 +296,7 @@ class Extraction:
         They are followed by the rates for the law of friction and their variance (``_quick``).
         """
         window = window._replace(
-            positions=window.positions + self.platform.parameters['geometry.zero_length'])
+            positions=window.positions + self.platform.parameters.geometry.zero_length)
         fast = window
         if noise is not None:
             white = noise.normal(size=(2, *window.positions.shape))
@@ -366,13 +366,13 @@ class Extraction:
     def _wrong(self, window: Window) -> tuple[Flags, int]:
         """Return outputs (N, 6) affected by invalid samples, and the count of samples at stops."""
         p = self.platform.parameters
-        lengths = window.positions + p['geometry.zero_length']
+        lengths = window.positions + p.geometry.zero_length
         stopped = np.zeros(lengths.shape, dtype=bool)
-        for name, sign in (('limits.length_min', -1.0), ('limits.length_max', 1.0)):
-            if p[name] is not None:
-                stopped |= sign * (lengths - p[name]) > -_STOP * self._size
-        if p['limits.force_max'] is not None:
-            stopped |= np.abs(window.efforts) > _SATURATED * p['limits.force_max']
+        for bound, sign in ((p.limits.length_min, -1.0), (p.limits.length_max, 1.0)):
+            if bound is not None:
+                stopped |= sign * (lengths - bound) > -_STOP * self._size
+        if p.limits.force_max is not None:
+            stopped |= np.abs(window.efforts) > _SATURATED * p.limits.force_max
         bad = (window.outliers | stopped)[self._wide.half:-self._wide.half]
         # Two half waves of the cut-off: samples farther away have little weight in the output.
         reach = min(self._narrow.half, round(1.0 / (self._narrow.cutoff * self._period)))

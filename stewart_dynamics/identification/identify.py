@@ -191,9 +191,9 @@ class Identification:
     """Reads bags and identifies parameters, beginning with those of the file."""
 
     def __init__(self, parameters: Parameters, options: IdentificationOptions) -> None:
-        if parameters['base.source'] != FIXED:
+        if parameters.base.source != FIXED:
             raise ParameterError(
-                f'base.source: {parameters["base.source"]}: hexapods are identified on a base at '
+                f'base.source: {parameters.base.source}: hexapods are identified on a base at '
                 'rest: must be fixed')
         self._per_effort = force_per_effort(
             parameters, options.motor_torque, options.motor_current)
@@ -210,7 +210,7 @@ class Identification:
         options = self._options
         with closing(Recording(path)) as recording:
             topics = find_topics(recording, options.node, options.measured, options.efforts)
-            legs = RecordedLegs(recording, topics, self.parameters['joints'],
+            legs = RecordedLegs(recording, topics, self.parameters.joints,
                                 2.0 * _margin(options.cutoff) + LONGEST_LAG)
             bag = self.add(path, legs.windows(progress))
             if bag is None:
@@ -282,7 +282,7 @@ class Identification:
         bag.counts.update({
             'samples': len(window.positions), 'stops': read.stops,
             'outliers': np.count_nonzero(window.outliers), 'speeds': speeds.size,
-            'slow': np.count_nonzero(speeds < self.parameters['actuator.coulomb_velocity'])})
+            'slow': np.count_nonzero(speeds < self.parameters.actuator.coulomb_velocity)})
 
     def _notices(self, bag: _Bag) -> Iterator[str]:
         """Yield notices on a bag whose windows are all added."""
@@ -500,7 +500,7 @@ class Identification:
         if not list(of_validation(written.before, written.after, written.measured, 0.0)):
             return written, []
         whole = fit(extracts, unknowns, noisy, self._cutoffs, rest)
-        slow = self.parameters['actuator.coulomb_velocity']
+        slow = self.parameters.actuator.coulomb_velocity
 
         def sliding(extract: Extract) -> Flags:
             flags: Flags = held_out(extract) & (np.abs(extract.legs[..., 1]) > slow)

@@ -32,7 +32,7 @@ def pose_near(platform: StewartPlatform, lengths: Array) -> Pose:
     p = platform.parameters
     positions, rotations = homes(p)  # both sides of the base, the more likely one first
     guesses = [Pose(*each) for each in zip(positions, rotations, strict=True)]
-    across = p['geometry.platform_joints'] - p['geometry.base_joints']
+    across = p.geometry.platform_joints - p.geometry.base_joints
     level = float(np.mean(lengths ** 2 - np.sum(across[:, :2] ** 2, axis=1)))
     height = np.sqrt(max(level, (0.1 * float(lengths.mean())) ** 2))
     side = 1.0 if positions[0, 2] >= 0.0 else -1.0
@@ -47,7 +47,7 @@ def pose_near(platform: StewartPlatform, lengths: Array) -> Pose:
 def first_pose(platform: StewartPlatform, window: Window) -> Pose:
     """Return the pose at the begin of a window; raises the errors of ``pose_near``."""
     return pose_near(
-        platform, window.positions[0] + platform.parameters['geometry.zero_length'])
+        platform, window.positions[0] + platform.parameters.geometry.zero_length)
 
 
 def poses(platform: StewartPlatform, lengths: Array, guess: Pose) -> Pose:

@@ -331,7 +331,7 @@ def _largest_part(platform: StewartPlatform, extracts: Iterable[Extract], unknow
              for word, which in (('at reversals', speeds < _REVERSES),
                                  ('at high rates', speeds > _FAST)) if which.any()}
     word = max(parts, key=lambda each: parts[each], default='')
-    return f'in {platform.parameters["joints"][leg]}' + (
+    return f'in {platform.parameters.joints[leg]}' + (
         f' {word}' if parts.get(word, 0.0) > _WORTH else '')
 
 

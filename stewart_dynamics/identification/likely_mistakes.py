@@ -122,11 +122,11 @@ class Comparison:
 
 def of_no_pose(p: Parameters, positions: Array) -> str:
     """Return the likely reason why no pose has the measured lengths."""
-    lengths = positions + p['geometry.zero_length']
+    lengths = positions + p.geometry.zero_length
     low, high = lengths.min(), lengths.max()
     text = (f'the measured lengths belong to no pose of this hexapod: with geometry.zero_length '
             f'they are {low:.4g} to {high:.4g} m')
-    least, most = p['limits.length_min'], p['limits.length_max']
+    least, most = p.limits.length_min, p.limits.length_max
     if least is not None and most is not None and (
             low < (1.0 - _TOLERANCE) * least.min() or high > (1.0 + _TOLERANCE) * most.max()):
         return (f'{text}, and limits.length_min and length_max are {least.min():g} and '
@@ -176,7 +176,7 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
     late = list(of_delay(delays))
     if residual < _SUSPICIOUS and lack is None and not late:
         return
-    piece, joints = most_motion(window, extraction), p['joints']
+    piece, joints = most_motion(window, extraction), p.joints
     now = _tried(extraction, piece, unknowns, fit.delays[0])
     found = [(now, 'misfit', (
         f'the residual is {100.0 * residual:.0f} % of the efforts whatever the parameters: '

@@ -97,7 +97,7 @@ def _rounded(found: Identified) -> Parameters:
 
 def document(found: Identified, options: IdentificationOptions) -> dict[str, Any]:
     """Return the content of identification.json, see docs/identification.md."""
-    joints, u, asked = found.parameters['joints'], found.unknowns, found.unknowns.asked
+    joints, u, asked = found.parameters.joints, found.unknowns, found.unknowns.asked
     lack, what, states = found.lack_of_fit, *_identifiability(found)
     sure = lack is None or not lack.unexplained
     errors, parts = _errors(found), found.fit.parts(u)
@@ -255,7 +255,7 @@ def _bags(result: Mapping[str, Any]) -> list[str]:
 def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapping[str, Any],
                  ) -> None:
     """Write the page of a result, with the content of identification.json."""
-    legs = list(found.parameters['joints'])
+    legs = list(found.parameters.joints)
     curves, spectra = _curves(extracts, found)
     data = {'legs': legs, 'curves': [base64_of(column, '<f4') for column in curves.T],
             'spectra': spectra, 'first': int(np.argmax(found.residuals.after))}
@@ -275,7 +275,7 @@ def _curves(extracts: Extracts, found: Identified) -> tuple[Array, list[dict[str
     The columns are times, efforts, forces before and after, and rates of the legs.
     """
     u = found.unknowns
-    timeout = found.parameters['setpoint.timeout']
+    timeout = found.parameters.setpoint.timeout
     spectrum = Spectrum(12, timeout)
     curves: list[Array] = []
     count, elapsed = 0, 0.0

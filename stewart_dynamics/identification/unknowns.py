@@ -122,14 +122,14 @@ class Unknowns:
         self._parameters = p = parameters
         self._theta = linear_parameters(p)
         # Known beside the platform: its ten parameters, zero without one.
-        self._payload = inertial_parameters(p.payload)
-        self.tilt = Tilt(p['gravity'])
+        self._payload = inertial_parameters(p.payload.body)
+        self.tilt = Tilt(p.gravity)
         names = names_of(p)
         self.names = (*_PLATFORM, *(names[n] for n in _LINEAR[PLATFORM:]), *self.tilt.names,
                       'effort_gain')
         self.units = (*BODY_UNITS, *(UNITS[n] for n in _LINEAR[PLATFORM:]), 'rad', 'rad', '')
         self.start: Array = np.concatenate([
-            [p['platform.mass']], p['platform.center_of_mass'], p['platform.inertia'],
+            [p.platform.mass], p.platform.center_of_mass, p.platform.inertia,
             self._theta[_LINEAR[PLATFORM:]], np.zeros(3)])
         asked = np.zeros(LINEAR, dtype=bool)
         for kind in kinds:
@@ -141,8 +141,8 @@ class Unknowns:
         of_friction = np.isin(np.arange(LINEAR), np.r_[VISCOUS_FRICTION, COULOMB_FRICTION])
         # Numbers that the file does not know at all count if they are asked for.
         level = root_of_covariance(
-            p, p.empty, np.where(asked | of_friction, scales, 0.0))
-        more = [p['uncertainty.tilt'], p['uncertainty.tilt'], p['uncertainty.effort_gain']]
+            p, p.platform.body, np.where(asked | of_friction, scales, 0.0))
+        more = [p.uncertainty.tilt, p.uncertainty.tilt, p.uncertainty.effort_gain]
         self.root: Array = np.diag(np.concatenate([np.zeros(LINEAR_UNKNOWNS), more]))
         self.root[:LINEAR_UNKNOWNS, :LINEAR_UNKNOWNS] = level[np.ix_(_LINEAR, _LINEAR)]
         if known is not None:
@@ -152,7 +152,7 @@ class Unknowns:
     @property
     def inertial_units(self) -> Array:
         """Return units of the ten inertial parameters (10,), by the file's mass and size."""
-        size = float(self._parameters['singularity.characteristic_length'])
+        size = self._parameters.singularity.characteristic_length
         units: Array = self.start[0] * np.repeat([1.0, size, size ** 2], [1, 3, 6])
         return units
 
@@ -283,7 +283,7 @@ def _derivative(function: Callable[[Array], Array], at: Array) -> Array:
 
 def _leg_scales(p: Parameters) -> Array:
     """Return sizes of the linear parameters at which they matter; only those of legs are set."""
-    mass, size = p.carried.mass / 6.0, float(p['singularity.characteristic_length'])
+    mass, size = p.carried.mass / 6.0, p.singularity.characteristic_length
     weight, rate = _ACCELERATION * mass, _RATE * math.sqrt(_ACCELERATION * size)
     length = 2.0 * size
     scales: Array = np.zeros(LINEAR)

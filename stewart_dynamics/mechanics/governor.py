@@ -46,8 +46,8 @@ from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, LOAD, OF_LEGS, short_name, SINGULARITY,
-    SPEED_MAX, TORQUE_MAX, VELOCITY_MAX)
+    LIMITS, Limits, LOAD, OF_LEGS, short_name, SINGULARITY,
+    SPEED_MAX, TORQUE_MAX)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import DETERMINANT, MOTION, POSE
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
@@ -99,7 +99,7 @@ class Governor:
         if angles is not None:
             # Angles that no limit needs have no axes, and are not compared: infinite bounds.
             limits['joint_axes'] = np.nan_to_num(angles.axes).reshape(36)
-        limits['with_clearance'] = parameters[CLEARANCE_MIN] is not None
+        limits['with_clearance'] = parameters.limits.leg_clearance_min is not None
         base, platform = (np.empty((0, 3)),) * 2
         if limits['with_clearance']:
             shape = LegClearance(parameters)
@@ -149,7 +149,7 @@ class Governor:
         if found is None and limit is None:
             return
         words = (f'{limit} is nearer than the margin of the governor' if found is None
-                 else found.words(parameters['joints']))
+                 else found.words(parameters.joints))
         raise ParameterError(f'{parameters.source}: cueing.govern: at home {words}')
 
 
@@ -243,19 +243,19 @@ def _within(parameters: Parameters) -> Records:
     margin = _OF_STROKE * _stroke(parameters)
     legs['length_min'] += margin
     legs['length_max'] -= margin
-    found['leg_clearance_min'] += _OF_CLEARANCE * parameters['singularity.characteristic_length']
+    found['leg_clearance_min'] += _OF_CLEARANCE * parameters.singularity.characteristic_length
     return found  # type: ignore[no-any-return]
 
 
 def _stroke(parameters: Parameters) -> Array:
     """Return the strokes of the legs (6,) [m]; zero without both limits of length."""
-    low, high = parameters[LENGTH_MIN], parameters[LENGTH_MAX]
+    low, high = parameters.limits.length_min, parameters.limits.length_max
     return np.zeros(6) if low is None or high is None else np.broadcast_to(high - low, 6)
 
 
 def _stop_rate(parameters: Parameters) -> float:
     """Return the rate of a stop [1/s]."""
-    stroke, fastest = _stroke(parameters), parameters[VELOCITY_MAX]
+    stroke, fastest = _stroke(parameters), parameters.limits.velocity_max
     if fastest is None or not stroke.all():
         return _USUAL_STOP
     rate = 2.0 * float(np.max(fastest / stroke)) / _STOP_IN

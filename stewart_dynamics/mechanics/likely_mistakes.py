@@ -138,7 +138,7 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
 
 def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
     base, platform = shape.base_radius, shape.platform_radius
-    mass = p['platform.mass']
+    mass = p.platform.mass
     if mass < _NO_BODY * platform * platform * platform:
         yield (f'platform.mass: {mass:.3g} kg stands for none: forces are those of a hexapod '
                'without masses: write the mass of the platform')
@@ -160,8 +160,8 @@ def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
 
 
 def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
-    moments = np.linalg.eigvalsh(inertia_matrix(p['platform.inertia']))
-    gyration = math.sqrt(moments[2] / p['platform.mass'])
+    moments = np.linalg.eigvalsh(inertia_matrix(p.platform.inertia))
+    gyration = math.sqrt(moments[2] / p.platform.mass)
     yield from _payload(p, shape)
     size = f'the platform joints are {shape.platform_radius:.3g} m from their center'
     if gyration > _LARGEST_GYRATION * shape.radius:
@@ -171,10 +171,10 @@ def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
         yield (f'platform.inertia: {moments[2]:.3g} kg m^2 at most, a radius of gyration of '
                f'{gyration:.3g} m, but {size}: scaled twice, or the joints in mm?')
     elif gyration < _SMALLEST_GYRATION_OF_A_MASS * shape.platform_radius:
-        yield (f'platform.mass: {p["platform.mass"]:.6g} kg, with platform.inertia a radius of '
+        yield (f'platform.mass: {p.platform.mass:.6g} kg, with platform.inertia a radius of '
                f'gyration of {gyration:.3g} m, but {size}: in g, or the joints in cm?')
     yield from _impossible_inertia('platform.inertia', moments)
-    yield from _far_point('platform.center_of_mass', p['platform.center_of_mass'], p, shape)
+    yield from _far_point('platform.center_of_mass', p.platform.center_of_mass, p, shape)
 
 
 def _impossible_inertia(name: str, moments: Array) -> Iterator[str]:
@@ -185,7 +185,7 @@ def _impossible_inertia(name: str, moments: Array) -> Iterator[str]:
 
 
 def _payload(p: Parameters, shape: Shape) -> Iterator[str]:
-    mass, center, inertia = p.payload
+    mass, center, inertia = p.payload.body
     if mass == 0.0:
         return
     moments = np.linalg.eigvalsh(inertia_matrix(inertia))
@@ -200,7 +200,7 @@ def _payload(p: Parameters, shape: Shape) -> Iterator[str]:
 
 def _far_point(name: str, point: Array, p: Parameters, shape: Shape) -> Iterator[str]:
     """Yield that a point of the platform frame is too far away for its unit."""
-    away = float(np.linalg.norm(point - p['geometry.platform_joints'].mean(axis=0)))
+    away = float(np.linalg.norm(point - p.geometry.platform_joints.mean(axis=0)))
     if away > _FARTHEST_CENTER * shape.radius:
         yield (f'{name}: {_listed(point)} m is {away:.3g} m from the middle of the platform '
                f'joints, but the platform joints are {shape.platform_radius:.3g} m from their '
@@ -231,15 +231,15 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
     if shape.platform_radius > _LARGEST_PLATFORM_RATIO * shape.base_radius:
         yield (f'geometry.platform_joints: {shape.platform_radius:.3g} m from their center, the '
                f'base joints only {shape.base_radius:.3g} m: base and platform exchanged?')
-    if p['base.source'] == FIXED and gravity_mistakes.likely_mistake(
-            p['gravity'], home) == gravity_mistakes.AWAY:
-        yield (f'gravity: {_listed(p["gravity"])} m/s^2 pulls the platform away from the base: a '
+    if p.base.source == FIXED and gravity_mistakes.likely_mistake(
+            p.gravity, home) == gravity_mistakes.AWAY:
+        yield (f'gravity: {_listed(p.gravity)} m/s^2 pulls the platform away from the base: a '
                'sign? For a hexapod that hangs, or whose axes point down, set '
                'geometry.platform_side')
-    center = p['platform.center_of_mass']
-    middle = p['geometry.platform_joints'].mean(axis=0)
+    center = p.platform.center_of_mass
+    middle = p.geometry.platform_joints.mean(axis=0)
     height = abs(float(home.heights[0]))
-    base_middle = p['geometry.base_joints'].mean(axis=0)
+    base_middle = p.geometry.base_joints.mean(axis=0)
     from_base = base_middle + height * away
     if home.length is None:
         return  # heights are guesses
@@ -258,10 +258,10 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
     if in_base_frame:
         yield (f'platform.center_of_mass: {_listed(center)} m is where the platform is at home '
                "in the base frame: from the base's origin? It is from that of the platform frame")
-    inertia = inertia_matrix(p['platform.inertia'])
-    axial = math.sqrt(max(float(away @ inertia @ away), 0.0) / p['platform.mass'])
+    inertia = inertia_matrix(p.platform.inertia)
+    axial = math.sqrt(max(float(away @ inertia @ away), 0.0) / p.platform.mass)
     across = shape.axes[:2] @ inertia @ shape.axes[:2].T
-    least = math.sqrt(max(float(np.linalg.eigvalsh(across)[0]), 0.0) / p['platform.mass'])
+    least = math.sqrt(max(float(np.linalg.eigvalsh(across)[0]), 0.0) / p.platform.mass)
     reference = abs(height + float((center - middle) @ away))
     if in_base_frame:
         reference = abs(float(center @ away))
@@ -274,30 +274,30 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
 
 def _torques_at_home(p: Parameters, home: Home) -> Iterator[str]:
     """Yield that the motors cannot hold the platform where it is at rest at home."""
-    most = p['drive.torque_max']
-    if most is None or not p.drives or home.length is None or p['base.source'] == BY_IMU:
+    most = p.drive.torque_max
+    if most is None or not p.drives or home.length is None or p.base.source == BY_IMU:
         return
     if any(each.startswith('drive.torque_max') for each in drives.likely_mistakes(p)):
         return
     positions, rotations = home.poses(p)
     jacobian = lagrange.inverse_jacobian(
         lagrange.unchecked_legs(p, positions[:1], rotations[:1]))[0]
-    weight = p.carried.mass * p['gravity']
+    weight = p.carried.mass * p.gravity
     load = np.concatenate([weight, np.cross(rotations[0] @ p.carried.center, weight)])
     if np.linalg.cond(jacobian) > UNSOLVABLE_CONDITION:
         return
-    torques = np.abs(np.linalg.solve(jacobian.T, load)) / motor_ratio(p) / p[
-        'drive.efficiency']
+    torques = (np.abs(np.linalg.solve(jacobian.T, load)) / motor_ratio(p)
+               / p.drive.efficiency)
     at = int(np.argmax(torques / most))
     if torques[at] > most[at]:
-        yield (f'drive.torque_max: {most[at]:.3g} N m: {p["joints"][at]} needs '
+        yield (f'drive.torque_max: {most[at]:.3g} N m: {p.joints[at]} needs '
                f'{torques[at]:.3g} N m to hold the platform at rest at home: at another shaft, or '
                'in another unit?')
 
 
 def _small_angles(p: Parameters, home: Home) -> Iterator[str]:
     """Yield limits of the joints' angles that end far before the strokes of the legs."""
-    low, high = p['limits.length_min'], p['limits.length_max']
+    low, high = p.limits.length_min, p.limits.length_max
     if low is None or high is None:
         return
     turns = 0.5 * float(np.max((high - low) / (high + low)))
@@ -316,63 +316,64 @@ def _reflected_mass(p: Parameters, shape: Shape) -> Iterator[str]:
             yield (f'{name}: missing, but {given[0]} is given: it is J (2 pi / lead)^2 of '
                    'rotor and screw; write 0.0 for a drive that has none')
         return
-    carried = (p.carried.mass + np.sum(p['legs.piston.mass'])) / 6.0
-    least = float(np.min(p[name]))
+    carried = (p.carried.mass + np.sum(p.legs.piston.mass)) / 6.0
+    masses = p.actuator.reflected_mass
+    least = float(np.min(masses))
     if 0.0 < least < _SMALLEST_REFLECTED_MASS * carried:
         yield (f'{name}: {least:.3g} kg, but each leg carries {carried:.3g} kg: the inertia of '
                'the rotor? It is J (2 pi / lead)^2')
         return
-    force, rate = p['limits.force_max'], p['limits.velocity_max']
+    force, rate = p.limits.force_max, p.limits.velocity_max
     if least == 0.0 or force is None:
         return
-    if p.drives and p['drive.torque_max'] is not None:
-        force = np.minimum(force, motor_ratio(p) * p['drive.torque_max'])
-    acceleration = force / p[name]
+    if p.drives and p.drive.torque_max is not None:
+        force = np.minimum(force, motor_ratio(p) * p.drive.torque_max)
+    acceleration = force / masses
     at = int(np.argmax(acceleration))
     start = 0.0 if rate is None else rate[at] / acceleration[at]
     size = min(shape.radius, 1.0)
     if acceleration[at] > _LARGEST_ACCELERATION / size and start < _SHORTEST_START * size:
-        yield (f'{name}: {p[name][at]:.3g} kg: limits.force_max alone would accelerate it by '
+        yield (f'{name}: {masses[at]:.3g} kg: limits.force_max alone would accelerate it by '
                f'{acceleration[at]:.3g} m/s^2, more than any motor: the inertia of the rotor in '
                'kg cm^2? It is J (2 pi / lead)^2 in kg')
 
 
 def _others(p: Parameters, shape: Shape) -> Iterator[str]:
-    gravity = float(np.linalg.norm(p['gravity']))
-    wrong = gravity_mistakes.likely_mistake(p['gravity'])
+    gravity = float(np.linalg.norm(p.gravity))
+    wrong = gravity_mistakes.likely_mistake(p.gravity)
     if wrong == gravity_mistakes.IN_MM:
         yield f'gravity: {gravity:.6g} m/s^2: four times that of Jupiter: in mm/s^2?'
-    elif wrong and p['base.source'] != BY_IMU:
+    elif wrong and p.base.source != BY_IMU:
         suspected = {gravity_mistakes.IN_G: 'in g?',
                      gravity_mistakes.NONE: 'none, as in orbit?'}[wrong]
         yield (f'gravity: {gravity:.6g} m/s^2: {suspected} The earth has '
                f'{-STANDARD_GRAVITY[2]:g}')
-    weight, most = p.carried.mass * gravity, p['limits.force_max']
-    if most is not None and p['platform.mass'] * gravity <= most.sum() < weight:
-        yield (f'payload.mass: {p["payload.mass"]:.3g} kg: six legs with limits.force_max, '
+    weight, most = p.carried.mass * gravity, p.limits.force_max
+    if most is not None and p.platform.mass * gravity <= most.sum() < weight:
+        yield (f'payload.mass: {p.payload.mass:.3g} kg: six legs with limits.force_max, '
                f'{_listed(np.unique(most))} N, cannot carry it and the platform, {weight:.3g} N: '
                'in g?')
     elif most is not None and wrong != gravity_mistakes.IN_MM and weight > most.sum():
         yield (f'limits.force_max: {_listed(np.unique(most))} N: six such legs cannot carry the '
                f'platform, {weight:.3g} N: in kN?')
-    friction = p['actuator.coulomb_friction']
+    friction = p.actuator.coulomb_friction
     if most is not None and weight <= most.sum() and np.any(friction >= most):
         at = int(np.argmax(friction - most))
-        yield (f'actuator.coulomb_friction: {friction[at]:.3g} N: {p["joints"][at]} cannot move '
+        yield (f'actuator.coulomb_friction: {friction[at]:.3g} N: {p.joints[at]} cannot move '
                f'with limits.force_max, {most[at]:.3g} N: in mN?')
-    fastest = p['limits.velocity_max']
+    fastest = p.limits.velocity_max
     if fastest is not None and fastest.max() > _FASTEST * max(shape.radius, 1.0):
         yield f'limits.velocity_max: {fastest.max():.3g} m/s: in mm/s?'
         return
-    low, high = p['limits.length_min'], p['limits.length_max']
+    low, high = p.limits.length_min, p.limits.length_max
     if fastest is None or low is None or high is None:
         return
     # Along the whole stroke, with all the force of a leg for a sixth of the platform.
     needed = fastest ** 2 / (2.0 * (high - low))
     largest = np.full(6, _LARGEST_ACCELERATION / min(shape.radius, 1.0))
     if most is not None and weight <= most.sum():
-        largest = np.minimum(largest, most / (p.carried.mass / 6.0 + p[
-            'legs.piston.mass'] + p['actuator.reflected_mass']))
+        largest = np.minimum(largest, most / (
+            p.carried.mass / 6.0 + p.legs.piston.mass + p.actuator.reflected_mass))
     at = int(np.argmax(needed / largest))
     if needed[at] > _UNREACHABLE * largest[at]:
         yield (f'limits.velocity_max: {fastest[at]:.3g} m/s: reached within the stroke of '
@@ -381,28 +382,32 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
 
 
 def _clearance(p: Parameters) -> Iterator[str]:
-    shortest, cylinders = p['limits.length_min'], p['legs.cylinder.length']
+    shortest, cylinders = p.limits.length_min, p.legs.cylinder.length
     if shortest is not None and cylinders is not None and np.any(cylinders > shortest):
         at = int(np.argmax(cylinders - shortest))
-        yield (f'legs.cylinder.length: {cylinders[at]:.3g} m, but {p["joints"][at]} can be as '
+        yield (f'legs.cylinder.length: {cylinders[at]:.3g} m, but {p.joints[at]} can be as '
                f'short as limits.length_min, {shortest[at]:.3g} m: in mm? It is the length from '
                'the base joint to the end of the cylinder')
-    if p[CLEARANCE_MIN] is None:
+    if p.limits.leg_clearance_min is None:
         return
-    for name in ('base_joints', 'platform_joints'):
-        joints = p[f'geometry.{name}']
+    for name, joints in _joints(p).items():
         for i, j in combinations(range(6), 2):
             if np.array_equal(joints[i], joints[j]):
-                yield (f'{CLEARANCE_MIN}: {p[CLEARANCE_MIN]:.3g} m, but {p["joints"][i]} and '
-                       f'{p["joints"][j]} have the same place in geometry.{name}: their '
+                yield (f'{CLEARANCE_MIN}: {p.limits.leg_clearance_min:.3g} m, but '
+                       f'{p.joints[i]} and {p.joints[j]} have the same place in {name}: their '
                        'clearance is never above zero; leave the limit out')
                 return
+
+
+def _joints(p: Parameters) -> dict[str, Array]:
+    return {'geometry.base_joints': p.geometry.base_joints,
+            'geometry.platform_joints': p.geometry.platform_joints}
 
 
 def _legs(p: Parameters, home: Home, wrong_size: bool) -> Iterator[str]:
     """Yield mistakes of the legs; where joints or lengths have a wrong unit, no others of them."""
     shape, longest = home.shape, home.longest
-    low, high = p['limits.length_min'], p['limits.length_max']
+    low, high = p.limits.length_min, p.limits.length_max
     if low is not None and high is not None and np.any(low < _SMALLEST_LENGTH_RATIO * high):
         yield (f'limits.length_min: {_listed(np.unique(low))} m, limits.length_max: '
                f'{_listed(np.unique(high))} m: strokes? They are lengths from joint to joint')
@@ -416,15 +421,16 @@ def _legs(p: Parameters, home: Home, wrong_size: bool) -> Iterator[str]:
         return  # any of them may be wrong, so that the other checks would report it again
     if wrong_size:
         return
-    if high is not None and np.any(p['geometry.zero_length'] > high) and not is_too_long(
+    if high is not None and np.any(p.geometry.zero_length > high) and not is_too_long(
             p, 'geometry.zero_length', shape):
         yield (f'limits.length_max: {_listed(np.unique(high))} m, less than geometry.zero_length, '
-               f'{_listed(np.unique(p["geometry.zero_length"]))} m: a stroke? It is the length '
+               f'{_listed(np.unique(p.geometry.zero_length))} m: a stroke? It is the length '
                'from joint to joint')
         return
     for part, joint in (('cylinder', 'base'), ('piston', 'platform')):
         name = f'legs.{part}.center_of_mass'
-        masses, centers = p[f'legs.{part}.mass'], p[name]
+        masses, centers = p.legs.parts[part].mass, p.legs.parts[part].center_of_mass
+        inertias = p.legs.parts[part].inertia
         # Behind the joint there may be a motor, but at most half a leg away from it.
         outside = (centers > longest) | (centers < -0.5 * longest)
         if outside.any():
@@ -433,11 +439,10 @@ def _legs(p: Parameters, home: Home, wrong_size: bool) -> Iterator[str]:
         elif part == 'piston' and np.any(centers < -_BEHIND * longest):
             yield (f'{name}: {centers.min():.3g} m: behind the platform joint: a sign? It counts '
                    'from this joint toward the base')
-        gyration = np.sqrt(np.divide(p[f'legs.{part}.inertia'], masses, where=masses > 0.0,
-                                     out=np.zeros(6)))
+        gyration = np.sqrt(np.divide(inertias, masses, where=masses > 0.0, out=np.zeros(6)))
         at = int(np.argmax(gyration))
         if gyration[at] > _LARGEST_LEG_GYRATION * longest:
-            yield (f'legs.{part}.inertia: {p[f"legs.{part}.inertia"][at]:.3g} kg m^2, a radius '
+            yield (f'legs.{part}.inertia: {inertias[at]:.3g} kg m^2, a radius '
                    f'of gyration of {gyration[at]:.3g} m, but no leg is over {longest:.3g} m: '
                    'in g mm^2 or kg mm^2?')
         gyration[gyration == 0.0] = np.inf
@@ -462,14 +467,13 @@ def _order(p: Parameters, home: Home) -> Iterator[str]:
 
 
 def _symmetry(p: Parameters) -> Iterator[str]:
-    for name in ('base_joints', 'platform_joints'):
-        joints = p[f'geometry.{name}']
+    for name, joints in _joints(p).items():
         odd = odd_joint(joints)
         if odd is not None:
-            twins = [leg for n, leg in enumerate(p['joints'])
+            twins = [leg for n, leg in enumerate(p.joints)
                      if n != odd.joint and np.array_equal(joints[n], joints[odd.joint])]
             same = f', the same as {twins[0]}' if twins else ''
-            yield (f'geometry.{name}: {p["joints"][odd.joint]}: '
+            yield (f'{name}: {p.joints[odd.joint]}: '
                    f'{listed(joints[odd.joint], _DIGITS)} m'
                    f'{same}: the other five {odd.symmetry}, as all six would with '
                    f'{listed(odd.expected, _DIGITS)} m: a sign or a digit?')
@@ -482,7 +486,7 @@ def _singular(p: Parameters, home: Home) -> Iterator[str]:
              for yaw in (0.0, 20.0, -20.0, 45.0, -45.0) for tilt in (0.0, _TILT, -_TILT)]
     heights, angles, tilts = np.array(tried).T
     turned = turns_about(2, angles) @ turns_about(0, tilts) @ turns_about(1, 0.5 * tilts)
-    stop = p['singularity.stop_condition']
+    stop = p.singularity.stop_condition
     for where, at, turns, suspected in (
             (f'every pose of {len(tried)} tried: the condition number is at least',
              heights, turned,
@@ -503,7 +507,7 @@ def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -
     if not np.isfinite(positions).all():
         return np.full(len(heights), 1.0)
     matrices = lagrange.inverse_jacobian(lagrange.unchecked_legs(p, positions, rotations))
-    length = p['singularity.characteristic_length']
+    length = p.singularity.characteristic_length
     if is_too_long(p, 'singularity.characteristic_length', shape):
         length = shape.platform_radius  # reported already, and not a mistake of the geometry
     matrices[..., 3:] /= length

@@ -34,7 +34,7 @@ when the predicted time to the crossing exceeds warn_time divided by it.
 
 def stop_condition_of(parameters: Parameters) -> float:
     """Return the condition number from which on a pose counts as singular."""
-    return min(float(parameters['singularity.stop_condition']), UNSOLVABLE_CONDITION)
+    return min(parameters.singularity.stop_condition, UNSOLVABLE_CONDITION)
 
 
 class Cause(IntEnum):

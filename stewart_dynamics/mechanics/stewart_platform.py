@@ -90,7 +90,7 @@ class StewartPlatform:
         self._home: Pose | None = None
         self._joint_angles: JointAngles | None = None
         self._drives: Drives | None = None
-        self._still = BaseMotion(parameters['gravity'])
+        self._still = BaseMotion(parameters.gravity)
 
     def __reduce__(self) -> tuple[type[StewartPlatform], tuple[Parameters]]:
         """Pickle and copy the parameters alone."""
@@ -185,7 +185,7 @@ class StewartPlatform:
             self._drives = Drives(self.parameters)
         rows = self._drives(copies(motion.rows, shape), results.reshape(-1, RESULT))
         rows = rows.reshape(*shape, MOTORS)
-        if self.parameters['actuator.screw_lead'] is not None:
+        if self.parameters.actuator.screw_lead is not None:
             check_finite('motion', rows[..., MECHANICAL], len(shape))
         return Motors.of_rows(rows)
 
@@ -350,7 +350,7 @@ class StewartPlatform:
             at = int(np.argmax(codes > 0))
             outside = Limits(self.parameters).exceeded(
                 dict.fromkeys((LENGTH_MIN, LENGTH_MAX), wanted[at].tolist()))
-            reason = f'{outside[0].words(self.parameters["joints"])}; ' if outside else ''
+            reason = f'{outside[0].words(self.parameters.joints)}; ' if outside else ''
             where = (f'sample {place(at, shape)}: lengths {listed(wanted[at])} m from the guess '
                      f'{listed(rows[at, POSITION].round(9))} m: {reason}')
             if codes[at] == forward_kinematics.SINGULAR:

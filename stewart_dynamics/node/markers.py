@@ -23,7 +23,7 @@ from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
 from stewart_dynamics.node.diagnostics.answers import singularity_state
 from stewart_dynamics.node.diagnostics.levels import ERROR, OK, WARN
 from stewart_dynamics.parameters.table import (
-    BASE_OUTLINE, mean_radius, Parameters, PLATFORM_OUTLINE)
+    mean_radius, Parameters)
 from stewart_dynamics.setpoints.step import Output
 from visualization_msgs.msg import Marker
 
@@ -81,16 +81,16 @@ class Markers:
     @np.errstate(all='ignore')
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
-        self._names = parameters['joints']
-        self._base = parameters['geometry.base_joints']
-        self._platform = parameters['geometry.platform_joints']
-        self._bounds = parameters['limits.force_max']
-        self._shortest = parameters['limits.length_min']
+        self._names = parameters.joints
+        geometry = parameters.geometry
+        self._base, self._platform = geometry.base_joints, geometry.platform_joints
+        self._bounds = parameters.limits.force_max
+        self._shortest = parameters.limits.length_min
         size = mean_radius(self._platform)
         self._diameters = np.repeat([2.0 * BARREL * size, 2.0 * ROD * size], 6)
         self._text_above = _TEXT_ABOVE * size
-        self._frame = parameters['base_frame']
-        rate = parameters['visualization_rate']
+        self._frame = parameters.base_frame
+        rate = parameters.visualization_rate
         self._stays = min(max(STAYS, 2.0 / rate if rate else 0.0), _LONGEST)
 
         ball, line = (2.0 * BALL * size,) * 3, (_LINE * size, 0.0, 0.0)
@@ -102,8 +102,7 @@ class Markers:
         self._body = bytearray(LITTLE_ENDIAN)
         self._put(4, 'I', 0)  # how many there are
         self._marker('base', 0, Marker.TRIANGLE_LIST, COLORS['base'], points=_plate(
-            self._base if parameters[BASE_OUTLINE] is None else parameters[BASE_OUTLINE],
-            thickness))
+            self._base if geometry.base_outline is None else geometry.base_outline, thickness))
         self._marker('base', 1, Marker.SPHERE_LIST, COLORS['joint'], ball, self._base)
         outside = self._base + _NAME_OUTSIDE * (self._base - self._base.mean(axis=0))
         for n, name in enumerate(self._names):
@@ -111,8 +110,8 @@ class Markers:
                          position=outside[n], text=name)
         self._plate = self._marker('platform', 0, Marker.TRIANGLE_LIST, PLATFORM[OK],
                                    points=_plate(
-            self._platform if parameters[PLATFORM_OUTLINE] is None
-            else parameters[PLATFORM_OUTLINE], thickness))
+            self._platform if geometry.platform_outline is None else geometry.platform_outline,
+            thickness))
         self._with_platform = [
             self._plate,
             self._marker('platform', 1, Marker.SPHERE_LIST, COLORS['joint'], ball, self._platform),
@@ -121,8 +120,8 @@ class Markers:
             self._marker('platform', 3, Marker.SPHERE_LIST, _CENTER_OF_MASS, (_HEAVY * size,) * 3,
                          parameters.carried.center[None]),
             *([self._marker('platform', 4, Marker.SPHERE_LIST, _PAYLOAD, (_HEAVY * size,) * 3,
-                            parameters.payload.center[None])]
-              if parameters['payload.mass'] > 0.0 else [])]
+                            parameters.payload.body.center[None])]
+              if parameters.payload.mass > 0.0 else [])]
         self._bodies = [self._marker('cylinders' if n < 6 else 'pistons', n % 6, Marker.CYLINDER,
                                      NO_FORCE) for n in range(12)]
         self._text = self._marker('singularity', 0, Marker.TEXT_VIEW_FACING, _WHITE, text_size)

@@ -93,7 +93,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         parameters, models = self._settings, self._models
         self._identified = None
         self._setpoints = Setpoints(parameters, self._on_rejection, self._on_notice)
-        self._history = LegHistory(parameters['payload.window'])
+        self._history = LegHistory(parameters.payload.window)
         self._measured_legs = MeasuredLegs(
             parameters, models.external_wrench, self._on_rejection, self._on_notice,
             self._history)
@@ -105,13 +105,13 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._last: Output | None = None
         self._target: Target | None = None  # the last answered setpoint
         self._restarting = False  # the last setpoint was a restart that could not be answered
-        publishers, rate = self._topics.publishers, parameters['visualization_rate']
+        publishers, rate = self._topics.publishers, parameters.visualization_rate
         self._markers = PublisherAtRate(publishers.get(MARKERS), rate, Markers(parameters).write)
         self._joint_states = PublisherAtRate(
             publishers.get(JOINT_STATES), rate, self._model_messages.joint_states)
         self._transforms_read = False  # they have a subscriber
         self._travel = TravelPublisher(parameters, publishers[TRAVEL])
-        self._model_measured = parameters['joint_states.source'] == AS_MEASURED
+        self._model_measured = parameters.joint_states.source == AS_MEASURED
         self._handled, self._rested = -math.inf, False
 
     def open_topics(self) -> None:
@@ -125,7 +125,7 @@ class DynamicsNode(ManagedNode[Parameters]):
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
             planned.INPUT: self._on_trajectory})
         self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
-        self._exclusive = self._settings['setpoint.exclusive']
+        self._exclusive = self._settings.setpoint.exclusive
 
     def close_topics(self) -> None:
         self._topics.destroy()
@@ -287,7 +287,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         if outcome.payload:
             self._identified = outcome.payload
             self._topics.publishers[PAYLOAD].publish(
-                inertia_message(outcome.payload, self._settings['platform_frame']))
+                inertia_message(outcome.payload, self._settings.platform_frame))
         self._diagnostics.payload.done(outcome, seconds)
         self._report()
 
@@ -295,7 +295,7 @@ class DynamicsNode(ManagedNode[Parameters]):
             self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Take the payload that was identified last as ``payload.*``."""
         found = self._identified and payload.carried_payload(
-            self._identified._replace(given=self._settings.empty))
+            self._identified._replace(given=self._settings.platform.body))
         if found is None:
             response.message = 'no payload is identified: call ~/identify_payload first'
         elif isinstance(found, str):
@@ -320,7 +320,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         base = self._setpoints.base.at_rest(known=not self._diagnostics.base.stale(now))
         measured = (
             self._measured_legs.motion if now - self._diagnostics.external_wrench.used_at
-            <= self._settings['setpoint.timeout'] else None)
+            <= self._settings.setpoint.timeout else None)
         self._planned.add(planned.answer(
             self._settings, self._setpoints.wrench, data, base, measured), now)
 

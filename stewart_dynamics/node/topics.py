@@ -167,7 +167,7 @@ class NodeTopics:
         others: called with the bytes of a message on each of the other topics.
         Raises ParameterError: ``publish_tf`` needs a package that is not installed.
         """
-        there = {MARKERS: parameters['visualization_rate'] > 0.0, TF: parameters['publish_tf']}
+        there = {MARKERS: parameters.visualization_rate > 0.0, TF: parameters.publish_tf}
         there[JOINT_STATES] = there[MARKERS]
         there[MOTOR_STATES] = there[MOTOR_TORQUES] = bool(parameters.drives)
         for topic in PUBLISHED:
@@ -177,8 +177,8 @@ class NodeTopics:
         # earlier messages of the base.
         self.base, self.setpoints = ({
             name: self._subscribe(_INPUTS[name], partial(take, name)) for name in names}
-            for names, take in ((BASE_SOURCES[parameters['base.source']], on_base),
-                                (SOURCES[parameters['setpoint.source']], on_setpoint)))
+            for names, take in ((BASE_SOURCES[parameters.base.source], on_base),
+                                (SOURCES[parameters.setpoint.source], on_setpoint)))
         inputs = {**self.base, **self.setpoints, **{
             name: self._subscribe(_INPUTS[name], callback) for name, callback in others.items()}}
         self._names = {name: subscription.topic_name for name, subscription in inputs.items()}

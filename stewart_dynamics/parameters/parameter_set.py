@@ -9,13 +9,15 @@ from collections.abc import Collection, Iterator, Mapping
 import difflib
 from itertools import chain
 import math
+from operator import attrgetter
 from pathlib import Path
 import re
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, TYPE_CHECKING
+from typing import Any, ClassVar, get_args, get_type_hints, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, shown, shown_name
 from stewart_dynamics.parameters.yaml_file import (
     check_given, check_sections, flat, is_of_ros, parameters_of, read_document, read_value,
@@ -25,6 +27,9 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 _PYTHON_TYPES: Mapping[str, Any] = {'string': str, 'double': float, 'bool': bool}
+# The kind of a parameter, by the type with which it is declared.
+_KINDS: Mapping[Any, str] = {
+    str: 'string', tuple[str, ...]: 'string', float: 'double', Array: 'double', bool: 'bool'}
 
 
 class Parameter(NamedTuple):
@@ -75,6 +80,15 @@ class Parameter(NamedTuple):
         if self.maximum < math.inf:
             rules.append(f'at most {self.maximum:g}')
         return ', '.join(rules)
+
+
+def declare(text: str, unit: str = '', default: Any = None, **rule: Any) -> Any:
+    """
+    Return the declaration of an attribute of a group; ``rule``: further fields of Parameter.
+
+    Name and kind are those of the attribute: ``mass: float = declare('mass of the platform')``.
+    """
+    return Parameter('', '', text, unit, default, **rule)
 
 
 def checked(parameter: Parameter, value: Any, source: str) -> Any:
@@ -191,9 +205,80 @@ def _similar(text: str, names: Collection[str]) -> list[str]:
     return nearest(_MISSPELT) or (with_words if certain else nearest(_SIMILAR))
 
 
-class ParameterSet(Mapping[str, Any]):
+class ParameterGroup:
     """
-    A complete, checked set of parameters under their dotted names; immutable.
+    Parameters whose names begin alike, as ``limits.force_max``; immutable.
+
+    A class declares each with its type: float, Array, str, bool or tuple[str, ...], and None where
+    it may be not set. Groups within it are annotations alone. The names of its own begin with _.
+    """
+
+    _declarations: ClassVar[Mapping[str, Parameter]] = {}  # by their names from here on
+    _groups: ClassVar[Mapping[str, type[ParameterGroup]]] = {}  # likewise, outer ones first
+    _path: str = ''  # what the names begin with: 'limits.'
+    _set: type[ParameterSet]  # that this is a part of
+
+    def __init__(self, of_set: type[ParameterSet], path: str) -> None:
+        vars(self).update(_set=of_set, _path=path)
+
+    def __init_subclass__(cls) -> None:
+        """Collect the declarations of the class."""
+        declared, groups = dict(cls._declarations), dict(cls._groups)
+        hints = get_type_hints(cls, localns={cls.__name__: cls})
+        for name in vars(cls).get('__annotations__', ()):
+            kind, declaration = hints[name], vars(cls).get(name)
+            if isinstance(declaration, Parameter):
+                delattr(cls, name)  # the values are attributes of an instance
+                declared[name] = declaration._replace(name=name, kind=_kind_of(kind))
+            elif isinstance(kind, type) and issubclass(kind, ParameterGroup):
+                groups |= {name: kind, **{f'{name}.{each}': group
+                                          for each, group in kind._groups.items()}}
+                declared |= {(within := f'{name}.{each}'): parameter._replace(name=within)
+                             for each, parameter in kind._declarations.items()}
+            else:
+                continue
+            if hasattr(cls, name):
+                raise TypeError(f'{cls.__name__}.{name}: the name of a method')
+        cls._declarations, cls._groups = declared, groups
+
+    if not TYPE_CHECKING:  # with it, any name would be right
+
+        def __getattr__(self, name: str) -> Any:
+            """Raise AttributeError, which suggests similar names of parameters."""
+            if name[:1] != '_':
+                try:
+                    self._set.declared(self._path + name)
+                except ParameterError as exc:
+                    raise AttributeError(str(exc)) from None
+            raise AttributeError(f'{type(self).__name__} has no {name}')
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Set an attribute that is no parameter."""
+        if name in self._declarations or name in self._groups:
+            raise AttributeError(
+                f'{self._path}{name}: parameters are immutable: parameters.replaced'
+                f'({{{self._path + name!r}: ...}}) returns a changed copy')
+        super().__setattr__(name, value)
+
+    def __repr__(self) -> str:
+        """Return the values."""
+        values = ', '.join(
+            f'{name}={attrgetter(name)(self)!r}' for name in self._declarations)
+        return f'<{self._path[:-1]}: {values}>'
+
+
+def _kind_of(hint: Any) -> str:
+    """Return the kind of a parameter that is declared with a type, or with it and None."""
+    plain = [each for each in get_args(hint) if each is not type(None)]
+    return _KINDS[hint] if hint in _KINDS else _KINDS[plain[0]]
+
+
+class ParameterSet(ParameterGroup, Mapping[str, Any]):
+    """
+    A complete, checked set of parameters; immutable.
+
+    A parameter is read as an attribute, ``parameters.limits.force_max``, whose type is known where
+    it is declared, or under its dotted name, ``parameters['limits.force_max']``.
 
     Arrays are read-only numpy arrays: joints (6, 3), values of the legs (6,); limits that are not
     checked are None. None as a given value stands for the default. ``source`` names where the
@@ -202,10 +287,16 @@ class ParameterSet(Mapping[str, Any]):
     the first rule that is broken.
     """
 
+    source = 'parameters'
     table: ClassVar[Mapping[str, Parameter]]
     node: ClassVar[str]
     unused: ClassVar[frozenset[str]] = frozenset()  # accepted in a shared file, without effect
     described: ClassVar[tuple[str, ...]] = ()  # groups that a file describes by giving any of them
+
+    def __init_subclass__(cls) -> None:
+        """Make the table from the declarations of the class."""
+        super().__init_subclass__()
+        cls.table, cls._set = MappingProxyType(dict(cls._declarations)), cls
 
     def __init__(self, values: Mapping[str, Any], source: str = 'parameters', *,
                  exact_types: bool = False) -> None:
@@ -222,7 +313,22 @@ class ParameterSet(Mapping[str, Any]):
             name: checked(parameter, self._given.get(name, parameter.default), source)
             if name in self._given or not any(each in self._given for each in parameter.instead)
             else None for name, parameter in self.table.items()}
+        groups: dict[str, ParameterGroup] = {'': self}
+        for path, kind in self._groups.items():
+            outer, _, name = path.rpartition('.')
+            vars(groups[outer])[name] = groups[path] = kind(type(self), f'{path}.')
+        for whole_name, value in self._values.items():
+            path, _, name = whole_name.rpartition('.')
+            vars(groups[path])[name] = value
         self._check_together(source)
+
+    def _complete(self, name: str, value: Any) -> None:
+        """Set the value of a parameter that follows from others."""
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+        self._values[name] = value
+        path, _, last = name.rpartition('.')
+        vars(attrgetter(path)(self) if path else self)[last] = value
 
     def __getitem__(self, name: str) -> Any:
         """Return a parameter's value."""

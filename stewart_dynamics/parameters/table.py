@@ -4,14 +4,14 @@
 """
 The table of the parameters of a hexapod, and the rules between them.
 
-The check, the node's declaration, ``--help`` and the documents are all made from PARAMETERS.
+The table is made from the attributes of class Parameters and of its groups, in their order. The
+check, the node's declaration, ``--help`` and the documents are all made from it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 import math
-from types import MappingProxyType
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +23,8 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.circles import (
     BODIES, circle_names, joints_of, without_other)
-from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters.parameter_set import (
+    declare, Parameter, ParameterGroup, ParameterSet)
 from stewart_dynamics.parameters.tolerances import (
     is_unit, REFLECTED_MASS_TOLERANCE, START_TOLERANCE, unit_rule)
 
@@ -39,151 +40,6 @@ NO_MASS = 1e-15
 """Mass of a platform in a cube on its radius that stands for none: forces are zero [kg/m^3]."""
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s^2]
 _HYSTERESIS = CONSTANTS['HYSTERESIS']
-
-
-def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:
-    return Parameter(name, 'double', text, unit, default, sizes=(1, 6), **rule)
-
-
-def _circles() -> Iterator[Parameter]:
-    for body in BODIES:
-        radius, angles, height = circle_names(body)
-        yield Parameter(radius, 'double', f'radius of the circle of the {body} joints about the '
-                        f'origin of the {body} frame, with {angles}: in place of '
-                        f'geometry.{body}_joints', 'm', minimum=0.0, above=True)
-        yield Parameter(angles, 'double', f'angle of each {body} joint on its circle, leg by leg, '
-                        f'about the z axis of the {body} frame, from x toward y', 'rad', (),
-                        sizes=(6,), minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
-        yield Parameter(height, 'double', f'z of the {body} joints on their circle', 'm', 0.0)
-
-
-def _meshes() -> Iterator[Parameter]:
-    for part, body in (('base', 'base'), ('platform', 'platform'), ('cylinder', 'each cylinder'),
-                       ('piston', 'each piston')):
-        axes = {'base': 'base frame', 'platform': 'platform frame'}.get(
-            part, 'z along the leg, from the ' + (
-                'base joint' if part == 'cylinder' else 'platform joint'))
-        yield Parameter(f'meshes.{part}', 'string', f'file of the mesh of {body}, as '
-                        'stewart_describe writes it; empty: a simple shape', default='')
-        yield Parameter(f'meshes.{part}_offset', 'double', 'x y z, and roll pitch yaw, of this '
-                        f'mesh; {axes}', 'm, rad', (0.0,) * 6, sizes=(6,))
-    yield Parameter('meshes.scale', 'double', 'scale of all meshes; 0.001 for files in mm', '',
-                    1.0, minimum=0.0, above=True)
-
-
-def _drives() -> Iterator[Parameter]:
-    yield _legs('drive.gear_ratio', 'turns of the motor in one turn of the screw', '', (1.0,),
-                minimum=0.0, above=True)
-    yield _legs(MOTOR_INERTIA, 'inertia of rotor, brake and gear at the shaft of the motor; '
-                'actuator.reflected_mass follows from it', 'kg m^2', minimum=0.0)
-    yield _legs(SCREW_INERTIA, 'inertia at the screw; actuator.reflected_mass follows from it',
-                'kg m^2', minimum=0.0)
-    yield _legs('drive.efficiency', 'of screw and gear together where the motor drives the leg; '
-                'near standstill, below actuator.coulomb_velocity, its effect is linear in the '
-                'rate', '', (1.0,), minimum=0.0, above=True, maximum=1.0)
-    yield _legs('drive.back_driving_efficiency', 'the same where the leg drives the motor, 0 or '
-                'less for a self-locking screw; by default 2 - 1 / drive.efficiency', '', (),
-                minimum=-100.0, maximum=1.0)
-    yield _legs('drive.torque_max', 'maximum torque of a motor, to which torques are clipped; '
-                'unlimited if not set', 'N m', (), minimum=0.0, above=True)
-    yield _legs('drive.torque_continuous', 'torque that a motor can hold without end, for the RMS '
-                'torque of a motion', 'N m', (), minimum=0.0, above=True)
-    yield _legs('drive.speed_max', 'maximum speed of a motor; unlimited if not set', 'rad/s', (),
-                minimum=0.0, above=True)
-    yield Parameter('drive.torque_speed', 'double', 'largest torque of a motor at rising speeds, '
-                    'speed and torque of one point after the other, linear between them; from 0 '
-                    'rad/s to the first speed the first torque, above the last speed 0 N m; '
-                    'unlimited if not set', 'rad/s, N m', (), sizes=(2,), repeated=True,
-                    minimum=0.0)
-    yield _legs('drive.torque_constant', 'torque of a motor for each ampere', 'N m/A', (),
-                minimum=0.0, above=True)
-    yield _legs('drive.resistance', 'copper heat of a motor divided by the square of its current: '
-                'with RMS currents of three phases 1.5 times the resistance between two phases',
-                'Ohm', (), minimum=0.0)
-    yield _legs('drive.thermal_resistance', 'from winding to ambient', 'K/W', (), minimum=0.0,
-                above=True)
-    yield _legs('drive.thermal_time_constant', 'of the winding with its motor', 's', (),
-                minimum=0.0, above=True)
-    yield _legs('drive.temperature_rise_max', 'maximum temperature of a winding above ambient; '
-                'unlimited if not set', 'K', (), minimum=0.0, above=True)
-    yield _legs('drive.rated_torque', 'torque that the amplifier calls 1000 per mille, object '
-                '6076h of CiA 402; for stewart_export --drives', 'N m', (), minimum=0.0,
-                above=True)
-    yield _legs('drive.counts_per_turn', 'increments of position in one turn of the motor, as the '
-                'amplifier counts them; for stewart_export --drives', '', (), minimum=0.0,
-                above=True)
-    yield _legs('drive.direction', '1.0 if positive torque and position of the amplifier extend '
-                'the leg, else -1.0; for stewart_export --drives', '', (1.0,), minimum=-1.0,
-                maximum=1.0)
-    yield Parameter('drive.screw_rotation', 'string', 'guided: screw and nut cannot turn with the '
-                    'leg; universal: the leg turns between its universal joints, and its motor '
-                    'makes up for it', '', GUIDED, choices=(GUIDED, UNIVERSAL))
-    yield Parameter('drive.screw_hand', 'string', 'hand of the thread, for drive.screw_rotation: '
-                    'universal', '', RIGHT, choices=(RIGHT, LEFT))
-    for end in ('base', 'platform'):
-        yield Parameter(f'drive.{end}_universal_axes', 'double', 'x y z of the axis of each '
-                        f'universal joint that is fixed to the {end}, {end} axes, for '
-                        'drive.screw_rotation: universal; default: across the leg at the home '
-                        'pose, in the plane of the base joints', '', (), sizes=(18,))
-
-
-def _cueing() -> Iterator[Parameter]:
-    def three(name: str, text: str, unit: str, default: tuple[float, ...], **rule: Any,
-              ) -> Parameter:
-        return Parameter(f'cueing.{name}', 'double', text, unit, default, sizes=(len(default),),
-                         while_active=True, **rule)
-
-    of_head, tilt = 'surge, sway, heave', 'surge, sway'
-    frequency = {'minimum': 0.0, 'above': True, 'maximum': 100.0}
-    damping = {'minimum': 0.5, 'maximum': 10.0}
-    yield three('head', "position of the pilot's head, platform frame", 'm', (0.0, 0.0, 0.0))
-    yield Parameter('cueing.input', 'string', 'linear acceleration of the vehicle at the head: '
-                    'specific_force, with gravity, as an accelerometer measures it; acceleration: '
-                    'without', '', SPECIFIC_FORCE, choices=(SPECIFIC_FORCE, ACCELERATION),
-                    while_active=True)
-    yield three('translation.gain', f'share of the acceleration that translation gives, {of_head}',
-                '', (0.5,) * 3, minimum=0.0, maximum=10.0)
-    yield three('translation.natural_frequency', 'natural frequency of the high-pass filter of '
-                f'second order, {of_head}', 'rad/s', (2.5, 4.0, 4.0), **frequency)
-    yield three('translation.damping', f'damping ratio of this filter, {of_head}', '', (1.0,) * 3,
-                **damping)
-    yield three('translation.washout_frequency', 'frequency of the high-pass filter of first '
-                f'order that returns the head to its place, {of_head}', 'rad/s',
-                (0.25, 0.4, 0.4), **frequency)
-    yield three('tilt.gain', f'share of the acceleration that tilt gives, {tilt}', '',
-                (0.5,) * 2, minimum=0.0, maximum=10.0)
-    yield three('tilt.natural_frequency', 'natural frequency of the low-pass filter of second '
-                f'order, {tilt}', 'rad/s', (5.0, 8.0), **frequency)
-    yield three('tilt.damping', f'damping ratio of this filter, {tilt}', '', (1.0,) * 2,
-                **damping)
-    yield Parameter('cueing.tilt.rate_max', 'double', 'maximum rate of the tilt: below it, it is '
-                    'not felt as rotation', 'rad/s', 0.0524, minimum=0.0, above=True,
-                    maximum=100.0, while_active=True)
-    yield three('rotation.gain', 'share of the angular velocity that rotation gives, roll, pitch, '
-                'yaw', '', (0.5,) * 3, minimum=0.0, maximum=10.0)
-    yield three('rotation.natural_frequency', 'frequency of the high-pass filter of first order, '
-                'roll, pitch, yaw', 'rad/s', (1.0,) * 3, **frequency)
-    yield Parameter('cueing.rate', 'double', 'rate of the setpoints of stewart_cueing', 'Hz',
-                    250.0, minimum=10.0, maximum=1e4)
-    yield Parameter('cueing.govern', 'bool', 'keep every setpoint within the limits of this file, '
-                    'with a stop from it within them', default=True, while_active=True)
-
-
-def _uncertainties() -> Iterator[Parameter]:
-    for name, text, unit, default in (
-            ('platform_mass', 'platform.mass, relative to it', '', 0.5),
-            ('center_of_mass', 'each coordinate of platform.center_of_mass; default: '
-             f'{CENTER_UNCERTAINTY:g} of singularity.characteristic_length', 'm', None),
-            ('inertia', 'platform.inertia, relative to its mean principal moment', '', 1.0),
-            ('leg_mass', 'masses, centers of mass and inertias of cylinders and pistons, relative '
-             'to them: once of all legs together, and again of each leg', '', 0.05),
-            ('reflected_mass', 'actuator.reflected_mass of each leg, relative to it', '', 0.1),
-            ('effort_gain', 'the gain of measured efforts, of all legs together', '', 0.01),
-            ('tilt', 'the direction of gravity in the base frame, about each of two axes', 'rad',
-             0.005)):
-        yield Parameter(
-            f'uncertainty.{name}', 'double', f'standard deviation of {text}; a prior of '
-            'stewart_identify and ~/identify_payload', unit, default, minimum=0.0)
 
 
 GUIDED, UNIVERSAL = 'guided', 'universal'  # values of drive.screw_rotation
@@ -215,193 +71,527 @@ _NEEDED_BY = {
     'drive.thermal_time_constant': ('drive.thermal_resistance',),
     'drive.temperature_rise_max': ('drive.thermal_resistance',)}
 
-PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
-    Parameter('base_frame', 'string', 'frame of setpoints and wrenches', default='base'),
-    Parameter('platform_frame', 'string', 'frame that moves with the platform',
-              default='platform'),
-    Parameter('joints', 'string', 'names of the legs, in the order of all arrays of six',
-              default=tuple(f'leg_{n}' for n in range(1, 7)), sizes=(6,)),
-    Parameter('geometry.base_joints', 'double',
-              'x y z of the six base joints, leg by leg, base frame', 'm', required=True,
-              sizes=(18,), instead=circle_names('base')[:2]),
-    Parameter('geometry.platform_joints', 'double',
-              'x y z of the six platform joints, in the same order, platform frame', 'm',
-              required=True, sizes=(18,), instead=circle_names('platform')[:2]),
-    *_circles(),
-    Parameter('geometry.base_joint_axes', 'double', 'x y z of the direction from which the angle '
-              'of each base joint is measured, toward the platform, of any length, base axes; '
-              'default: along the leg at the home pose', '', (), sizes=(18,)),
-    Parameter('geometry.platform_joint_axes', 'double', 'x y z of the direction from which the '
-              'angle of each platform joint is measured, from the base toward the platform, of '
-              'any length, platform axes; default: along the leg at the home pose', '', (),
-              sizes=(18,)),
-    Parameter(BASE_OUTLINE, 'double', 'x y z of the corners of a flat convex plate of the base, '
-              'in order, base frame; pistons keep limits.leg_clearance_min from it', 'm', (),
-              sizes=(3,), repeated=True),
-    Parameter(PLATFORM_OUTLINE, 'double', 'x y z of the corners of a flat convex plate of the '
-              'platform, in order, platform frame; cylinders keep limits.leg_clearance_min from '
-              'it', 'm', (), sizes=(3,), repeated=True),
-    Parameter('geometry.platform_side', 'string', 'side of the base joints on which the platform '
-              'is. positive: the side to which the base axis most nearly normal to their plane, '
-              'usually z, points; negative: the other side; auto: positive, unless only the '
-              'other side has a level pose within the limits of length', '', AUTO,
-              choices=(AUTO, POSITIVE, NEGATIVE)),
-    _legs('geometry.zero_length', 'length of a leg at which its published position is zero', 'm',
-          minimum=0.0),
-    Parameter('platform.mass', 'double', 'mass of the empty platform', 'kg',
-              required=True, minimum=0.0, above=True, while_active=True),
-    Parameter('platform.center_of_mass', 'double',
-              'center of mass of the empty platform, from the platform frame', 'm',
-              (0.0, 0.0, 0.0), sizes=(3,), while_active=True),
-    Parameter('platform.inertia', 'double', 'ixx ixy ixz iyy iyz izz of the empty platform, about '
-              'its center of mass, platform axes', 'kg m^2', required=True, sizes=(6,),
-              while_active=True),
-    Parameter('payload.mass', 'double', 'mass of a payload on the platform, a driver for example; '
-              '0: none, and the other two have no effect', 'kg', 0.0, minimum=0.0,
-              while_active=True),
-    Parameter('payload.center_of_mass', 'double',
-              'center of mass of the payload, from the platform frame', 'm', (0.0, 0.0, 0.0),
-              sizes=(3,), while_active=True),
-    Parameter('payload.inertia', 'double', 'ixx ixy ixz iyy iyz izz of the payload, about its '
-              'center of mass, platform axes; 0: a point mass', 'kg m^2', (0.0,) * 6, sizes=(6,),
-              while_active=True),
-    _legs('legs.cylinder.mass', 'mass of a cylinder, the lower part of a leg', 'kg', minimum=0.0),
-    _legs('legs.cylinder.center_of_mass', 'distance of its center of mass from the base joint',
-          'm'),
-    _legs('legs.cylinder.inertia', 'transverse inertia about its center of mass', 'kg m^2',
-          minimum=0.0),
-    _legs('legs.cylinder.radius', 'outer radius of a cylinder, for limits.leg_clearance_min', 'm',
-          (), minimum=0.0),
-    _legs('legs.cylinder.length', 'length of a cylinder from the base joint, for '
-          'limits.leg_clearance_min', 'm', (), minimum=0.0),
-    _legs('legs.piston.mass', 'mass of a piston, the upper part of a leg', 'kg', minimum=0.0),
-    _legs('legs.piston.center_of_mass', 'distance of its center of mass from the platform joint',
-          'm'),
-    _legs('legs.piston.inertia', 'transverse inertia about its center of mass', 'kg m^2',
-          minimum=0.0),
-    _legs('legs.piston.radius', 'outer radius of a piston, for limits.leg_clearance_min; at most '
-          'that of the cylinder', 'm', (), minimum=0.0),
-    _legs('actuator.reflected_mass', 'inertia of rotor and screw along the leg, J (2 pi / lead)^2',
-          'kg', minimum=0.0),
-    _legs('actuator.viscous_friction', 'viscous friction along the leg', 'N s/m', minimum=0.0),
-    _legs('actuator.coulomb_friction',
-          'Coulomb friction along the leg', 'N', minimum=0.0),
-    _legs('actuator.coulomb_velocity', 'rate of the leg below which Coulomb friction is linear',
-          'm/s', (1e-3,), minimum=0.0, above=True),
-    _legs('actuator.screw_lead', 'travel of a leg in one turn of its screw; needed by drive.*',
-          'm', (), minimum=0.0, above=True),
-    *_drives(),
-    Parameter('gravity', 'double', 'acceleration of free fall: base axes; axes of the world where '
-              'base.source is pose or motion; not used where it is imu', 'm/s^2',
-              STANDARD_GRAVITY, sizes=(3,)),
-    _legs('limits.length_min', 'minimum length of a leg; unlimited if not set', 'm', (),
-          minimum=0.0),
-    _legs('limits.length_max', 'maximum length of a leg; unlimited if not set', 'm', (),
-          minimum=0.0, above=True),
-    _legs('limits.velocity_max', 'maximum rate of a leg; unlimited if not set', 'm/s', (),
-          minimum=0.0, above=True),
-    _legs('limits.force_max',
-          'maximum force of a leg, to which forces are clipped; unlimited if not set', 'N', (),
-          minimum=0.0, above=True),
-    _legs('limits.joint_force_max', 'maximum force along a leg that its joints and its rod carry, '
-          'the thrust rating of a cylinder: without friction and reflected mass of the actuator; '
-          'unlimited if not set', 'N', (), minimum=0.0, above=True),
-    _legs('limits.base_joint_angle_max', 'maximum angle between a leg and its '
-          'geometry.base_joint_axes; unlimited if not set', 'rad', (), minimum=0.0, above=True,
-          maximum=math.pi),
-    _legs('limits.platform_joint_angle_max', 'maximum angle between a leg and its '
-          'geometry.platform_joint_axes; unlimited if not set', 'rad', (), minimum=0.0, above=True,
-          maximum=math.pi),
-    Parameter('limits.leg_clearance_min', 'double', 'minimum distance of the surface of a leg, a '
-              'cylinder and a thinner piston, from that of another leg, and from the outlines of '
-              'geometry that are given; unlimited if not set', 'm',
-              minimum=0.0),
-    Parameter('limits.action', 'string', 'action while a limit of length, rate, joint force, '
-              'joint angle or clearance, or of speed or temperature of a motor, is exceeded, or a '
-              'setpoint is too far from the last one for limits.velocity_max: warn only, or '
-              'publish no forces and torques', '', WARN, choices=ACTIONS, while_active=True),
-    Parameter('singularity.characteristic_length', 'double', 'length by which moments are '
-              'divided in the condition number; default: mean distance of the platform joints '
-              'from their center', 'm', minimum=0.0, above=True),
-    Parameter('singularity.warn_condition', 'double', 'condition number of J_inv at which the '
-              f'singularity warning begins; it ends below {_HYSTERESIS:g} of this', '', 20.0,
-              minimum=1.0,
-              while_active=True),
-    Parameter('singularity.stop_condition', 'double',
-              'condition number at which singularity.action begins; it ends below '
-              f'{_HYSTERESIS:g} of this', '',
-              100.0, minimum=1.0, while_active=True),
-    Parameter('singularity.warn_time', 'double',
-              'warn when the predicted time to a crossing of det(J) = 0 is shorter than this', 's',
-              0.5, minimum=0.0, while_active=True),
-    Parameter('singularity.action', 'string',
-              'action above stop_condition: warn only, or publish no forces', '', WARN,
-              choices=ACTIONS, while_active=True),
-    Parameter('setpoint.source', 'string', 'setpoints on three topics, on one combined topic, or '
-              'poses alone (quasi-static: no motion terms)', '', SEPARATE,
-              choices=(SEPARATE, COMBINED, POSES_ALONE)),
-    Parameter('setpoint.sync_tolerance', 'double',
-              'largest difference between the stamps of one setpoint', 's', 0.0, minimum=0.0,
-              maximum=1e9),
-    Parameter('setpoint.timeout', 'double', 'time without setpoints after which they are stale; '
-              'a longer jump back in time is a restart', 's', 0.1, minimum=0.0, above=True,
-              maximum=1e9),
-    Parameter('setpoint.exclusive', 'bool',
-              'reject setpoints and base motion while a topic of them has more than one publisher',
-              default=False),
-    Parameter('base.source', 'string', 'how the base moves: not at all, by its orientation in the '
-              'world (~/base/pose, at rest), by its motion in the world (~/base/pose, twist and '
-              'accel), or as an IMU on it measures (~/base/imu)', '', FIXED,
-              choices=(FIXED, AT_REST, MOVING, BY_IMU)),
-    Parameter('base.timeout', 'double',
-              'age of the last base motion above which no forces are published', 's', 0.1,
-              minimum=0.0, above=True, maximum=1e9),
-    Parameter('base.imu.position', 'double', 'position of the IMU, base frame', 'm',
-              (0.0, 0.0, 0.0), sizes=(3,)),
-    Parameter('base.imu.orientation', 'double',
-              'quaternion x y z w that turns IMU axes into base axes', '', (0.0, 0.0, 0.0, 1.0),
-              sizes=(4,)),
-    Parameter('base.imu.cutoff', 'double', 'cut-off frequency of the low-pass filter on the '
-              'angular acceleration, the derivative of the angular velocity', 'Hz', 20.0,
-              minimum=0.0, above=True),
-    Parameter('world_frame', 'string', 'frame of ~/base/pose, twist and accel', default='world'),
-    Parameter('trajectory.effort', 'bool', 'publish forces with the points of ~/leg_trajectory; '
-              'a joint_trajectory_controller without an effort command interface rejects points '
-              'with effort', default=True),
-    Parameter('trajectory.approach', 'string', 'where ~/platform_trajectory may start: anywhere; '
-              f'check: where the measured legs are, to {100.0 * START_TOLERANCE:g} % of '
-              'singularity.characteristic_length; '
-              'prepend: a motion from rest there to the first point is put before it', '',
-              IGNORE, choices=(IGNORE, CHECK, PREPEND)),
-    Parameter('external_wrench.cutoff', 'double',
-              'cut-off frequency of the low-pass filter on ~/external_wrench', 'Hz', 10.0,
-              minimum=0.0, above=True, while_active=True),
-    Parameter('external_wrench.force_max', 'double',
-              'external force above which diagnostics report an ERROR; unlimited if not set', 'N',
-              minimum=0.0, above=True, while_active=True),
-    Parameter('external_wrench.moment_max', 'double', "external moment at the platform's origin "
-              'above which diagnostics report an ERROR; unlimited if not set', 'N m', minimum=0.0,
-              above=True, while_active=True),
-    Parameter('payload.window', 'double', 'time of the measurements that ~/identify_payload uses, '
-              'the last ones', 's', 10.0, minimum=2.0, maximum=60.0),
-    *_cueing(),
-    *_uncertainties(),
-    *_meshes(),
-    Parameter('visualization_rate', 'double', 'maximum rate of ~/markers and ~/joint_states; 0: '
-              'off', 'Hz', 30.0, minimum=0.0),
-    Parameter('publish_tf', 'bool', 'publish the transform from base_frame to platform_frame on '
-              '/tf, with every pose', default=False),
-    Parameter('joint_states.source', 'string', 'whose poses ~/joint_states and /tf have: those of '
-              'setpoints, or of the measured legs (~/measured_legs)', '', OF_SETPOINTS,
-              choices=(OF_SETPOINTS, AS_MEASURED)),
-    Parameter('autostart', 'bool', 'configure and activate the node when it starts', default=True),
-)})
+
+def _legs(text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Any:
+    """Declare a value of each leg, or one for all."""
+    return declare(text, unit, default, sizes=(1, 6), **rule)
+
+
+def _point(text: str, unit: str = 'm', default: Any = (0.0, 0.0, 0.0), **rule: Any) -> Any:
+    """Declare three coordinates."""
+    return declare(text, unit, default, sizes=(3,), **rule)
+
+
+def _radius(body: str) -> Any:
+    _, angles, _ = circle_names(body)
+    return declare(f'radius of the circle of the {body} joints about the origin of the {body} '
+                   f'frame, with {angles}: in place of geometry.{body}_joints', 'm', minimum=0.0,
+                   above=True)
+
+
+def _angles(body: str) -> Any:
+    return declare(f'angle of each {body} joint on its circle, leg by leg, about the z axis of '
+                   f'the {body} frame, from x toward y', 'rad', (), sizes=(6,),
+                   minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
+
+
+def _height(body: str) -> Any:
+    return declare(f'z of the {body} joints on their circle', 'm', 0.0)
+
+
+class GeometryGroup(ParameterGroup):
+    """The joints of the legs, and the outlines of base and platform."""
+
+    base_joints: Array = declare(
+        'x y z of the six base joints, leg by leg, base frame', 'm', required=True, sizes=(18,),
+        instead=circle_names('base')[:2])
+    platform_joints: Array = declare(
+        'x y z of the six platform joints, in the same order, platform frame', 'm', required=True,
+        sizes=(18,), instead=circle_names('platform')[:2])
+    base_radius: float | None = _radius('base')
+    base_angles: Array | None = _angles('base')
+    base_height: float = _height('base')
+    platform_radius: float | None = _radius('platform')
+    platform_angles: Array | None = _angles('platform')
+    platform_height: float = _height('platform')
+    base_joint_axes: Array | None = declare(
+        'x y z of the direction from which the angle of each base joint is measured, toward the '
+        'platform, of any length, base axes; default: along the leg at the home pose', '', (),
+        sizes=(18,))
+    platform_joint_axes: Array | None = declare(
+        'x y z of the direction from which the angle of each platform joint is measured, from the '
+        'base toward the platform, of any length, platform axes; default: along the leg at the '
+        'home pose', '', (), sizes=(18,))
+    base_outline: Array | None = declare(
+        'x y z of the corners of a flat convex plate of the base, in order, base frame; pistons '
+        'keep limits.leg_clearance_min from it', 'm', (), sizes=(3,), repeated=True)
+    platform_outline: Array | None = declare(
+        'x y z of the corners of a flat convex plate of the platform, in order, platform frame; '
+        'cylinders keep limits.leg_clearance_min from it', 'm', (), sizes=(3,), repeated=True)
+    platform_side: str = declare(
+        'side of the base joints on which the platform is. positive: the side to which the base '
+        'axis most nearly normal to their plane, usually z, points; negative: the other side; '
+        'auto: positive, unless only the other side has a level pose within the limits of length',
+        '', AUTO, choices=(AUTO, POSITIVE, NEGATIVE))
+    zero_length: Array = _legs(
+        'length of a leg at which its published position is zero', 'm', minimum=0.0)
+
+
+class PlatformGroup(ParameterGroup):
+    """The empty platform."""
+
+    mass: float = declare('mass of the empty platform', 'kg', required=True, minimum=0.0,
+                          above=True, while_active=True)
+    center_of_mass: Array = _point(
+        'center of mass of the empty platform, from the platform frame', while_active=True)
+    inertia: Array = declare(
+        'ixx ixy ixz iyy iyz izz of the empty platform, about its center of mass, platform axes',
+        'kg m^2', required=True, sizes=(6,), while_active=True)
+
+    @property
+    def body(self) -> Body:
+        """Return the three as one."""
+        return Body(self.mass, self.center_of_mass, self.inertia)
+
+
+class PayloadGroup(ParameterGroup):
+    """A payload on the platform, and its identification by the node."""
+
+    mass: float = declare(
+        'mass of a payload on the platform, a driver for example; 0: none, and the other two have '
+        'no effect', 'kg', 0.0, minimum=0.0, while_active=True)
+    center_of_mass: Array = _point(
+        'center of mass of the payload, from the platform frame', while_active=True)
+    inertia: Array = declare(
+        'ixx ixy ixz iyy iyz izz of the payload, about its center of mass, platform axes; 0: a '
+        'point mass', 'kg m^2', (0.0,) * 6, sizes=(6,), while_active=True)
+    window: float = declare(
+        'time of the measurements that ~/identify_payload uses, the last ones', 's', 10.0,
+        minimum=2.0, maximum=60.0)
+
+    @property
+    def body(self) -> Body:
+        """Return the first three as one; zeros without a payload."""
+        if self.mass == 0.0:
+            return Body(0.0, np.zeros(3), np.zeros(6))
+        return Body(self.mass, self.center_of_mass, self.inertia)
+
+
+class LegPartGroup(ParameterGroup):
+    """A part of a leg."""
+
+    mass: Array
+    center_of_mass: Array
+    inertia: Array
+    radius: Array | None
+
+
+class CylinderGroup(LegPartGroup):
+    """The lower part of a leg."""
+
+    mass: Array = _legs('mass of a cylinder, the lower part of a leg', 'kg', minimum=0.0)
+    center_of_mass: Array = _legs('distance of its center of mass from the base joint', 'm')
+    inertia: Array = _legs('transverse inertia about its center of mass', 'kg m^2', minimum=0.0)
+    radius: Array | None = _legs(
+        'outer radius of a cylinder, for limits.leg_clearance_min', 'm', (), minimum=0.0)
+    length: Array | None = _legs(
+        'length of a cylinder from the base joint, for limits.leg_clearance_min', 'm', (),
+        minimum=0.0)
+
+
+class PistonGroup(LegPartGroup):
+    """The upper part of a leg."""
+
+    mass: Array = _legs('mass of a piston, the upper part of a leg', 'kg', minimum=0.0)
+    center_of_mass: Array = _legs('distance of its center of mass from the platform joint', 'm')
+    inertia: Array = _legs('transverse inertia about its center of mass', 'kg m^2', minimum=0.0)
+    radius: Array | None = _legs(
+        'outer radius of a piston, for limits.leg_clearance_min; at most that of the cylinder',
+        'm', (), minimum=0.0)
+
+
+class LegsGroup(ParameterGroup):
+    """The parts of the legs."""
+
+    cylinder: CylinderGroup
+    piston: PistonGroup
+
+    @property
+    def parts(self) -> dict[str, LegPartGroup]:
+        """Return both by their names."""
+        return {'cylinder': self.cylinder, 'piston': self.piston}
+
+
+class ActuatorGroup(ParameterGroup):
+    """Inertia and friction of the actuators, along the legs."""
+
+    reflected_mass: Array = _legs(
+        'inertia of rotor and screw along the leg, J (2 pi / lead)^2', 'kg', minimum=0.0)
+    viscous_friction: Array = _legs('viscous friction along the leg', 'N s/m', minimum=0.0)
+    coulomb_friction: Array = _legs('Coulomb friction along the leg', 'N', minimum=0.0)
+    coulomb_velocity: Array = _legs(
+        'rate of the leg below which Coulomb friction is linear', 'm/s', (1e-3,), minimum=0.0,
+        above=True)
+    screw_lead: Array | None = _legs(
+        'travel of a leg in one turn of its screw; needed by drive.*', 'm', (), minimum=0.0,
+        above=True)
+
+
+def _universal_axes(end: str) -> Any:
+    return declare(f'x y z of the axis of each universal joint that is fixed to the {end}, {end} '
+                   'axes, for drive.screw_rotation: universal; default: across the leg at the '
+                   'home pose, in the plane of the base joints', '', (), sizes=(18,))
+
+
+class DriveGroup(ParameterGroup):
+    """Screws, gears and motors."""
+
+    gear_ratio: Array = _legs(
+        'turns of the motor in one turn of the screw', '', (1.0,), minimum=0.0, above=True)
+    motor_inertia: Array = _legs(
+        'inertia of rotor, brake and gear at the shaft of the motor; actuator.reflected_mass '
+        'follows from it', 'kg m^2', minimum=0.0)
+    screw_inertia: Array = _legs(
+        'inertia at the screw; actuator.reflected_mass follows from it', 'kg m^2', minimum=0.0)
+    efficiency: Array = _legs(
+        'of screw and gear together where the motor drives the leg; near standstill, below '
+        'actuator.coulomb_velocity, its effect is linear in the rate', '', (1.0,), minimum=0.0,
+        above=True, maximum=1.0)
+    back_driving_efficiency: Array = _legs(
+        'the same where the leg drives the motor, 0 or less for a self-locking screw; by default '
+        '2 - 1 / drive.efficiency', '', (), minimum=-100.0, maximum=1.0)
+    torque_max: Array | None = _legs(
+        'maximum torque of a motor, to which torques are clipped; unlimited if not set', 'N m',
+        (), minimum=0.0, above=True)
+    torque_continuous: Array | None = _legs(
+        'torque that a motor can hold without end, for the RMS torque of a motion', 'N m', (),
+        minimum=0.0, above=True)
+    speed_max: Array | None = _legs(
+        'maximum speed of a motor; unlimited if not set', 'rad/s', (), minimum=0.0, above=True)
+    torque_speed: Array | None = declare(
+        'largest torque of a motor at rising speeds, speed and torque of one point after the '
+        'other, linear between them; from 0 rad/s to the first speed the first torque, above the '
+        'last speed 0 N m; unlimited if not set', 'rad/s, N m', (), sizes=(2,), repeated=True,
+        minimum=0.0)
+    torque_constant: Array | None = _legs(
+        'torque of a motor for each ampere', 'N m/A', (), minimum=0.0, above=True)
+    resistance: Array | None = _legs(
+        'copper heat of a motor divided by the square of its current: with RMS currents of three '
+        'phases 1.5 times the resistance between two phases', 'Ohm', (), minimum=0.0)
+    thermal_resistance: Array | None = _legs(
+        'from winding to ambient', 'K/W', (), minimum=0.0, above=True)
+    thermal_time_constant: Array | None = _legs(
+        'of the winding with its motor', 's', (), minimum=0.0, above=True)
+    temperature_rise_max: Array | None = _legs(
+        'maximum temperature of a winding above ambient; unlimited if not set', 'K', (),
+        minimum=0.0, above=True)
+    rated_torque: Array | None = _legs(
+        'torque that the amplifier calls 1000 per mille, object 6076h of CiA 402; for '
+        'stewart_export --drives', 'N m', (), minimum=0.0, above=True)
+    counts_per_turn: Array | None = _legs(
+        'increments of position in one turn of the motor, as the amplifier counts them; for '
+        'stewart_export --drives', '', (), minimum=0.0, above=True)
+    direction: Array = _legs(
+        '1.0 if positive torque and position of the amplifier extend the leg, else -1.0; for '
+        'stewart_export --drives', '', (1.0,), minimum=-1.0, maximum=1.0)
+    screw_rotation: str = declare(
+        'guided: screw and nut cannot turn with the leg; universal: the leg turns between its '
+        'universal joints, and its motor makes up for it', '', GUIDED, choices=(GUIDED, UNIVERSAL))
+    screw_hand: str = declare(
+        'hand of the thread, for drive.screw_rotation: universal', '', RIGHT,
+        choices=(RIGHT, LEFT))
+    base_universal_axes: Array | None = _universal_axes('base')
+    platform_universal_axes: Array | None = _universal_axes('platform')
+
+
+class LimitsGroup(ParameterGroup):
+    """Limits of legs and joints."""
+
+    length_min: Array | None = _legs(
+        'minimum length of a leg; unlimited if not set', 'm', (), minimum=0.0)
+    length_max: Array | None = _legs(
+        'maximum length of a leg; unlimited if not set', 'm', (), minimum=0.0, above=True)
+    velocity_max: Array | None = _legs(
+        'maximum rate of a leg; unlimited if not set', 'm/s', (), minimum=0.0, above=True)
+    force_max: Array | None = _legs(
+        'maximum force of a leg, to which forces are clipped; unlimited if not set', 'N', (),
+        minimum=0.0, above=True)
+    joint_force_max: Array | None = _legs(
+        'maximum force along a leg that its joints and its rod carry, the thrust rating of a '
+        'cylinder: without friction and reflected mass of the actuator; unlimited if not set',
+        'N', (), minimum=0.0, above=True)
+    base_joint_angle_max: Array | None = _legs(
+        'maximum angle between a leg and its geometry.base_joint_axes; unlimited if not set',
+        'rad', (), minimum=0.0, above=True, maximum=math.pi)
+    platform_joint_angle_max: Array | None = _legs(
+        'maximum angle between a leg and its geometry.platform_joint_axes; unlimited if not set',
+        'rad', (), minimum=0.0, above=True, maximum=math.pi)
+    leg_clearance_min: float | None = declare(
+        'minimum distance of the surface of a leg, a cylinder and a thinner piston, from that of '
+        'another leg, and from the outlines of geometry that are given; unlimited if not set',
+        'm', minimum=0.0)
+    action: str = declare(
+        'action while a limit of length, rate, joint force, joint angle or clearance, or of speed '
+        'or temperature of a motor, is exceeded, or a setpoint is too far from the last one for '
+        'limits.velocity_max: warn only, or publish no forces and torques', '', WARN,
+        choices=ACTIONS, while_active=True)
+
+
+class SingularityGroup(ParameterGroup):
+    """How near a singularity setpoints may be."""
+
+    characteristic_length: float = declare(
+        'length by which moments are divided in the condition number; default: mean distance of '
+        'the platform joints from their center', 'm', minimum=0.0, above=True)
+    warn_condition: float = declare(
+        'condition number of J_inv at which the singularity warning begins; it ends below '
+        f'{_HYSTERESIS:g} of this', '', 20.0, minimum=1.0, while_active=True)
+    stop_condition: float = declare(
+        'condition number at which singularity.action begins; it ends below '
+        f'{_HYSTERESIS:g} of this', '', 100.0, minimum=1.0, while_active=True)
+    warn_time: float = declare(
+        'warn when the predicted time to a crossing of det(J) = 0 is shorter than this', 's', 0.5,
+        minimum=0.0, while_active=True)
+    action: str = declare(
+        'action above stop_condition: warn only, or publish no forces', '', WARN, choices=ACTIONS,
+        while_active=True)
+
+
+class SetpointGroup(ParameterGroup):
+    """How setpoints arrive."""
+
+    source: str = declare(
+        'setpoints on three topics, on one combined topic, or poses alone (quasi-static: no '
+        'motion terms)', '', SEPARATE, choices=(SEPARATE, COMBINED, POSES_ALONE))
+    sync_tolerance: float = declare(
+        'largest difference between the stamps of one setpoint', 's', 0.0, minimum=0.0,
+        maximum=1e9)
+    timeout: float = declare(
+        'time without setpoints after which they are stale; a longer jump back in time is a '
+        'restart', 's', 0.1, minimum=0.0, above=True, maximum=1e9)
+    exclusive: bool = declare(
+        'reject setpoints and base motion while a topic of them has more than one publisher',
+        default=False)
+
+
+class ImuGroup(ParameterGroup):
+    """An IMU on the base."""
+
+    position: Array = _point('position of the IMU, base frame')
+    orientation: Array = declare(
+        'quaternion x y z w that turns IMU axes into base axes', '', (0.0, 0.0, 0.0, 1.0),
+        sizes=(4,))
+    cutoff: float = declare(
+        'cut-off frequency of the low-pass filter on the angular acceleration, the derivative of '
+        'the angular velocity', 'Hz', 20.0, minimum=0.0, above=True)
+
+
+class BaseGroup(ParameterGroup):
+    """How the base moves."""
+
+    source: str = declare(
+        'how the base moves: not at all, by its orientation in the world (~/base/pose, at rest), '
+        'by its motion in the world (~/base/pose, twist and accel), or as an IMU on it measures '
+        '(~/base/imu)', '', FIXED, choices=(FIXED, AT_REST, MOVING, BY_IMU))
+    timeout: float = declare(
+        'age of the last base motion above which no forces are published', 's', 0.1, minimum=0.0,
+        above=True, maximum=1e9)
+    imu: ImuGroup
+
+
+class TrajectoryGroup(ParameterGroup):
+    """Planned trajectories."""
+
+    effort: bool = declare(
+        'publish forces with the points of ~/leg_trajectory; a joint_trajectory_controller '
+        'without an effort command interface rejects points with effort', default=True)
+    approach: str = declare(
+        'where ~/platform_trajectory may start: anywhere; check: where the measured legs are, to '
+        f'{100.0 * START_TOLERANCE:g} % of singularity.characteristic_length; prepend: a motion '
+        'from rest there to the first point is put before it', '', IGNORE,
+        choices=(IGNORE, CHECK, PREPEND))
+
+
+class ExternalWrenchGroup(ParameterGroup):
+    """The wrench on the platform that measured efforts show."""
+
+    cutoff: float = declare(
+        'cut-off frequency of the low-pass filter on ~/external_wrench', 'Hz', 10.0, minimum=0.0,
+        above=True, while_active=True)
+    force_max: float | None = declare(
+        'external force above which diagnostics report an ERROR; unlimited if not set', 'N',
+        minimum=0.0, above=True, while_active=True)
+    moment_max: float | None = declare(
+        "external moment at the platform's origin above which diagnostics report an ERROR; "
+        'unlimited if not set', 'N m', minimum=0.0, above=True, while_active=True)
+
+
+_OF_HEAD, _OF_TILT = 'surge, sway, heave', 'surge, sway'
+
+
+def _axes(text: str, unit: str, default: tuple[float, ...], **rule: Any) -> Any:
+    """Declare a value of motion cueing for each axis."""
+    return declare(text, unit, default, sizes=(len(default),), while_active=True, **rule)
+
+
+def _gains(text: str, default: tuple[float, ...]) -> Any:
+    return _axes(text, '', default, minimum=0.0, maximum=10.0)
+
+
+def _frequencies(text: str, default: tuple[float, ...]) -> Any:
+    return _axes(text, 'rad/s', default, minimum=0.0, above=True, maximum=100.0)
+
+
+def _damping(text: str, default: tuple[float, ...]) -> Any:
+    return _axes(text, '', default, minimum=0.5, maximum=10.0)
+
+
+class TranslationGroup(ParameterGroup):
+    """Translation of the head, from quick changes of the acceleration."""
+
+    gain: Array = _gains(
+        f'share of the acceleration that translation gives, {_OF_HEAD}', (0.5,) * 3)
+    natural_frequency: Array = _frequencies(
+        f'natural frequency of the high-pass filter of second order, {_OF_HEAD}', (2.5, 4.0, 4.0))
+    damping: Array = _damping(f'damping ratio of this filter, {_OF_HEAD}', (1.0,) * 3)
+    washout_frequency: Array = _frequencies(
+        'frequency of the high-pass filter of first order that returns the head to its place, '
+        f'{_OF_HEAD}', (0.25, 0.4, 0.4))
+
+
+class TiltGroup(ParameterGroup):
+    """Tilt, in place of lasting acceleration."""
+
+    gain: Array = _gains(f'share of the acceleration that tilt gives, {_OF_TILT}', (0.5,) * 2)
+    natural_frequency: Array = _frequencies(
+        f'natural frequency of the low-pass filter of second order, {_OF_TILT}', (5.0, 8.0))
+    damping: Array = _damping(f'damping ratio of this filter, {_OF_TILT}', (1.0,) * 2)
+    rate_max: float = declare(
+        'maximum rate of the tilt: below it, it is not felt as rotation', 'rad/s', 0.0524,
+        minimum=0.0, above=True, maximum=100.0, while_active=True)
+
+
+class RotationGroup(ParameterGroup):
+    """Rotation, from the angular velocity."""
+
+    gain: Array = _gains(
+        'share of the angular velocity that rotation gives, roll, pitch, yaw', (0.5,) * 3)
+    natural_frequency: Array = _frequencies(
+        'frequency of the high-pass filter of first order, roll, pitch, yaw', (1.0,) * 3)
+
+
+class CueingGroup(ParameterGroup):
+    """Motion cueing."""
+
+    head: Array = _axes(
+        "position of the pilot's head, platform frame", 'm', (0.0, 0.0, 0.0))
+    input: str = declare(
+        'linear acceleration of the vehicle at the head: specific_force, with gravity, as an '
+        'accelerometer measures it; acceleration: without', '', SPECIFIC_FORCE,
+        choices=(SPECIFIC_FORCE, ACCELERATION), while_active=True)
+    translation: TranslationGroup
+    tilt: TiltGroup
+    rotation: RotationGroup
+    rate: float = declare(
+        'rate of the setpoints of stewart_cueing', 'Hz', 250.0, minimum=10.0, maximum=1e4)
+    govern: bool = declare(
+        'keep every setpoint within the limits of this file, with a stop from it within them',
+        default=True, while_active=True)
+
+
+def _deviation(text: str, unit: str, default: float | None) -> Any:
+    return declare(f'standard deviation of {text}; a prior of stewart_identify and '
+                   '~/identify_payload', unit, default, minimum=0.0)
+
+
+class UncertaintyGroup(ParameterGroup):
+    """Standard deviations of the parameters of the file."""
+
+    platform_mass: float = _deviation('platform.mass, relative to it', '', 0.5)
+    center_of_mass: float = _deviation(
+        f'each coordinate of platform.center_of_mass; default: {CENTER_UNCERTAINTY:g} of '
+        'singularity.characteristic_length', 'm', None)
+    inertia: float = _deviation(
+        'platform.inertia, relative to its mean principal moment', '', 1.0)
+    leg_mass: float = _deviation(
+        'masses, centers of mass and inertias of cylinders and pistons, relative to them: once of '
+        'all legs together, and again of each leg', '', 0.05)
+    reflected_mass: float = _deviation(
+        'actuator.reflected_mass of each leg, relative to it', '', 0.1)
+    effort_gain: float = _deviation(
+        'the gain of measured efforts, of all legs together', '', 0.01)
+    tilt: float = _deviation(
+        'the direction of gravity in the base frame, about each of two axes', 'rad', 0.005)
+
+
+def _mesh(body: str) -> Any:
+    return declare(f'file of the mesh of {body}, as stewart_describe writes it; empty: a simple '
+                   'shape', default='')
+
+
+def _offset(axes: str) -> Any:
+    return declare(f'x y z, and roll pitch yaw, of this mesh; {axes}', 'm, rad', (0.0,) * 6,
+                   sizes=(6,))
+
+
+class MeshesGroup(ParameterGroup):
+    """Pictures of the parts."""
+
+    base: str = _mesh('base')
+    base_offset: Array = _offset('base frame')
+    platform: str = _mesh('platform')
+    platform_offset: Array = _offset('platform frame')
+    cylinder: str = _mesh('each cylinder')
+    cylinder_offset: Array = _offset('z along the leg, from the base joint')
+    piston: str = _mesh('each piston')
+    piston_offset: Array = _offset('z along the leg, from the platform joint')
+    scale: float = declare(
+        'scale of all meshes; 0.001 for files in mm', '', 1.0, minimum=0.0, above=True)
+
+
+class JointStatesGroup(ParameterGroup):
+    """Poses of the hexapod in RViz."""
+
+    source: str = declare(
+        'whose poses ~/joint_states and /tf have: those of setpoints, or of the measured legs '
+        '(~/measured_legs)', '', OF_SETPOINTS, choices=(OF_SETPOINTS, AS_MEASURED))
 
 
 class Parameters(ParameterSet):
     """The parameters of a hexapod and of the node that computes its leg forces."""
 
-    table = PARAMETERS
+    base_frame: str = declare('frame of setpoints and wrenches', default='base')
+    platform_frame: str = declare('frame that moves with the platform', default='platform')
+    joints: tuple[str, ...] = declare(
+        'names of the legs, in the order of all arrays of six',
+        default=tuple(f'leg_{n}' for n in range(1, 7)), sizes=(6,))
+    geometry: GeometryGroup
+    platform: PlatformGroup
+    payload: PayloadGroup
+    legs: LegsGroup
+    actuator: ActuatorGroup
+    drive: DriveGroup
+    gravity: Array = _point(
+        'acceleration of free fall: base axes; axes of the world where base.source is pose or '
+        'motion; not used where it is imu', 'm/s^2', STANDARD_GRAVITY)
+    limits: LimitsGroup
+    singularity: SingularityGroup
+    setpoint: SetpointGroup
+    base: BaseGroup
+    world_frame: str = declare('frame of ~/base/pose, twist and accel', default='world')
+    trajectory: TrajectoryGroup
+    external_wrench: ExternalWrenchGroup
+    cueing: CueingGroup
+    uncertainty: UncertaintyGroup
+    meshes: MeshesGroup
+    visualization_rate: float = declare(
+        'maximum rate of ~/markers and ~/joint_states; 0: off', 'Hz', 30.0, minimum=0.0)
+    publish_tf: bool = declare(
+        'publish the transform from base_frame to platform_frame on /tf, with every pose',
+        default=False)
+    joint_states: JointStatesGroup
+    autostart: bool = declare('configure and activate the node when it starts', default=True)
+
     node = 'stewart_dynamics'
     described = 'cueing.', 'drive.', 'actuator.reflected_mass'  # which may follow from drive.*
     drives: tuple[str, ...]  # names of drive.* that are given; without them no motors are computed
@@ -410,8 +600,8 @@ class Parameters(ParameterSet):
     def _check_together(self, source: str) -> None:
         """Check the rules between parameters."""
         for body in BODIES:
-            self._values[f'geometry.{body}_joints'] = joints_of(self, body, source)
-        joints = self['joints']
+            self._complete(f'geometry.{body}_joints', joints_of(self, body, source))
+        joints = self.joints
         if len(set(joints)) < 6 or '' in joints:
             raise ParameterError(f'{source}: joints: {list(joints)}: six different names needed')
         self._check_bodies(source)
@@ -428,20 +618,19 @@ class Parameters(ParameterSet):
         for name in OUTLINES:
             if self[name] is not None and (rule := _broken_rule_of_plate(self[name])):
                 raise ParameterError(f'{source}: {name}: {self[name].tolist()}: {rule}')
-        length = float(np.linalg.norm(self['base.imu.orientation']))
+        length = float(np.linalg.norm(self.base.imu.orientation))
         if not is_unit(length):
             raise ParameterError(f'{source}: base.imu.orientation: '
-                                 f'{self["base.imu.orientation"].tolist()}: {unit_rule(length)}')
-        platform_joints = self['geometry.platform_joints']
-        size = mean_radius(platform_joints)
+                                 f'{self.base.imu.orientation.tolist()}: {unit_rule(length)}')
+        size = mean_radius(self.geometry.platform_joints)
         if size == 0.0:
             raise ParameterError(
                 f'{source}: geometry.platform_joints: all six are at one point')
-        if self['singularity.characteristic_length'] is None:
-            self._values['singularity.characteristic_length'] = size
-        if self['uncertainty.center_of_mass'] is None:
-            self._values['uncertainty.center_of_mass'] = (
-                CENTER_UNCERTAINTY * self['singularity.characteristic_length'])
+        if self.singularity.characteristic_length is None:
+            self._complete('singularity.characteristic_length', size)
+        if self.uncertainty.center_of_mass is None:
+            self._complete('uncertainty.center_of_mass',
+                           CENTER_UNCERTAINTY * self.singularity.characteristic_length)
         for name in ('geometry.base_joint_axes', 'geometry.platform_joint_axes',
                      'drive.base_universal_axes', 'drive.platform_universal_axes'):
             axes = self[name]
@@ -460,28 +649,13 @@ class Parameters(ParameterSet):
                     f'{source}: {name}: {self[name].tolist()}: must be {rule}, but its smallest '
                     f'principal moment is {moments[0]:.6g} kg m^2 (the order is ixx ixy ixz iyy '
                     'iyz izz)')
-        self.carried = self.empty
-        if self['payload.mass'] > 0.0:
+        self.carried = self.platform.body
+        if self.payload.mass > 0.0:
             try:
-                self.carried = self.empty.with_body(self.payload)
+                self.carried = self.carried.with_body(self.payload.body)
             except ParameterError as exc:
-                raise ParameterError(f'{source}: payload.mass: {self["payload.mass"]:g} kg, with '
+                raise ParameterError(f'{source}: payload.mass: {self.payload.mass:g} kg, with '
                                      f'platform.mass: {exc}') from exc
-
-    @property
-    def empty(self) -> Body:
-        """Return the empty platform, ``platform.*``."""
-        return self._body('platform')
-
-    @property
-    def payload(self) -> Body:
-        """Return the payload, ``payload.*``; zeros without one."""
-        if self['payload.mass'] == 0.0:
-            return Body(0.0, np.zeros(3), np.zeros(6))
-        return self._body('payload')
-
-    def _body(self, group: str) -> Body:
-        return Body(*(self[f'{group}.{name}'] for name in ('mass', 'center_of_mass', 'inertia')))
 
     def replaced(self, changes: Mapping[str, Any], source: str = '', *,
                  exact_types: bool = False) -> Self:
@@ -501,18 +675,18 @@ class Parameters(ParameterSet):
 
     def merged(self) -> Self:
         """Return a copy without payload, whose ``platform.*`` are platform and payload."""
-        if self['payload.mass'] == 0.0:
+        if self.payload.mass == 0.0:
             return self
         mass, center, inertia = self.carried
         return self.replaced({
             'platform.mass': mass, 'platform.center_of_mass': center, 'platform.inertia': inertia,
-            **dict.fromkeys(payload_values(self.payload))})
+            **dict.fromkeys(payload_values(self.payload.body))})
 
     def _check_drives(self, source: str) -> None:
         """Check drive.*, and complete it and actuator.reflected_mass."""
-        lead, ratio = self['actuator.screw_lead'], self['drive.gear_ratio']
+        lead, ratio = self.actuator.screw_lead, self.drive.gear_ratio
         with np.errstate(over='ignore'):
-            driven_back = 2.0 - 1.0 / self['drive.efficiency']
+            driven_back = 2.0 - 1.0 / self.drive.efficiency
         given = tuple(name for name in self.given
                       if name.startswith('drive.') and self[name] is not None)
         self.drives = () if lead is None else given
@@ -523,13 +697,13 @@ class Parameters(ParameterSet):
             if np.size(default) == 0 or not np.all(self[name] == default):
                 raise ParameterError(
                     f'{source}: actuator.screw_lead: not set: needed by {name}')
-        if self['drive.back_driving_efficiency'] is None:
-            self._set('drive.back_driving_efficiency', driven_back)
-        if any(np.any(self[name] > 0.0) for name in DRIVE_INERTIAS):
+        if self.drive.back_driving_efficiency is None:
+            self._complete('drive.back_driving_efficiency', driven_back)
+        if lead is not None and any(np.any(self[name] > 0.0) for name in DRIVE_INERTIAS):
             with np.errstate(all='ignore'):
                 follows = (2.0 * math.pi * ratio / lead) ** 2 * (
-                    self[MOTOR_INERTIA] + self[SCREW_INERTIA] / ratio ** 2)
-            mass = self['actuator.reflected_mass']
+                    self.drive.motor_inertia + self.drive.screw_inertia / ratio ** 2)
+            mass = self.actuator.reflected_mass
             wrong = np.abs(mass - follows) > REFLECTED_MASS_TOLERANCE * follows
             if 'actuator.reflected_mass' in self.given and wrong.any():
                 leg = int(np.argmax(wrong))
@@ -539,24 +713,22 @@ class Parameters(ParameterSet):
             if not np.isfinite(follows).all():
                 raise ParameterError(f'{source}: actuator.reflected_mass: {follows.tolist()} kg '
                                      f'from {MOTOR_INERTIA} and {SCREW_INERTIA}: must be finite')
-            self._set('actuator.reflected_mass', follows)
-        direction = self['drive.direction']
+            self._complete('actuator.reflected_mass', follows)
+        direction = self.drive.direction
         if np.any(np.abs(direction) != 1.0):
             raise ParameterError(
                 f'{source}: drive.direction: {direction.tolist()}: must be 1.0 or -1.0')
-        curve = self['drive.torque_speed']
+        curve = self.drive.torque_speed
         if curve is not None and np.any(np.diff(curve[:, 0]) <= 0.0):
             raise ParameterError(
                 f'{source}: drive.torque_speed: speeds {curve[:, 0].tolist()} rad/s: must be '
                 'strictly increasing (the order is speed, torque, speed, torque, ...)')
 
-    def _set(self, name: str, value: Any) -> None:
-        """Set the value of a parameter that follows from others."""
-        value.setflags(write=False)
-        self._values[name] = value
+
+PARAMETERS: Mapping[str, Parameter] = Parameters.table
 
 
-def _broken_rule_of_plate(corners: Any) -> str:
+def _broken_rule_of_plate(corners: Array) -> str:
     """Return the rule that corners (M, 3) of a plate break; empty if they break none."""
     if len(corners) < 3:
         return 'must have three corners or more'
@@ -580,6 +752,11 @@ def payload_values(payload: Body) -> dict[str, Any]:
     """Return the values of a payload under the names of a parameter file."""
     return {'payload.mass': payload.mass, 'payload.center_of_mass': payload.center,
             'payload.inertia': payload.inertia}
+
+
+def six_of(value: Array | None, not_set: float) -> Array:
+    """Return the value of each leg (6,), or one that stands for it where it is not set."""
+    return np.full(6, not_set) if value is None else value
 
 
 def mean_radius(points: Array) -> float:

@@ -22,7 +22,7 @@ from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import optional_array, wrong_type
 from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
-from stewart_dynamics.mechanics.limits import OF_LOADS, OF_RATES, VELOCITY_MAX
+from stewart_dynamics.mechanics.limits import OF_LOADS, OF_RATES
 from stewart_dynamics.mechanics.rows import MOTION, POSE, RATES, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.interpolation import Interpolation
@@ -150,8 +150,8 @@ def _first_duration(platform: StewartPlatform, begin: Array, finish: Array) -> f
     part = np.linspace(0.0, 1.0, 65)
     between = Interpolation(np.ones(1), np.stack([begin, at_rest]))
     rates = np.abs(platform.solve(between.at(np.zeros(65, dtype=np.int64), part))[:, RATES])
-    limit = platform.parameters[VELOCITY_MAX]
-    fastest = (_SPEED_WITHOUT_LIMIT * platform.parameters['singularity.characteristic_length']
+    limit = platform.parameters.limits.velocity_max
+    fastest = (_SPEED_WITHOUT_LIMIT * platform.parameters.singularity.characteristic_length
                if limit is None else _SPEED * limit)
     return max(float(np.nan_to_num((rates / fastest).max())), 2.0 / RATE)
 

@@ -98,11 +98,11 @@ class Checks:
         self.condition_number, self.condition_time = 0.0, 0.0
         self.force, self.force_leg, self.load = -1.0, 0, 0.0
         self._strongest = np.zeros(6)
-        self._joints = parameters['joints']
+        self._joints = parameters.joints
         self._limits = Limits(parameters)
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._clearance = clearance_to_check(parameters)
-        self._clearance_tolerance = _CLEARANCE * parameters['singularity.characteristic_length']
+        self._clearance_tolerance = _CLEARANCE * parameters.singularity.characteristic_length
         self._stop = stop_condition_of(parameters)
         self._friction = Friction.of(parameters)
         self._parameters = parameters
@@ -194,10 +194,10 @@ class Checks:
         """Return after which samples a drive reverses while its motor may be at its limit."""
         p, ratio = self._parameters, motor_ratio(self._parameters)
         rates = rows[:, SPEEDS] / ratio
-        inertial = p['actuator.reflected_mass'] / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
+        inertial = p.actuator.reflected_mass / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
         highest = (np.abs(inertial) + (np.abs(samples.results[:, FORCES] - inertial)
                                        + self._friction.largest_change)
-                   / p['drive.efficiency']) / ratio
+                   / p.drive.efficiency) / ratio
         may = exceeds(np.maximum(highest[:-1], highest[1:]), np.minimum(
             rows[:-1, AVAILABLE_TORQUES], rows[1:, AVAILABLE_TORQUES]))
         reverses = (rates[:-1] * rates[1:] < 0.0) & (np.maximum(

@@ -89,13 +89,13 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
     """
     platform = StewartPlatform(parameters)
     try:
-        message = _checked_header(data, parameters['base_frame'])
+        message = _checked_header(data, parameters.base_frame)
         times, rows, given = yield from _read(message, parameters)
         if given is None and base is not None and np.isnan(base).any():
             raise _NotCheckableError(
                 BASE_NOT_KNOWN, 'give it with the points, or publish the topics of the base')
         bases = base if given is None else given
-        if parameters['trajectory.approach'] != IGNORE:
+        if parameters.trajectory.approach != IGNORE:
             times, rows, bases = yield from _from_measured(
                 platform, times, rows, np.array(wrench), bases, measured)
     except MalformedError as exc:
@@ -140,7 +140,7 @@ def _read(message: PlatformTrajectory, parameters: Parameters,
     """
     times, rows = np.empty(message.size, dtype=np.int64), np.empty((message.size, MOTION))
     bases = np.empty((message.size, BASE)) if message.joints == 2 else None
-    gravity = parameters['gravity'].tolist()
+    gravity = parameters.gravity.tolist()
     for first in range(0, message.size, _READ):
         end = min(first + _READ, message.size)
         points = message.points(first, end)
@@ -181,13 +181,13 @@ def _from_measured(platform: StewartPlatform, times: Stamps, rows: Array, wrench
     start[POSE] = measured[POSE]
     lengths = platform.solve(np.stack([start, rows[0]]))[:, LENGTHS]
     away = np.abs(lengths[1] - lengths[0])
-    tolerance = START_TOLERANCE * p['singularity.characteristic_length']
+    tolerance = START_TOLERANCE * p.singularity.characteristic_length
     if away.max() <= tolerance:
         return times, rows, bases
     leg = int(np.argmax(away))
-    if p['trajectory.approach'] == CHECK:
+    if p.trajectory.approach == CHECK:
         raise _NotCheckableError(
-            STARTS_ELSEWHERE, f'{p["joints"][leg]} is {away[leg]:.4g} m from its first length, '
+            STARTS_ELSEWHERE, f'{p.joints[leg]} is {away[leg]:.4g} m from its first length, '
             f'more than {tolerance:.4g} m')
     first = bases if bases is None or bases.ndim == 1 else bases[0]
     found = None
@@ -231,11 +231,11 @@ def _written(parameters: Parameters, stamp: int, times: Stamps, result: PlannedT
              ) -> Generator[None, None, bytes]:
     """Return the trajectory_msgs/JointTrajectory of an accepted trajectory."""
     answer = LegTrajectory(
-        stamp, parameters['joints'], result.points, parameters['trajectory.effort'])
+        stamp, parameters.joints, result.points, parameters.trajectory.effort)
     for first in range(0, result.points, _WRITTEN):
         some = slice(first, min(first + _WRITTEN, result.points))
         answer.put(
-            first, times[some], result.lengths[some] - parameters['geometry.zero_length'],
+            first, times[some], result.lengths[some] - parameters.geometry.zero_length,
             result.rates[some], result.forces[some])
         yield
     return answer.message()
@@ -244,13 +244,13 @@ def _written(parameters: Parameters, stamp: int, times: Stamps, result: PlannedT
 def _values(parameters: Parameters, result: PlannedTrajectory) -> tuple[tuple[str, str], ...]:
     """Return the keys and values for diagnostics."""
     values = [('points', str(result.points)), ('duration (s)', f'{result.duration:.9g}')]
-    joints = parameters['joints']
+    joints = parameters.joints
     if result.accepted and result.force_leg is not None:
         values += [('worst condition number', f'{result.condition_number:.6g}'),
                    ('its time (s)', f'{result.condition_time:.3f}'),
                    ('largest force (N)', f'{result.force:.6g}'),
                    ('its leg', joints[result.force_leg])]
-        if parameters['limits.force_max'] is not None:
+        if parameters.limits.force_max is not None:
             values.append(('largest force, of limits.force_max', f'{result.load:.4g}'))
     elif not np.isnan(result.time):
         values.append(('rejected at (s)', f'{result.time:.6g}'))

@@ -51,29 +51,29 @@ class Sampling:
 
     def __init__(self, parameters: Parameters, tolerance: float = TOLERANCE) -> None:
         self._tolerance = tolerance
-        self._arm = arm = float(parameters['singularity.characteristic_length'])
+        self._arm = arm = parameters.singularity.characteristic_length
         self._limits = Limits(parameters)
         self._friction = Friction.of(parameters)
-        self._reflected = parameters['actuator.reflected_mass']
+        self._reflected = parameters.actuator.reflected_mass
         self._parameters = parameters
         # Rates above which a leg or its motor may exceed a limit.
         self._fastest = self._limits.thresholds[VELOCITY_MAX]
         if parameters.drives:
             self._fastest = np.minimum(self._fastest, rate_limits(parameters))
         # Largest speed of a platform joint at a speed |v| + arm |w| of the platform.
-        radii = np.linalg.norm(parameters['geometry.platform_joints'], axis=1)
+        radii = np.linalg.norm(parameters.geometry.platform_joints, axis=1)
         self._lever = np.maximum(1.0, radii / arm)
         # Largest wrench |F| + |N| / arm at an acceleration |a| + arm |alpha| of the platform.
         offset = float(np.linalg.norm(parameters.carried.center)) / arm
         xx, _, _, yy, _, zz = parameters.carried.inertia
         self._platform_mass = (parameters.carried.mass * (1.0 + offset) ** 2
                                + float(xx + yy + zz) / arm ** 2)
-        self._piston_mass = parameters['legs.piston.mass']
-        self._piston_center = parameters['legs.piston.center_of_mass']
-        cylinder_center = parameters['legs.cylinder.center_of_mass']
+        self._piston_mass = parameters.legs.piston.mass
+        self._piston_center = parameters.legs.piston.center_of_mass
+        cylinder_center = parameters.legs.cylinder.center_of_mass
         self._joint_inertia = (
-            parameters['legs.cylinder.mass'] * cylinder_center ** 2
-            + parameters['legs.cylinder.inertia'] + parameters['legs.piston.inertia'])
+            parameters.legs.cylinder.mass * cylinder_center ** 2
+            + parameters.legs.cylinder.inertia + parameters.legs.piston.inertia)
 
     def parts(self, durations: Array, between: Interpolation, results: Array,
               drive_rates: Array, bases: Array | None, largest: float) -> Array:
@@ -138,7 +138,7 @@ class Sampling:
         if self._parameters.drives:
             # Losses in the screw change there as well. A curve may end at zero.
             friction = friction + np.where(changes, _larger(magnitudes), 0.0) * (
-                2.0 / self._parameters['drive.efficiency'] - 2.0)
+                2.0 / self._parameters.drive.efficiency - 2.0)
             of_motors = force_limits(self._parameters, _larger(np.abs(rates)) + rate_deviation)
             still = force_limits(self._parameters, np.zeros(6))
             strongest = np.minimum(strongest, np.maximum(of_motors, _LEAST * still))

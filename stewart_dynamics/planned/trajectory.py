@@ -28,7 +28,6 @@ from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics import (
     forward_kinematics, leg_clearance)
-from stewart_dynamics.mechanics.limits import TEMPERATURE_RISE_MAX
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_VELOCITY, consecutive, FORCES, LENGTHS, LINEAR_VELOCITY, RATES, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -256,7 +255,7 @@ class _Work:
         self._samples = 0
         clearance = leg_clearance.clearance_to_check(self._parameters)
         self._reach = clearance.reach if clearance else None
-        self._warms = self._parameters[TEMPERATURE_RISE_MAX] is not None
+        self._warms = self._parameters.drive.temperature_rise_max is not None
 
     def check(self) -> Iterator[None]:
         """Compute motion and forces of the legs; raise _ViolationError at a violation."""
@@ -409,7 +408,7 @@ class _Work:
         """Return the result of a trajectory without violations."""
         checks, points = self._checks, len(self._times)
         message = f'accepted: {points} point{"s" * (points > 1)} over {self._duration:.6g} s'
-        warn = self._parameters['singularity.warn_condition']
+        warn = self._parameters.singularity.warn_condition
         if warning := checks.condition_number >= warn:
             message += (f', condition number {checks.condition_number:.4g} at '
                         f'{checks.condition_time:.3f} s is not below '

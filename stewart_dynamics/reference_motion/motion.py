@@ -30,9 +30,9 @@ def sample_times(parameters: ReferenceMotionParameters) -> Integers:
 
 def sample_count(parameters: ReferenceMotionParameters) -> int:
     """Return the number of times in ``sample_times``."""
-    seconds = (duration(parameters) if parameters['motion.type'] == 'response'
-               else parameters['motion.duration'])
-    exact: float = seconds * parameters['rate']
+    seconds = (duration(parameters) if parameters.motion.type == 'response'
+               else parameters.motion.duration)
+    exact: float = seconds * parameters.rate
     near = round(exact)
     is_near = math.isclose(exact, near, rel_tol=1e-12, abs_tol=1e-9)
     return 1 + (near if is_near else math.ceil(exact))
@@ -41,7 +41,7 @@ def sample_count(parameters: ReferenceMotionParameters) -> int:
 def sample_time(parameters: ReferenceMotionParameters, index: ArrayLike) -> Integers:
     """Return the times of samples by their index (...) [ns]; rounding errors do not add up."""
     times: Integers = np.rint(
-        np.asarray(index) * SECOND / parameters['rate']).astype(np.int64)
+        np.asarray(index) * SECOND / parameters.rate).astype(np.int64)
     return times
 
 
@@ -75,13 +75,13 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
     before its start and after its end.
     """
     time = np.asarray(times, dtype=float)
-    kind, initial = parameters['motion.type'], parameters['motion.initial']
+    kind, initial = parameters.motion.type, parameters.motion.initial
     if kind == 'hold':
         return _euler_motion(np.broadcast_to(initial, (*time.shape, 6)), np.zeros(6), np.zeros(6))
     if kind == 'sine':
-        amplitude = parameters['motion.amplitude']
-        omega = 2.0 * np.pi * parameters['motion.frequency']
-        angle = omega * time[..., None] + parameters['motion.phase']
+        amplitude = parameters.motion.amplitude
+        omega = 2.0 * np.pi * parameters.motion.frequency
+        angle = omega * time[..., None] + parameters.motion.phase
         return _euler_motion(
             initial + amplitude * np.sin(angle), amplitude * omega * np.cos(angle),
             -amplitude * omega ** 2 * np.sin(angle))
@@ -91,7 +91,8 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
         offset, rate, acceleration = _series(parameters, time)
         return _euler_motion(initial + offset, rate, acceleration)
     s, ds, dds = (each[..., None] for each in _progress(parameters, time))
-    final = parameters['motion.final']
+    # Both kinds that are left have one.
+    final = initial if parameters.motion.final is None else parameters.motion.final
     if kind == 'paper':
         change = final - initial
         return _euler_motion(initial + s * change, ds * change, dds * change)
@@ -109,16 +110,16 @@ def _euler_motion(pose: Array, rate: Array, acceleration: Array) -> Motion:
 
 def _progress(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, Array, Array]:
     """Return the completed part of the motion and its time derivatives [1, 1/s, 1/s^2]."""
-    duration = parameters['motion.duration']
+    duration = parameters.motion.duration
     u = time / duration
     sign = np.ones_like(u)
-    if parameters['loop']:
+    if parameters.loop:
         u = np.mod(u, 2.0)
         sign = np.where(u > 1.0, -1.0, 1.0)
         u = np.where(u > 1.0, 2.0 - u, u)
     moving = np.where((u >= 0.0) & (u <= 1.0), 1.0, 0.0)
     u = np.clip(u, 0.0, 1.0)
-    if parameters['motion.type'] == 'paper':
+    if parameters.motion.type == 'paper':
         s, ds, dds = ((1.0 - np.cos(np.pi * u)) / 2.0, np.pi / 2.0 * np.sin(np.pi * u),
                       np.pi ** 2 / 2.0 * np.cos(np.pi * u))
     else:
@@ -128,14 +129,14 @@ def _progress(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array
 
 def _series(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, Array, Array]:
     """Return the Fourier series in its window (..., 6), and its time derivatives."""
-    cosine, sine = (parameters[f'motion.fourier.{name}'] for name in ('cosine', 'sine'))
+    cosine, sine = parameters.motion.fourier.cosine, parameters.motion.fourier.sine
     cosine = np.zeros_like(sine) if cosine is None else cosine
     sine = np.zeros_like(cosine) if sine is None else sine
-    turn = 2.0 * np.pi * np.mod(time * parameters['motion.fourier.frequency'], 1.0)[..., None]
+    turn = 2.0 * np.pi * np.mod(time * parameters.motion.fourier.frequency, 1.0)[..., None]
     x, dx, ddx = np.zeros((3, *time.shape, 6))
     # Not by a matrix product: its last bits depend on the number of times.
     for k, (a, b) in enumerate(zip(cosine, sine, strict=True), start=1):
-        omega = 2.0 * np.pi * parameters['motion.fourier.frequency'] * k
+        omega = 2.0 * np.pi * parameters.motion.fourier.frequency * k
         c, s = np.cos(k * turn), np.sin(k * turn)
         x += a * c + b * s
         dx += omega * (b * c - a * s)
@@ -146,8 +147,8 @@ def _series(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, 
 
 def _window(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, Array, Array]:
     """Return the window of a Fourier series and its time derivatives [1, 1/s, 1/s^2]."""
-    fade, duration = parameters['motion.fourier.fade'], parameters['motion.duration']
-    ends = not parameters['loop'] and time > duration / 2.0
+    fade, duration = parameters.motion.fourier.fade, parameters.motion.duration
+    ends = not parameters.loop and time > duration / 2.0
     sign = np.where(ends, -1.0, 1.0)
     u = np.clip(np.where(ends, duration - time, time) / fade, 0.0, 1.0)
     w, dw, ddw = quintic(u)

@@ -44,19 +44,19 @@ class TrajectoryNode(Node):
         super().__init__(ReferenceMotionParameters.node, **MADE_WITH)
         self._settings = declare_parameters(self, ReferenceMotionParameters)
         self._done = done
-        self._loop = self._settings['loop']
+        self._loop = self._settings.loop
         self._samples = sample_count(self._settings)
         self._index = 0
         self._block: Any = None
         self._held: list[list[float]] | None = None
         self._row()  # an error in it is raised before anything moves
-        target = self._settings['target']
+        target = self._settings.target
         self._setpoints = SetpointPublisher(
-            self, target, self._settings['output'], self._settings['base_frame'])
+            self, target, self._settings.output, self._settings.base_frame)
         self._begun = self._subscribed = False
-        self._start = time.monotonic_ns() + round(self._settings['start_timeout'] * SECOND)
+        self._start = time.monotonic_ns() + round(self._settings.start_timeout * SECOND)
         self._timer = self.create_timer(
-            1.0 / self._settings['rate'], self._on_timer,
+            1.0 / self._settings.rate, self._on_timer,
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._simulated = self.get_parameter('use_sim_time').value
         if self._simulated:
@@ -64,7 +64,7 @@ class TrajectoryNode(Node):
                 JumpThreshold(min_forward=Duration(nanoseconds=1),
                               min_backward=Duration(nanoseconds=-1), on_clock_change=False),
                 post_callback=self._on_clock)
-        motion, rate = self._settings['motion.type'], self._settings['rate']
+        motion, rate = self._settings.motion.type, self._settings.rate
         self.get_logger().info(
             f'{motion} motion at {rate:g} Hz to {target}' + (
                 ', until stopped' if self._loop else f', {self._samples} setpoints'))
@@ -96,7 +96,7 @@ class TrajectoryNode(Node):
     def _publish_due(self, now: int) -> None:
         """Publish the samples that are due, each with its own stamp, however late it is [ns]."""
         if self._held:  # of these the last one is enough
-            self._index = max(self._index, int(now * NANOSECOND * self._settings['rate']))
+            self._index = max(self._index, int(now * NANOSECOND * self._settings.rate))
         while not self._done.done():
             due = int(sample_time(self._settings, self._index))
             if due > now:
@@ -110,7 +110,7 @@ class TrajectoryNode(Node):
     def _end(self, position: list[float], quaternion: list[float]) -> None:
         """Hold the pose of the last sample, or end."""
         log = self.get_logger()
-        if self._settings['motion.hold_at_end']:
+        if self._settings.motion.hold_at_end:
             self._held = [position, quaternion, *[[0.0] * 3] * 4]
             log.info(f'{self._samples} setpoints published; holds the final pose until stopped')
         else:

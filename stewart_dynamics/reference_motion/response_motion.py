@@ -44,14 +44,14 @@ def response_motion(parameters: ReferenceMotionParameters, time: Array) -> Motio
     moving = np.flatnonzero(amplitudes)
     each = _time_of_axis(parameters)
     whole = each * len(moving)
-    time = np.mod(time, whole) if parameters['loop'] else np.clip(time, 0.0, whole)
+    time = np.mod(time, whole) if parameters.loop else np.clip(time, 0.0, whole)
     number = np.minimum((time // each).astype(np.int64), len(moving) - 1)
     offset, rate, acceleration = _one_axis(parameters, time - number * each)
     axis = moving[number]
     chosen: Flags = np.arange(6) == axis[..., None]
     x, dx, ddx = (np.where(chosen, amplitudes * value[..., None], 0.0)
                   for value in (offset, rate, acceleration))
-    return _about(parameters['motion.initial'], x, dx, ddx)
+    return _about(parameters.motion.initial, x, dx, ddx)
 
 
 def _about(initial: Array, x: Array, dx: Array, ddx: Array) -> Motion:
@@ -63,18 +63,18 @@ def _about(initial: Array, x: Array, dx: Array, ddx: Array) -> Motion:
 
 def _time_of_axis(parameters: ReferenceMotionParameters) -> float:
     """Return the time from the start of one axis to that of the next [s], in whole samples."""
-    period, rate = parameters['motion.response.period'], parameters['rate']
-    time = (1.0 + parameters['motion.response.periods'] + _FADE) * period + _REST
+    period, rate = parameters.motion.response.period, parameters.rate
+    time = (1.0 + parameters.motion.response.periods + _FADE) * period + _REST
     return float(np.ceil(time * rate - 1e-6) / rate)
 
 
 def _one_axis(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, Array, Array]:
     """Return the signal of an axis, its peak 1, and its time derivatives [1, 1/s, 1/s^2]."""
-    period = parameters['motion.response.period']
+    period = parameters.motion.response.period
     signal = multisine(_highest(parameters))
     x, dx, ddx = signal.at(time / period)
     dx, ddx = dx / period, ddx / period ** 2
-    end = (1.0 + parameters['motion.response.periods'] + _FADE) * period
+    end = (1.0 + parameters.motion.response.periods + _FADE) * period
     fade = _FADE * period
     ends = time > 0.5 * end
     w, dw, ddw = quintic(np.clip(np.where(ends, end - time, time) / fade, 0.0, 1.0))
@@ -83,20 +83,18 @@ def _one_axis(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array
 
 
 def _highest(parameters: ReferenceMotionParameters) -> int:
-    highest, period = (
-        parameters[f'motion.response.{name}'] for name in ('highest_frequency', 'period'))
-    return int(highest * period + 1e-9)
+    response = parameters.motion.response
+    return int(response.highest_frequency * response.period + 1e-9)
 
 
 def _amplitudes_of(parameters: ReferenceMotionParameters) -> Array:
     """Return the peaks of the axes (6,) [m, rad]."""
-    if not parameters['motion.response.params_file']:
-        found: Array = parameters['motion.amplitude']
-        return found
+    if not parameters.motion.response.params_file:
+        return parameters.motion.amplitude
     return np.array(_amplitudes_within(
-        parameters['motion.response.params_file'], tuple(parameters['motion.initial'].tolist()),
-        parameters['motion.response.part'], _highest(parameters),
-        parameters['motion.response.period']))
+        parameters.motion.response.params_file, tuple(parameters.motion.initial.tolist()),
+        parameters.motion.response.part, _highest(parameters),
+        parameters.motion.response.period))
 
 
 @lru_cache(maxsize=4)
@@ -114,7 +112,7 @@ def _amplitudes_within(path: str, initial: tuple[float, ...], part: float, highe
         raise ParameterError(f'{path}: {", ".join(missing)}: missing: the motion response needs '
                              'them, or motion.amplitude in place of motion.response.params_file')
     capability = Capability(platform)
-    size = platform.parameters['singularity.characteristic_length']
+    size = platform.parameters.singularity.characteristic_length
     center = np.array(initial)
     pose = Pose.from_euler(center[:3], center[3:])
     samples = np.arange(_SAMPLES * highest) / (_SAMPLES * highest)

@@ -68,10 +68,10 @@ class Report:
     def __init__(self, parameters: Parameters, measured: bool = False,
                  folder: Path | None = None) -> None:
         self._parameters = parameters
-        self._legs: tuple[str, ...] = parameters['joints']
+        self._legs: tuple[str, ...] = parameters.joints
         self._plotted = plotted(parameters)
         self._sources = len(sources_of(parameters))
-        timeout = parameters['setpoint.timeout']
+        timeout = parameters.setpoint.timeout
         self._curves = Curves(timeout)
         self._places: dict[str, slice] = {}
         self._spectrum = Spectrum(6, timeout, folder)
@@ -195,8 +195,8 @@ class Report:
             'end': times[-1] if len(times) else 0.0,
             'legs': self._legs,
             'forceColors': FORCE_COLORS,
-            'baseJoints': p['geometry.base_joints'],
-            'platformJoints': p['geometry.platform_joints'],
+            'baseJoints': p.geometry.base_joints,
+            'platformJoints': p.geometry.platform_joints,
             'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8'),
                        'places': _FRAME},
             'warnings': singularity['warnings_from_to_s'],

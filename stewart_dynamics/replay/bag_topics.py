@@ -28,8 +28,8 @@ _OF_BASE = tuple(dict.fromkeys(key for keys in inputs.BASE_SOURCES.values() for 
 
 def find_topics(recording: Recording, parameters: Parameters, options: Options) -> dict[str, str]:
     """Return the name in the bag of each topic that is read."""
-    wanted = inputs.SOURCES[parameters['setpoint.source']]
-    of_base = inputs.BASE_SOURCES[parameters['base.source']]
+    wanted = inputs.SOURCES[parameters.setpoint.source]
+    of_base = inputs.BASE_SOURCES[parameters.base.source]
     for key in inputs.INPUT_TYPES:
         if key not in (*wanted, *of_base, inputs.WRENCH) and name_of(key) in options.topics:
             source = 'base.source' if key in _OF_BASE else 'setpoint.source'
@@ -45,7 +45,7 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
             _others(key, options, named.values()), _advice(recording, key))
     for key in of_base:
         found[key] = named.get(key) or _base_by_type(
-            recording, key, options, parameters['base.source'], found)
+            recording, key, options, parameters.base.source, found)
     # A WrenchStamped found by its type could be anything: a load cell, an estimate.
     if load := _named(recording, inputs.WRENCH, options, ending=False):
         found[inputs.WRENCH] = load
@@ -105,7 +105,7 @@ def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Para
              or kind == inputs.INPUT_TYPES[inputs.BASE_IMU]
              or name.endswith(f'/{inputs.BASE_POSE}')))
     if base:
-        notices.append(f'{joined(base)}: not used: base.source is {parameters["base.source"]}')
+        notices.append(f'{joined(base)}: not used: base.source is {parameters.base.source}')
     legs = recording.topics_of(type_names.JOINT_STATE,
                                {*topics.values(), *_computed_by(options.node)})
     if legs and MEASURED not in topics:

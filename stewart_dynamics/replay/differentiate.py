@@ -61,7 +61,7 @@ def differentiator(parameters: Parameters, options: Options) -> Differentiator |
     """Return what computes the motion of poses by a cut-off frequency; None without one."""
     # A period of the cut-off frequency is the longest step that splines can bridge.
     return None if options.cutoff is None else Differentiator(
-        options.cutoff, max(parameters['setpoint.timeout'], 1.0 / options.cutoff))
+        options.cutoff, max(parameters.setpoint.timeout, 1.0 / options.cutoff))
 
 
 class Differentiator:

@@ -15,9 +15,8 @@ from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.mechanics.drives.motor_limits import (
     bound_of, largest_speeds, largest_torques)
 from stewart_dynamics.mechanics.drives.motors import Motors
-from stewart_dynamics.mechanics.limits import TORQUE_MAX, TORQUE_SPEED
+from stewart_dynamics.mechanics.limits import TORQUE_MAX
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.motor_loads import CONTINUOUS
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES
 
@@ -96,7 +95,7 @@ class Deliverable:
 
     def __init__(self, parameters: Parameters, leg: int) -> None:
         self._parameters, self._leg = parameters, leg
-        self._curve = parameters[TORQUE_SPEED]
+        self._curve = parameters.drive.torque_speed
         self.torque = float(bound_of(parameters, TORQUE_MAX)[leg])
         if self._curve is not None:
             self.torque = min(self.torque, float(self._curve[:, 1].max()))
@@ -125,7 +124,7 @@ def motor_charts(points: OperatingPoints, parameters: Parameters,
     The loads are ``motors.legs`` of summary.json.
     """
     limits = [Deliverable(parameters, leg) for leg in range(6)]
-    continuous = parameters[CONTINUOUS]
+    continuous = parameters.drive.torque_continuous
     speed, torque = points.extent
     speed = 1.06 * _scale(speed, [limit.speed for limit in limits])
     torque = 1.08 * _scale(torque, [*(limit.torque for limit in limits),
@@ -172,7 +171,7 @@ def _chart(points: OperatingPoints, leg: int, name: str, limit: Deliverable,
         left, top, width, _ = _FRAME
         picture.text([left + width, top - 8.0], f'deliverable to {" and ".join(outside)}', 'end',
                      css='tick')
-    continuous = parameters[CONTINUOUS]
+    continuous = parameters.drive.torque_continuous
     if continuous is not None and continuous[leg] <= torque:
         for level in (continuous[leg], -continuous[leg]):
             picture.line(*chart.at([[0.0, level], [speed, level]]), css='continuous')

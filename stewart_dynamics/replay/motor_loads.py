@@ -19,13 +19,12 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.limits import (
-    LIMITS, OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
+    LIMITS, OF_MOTORS, SPEED_MAX, TORQUE_SPEED)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.block_statistics import Exceeded, Extreme, finite, Integral
 from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
 
 MARGIN = 1.2  # factor on torques and speed of the motor that is needed
-CONTINUOUS = 'drive.torque_continuous'
 _OF_VELOCITY = TORQUE_SPEED, SPEED_MAX
 
 
@@ -103,14 +102,14 @@ class MotorLoads:
             {key: load[key] for key, *_ in NEEDS.values()} for load in loads.values())}
 
     def _motor(self, leg: int) -> dict[str, float | None]:
-        p = self._parameters
-        limited = p[TORQUE_MAX] is not None or p[TORQUE_SPEED] is not None
-        continuous, fastest = (None if p[name] is None else p[name][leg]
-                               for name in (CONTINUOUS, SPEED_MAX))
+        drive = self._parameters.drive
+        limited = drive.torque_max is not None or drive.torque_speed is not None
+        continuous, fastest = (None if each is None else each[leg]
+                               for each in (drive.torque_continuous, drive.speed_max))
         rms, heat = math.sqrt(self._means.mean[leg]), self._electrical.mean[leg]
-        speed, constant = self._speed.values[leg], p['drive.torque_constant']
-        steady = math.nan if p['drive.thermal_resistance'] is None else (
-            heat * p['drive.thermal_resistance'][leg])
+        speed, constant = self._speed.values[leg], drive.torque_constant
+        steady = math.nan if drive.thermal_resistance is None else (
+            heat * drive.thermal_resistance[leg])
         found = {
             **self._torque.named(leg, 'torque_peak', 'n_m'),
             'torque_rms_n_m': rms,
@@ -125,8 +124,8 @@ class MotorLoads:
             **self._rise.named(leg, 'temperature_rise_max', 'k'),
             'temperature_rise_steady_k': steady,
             'temperature_rise_margin_k': (
-                None if p[TEMPERATURE_RISE_MAX] is None
-                else p[TEMPERATURE_RISE_MAX][leg] - self._rise.values[leg])}
+                None if drive.temperature_rise_max is None
+                else drive.temperature_rise_max[leg] - self._rise.values[leg])}
         if self._quasi_static:
             found |= {key: None for key in found if 'speed' in key}
         return {key: finite(value) for key, value in found.items()}

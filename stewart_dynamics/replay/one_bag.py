@@ -87,7 +87,7 @@ def replay(
     made_of = fingerprint(bag, parameters, options)
     parameters = options.applied_to(parameters, bag)
     with closing(Recording(
-            bag, options.reading, parameters['platform_frame'],
+            bag, options.reading, parameters.platform_frame,
             lambda: StewartPlatform(parameters).home_pose().position)) as recording:
         topics = find_topics(recording, parameters, options)
         notices = notices_of(recording, topics, parameters, options)
@@ -146,7 +146,7 @@ class _Run:
         self.notices: list[str] = []
         self._more = 0
         self._quasi_static = (
-            parameters['setpoint.source'] == POSES_ALONE and options.cutoff is None)
+            parameters.setpoint.source == POSES_ALONE and options.cutoff is None)
         if self._quasi_static:
             self.notices.append('setpoint.source is pose: the forces are those at rest')
         self._firsts: dict[Rejection, _First] = {}
@@ -165,7 +165,7 @@ class _Run:
             parameters, options.motor_torque, options.motor_current)
         self._comparison = None if options.measured is None else Comparison(
             parameters, self._per_effort is not None)
-        self._efforts = Efforts(parameters['joints'])
+        self._efforts = Efforts(parameters.joints)
         self._response = RecordedResponse(
             parameters, topics, self._setpoints.reject) if options.response else None
         self.followed: Followed | None = None
@@ -343,7 +343,7 @@ class _Run:
         self._compared(self._comparison.add_measured(stamps, efforts))
 
     def _efforts_recorded(self, messages: Messages) -> bool:
-        reader = JointStateReader(self._parameters['joints'], ['effort'])
+        reader = JointStateReader(self._parameters.joints, ['effort'])
         return len(reader.read_many(messages.data, messages.starts, messages.sizes).stamps) > 0
 
     def _compared(self, compared: Any) -> None:

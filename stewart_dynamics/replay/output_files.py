@@ -22,7 +22,7 @@ from typing import Any
 
 from stewart_dynamics.bags.find import OUTPUT_BAG
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
+from stewart_dynamics.mechanics.limits import OF_JOINTS
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import unexpected
@@ -52,11 +52,11 @@ class OutputFiles:
                  quasi_static: bool, inputs: Sequence[str]) -> None:
         model = _model(parameters, options.node.strip('/'))
         self._table = kind_of_table(options.parquet)(
-            folder, parameters['joints'], quasi_static,
+            folder, parameters.joints, quasi_static,
             any(parameters[name] is not None for name in OF_JOINTS),
-            parameters[CLEARANCE_MIN] is not None)
+            parameters.limits.leg_clearance_min is not None)
         self._bag = OutputBag(folder / OUTPUT_BAG, options.node, OutputMessages(parameters), model,
-                              parameters['visualization_rate'], inputs)
+                              parameters.visualization_rate, inputs)
 
     def write(self, block: Answered) -> None:
         """Write setpoints."""

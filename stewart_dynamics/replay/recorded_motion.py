@@ -53,7 +53,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
     splines = differentiator(parameters, options)
     batches: list[Batch] = []
     with closing(Recording(
-            bag, options.reading, parameters['platform_frame'],
+            bag, options.reading, parameters.platform_frame,
             (lambda: StewartPlatform(parameters).home_pose().position) if home else None,
             )) as recording:
         topics = find_topics(recording, parameters, options)

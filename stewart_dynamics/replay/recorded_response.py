@@ -64,10 +64,10 @@ class RecordedResponse:
         self._platform = StewartPlatform(parameters)
         self.key = MEASURED_POSE if MEASURED_POSE in topics else MEASURED
         self._topic = topics[self.key]
-        self._legs = JointStateReader(parameters['joints'], ['position'])
+        self._legs = JointStateReader(parameters.joints, ['position'])
         self._rejections = Rejections(
             lambda rejection, details: reject(self.key, rejection.reason, details, 1))
-        self._poses = SampleReader(inputs.POSE, parameters['base_frame'], self._rejections)
+        self._poses = SampleReader(inputs.POSE, parameters.base_frame, self._rejections)
         self._commanded = Tracks(12)
         self._measured = Tracks(6 if self.key == MEASURED else 12)
         self.notices: list[str] = []
@@ -132,17 +132,17 @@ class RecordedResponse:
                 self.notices.append(f'response: {tracks.left_out} samples of {name} are left out: '
                                     'their stamps do not increase')
         check_overlap(commanded, measured, self._topic)
-        timeout = self._parameters['setpoint.timeout']
+        timeout = self._parameters.setpoint.timeout
         legs: dict[str, Any] = {'legs': {}, 'leg_balance': None}
         if self.key == MEASURED:
             measured = measured._replace(
-                values=measured.values + self._parameters['geometry.zero_length'])
+                values=measured.values + self._parameters.geometry.zero_length)
             lengths = commanded._replace(values=self._platform.inverse_kinematics(
                 Pose(commanded.values[:, POSITION],
                      commanded.values[:, ROTATION].reshape(-1, 3, 3))))
             own = at_even_times(lengths, measured, timeout)
             if own.runs:
-                legs = legs_response(own, self._parameters['joints'])
+                legs = legs_response(own, self._parameters.joints)
             measured, lost = achieved_poses(self._platform.structure, measured, commanded)
             if lost:
                 self._reject(self.key, NO_POSE, '', lost)
@@ -154,7 +154,7 @@ class RecordedResponse:
         if not samples.runs:
             raise StewartError(f'response: setpoints and {self._topic} have no time without a gap '
                                'in common that is long enough')
-        size = self._parameters['singularity.characteristic_length']
+        size = self._parameters.singularity.characteristic_length
         axes = axes_response(samples, size)
         self.notices += clock_notices(commanded, measured, self._topic, [
             axes[name]['delay'] for name in AXES if axes[name]['delay'] is not None],

@@ -51,7 +51,7 @@ class Options(NamedTuple):
         source = ('pose' if self.cutoff is not None
                   else 'combined' if 'combined' in self.topics
                   else 'separate' if bag.suffix.lower() == TABLE
-                  and parameters['setpoint.source'] == 'combined' else None)
+                  and parameters.setpoint.source == 'combined' else None)
         return parameters.replaced({'setpoint.source': source}) if source else parameters
 
 

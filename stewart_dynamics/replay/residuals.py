@@ -114,7 +114,7 @@ class Comparison:
         self._losses = of_motors and has_losses(parameters)
         self._ratio = motor_ratio(parameters)
         self._platform = StewartPlatform(parameters)
-        gap = parameters['setpoint.timeout']
+        gap = parameters.setpoint.timeout
         self._gap = round(gap * SECOND)
         self._setpoints = Waiting(self._gap, _SETPOINTS_WAITING)
         self._samples = Waiting(self._gap, _SAMPLES_WAITING)
@@ -185,7 +185,7 @@ class Comparison:
 
     def values(self) -> dict[str, Any]:
         """Return the part of summary.json."""
-        joints, mistake = self._parameters['joints'], self._sums.mistake()
+        joints, mistake = self._parameters.joints, self._sums.mistake()
         load_known = mistake is None or mistake.leaves_wrench
         wrench = self._wrench if load_known else _Statistics()
         return {
@@ -235,7 +235,7 @@ class Comparison:
         number = max(self._legs.count, 1)
         force = float(np.sqrt(np.mean(
             self._sums.computed_squares + self._sums.measured_squares) / number))
-        length = self._parameters['singularity.characteristic_length']
+        length = self._parameters.singularity.characteristic_length
         smallest = 1e-3 * force * np.array([1.0, 1.0, 1.0, length, length, length])
         middle, deviation = self._bins.middle()
         threshold = np.maximum(6.0 * deviation, smallest)

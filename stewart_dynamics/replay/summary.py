@@ -81,8 +81,8 @@ class Summary:
 
     def __init__(self, parameters: Parameters, quasi_static: bool = False) -> None:
         self._quasi_static = quasi_static
-        self._legs: tuple[str, ...] = parameters['joints']
-        self._timeout: float = parameters['setpoint.timeout']
+        self._legs = parameters.joints
+        self._timeout = parameters.setpoint.timeout
         self._limits = Limits(parameters)
         self._exceeded = {
             name: Exceeded(LIMITS[name].minimum)

@@ -78,7 +78,7 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
 
     first: position of the first setpoint [m]; the curves of positions begin there.
     """
-    joints, begin = p['joints'], ', '.join(f'{each:.6g}' for each in first)
+    joints, begin = p.joints, ', '.join(f'{each:.6g}' for each in first)
     of_motion = [
         Plot('velocity', 'Velocity of the platform', 'm/s',
              _of_axes(at['velocity'], 'v x', 'v y', 'v z'), 'of its origin, base axes'),
@@ -104,7 +104,7 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
         *_of_results(p, at, (LENGTH_MIN, LENGTH_MAX)),
         *(_of_joints(p, limit, at['joint_angles'].start) for limit in OF_JOINTS
           if p[limit] is not None),
-        *([] if p[CLEARANCE_MIN] is None else [
+        *([] if p.limits.leg_clearance_min is None else [
             _bounded(p, [CLEARANCE_MIN], 'Clearance between the legs', at['clearances'],
                      'from each leg to the nearest other leg')]),
         Plot('determinant', 'det(J)', 'm³',
@@ -114,8 +114,8 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
         Plot('condition', 'Condition number of J_inv', '–',
              {'': [Curve('condition', LEG_COLORS[1], at['condition'].start)]},
              'dimensionless; 1 is best', [
-                 Bound(p['singularity.warn_condition'], 'warn', ROLES['near']),
-                 Bound(p['singularity.stop_condition'], 'stop', ROLES['singular'])], log=True),
+                 Bound(p.singularity.warn_condition, 'warn', ROLES['near']),
+                 Bound(p.singularity.stop_condition, 'stop', ROLES['singular'])], log=True),
         *_of_results(p, at, OF_LOADS),
         *(of_rates if velocities_known else ()),
         *(_of_motors(p, at, velocities_known) if p.drives else ()),
@@ -145,7 +145,7 @@ def _bounded(p: Parameters, limits: Sequence[str], title: str, channels: slice, 
              both: bool = False, spikes: bool = False) -> Plot:
     """Return the plot of a quantity with limits, the lower one first; both: of either sign."""
     quantity = LIMITS[limits[0]].quantity
-    return Plot(quantity.key, title, quantity.unit, _of_legs(p['joints'], channels), note,
+    return Plot(quantity.key, title, quantity.unit, _of_legs(p.joints, channels), note,
                 [bound for limit in limits for bound in _bounds(limit, p[limit], both)],
                 spikes=spikes)
 
@@ -155,7 +155,7 @@ def _of_joints(p: Parameters, limit: str, first: int) -> Plot:
     which, joint = ANGLES[limit], 'base' if limit == BASE_ANGLE_MAX else 'platform'
     return Plot(
         LIMITS[limit].quantity.key, f'Angles of the {joint} joints', 'deg',
-        _of_legs(p['joints'], slice(first + which.start, first + which.stop)),
+        _of_legs(p.joints, slice(first + which.start, first + which.stop)),
         f'between the leg and geometry.{joint}_joint_axes, by default its direction at home',
         _bounds(limit, np.degrees(p[limit])))
 
@@ -194,9 +194,9 @@ def measured_plots(p: Parameters, at: Places) -> list[Plot]:
             leg: [Curve('measured', _BLACK, at['measured'].start + n),
                   Curve('computed', LEG_COLORS[n], at['computed'].start + n),
                   Curve('residual', ROLES['faint'], at['residual'].start + n, 'dot')]
-            for n, leg in enumerate(p['joints'])}, 'residual: measured less computed',
+            for n, leg in enumerate(p.joints)}, 'residual: measured less computed',
             contacts=True, spikes=True),
-        Plot('residuals', 'Residual of every leg', 'N', _of_legs(p['joints'], at['residual']),
+        Plot('residuals', 'Residual of every leg', 'N', _of_legs(p.joints, at['residual']),
              'measured less computed force', contacts=True, spikes=True),
         Plot('external_force', 'External force', 'N',
              _of_axes(at['external_force'], 'F x', 'F y', 'F z'),
@@ -213,11 +213,11 @@ def _of_motors(p: Parameters, at: Places, velocities_known: bool) -> Iterator[Pl
     if velocities_known:
         yield _bounded(p, [SPEED_MAX], 'Speeds of the motors', at['speeds'], '+ extends',
                        both=True)
-        if p['drive.resistance'] is not None:
+        if p.drive.resistance is not None:
             yield Plot('bus_power', 'Power of the bus', 'W', {
                 '': [Curve('bus', _BLACK, at['bus_power'].start)]},
                 'electrical, of all motors; − flows back', spikes=True)
-    if p['drive.thermal_resistance'] is not None:
+    if p.drive.thermal_resistance is not None:
         yield _bounded(p, [TEMPERATURE_RISE_MAX], 'Temperature rises of the windings', at['rises'],
                        'above ambient, from ambient at the beginning')
 

@@ -44,7 +44,7 @@ class ManagedNode(LifecycleNode, Generic[Kind]):
 
     def start(self) -> None:
         """Configure and activate the node if ``autostart`` is set."""
-        if not self._settings['autostart']:
+        if not self._settings.autostart:
             self.get_logger().info('unconfigured: autostart is false')
             return
         self._starting = True

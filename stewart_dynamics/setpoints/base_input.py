@@ -47,16 +47,16 @@ class BaseInput:
 
     def __init__(self, parameters: Parameters, rejections: Rejections,
                  noticed: Callable[[str], object]) -> None:
-        source = parameters['base.source']
+        source = parameters.base.source
         self.topics = BASE_SOURCES[source]  # topics of the base; empty if the base is fixed
         self.joining = SampleJoining(
-            self.topics, None if source == BY_IMU else parameters['world_frame'],
-            parameters['setpoint.sync_tolerance'], parameters['base.timeout'], rejections,
+            self.topics, None if source == BY_IMU else parameters.world_frame,
+            parameters.setpoint.sync_tolerance, parameters.base.timeout, rejections,
             lambda text: noticed(f'base: {text}'))
         """Joins the samples of the topics."""
-        self._timeout = round(parameters['base.timeout'] * SECOND)
-        self._restart = round(parameters['setpoint.timeout'] * SECOND)
-        gravity: Any = tuple(parameters['gravity'].tolist())
+        self._timeout = round(parameters.base.timeout * SECOND)
+        self._restart = round(parameters.setpoint.timeout * SECOND)
+        gravity: Any = tuple(parameters.gravity.tolist())
 
         def of_pose(stamp: int, values: Any) -> _Row:
             return row_of_pose(values[3:12], gravity)
@@ -71,8 +71,8 @@ class BaseInput:
         self._samples: deque[tuple[int, _Row]] = deque(maxlen=_KEPT)
         self._gravity = MeasuredGravity(parameters) if self.topics else None
         self.consistency = Consistency(
-            parameters['singularity.characteristic_length'],
-            (parameters['world_frame'], parameters['base_frame'])) if source == MOVING else None
+            parameters.singularity.characteristic_length,
+            (parameters.world_frame, parameters.base_frame)) if source == MOVING else None
         """The check of the samples' twists and accelerations; None without samples."""
 
     @property
@@ -203,12 +203,12 @@ class _OfImu:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self._position: Any = tuple(parameters['base.imu.position'].tolist())
-        x, y, z, w = parameters['base.imu.orientation'].tolist()
+        self._position: Any = tuple(parameters.base.imu.position.tolist())
+        x, y, z, w = parameters.base.imu.orientation.tolist()
         length = math.sqrt(x * x + y * y + z * z + w * w)
         self._rotation = from_quaternion(x / length, y / length, z / length, w / length)
-        self._rate = 2.0 * math.pi * parameters['base.imu.cutoff']
-        self._timeout = round(parameters['base.timeout'] * SECOND)
+        self._rate = 2.0 * math.pi * parameters.base.imu.cutoff
+        self._timeout = round(parameters.base.timeout * SECOND)
         self._last: tuple[int, Any] | None = None
         self._filtered = 0.0, 0.0, 0.0
 

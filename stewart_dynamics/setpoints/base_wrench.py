@@ -36,7 +36,7 @@ class BaseWrench:
 
     def __init__(self, parameters: Parameters) -> None:
         self._platform = StewartPlatform(parameters)
-        self._still = tuple(BaseMotion(parameters['gravity']).rows.tolist())
+        self._still = tuple(BaseMotion(parameters.gravity).rows.tolist())
         self._sample = Sample('one_motion', 'base', 'base_wrench')
         self._solve = function('base_wrench_one').bound(
             self._platform.structure, self._sample.numbers)

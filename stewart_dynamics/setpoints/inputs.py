@@ -227,7 +227,7 @@ class WrenchInput:
     def __init__(self, parameters: Parameters, rejections: Rejections) -> None:
         self.wrench: Six = NO_WRENCH
         """Force and moment at the platform's origin, base axes [N, N m]."""
-        self.reader = SampleReader(WRENCH, parameters['base_frame'], rejections)
+        self.reader = SampleReader(WRENCH, parameters.base_frame, rejections)
 
     def take(self, data: bytes) -> None:
         """Use the wrench of this geometry_msgs/WrenchStamped from now on, if it is valid."""

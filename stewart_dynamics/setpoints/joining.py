@@ -47,16 +47,16 @@ class Setpoints:
     def __init__(
             self, parameters: Parameters, rejected: Callable[[Rejection, str], None],
             noticed: Callable[[str], object]) -> None:
-        self.topics = SOURCES[parameters['setpoint.source']]
+        self.topics = SOURCES[parameters.setpoint.source]
         self._rejections = Rejections(rejected)
         self._wrench_input = WrenchInput(parameters, self._rejections)
         self.base = BaseInput(parameters, self._rejections, noticed)  # the motion of the base
         self._joining = SampleJoining(
-            self.topics, parameters['base_frame'], parameters['setpoint.sync_tolerance'],
-            parameters['setpoint.timeout'], self._rejections, noticed)
-        self._consistency = None if parameters['setpoint.source'] == POSES_ALONE else Consistency(
-            parameters['singularity.characteristic_length'],
-            (parameters['base_frame'], parameters['platform_frame']))
+            self.topics, parameters.base_frame, parameters.setpoint.sync_tolerance,
+            parameters.setpoint.timeout, self._rejections, noticed)
+        self._consistency = None if parameters.setpoint.source == POSES_ALONE else Consistency(
+            parameters.singularity.characteristic_length,
+            (parameters.base_frame, parameters.platform_frame))
         self._checks = [each for each in (self._consistency, self.base.consistency) if each]
         self._parameters = parameters
         # Rows of motion; empty before the first.

@@ -69,7 +69,7 @@ class MeasuredGravity:
 
     def __init__(self, parameters: Parameters) -> None:
         self._home = home_of(parameters)
-        self._is_imu = parameters['base.source'] == BY_IMU
+        self._is_imu = parameters.base.source == BY_IMU
         self._texts = _OF_IMU if self._is_imu else _OF_POSE
         self._stamps: list[int] = []
         self._rows: list[Sequence[float]] = []

@@ -43,7 +43,7 @@ class MotorStep:
                  ) -> None:
         self._arguments = Drives(parameters).arguments
         self._limits = MotorLimits(parameters)
-        self._warms = parameters['drive.thermal_resistance'] is not None
+        self._warms = parameters.drive.thermal_resistance is not None
         self._sample = sample = Sample('one_motors', 'windings', 'windings', 'motors')
         self._motors = sample['motors']
         self._solve = function('check_motors_many').bound(

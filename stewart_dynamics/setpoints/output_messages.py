@@ -51,13 +51,13 @@ class OutputMessages:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self._zero_lengths = parameters['geometry.zero_length'].tolist()
-        leg_states = JointStateWriter(parameters['joints'])
+        self._zero_lengths = parameters.geometry.zero_length.tolist()
+        leg_states = JointStateWriter(parameters.joints)
         self._with_effort, self._without_effort = (
             leg_states.layout(effort) for effort in (True, False))
         self._motors = motor_states_writer(parameters)
         self.types = OUTPUT_TYPES | (MOTOR_TYPES if self._motors else {})
-        self._wrench = StampedWriter(parameters['base_frame'], 6)
+        self._wrench = StampedWriter(parameters.base_frame, 6)
 
     def of_output(self, output: Output) -> Iterator[tuple[str, bytes]]:
         """Yield topics (keys of ``types``) and messages for an output; see of_wrench."""
@@ -137,5 +137,5 @@ class OutputMessages:
 
 def motor_states_writer(parameters: Parameters) -> JointStateWriter | None:
     """Return the writer of the states of the motors; None without ``drive.*``."""
-    names = [f'{joint}_motor' for joint in parameters['joints']]
+    names = [f'{joint}_motor' for joint in parameters.joints]
     return JointStateWriter(names) if parameters.drives else None

@@ -259,10 +259,10 @@ class Step:
         self._sample = sample = Sample(
             'one_setpoint', 'base_known', 'answered', 'exceeding', 'jumped', 'result', 'forces',
             'after')
-        self._limits_suppress = parameters['limits.action'] == SUPPRESS_FORCES
+        self._limits_suppress = parameters.limits.action == SUPPRESS_FORCES
         # Margin by which the time between two setpoints may exceed that between their stamps [s].
-        self._slack = JITTER + parameters['setpoint.sync_tolerance']
-        self._slack_of_arrival = JITTER + parameters['setpoint.timeout']
+        self._slack = JITTER + parameters.setpoint.sync_tolerance
+        self._slack_of_arrival = JITTER + parameters.setpoint.timeout
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._angles_of_one = (
             None if self._angles is None else self._angles.of_one(sample['motion']))

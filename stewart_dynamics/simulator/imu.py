@@ -20,13 +20,13 @@ class SimulatedImu:
     """An IMU mounted as ``base.imu`` says, with bias and noise."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
-        self._position = _vector(parameters['base.imu.position'])
-        self._to_imu = matrix_of_quaternion(parameters['base.imu.orientation']).T
-        self._bias = np.concatenate([parameters['imu.bias.angular_velocity'],
-                                     parameters['imu.bias.specific_force']])
-        self._deviations = np.repeat([parameters['imu.noise.angular_velocity'],
-                                      parameters['imu.noise.specific_force']], 3)
-        seed = int(np.float64(parameters['noise.seed']).view(np.uint64))
+        self._position = _vector(parameters.base.imu.position)
+        self._to_imu = matrix_of_quaternion(parameters.base.imu.orientation).T
+        self._bias = np.concatenate([parameters.imu.bias.angular_velocity,
+                                     parameters.imu.bias.specific_force])
+        self._deviations = np.repeat([parameters.imu.noise.angular_velocity,
+                                      parameters.imu.noise.specific_force], 3)
+        seed = int(np.float64(parameters.noise.seed).view(np.uint64))
         # Not the numbers of the noise of the legs, which has the same seed.
         self._noise = np.random.default_rng([seed, 1])
 

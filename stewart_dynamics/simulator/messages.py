@@ -41,10 +41,10 @@ class StateMessages:
     """Writes the messages of states."""
 
     def __init__(self, parameters: Parameters) -> None:
-        self._zero_lengths = parameters['geometry.zero_length'].tolist()
-        self._joint_state = JointStateWriter(parameters['joints'])
+        self._zero_lengths = parameters.geometry.zero_length.tolist()
+        self._joint_state = JointStateWriter(parameters.joints)
         self._motors = motor_states_writer(parameters)
-        frame = parameters['base_frame']
+        frame = parameters.base_frame
         self._pose, self._six = StampedWriter(frame, 7), StampedWriter(frame, 6)
 
     def write(self, stamp: int, state: PlantState) -> Iterator[tuple[str, bytes]]:
@@ -62,12 +62,12 @@ class BaseMessages:
     """Writes the messages of a base that moves."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
-        frame = parameters['world_frame']
+        frame = parameters.world_frame
         self._pose, self._six = StampedWriter(frame, 7), StampedWriter(frame, 6)
         self._imu = SimulatedImu(parameters)
-        self._imu_writer = ImuWriter(IMU, parameters['imu.noise.angular_velocity'],
-                                     parameters['imu.noise.specific_force'])
-        self._imu_periods = round(parameters['rate'] / parameters['imu.rate'])
+        self._imu_writer = ImuWriter(IMU, parameters.imu.noise.angular_velocity,
+                                     parameters.imu.noise.specific_force)
+        self._imu_periods = round(parameters.rate / parameters.imu.rate)
 
     def write(self, stamp: int, index: int, period: BasePeriod) -> Iterator[tuple[str, bytes]]:
         """Yield topics and messages for the end of a period: its time [ns] and its number."""

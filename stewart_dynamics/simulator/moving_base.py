@@ -58,10 +58,10 @@ class GeneratedBaseMotion:
     """A base that moves about its center, from rest on."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
-        self.harmonics = (_sea if parameters['base_motion.source'] == 'sea' else _sine)(parameters)
-        self._center: Array = parameters['base_motion.center']
-        self._arm: Array = parameters['base_motion.lever_arm']
-        self._ramp = max(parameters['base_motion.ramp'], _SHORTEST_RAMP)
+        self.harmonics = (_sea if parameters.base_motion.source == 'sea' else _sine)(parameters)
+        self._center = parameters.base_motion.center
+        self._arm = parameters.base_motion.lever_arm
+        self._ramp = max(parameters.base_motion.ramp, _SHORTEST_RAMP)
 
     def at(self, times: ArrayLike) -> Motion:
         """Return the motion of the base frame in the world at times (...) [s] from its begin."""
@@ -87,9 +87,9 @@ class GeneratedBaseMotion:
 
 
 def _sine(parameters: SimulatorParameters) -> Harmonics:
-    return Harmonics(parameters['base_motion.amplitude'][None],
-                     2.0 * np.pi * parameters['base_motion.frequency'][None],
-                     parameters['base_motion.phase'][None])
+    return Harmonics(parameters.base_motion.amplitude[None],
+                     2.0 * np.pi * parameters.base_motion.frequency[None],
+                     parameters.base_motion.phase[None])
 
 
 def _sea(parameters: SimulatorParameters) -> Harmonics:
@@ -99,17 +99,17 @@ def _sea(parameters: SimulatorParameters) -> Harmonics:
     Each wave has the energy of a band of the spectrum and a random frequency in it, so that the
     motion does not repeat.
     """
-    random = np.random.default_rng(np.float64(parameters['base_motion.sea.seed']).view(np.uint64))
+    random = np.random.default_rng(np.float64(parameters.base_motion.sea.seed).view(np.uint64))
     edges = np.linspace(_LOWEST, _HIGHEST, _WAVES + 1)
     # the integral of the spectrum from zero to each edge [m^2]
-    energy = parameters['base_motion.sea.wave_height'] ** 2 / 16.0 * np.exp(-1.25 * edges ** -4.0)
+    energy = parameters.base_motion.sea.wave_height ** 2 / 16.0 * np.exp(-1.25 * edges ** -4.0)
     heights = np.sqrt(2.0 * np.diff(energy))
     relative = random.uniform(edges[:-1], edges[1:])
     phases = random.uniform(0.0, 2.0 * np.pi, _WAVES)
-    peak = 2.0 * np.pi / parameters['base_motion.sea.peak_period']
-    return Harmonics(heights[:, None] * parameters['base_motion.sea.response'],
+    peak = 2.0 * np.pi / parameters.base_motion.sea.peak_period
+    return Harmonics(heights[:, None] * parameters.base_motion.sea.response,
                      np.repeat(peak * relative[:, None], 6, axis=1),
-                     phases[:, None] + parameters['base_motion.phase'])
+                     phases[:, None] + parameters.base_motion.phase)
 
 
 # Periods that are computed at once: one alone takes as long as some of them.
@@ -131,8 +131,8 @@ class GeneratedBase:
 
     def __init__(self, parameters: SimulatorParameters) -> None:
         self._motion = GeneratedBaseMotion(parameters)
-        self._gravity: Array = parameters['gravity']
-        self._rate: float = parameters['rate']
+        self._gravity = parameters.gravity
+        self._rate = parameters.rate
         self._first = -1
         self._periods: list[BasePeriod] = []
         self._rest = self._computed(np.zeros(3))[0]
@@ -175,11 +175,11 @@ class BaseOfTopics:
             {'base.source': 'motion'}, 'base_motion.source'), rejections, noticed)
         """Takes the messages."""
         self._noticed = noticed
-        self._timeout: float = parameters['base.timeout']
-        self._half = 0.5e9 / parameters['rate']
+        self._timeout = parameters.base.timeout
+        self._half = 0.5e9 / parameters.rate
         self._known = False
         self._last: Array = np.zeros((3, BASE))
-        self._last[:, GRAVITY] = parameters['gravity']
+        self._last[:, GRAVITY] = parameters.gravity
 
     def period(self, index: int, end: int) -> BasePeriod:
         """Return the period that ends at a stamp [ns]."""

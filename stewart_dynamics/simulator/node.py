@@ -87,21 +87,21 @@ class SimulatorNode(Node):
         self._state_messages = StateMessages(self._settings)
         self._rejections = Rejections(self._on_rejection)
         self._wrench_input = WrenchInput(self._settings, self._rejections)
-        source = self._settings['base_motion.source']
+        source = self._settings.base_motion.source
         self._base: GeneratedBase | BaseOfTopics | None = (
             None if source == 'fixed' else GeneratedBase(self._settings) if source != 'topics'
             else BaseOfTopics(self._settings, self._rejections, self.get_logger().warning))
         self._base_messages = BaseMessages(self._settings)
         self._base_now: BasePeriod | None = None
         self._commands: Six | None = None
-        self._torques = self._settings['commands'] == TORQUE
+        self._torques = self._settings.commands == TORQUE
         self._index = 0
         self._braked = False
         self._commanded = 0  # the index at the last command
         self._begun = 0  # the index at the first one
-        timeout = self._settings['command_timeout']
-        self._patience = math.inf if timeout is None else timeout * self._settings['rate']
-        rate: float = self._settings['rate']
+        timeout = self._settings.command_timeout
+        self._patience = math.inf if timeout is None else timeout * self._settings.rate
+        rate: float = self._settings.rate
         self._periods = DuePeriods(rate, partial(self._say, 'late'), _BEGIN)
         qos = QoSProfile(depth=_QUEUE)
         self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
@@ -199,7 +199,7 @@ class SimulatorNode(Node):
             self._braked = True
             self._plant.brake()
             self.get_logger().warning(
-                f'no command for {self._settings["command_timeout"]:g} s: brakes engaged')
+                f'no command for {self._settings.command_timeout:g} s: brakes engaged')
 
     def _move_base(self) -> None:
         """Move the base, if it moves, on to the end of the present period."""
@@ -234,7 +234,7 @@ class SimulatorNode(Node):
 
     def _log_saturated(self, commands: Six, applied: tuple[float, ...]) -> None:
         joint, command, value = max(
-            zip(self._settings['joints'], commands, applied, strict=True),
+            zip(self._settings.joints, commands, applied, strict=True),
             key=lambda leg: abs(leg[1] - leg[2]))
         unit, limit = (('N m', 'drive.torque_max or drive.torque_speed') if self._torques
                        else ('N', 'limits.force_max'))

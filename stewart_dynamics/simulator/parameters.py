@@ -9,80 +9,114 @@ Apart from the plant itself, so that ``--help`` and the check of a file need no 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 import math
 from types import MappingProxyType
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.limits import FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_LEGS
-from stewart_dynamics.parameters.parameter_set import Parameter
+from stewart_dynamics.parameters.parameter_set import declare, ParameterGroup
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
 _POSE = 'X Y Z alpha beta gamma'
 
 FORCE, TORQUE = 'force', 'torque'  # values of commands
 
-_OWN = (
-    Parameter('initial_pose', 'double', 'X Y Z alpha beta gamma, where the brakes hold the '
-              'platform until the first command', 'm, rad', required=True, sizes=(6,)),
-    Parameter('step', 'double', 'step of the integration; smaller where friction or end stops '
-              'need it', 's', 1e-3, minimum=1e-5, maximum=1e-3),
-    Parameter('rate', 'double', 'rate of the published states; a period is a whole number of '
-              'steps. With use_sim_time each command advances time by one period', 'Hz', 500.0,
-              minimum=1.0, maximum=1e4),
-    Parameter('command_timeout', 'double', 'time without a command after which the brakes engage, '
-              'as those of a drive; they release with the next command; if not set, the last '
-              'command is held', 's', minimum=0.0, maximum=1e6, above=True),
-    Parameter('commands', 'string', 'quantity on ~/commands: forces of the legs [N], or torques '
-              'of the motors [N m], with drive.*', '', FORCE, choices=(FORCE, TORQUE)),
-    Parameter('end_stops.frequency', 'double', 'natural frequency of the mass of a leg on its end '
-              'stop: its reflected mass and a sixth of platform and pistons', 'Hz', 30.0,
-              minimum=0.0, above=True),
-    Parameter('end_stops.damping_ratio', 'double', 'damping ratio of the same; 1: no rebound',
-              '', 0.5, minimum=0.0),
-    Parameter('noise.length', 'double', 'standard deviation of the measured lengths', 'm', 0.0,
-              minimum=0.0, maximum=1e9),
-    Parameter('noise.rate', 'double', 'standard deviation of the measured rates', 'm/s', 0.0,
-              minimum=0.0, maximum=1e9),
-    Parameter('noise.force', 'double', 'standard deviation of the measured forces', 'N', 0.0,
-              minimum=0.0, maximum=1e9),
-    Parameter('noise.seed', 'double', 'seed of the noise: equal seeds give equal noise', '', 0.0),
-    Parameter('base_motion.source', 'string', 'how the base moves: not at all, as ~/base/pose, '
-              'twist and accel give it, by a sine on each axis, or as a ship in a seaway', '',
-              'fixed', choices=('fixed', 'topics', 'sine', 'sea')),
-    Parameter('base_motion.center', 'double', f'{_POSE} in the world at rest, about which sine '
-              'and sea move', 'm, rad', (0.0,) * 6, sizes=(6,), minimum=-1e6, maximum=1e6),
-    Parameter('base_motion.lever_arm', 'double', 'position of the base frame from the point that '
-              'sine or sea move, as the center of gravity of a ship; base axes', 'm',
-              (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6, maximum=1e6),
-    Parameter('base_motion.ramp', 'double', 'time in which sine and sea grow from rest, from the '
-              'first command on', 's', 5.0, minimum=0.0, maximum=1e6),
-    Parameter('base_motion.amplitude', 'double', f'of {_POSE}: surge, sway, heave, roll, pitch, '
-              'yaw; sine only', 'm, rad', (0.0,) * 6, sizes=(6,), minimum=-1e4, maximum=1e4),
-    Parameter('base_motion.frequency', 'double', f'of {_POSE}, or one for all; sine only', 'Hz',
-              (0.1,), sizes=(1, 6), minimum=0.0, maximum=100.0),
-    Parameter('base_motion.phase', 'double', f'of {_POSE}; sea: relative to the wave', 'rad',
-              (0.0,) * 6, sizes=(6,), minimum=-1e3, maximum=1e3),
-    Parameter('base_motion.sea.wave_height', 'double', 'significant wave height of the '
-              'Bretschneider spectrum', 'm', 2.0, minimum=0.0, maximum=100.0),
-    Parameter('base_motion.sea.peak_period', 'double', 'period of its peak', 's', 10.0,
-              minimum=0.1, maximum=1e3),
-    Parameter('base_motion.sea.response', 'double', f'amplitude of {_POSE} for a wave of '
-              'amplitude 1 m', 'm/m, rad/m', (0.0,) * 6, sizes=(6,), minimum=-1e3, maximum=1e3),
-    Parameter('base_motion.sea.seed', 'double', 'seed of the waves: equal seeds give equal '
-              'motion', '', 0.0),
-    Parameter('imu.rate', 'double', 'rate of ~/imu where the base moves; rate is a whole multiple '
-              'of it. The IMU is mounted as base.imu.position and .orientation say', 'Hz', 250.0,
-              minimum=0.0, above=True, maximum=1e4),
-    Parameter('imu.noise.specific_force', 'double', 'standard deviation of each reading', 'm/s^2',
-              0.0, minimum=0.0, maximum=1e6),
-    Parameter('imu.noise.angular_velocity', 'double', 'standard deviation of each reading',
-              'rad/s', 0.0, minimum=0.0, maximum=1e6),
-    Parameter('imu.bias.specific_force', 'double', 'constant error of the readings, IMU axes',
-              'm/s^2', (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6, maximum=1e6),
-    Parameter('imu.bias.angular_velocity', 'double', 'constant error of the readings, IMU axes',
-              'rad/s', (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6, maximum=1e6),
-)
+
+class EndStopsGroup(ParameterGroup):
+    """End stops of the legs."""
+
+    frequency: float = declare(
+        'natural frequency of the mass of a leg on its end stop: its reflected mass and a sixth '
+        'of platform and pistons', 'Hz', 30.0, minimum=0.0, above=True)
+    damping_ratio: float = declare(
+        'damping ratio of the same; 1: no rebound', '', 0.5, minimum=0.0)
+
+
+class NoiseGroup(ParameterGroup):
+    """Noise of the measured legs."""
+
+    length: float = declare(
+        'standard deviation of the measured lengths', 'm', 0.0, minimum=0.0, maximum=1e9)
+    rate: float = declare(
+        'standard deviation of the measured rates', 'm/s', 0.0, minimum=0.0, maximum=1e9)
+    force: float = declare(
+        'standard deviation of the measured forces', 'N', 0.0, minimum=0.0, maximum=1e9)
+    seed: float = declare('seed of the noise: equal seeds give equal noise', '', 0.0)
+
+
+class SeaGroup(ParameterGroup):
+    """A ship in a seaway."""
+
+    wave_height: float = declare(
+        'significant wave height of the Bretschneider spectrum', 'm', 2.0, minimum=0.0,
+        maximum=100.0)
+    peak_period: float = declare('period of its peak', 's', 10.0, minimum=0.1, maximum=1e3)
+    response: Array = declare(
+        f'amplitude of {_POSE} for a wave of amplitude 1 m', 'm/m, rad/m', (0.0,) * 6, sizes=(6,),
+        minimum=-1e3, maximum=1e3)
+    seed: float = declare('seed of the waves: equal seeds give equal motion', '', 0.0)
+
+
+class BaseMotionGroup(ParameterGroup):
+    """How the simulated base moves."""
+
+    source: str = declare(
+        'how the base moves: not at all, as ~/base/pose, twist and accel give it, by a sine on '
+        'each axis, or as a ship in a seaway', '', 'fixed',
+        choices=('fixed', 'topics', 'sine', 'sea'))
+    center: Array = declare(
+        f'{_POSE} in the world at rest, about which sine and sea move', 'm, rad', (0.0,) * 6,
+        sizes=(6,), minimum=-1e6, maximum=1e6)
+    lever_arm: Array = declare(
+        'position of the base frame from the point that sine or sea move, as the center of '
+        'gravity of a ship; base axes', 'm', (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6,
+        maximum=1e6)
+    ramp: float = declare(
+        'time in which sine and sea grow from rest, from the first command on', 's', 5.0,
+        minimum=0.0, maximum=1e6)
+    amplitude: Array = declare(
+        f'of {_POSE}: surge, sway, heave, roll, pitch, yaw; sine only', 'm, rad', (0.0,) * 6,
+        sizes=(6,), minimum=-1e4, maximum=1e4)
+    frequency: Array = declare(
+        f'of {_POSE}, or one for all; sine only', 'Hz', (0.1,), sizes=(1, 6), minimum=0.0,
+        maximum=100.0)
+    phase: Array = declare(
+        f'of {_POSE}; sea: relative to the wave', 'rad', (0.0,) * 6, sizes=(6,), minimum=-1e3,
+        maximum=1e3)
+    sea: SeaGroup
+
+
+class ImuNoiseGroup(ParameterGroup):
+    """Noise of the simulated IMU."""
+
+    specific_force: float = declare(
+        'standard deviation of each reading', 'm/s^2', 0.0, minimum=0.0, maximum=1e6)
+    angular_velocity: float = declare(
+        'standard deviation of each reading', 'rad/s', 0.0, minimum=0.0, maximum=1e6)
+
+
+class ImuBiasGroup(ParameterGroup):
+    """Constant errors of the simulated IMU."""
+
+    specific_force: Array = declare(
+        'constant error of the readings, IMU axes', 'm/s^2', (0.0, 0.0, 0.0), sizes=(3,),
+        minimum=-1e6, maximum=1e6)
+    angular_velocity: Array = declare(
+        'constant error of the readings, IMU axes', 'rad/s', (0.0, 0.0, 0.0), sizes=(3,),
+        minimum=-1e6, maximum=1e6)
+
+
+class SimulatedImuGroup(ParameterGroup):
+    """The simulated IMU on the base."""
+
+    rate: float = declare(
+        'rate of ~/imu where the base moves; rate is a whole multiple of it. The IMU is mounted '
+        'as base.imu.position and .orientation say', 'Hz', 250.0, minimum=0.0, above=True,
+        maximum=1e4)
+    noise: ImuNoiseGroup
+    bias: ImuBiasGroup
+
 
 # Beginnings of names.
 _OF_THE_NODE = ('autostart', 'cueing.', 'drive.resistance', 'drive.speed_max',
@@ -95,40 +129,60 @@ _OF_THE_NODE = ('autostart', 'cueing.', 'drive.resistance', 'drive.speed_max',
                 'platform_frame', 'publish_tf', 'setpoint.', 'singularity.', 'trajectory.',
                 'visualization_rate')
 
-SIMULATOR_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({
-    # The node has no lifecycle: none of the hexapod's may change while it runs either.
-    **{name: known._replace(while_active=False) for name, known in PARAMETERS.items()},
-    **{own.name: own for own in _OWN}})
-
 
 class SimulatorParameters(Parameters):
     """The parameters of the simulated hexapod, and of the simulation."""
 
-    table = SIMULATOR_PARAMETERS
+    initial_pose: Array = declare(
+        'X Y Z alpha beta gamma, where the brakes hold the platform until the first command',
+        'm, rad', required=True, sizes=(6,))
+    step: float = declare(
+        'step of the integration; smaller where friction or end stops need it', 's', 1e-3,
+        minimum=1e-5, maximum=1e-3)
+    rate: float = declare(
+        'rate of the published states; a period is a whole number of steps. With use_sim_time '
+        'each command advances time by one period', 'Hz', 500.0, minimum=1.0, maximum=1e4)
+    command_timeout: float | None = declare(
+        'time without a command after which the brakes engage, as those of a drive; they release '
+        'with the next command; if not set, the last command is held', 's', minimum=0.0,
+        maximum=1e6, above=True)
+    commands: str = declare(
+        'quantity on ~/commands: forces of the legs [N], or torques of the motors [N m], with '
+        'drive.*', '', FORCE, choices=(FORCE, TORQUE))
+    end_stops: EndStopsGroup
+    noise: NoiseGroup
+    base_motion: BaseMotionGroup
+    imu: SimulatedImuGroup
+
     node = 'stewart_simulator'
     unused = frozenset(name for name in PARAMETERS if name.startswith(_OF_THE_NODE))
 
     def _check_together(self, source: str) -> None:
         """Check what one parameter demands of another."""
         super()._check_together(source)
-        if self['commands'] == TORQUE:
+        if self.commands == TORQUE:
             if not self.drives:
                 raise ParameterError(f'{source}: commands: {TORQUE}: needs drive.*')
-            least = self['drive.back_driving_efficiency'].min()
+            least = self.drive.back_driving_efficiency.min()
             if least <= 0.0:
                 raise ParameterError(
                     f'{source}: commands: {TORQUE}: drive.back_driving_efficiency {least:.3g}: '
                     'a self-locking screw can be simulated with commanded forces only')
-        steps = 1.0 / (self['rate'] * self['step'])
+        steps = 1.0 / (self.rate * self.step)
         if not _is_whole(steps):
             raise ParameterError(
-                f'{source}: rate: {self["rate"]} Hz: a period must be a whole number of steps of '
-                f'{self["step"]:g} s, not {steps:.6g}')
-        periods = self['rate'] / self['imu.rate']
-        if self['base_motion.source'] != 'fixed' and not _is_whole(periods):
+                f'{source}: rate: {self.rate} Hz: a period must be a whole number of steps of '
+                f'{self.step:g} s, not {steps:.6g}')
+        periods = self.rate / self.imu.rate
+        if self.base_motion.source != 'fixed' and not _is_whole(periods):
             raise ParameterError(
-                f'{source}: imu.rate: {self["imu.rate"]} Hz: rate, {self["rate"]:g} Hz, must be a '
+                f'{source}: imu.rate: {self.imu.rate} Hz: rate, {self.rate:g} Hz, must be a '
                 f'whole multiple of it, not {periods:.6g}')
+
+
+# The node has no lifecycle: none of the hexapod's may change while it runs either.
+SimulatorParameters.table = MappingProxyType({
+    name: known._replace(while_active=False) for name, known in SimulatorParameters.table.items()})
 
 
 def _is_whole(ratio: float) -> bool:

@@ -56,13 +56,13 @@ _REACH = 1.0
 _MOST_SUBSTEPS = 1000
 
 
-def substeps(parameters: Parameters) -> int:
+def substeps(parameters: SimulatorParameters) -> int:
     """
     Return into how many parts the step of the parameters must be divided.
 
     Raises ParameterError if they would be too many, with the parameter that is too large.
     """
-    step = parameters['step']
+    step = parameters.step
     with np.errstate(all='ignore'):
         friction = Friction.of(parameters)
         viscous = friction.viscous
@@ -74,7 +74,7 @@ def substeps(parameters: Parameters) -> int:
         if parts <= _MOST_SUBSTEPS:
             return max(1, math.ceil(parts))
         # Up to critical damping, the damping is in proportion to the frequency.
-        ratio = parameters['end_stops.damping_ratio']
+        ratio = parameters.end_stops.damping_ratio
         of_each = {
             'actuator.viscous_friction': largest_eigenvalue(parameters, viscous),
             'actuator.coulomb_friction': largest_eigenvalue(parameters, coulomb),
@@ -92,14 +92,14 @@ def substeps(parameters: Parameters) -> int:
         f'{_REACH / fastest:.2g} s, the shortest possible are {step / _MOST_SUBSTEPS:.2g} s')
 
 
-def screw_friction(parameters: Parameters) -> Array:
+def screw_friction(parameters: SimulatorParameters) -> Array:
     """Return the largest losses in the screws (6,) as forces [N], where commands are torques."""
-    if parameters['commands'] != TORQUE:
+    if parameters.commands != TORQUE:
         return np.zeros(6)
-    weight = parameters.carried.mass * np.linalg.norm(parameters['gravity'])
-    most = parameters['drive.torque_max']
+    weight = parameters.carried.mass * np.linalg.norm(parameters.gravity)
+    most = parameters.drive.torque_max
     loads = weight if most is None else most * motor_ratio(parameters)
-    losses: Array = loads * (1.0 / parameters['drive.efficiency'] - 1.0)
+    losses: Array = loads * (1.0 / parameters.drive.efficiency - 1.0)
     return losses
 
 
@@ -113,13 +113,13 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
     another bound; the masses of the legs would only make it smaller. ``of_legs`` (6,) are dampings
     [N s/m] or stiffnesses [N/m].
     """
-    arms = parameters['geometry.platform_joints'] - parameters.carried.center
+    arms = parameters.geometry.platform_joints - parameters.carried.center
     smallest = np.linalg.eigvalsh(inertia_matrix(parameters.carried.inertia))[0]
     mobility = 1.0 / parameters.carried.mass + np.sum(arms ** 2, axis=-1) / smallest
     having = of_legs > 0.0
     if not having.any():
         return 0.0
-    by_actuators = np.min(parameters['actuator.reflected_mass'][having] / of_legs[having])
+    by_actuators = np.min(parameters.actuator.reflected_mass[having] / of_legs[having])
     return float(1.0 / (by_actuators + 1.0 / (of_legs @ mobility)))
 
 
@@ -169,8 +169,8 @@ class Plant:
         self.substeps = substeps(parameters)
         """Steps that are taken within one of the parameter's length."""
         self.fault = ''  # why it is held at rest permanently; empty while it is not
-        period = 1.0 / parameters['rate']
-        self.steps = round(period / parameters['step']) * self.substeps  # steps in a period
+        period = 1.0 / parameters.rate
+        self.steps = round(period / parameters.step) * self.substeps  # steps in a period
         self._step = period / self.steps
         self._limits = Limits(parameters)
         self._sample = Sample(
@@ -180,11 +180,11 @@ class Plant:
         plant = self._sample.numbers.view(record('one_plant'))
         self._plant = plant[0]
         self._driven = bool(parameters.drives)
-        plant['by_torques'] = parameters['commands'] == TORQUE
+        plant['by_torques'] = parameters.commands == TORQUE
         plant['driven'], plant['step'] = self._driven, self._step
         plant['stops'], plant['force_max'] = stops_of(parameters), self._limits.force_max
         self._sample['bases'][:] = math.nan
-        pose = parameters['initial_pose']
+        pose = parameters.initial_pose
         plant['state']['position'] = pose[:3]
         plant['state']['quaternion'] = to_quaternion(from_euler(pose[3:]))
         drives = Drives(parameters).arguments if self._driven else (
@@ -193,8 +193,8 @@ class Plant:
         self.state = self._run(0)._replace(acceleration=NO_WRENCH)  # the present one
         self._check_lengths()
         self._deviations = np.repeat([
-            parameters['noise.length'], parameters['noise.rate'], parameters['noise.force']], 6)
-        self._noise = np.random.default_rng(np.float64(parameters['noise.seed']).view(np.uint64))
+            parameters.noise.length, parameters.noise.rate, parameters.noise.force], 6)
+        self._noise = np.random.default_rng(np.float64(parameters.noise.seed).view(np.uint64))
 
     def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> PlantState:
         """
@@ -252,11 +252,11 @@ class Plant:
 
     def _check_lengths(self) -> None:
         """Raise ParameterError where the hexapod does not fit between its end stops."""
-        pose = self.parameters['initial_pose'].tolist()
+        pose = self.parameters.initial_pose.tolist()
         if self.fault:
             raise ParameterError(
                 f'initial_pose: {pose}: a leg would have no length, or one that overflows')
         for exceedance in self._limits.exceeded(
                 dict.fromkeys((LENGTH_MIN, LENGTH_MAX), self.state.lengths)):
             raise ParameterError(
-                f'initial_pose: {pose}: {exceedance.words(self.parameters["joints"])}')
+                f'initial_pose: {pose}: {exceedance.words(self.parameters.joints)}')

@@ -23,9 +23,9 @@ def temperature_rises(p: Parameters, times: Array, heat: Array, first: Array | N
     [K], zero by default. nan without ``drive.thermal_resistance``.
     """
     rises = np.full(heat.shape, np.nan)
-    if p['drive.thermal_resistance'] is not None:
+    resistance, time_constant = p.drive.thermal_resistance, p.drive.thermal_time_constant
+    if resistance is not None and time_constant is not None:
         rises[:1] = 0.0 if first is None else first
         function('warm_many')(
-            len(times), compact(times), compact(heat), p['drive.thermal_resistance'],
-            p['drive.thermal_time_constant'], rises)
+            len(times), compact(times), compact(heat), resistance, time_constant, rises)
     return rises

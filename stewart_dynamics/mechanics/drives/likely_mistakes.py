@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from stewart_dynamics.arrays import RPM
+from stewart_dynamics.arrays import Array, RPM
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.parameters.table import MOTOR_INERTIA, Parameters, SCREW_INERTIA
 
@@ -44,10 +44,10 @@ _OF_A_CYLINDER = 2.5
 
 def likely_mistakes(p: Parameters) -> Iterator[str]:
     """Yield likely mistakes in the drives, each in one line."""
-    if not p.drives:
+    lead, ratio = p.actuator.screw_lead, p.drive.gear_ratio
+    if lead is None or not p.drives:
         return
-    lead, ratio = p['actuator.screw_lead'], p['drive.gear_ratio']
-    speed, curve = p['drive.speed_max'], p['drive.torque_speed']
+    speed, curve = p.drive.speed_max, p.drive.torque_speed
     if lead.max() >= _LONGEST_LEAD:
         yield f'actuator.screw_lead: {lead.max():g} m for one turn of the screw: in mm?'
         return
@@ -59,7 +59,7 @@ def likely_mistakes(p: Parameters) -> Iterator[str]:
             return
     yield from _inertia(p)
     yield from _heat(p)
-    forward, back = p['drive.efficiency'], p['drive.back_driving_efficiency']
+    forward, back = p.drive.efficiency, p.drive.back_driving_efficiency
     if np.any(back > forward + _BACK):
         at = int(np.argmax(back - forward))
         yield (f'drive.back_driving_efficiency: {back[at]:g}, but drive.efficiency is '
@@ -67,27 +67,30 @@ def likely_mistakes(p: Parameters) -> Iterator[str]:
                f'(2 - 1 / efficiency is {2.0 - 1.0 / forward[at]:.3g}): exchanged?')
     if speed is None and curve is not None:
         speed = np.full(6, curve[-1, 0])
-    torque = p['drive.torque_max']
+    torque = p.drive.torque_max
     if torque is None and curve is not None:
         torque = np.full(6, curve[:, 1].max())
-    rate, force = p['limits.velocity_max'], p['limits.force_max']
+    rate, force = p.limits.velocity_max, p.limits.force_max
     if torque is None:
         return
     k = motor_ratio(p)
-    most = torque * k * p['drive.efficiency']
-    weight = p.carried.mass * float(np.linalg.norm(p['gravity'])) / 6.0
+    most = torque * k * p.drive.efficiency
+    weight = p.carried.mass * float(np.linalg.norm(p.gravity)) / 6.0
     force = np.full(6, weight) if force is None else force
     # The reserve of both: above one, the drive cannot reach the limit of the leg.
     if most.min() > _OF_A_CYLINDER * force.max():
         yield from _thrust_rating(p, float(most.min()))
     loads = force / most
-    speeds = np.zeros(6) if rate is None or speed is None else rate * k / speed
+    speeds: Array = np.zeros(6)
+    moves = moved = ''
+    if rate is not None and speed is not None:
+        speeds = rate * k / speed
+        moves = f' and move a leg at {float((speed / k).min()):.3g} m/s'
+        moved = f' and {rate.max():.3g} m/s'
     if max(loads.max(), speeds.max()) <= _MISSED:
         return
-    said = (f'the motors can push {most.min():.3g} N' + (
-        f' and move a leg at {float((speed / k).min()):.3g} m/s' if speeds.any() else '')
-        + f', the legs need {force.max():.3g} N' + (
-        f' and {rate.max():.3g} m/s' if speeds.any() else ''))
+    said = (f'the motors can push {most.min():.3g} N{moves}, the legs need '
+            f'{force.max():.3g} N{moved}')
     for factor, name, words in (
             (2.0 * math.pi * np.ones(6), 'actuator.screw_lead',
              f'{lead[0]:g} m: {said}: the travel for one radian? It is that of one turn'),
@@ -102,9 +105,9 @@ def likely_mistakes(p: Parameters) -> Iterator[str]:
 
 def _thrust_rating(p: Parameters, pushed: float) -> Iterator[str]:
     """Yield that the limit of the actuators' forces looks like one of the forces in the joints."""
-    force, reflected = p['limits.force_max'], p['actuator.reflected_mass']
-    carried = p.carried.mass / 6.0 + p['legs.piston.mass']
-    if p['limits.joint_force_max'] is not None or force is None or np.any(reflected < carried):
+    force, reflected = p.limits.force_max, p.actuator.reflected_mass
+    carried = p.carried.mass / 6.0 + p.legs.piston.mass
+    if p.limits.joint_force_max is not None or force is None or np.any(reflected < carried):
         return
     yield (f'limits.force_max: {force.max():.3g} N: the motors can push {pushed:.3g} N, of which '
            f'actuator.reflected_mass, {reflected.max():.3g} kg, takes more than the '
@@ -114,21 +117,21 @@ def _thrust_rating(p: Parameters, pushed: float) -> Iterator[str]:
 
 def _heat(p: Parameters) -> Iterator[str]:
     """Yield that windings would be heated as no motor is."""
-    peak, lasting = p['drive.torque_max'], p['drive.torque_continuous']
+    peak, lasting = p.drive.torque_max, p.drive.torque_continuous
     torque = lasting if lasting is not None or peak is None else _OF_PEAK * peak
-    resistance, constant, speed = (
-        p[f'drive.{name}'] for name in ('resistance', 'torque_constant', 'speed_max'))
+    resistance, constant = p.drive.resistance, p.drive.torque_constant
+    speed = p.drive.speed_max
     if torque is None:
         return
-    to_ambient, time = p['drive.thermal_resistance'], p['drive.thermal_time_constant']
-    if time is not None:
+    to_ambient, time = p.drive.thermal_resistance, p.drive.thermal_time_constant
+    if time is not None and to_ambient is not None:
         density = torque * _HEAT_CAPACITY * to_ambient / time
         at = int(np.argmax(density))
         if density[at] > _DENSEST_TORQUE:
             yield (f'drive.thermal_time_constant: {time[at]:g} s: the heat capacity of '
                    f'{1000.0 * time[at] / to_ambient[at] / _HEAT_CAPACITY:.3g} g of metal for a '
                    f'motor of {torque[at]:.3g} N m: in minutes?')
-    if resistance is None:
+    if resistance is None or constant is None:
         return
     rise = 0.0 * torque if to_ambient is None else (
         resistance * (torque / constant) ** 2 * to_ambient)
@@ -142,8 +145,8 @@ def _heat(p: Parameters) -> Iterator[str]:
 
 
 def _inertia(p: Parameters) -> Iterator[str]:
-    ratio, torque, speed = p['drive.gear_ratio'], p['drive.torque_max'], p['drive.speed_max']
-    motor, screw = p[MOTOR_INERTIA], p[SCREW_INERTIA]
+    ratio, torque, speed = p.drive.gear_ratio, p.drive.torque_max, p.drive.speed_max
+    motor, screw = p.drive.motor_inertia, p.drive.screw_inertia
     if SCREW_INERTIA in p.given and MOTOR_INERTIA not in p.given:
         yield (f'{MOTOR_INERTIA}: missing, but {SCREW_INERTIA} is given: is that the inertia of '
                'the rotor, at the wrong shaft? Write 0.0 for a rotor without inertia')

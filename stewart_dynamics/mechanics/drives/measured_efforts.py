@@ -45,28 +45,28 @@ def force_per_effort(parameters: Parameters, torques: bool, currents: bool) -> A
     Raises ParameterError if a parameter of the drives that this needs has no value, or if screws
     are self-locking: the torque of a motor then does not show the load that drives it back.
     """
-    for option, given, name in (
-            ('--motor-torque', torques, 'actuator.screw_lead'),
-            ('--motor-current', currents, 'actuator.screw_lead'),
-            ('--motor-current', currents, 'drive.torque_constant')):
-        if given and parameters[name] is None:
+    lead, constant = parameters.actuator.screw_lead, parameters.drive.torque_constant
+    for option, given, name, value in (
+            ('--motor-torque', torques, 'actuator.screw_lead', lead),
+            ('--motor-current', currents, 'actuator.screw_lead', lead),
+            ('--motor-current', currents, 'drive.torque_constant', constant)):
+        if given and value is None:
             raise ParameterError(f'{name}: has no value: {option} needs it')
     if not (torques or currents):
         return None
-    back = parameters['drive.back_driving_efficiency']
+    back = parameters.drive.back_driving_efficiency
     if np.any(back <= 0.0):
         raise ParameterError(
             f'drive.back_driving_efficiency: {back.min():g}: must be more than 0 where efforts '
             'are those of motors: the torque at a self-locking screw does not show its load')
-    per_effort: Array = motor_ratio(parameters) * (
-        parameters['drive.torque_constant'] if currents else 1.0)
-    return per_effort
+    per_torque = motor_ratio(parameters)
+    return per_torque * constant if currents and constant is not None else per_torque
 
 
 def has_losses(parameters: Parameters) -> bool:
     """Return whether screw or gear lose a part of the torque."""
-    return bool(np.any(parameters['drive.efficiency'] != 1.0)
-                or np.any(parameters['drive.back_driving_efficiency'] != 1.0))
+    return bool(np.any(parameters.drive.efficiency != 1.0)
+                or np.any(parameters.drive.back_driving_efficiency != 1.0))
 
 
 def without_losses(forces: Array, rates: Array, accelerations: Array, p: Parameters) -> Array:
@@ -134,7 +134,7 @@ class EffortSums:
         """Return the likely mistake in the efforts; None without one."""
         residual = float(self._residuals.sum())
         # Friction may hold the platform with any force up to its own.
-        friction = self.count * float(np.sum(self._parameters['actuator.coulomb_friction'] ** 2))
+        friction = self.count * float(np.sum(self._parameters.actuator.coulomb_friction ** 2))
         if residual <= friction:
             return None
         scale = self._scale()
@@ -158,7 +158,7 @@ class EffortSums:
 
     def _of_one_leg(self) -> EffortMistake | None:
         """Return the mistake in one leg's sign, if the other legs are right; a load moves all."""
-        leg, joints = int(np.argmax(self._residuals)), self._parameters['joints']
+        leg, joints = int(np.argmax(self._residuals)), self._parameters.joints
         residual = float(self._residuals[leg])
         if not self.computed_squares[leg] or (
                 float(self._residuals.sum()) - residual > _OTHERS * residual):
@@ -177,7 +177,7 @@ class EffortSums:
         """Return the two legs whose efforts are swapped, if they vary and show it."""
         if not self.count:
             return None
-        number, joints = self.count, self._parameters['joints']
+        number, joints = self.count, self._parameters.joints
         varying = self.products - np.outer(self.measured, self.computed) / number
         best, text = _BETTER, ''
         means = (self.measured - self.computed) ** 2 / number
@@ -204,21 +204,21 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> EffortMist
     if not np.isfinite(scale) or scale == 0.0:
         return EffortMistake(ZERO, 'all efforts are zero')
     if scale < 0.0:
-        other = '' if p['geometry.platform_side'] != AUTO else (
+        other = '' if p.geometry.platform_side != AUTO else (
             '; or the platform is on the other side of the base: geometry.platform_side')
         return EffortMistake(SIGN, (
             'the efforts have the opposite sign: + must push, as the forces of the node do (they '
             f'are {scale:.3g} times what the model computes){other}'))
     if 1.0 / FAR < scale < FAR:
         return None
-    lead, ratio = p['actuator.screw_lead'], p['drive.gear_ratio']
+    lead, ratio = p.actuator.screw_lead, p.drive.gear_ratio
     torques = ('likely torques of the motors in place of forces: stewart_replay and '
                'stewart_identify take them with --motor-torque')
     units = [unit for factor, unit in _FACTORS if _is_near(scale, factor)]
     if of_motors and any(_is_near(scale, each, _LOSSES) for each in _per_effort(p)):
         what, likely = FORCE, ('likely forces at the legs in place of torques or currents of the '
                                'motors: omit --motor-torque, --motor-current')
-    elif of_motors:
+    elif of_motors and lead is not None:
         what, likely = SCALE, (
             f'likely actuator.screw_lead, {lead[0]:g} m, is wrong: about {lead[0] * scale:.3g} m '
             f'would fit; or drive.gear_ratio, {ratio[0]:g}: about {ratio[0] / scale:.3g}')
@@ -239,13 +239,13 @@ def known_scales(p: Parameters, of_motors: bool) -> list[float]:
     """Return the scales of efforts that ``mistake_of_scale`` attributes to a unit."""
     if of_motors:
         return _per_effort(p)
-    torques = [] if p['actuator.screw_lead'] is None else [float(np.mean(1.0 / motor_ratio(p)))]
+    torques = [] if p.actuator.screw_lead is None else [float(np.mean(1.0 / motor_ratio(p)))]
     return [factor for factor, _ in _FACTORS] + torques
 
 
 def _per_effort(p: Parameters) -> list[float]:
     """Return the mean leg forces for torques, and for currents, of 1."""
-    ratio, constant = motor_ratio(p), p['drive.torque_constant']
+    ratio, constant = motor_ratio(p), p.drive.torque_constant
     return [float(np.mean(each * ratio)) for each in (1.0, constant) if each is not None]
 
 

@@ -28,7 +28,7 @@ class MotorLimits:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self._curve = parameters[TORQUE_SPEED] is not None
+        self._curve = parameters.drive.torque_speed is not None
         self.bounds: dict[str, Array] = {
             limit: bound_of(parameters, limit)
             for limit in OF_MOTORS if limit != TORQUE_SPEED}
@@ -59,7 +59,7 @@ def bound_of(p: Parameters, limit: str) -> Array:
 
 def largest_torques(p: Parameters, speeds: Array) -> Array:
     """Return the largest torques [N m] at magnitudes of the motors' speeds (..., 6) [rad/s]."""
-    torques, curve = np.full(speeds.shape, math.inf), p[TORQUE_SPEED]
+    torques, curve = np.full(speeds.shape, math.inf), p.drive.torque_speed
     if curve is not None:
         torques = np.where(speeds > curve[-1, 0] * (1.0 + TOLERANCE), 0.0,
                            np.interp(speeds, *curve.T))
@@ -69,7 +69,7 @@ def largest_torques(p: Parameters, speeds: Array) -> Array:
 
 def largest_speeds(p: Parameters) -> Array:
     """Return the largest speeds (6,) [rad/s]: there is no torque beyond the torque-speed curve."""
-    curve = p[TORQUE_SPEED]
+    curve = p.drive.torque_speed
     speeds: Array = np.minimum(
         bound_of(p, SPEED_MAX), math.inf if curve is None else curve[-1, 0])
     return speeds
@@ -82,7 +82,7 @@ def force_limits(p: Parameters, rates: Array) -> Array:
     For reflected masses that move uniformly; infinite without limits of torque.
     """
     ratio = motor_ratio(p)
-    forces: Array = largest_torques(p, ratio * np.abs(rates)) * ratio * p['drive.efficiency']
+    forces: Array = largest_torques(p, ratio * np.abs(rates)) * ratio * p.drive.efficiency
     return forces
 
 
@@ -90,7 +90,7 @@ def rate_limits(p: Parameters) -> Array:
     """Return rates of the legs (6,) [m/s] below which no motor exceeds a limit of speed."""
     # The twist of a leg adds little to the speed of its motor.
     rates: Array = largest_speeds(p) / motor_ratio(p) * (
-        _WITHOUT_TWIST if p['drive.screw_rotation'] == UNIVERSAL else 1.0)
+        _WITHOUT_TWIST if p.drive.screw_rotation == UNIVERSAL else 1.0)
     return rates
 
 

@@ -42,9 +42,9 @@ from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.leg_columns import columns, LEGS
-from stewart_dynamics.mechanics.limits import SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE
+from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import FORCES
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, six_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -145,7 +145,7 @@ class Drives:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        curve = parameters['drive.torque_speed']
+        curve = parameters.drive.torque_speed
         curve = np.empty((0, 2)) if curve is None else np.array(curve)
         self.arguments = (
             hexapod_structure(parameters), drives_structure(parameters), len(curve), curve)
@@ -164,34 +164,28 @@ class Drives:
 def motor_ratio(parameters: Parameters) -> Array:
     """Return the turn of the motors for a metre of their legs (6,) [rad/m]; nan if not given."""
     with np.errstate(over='ignore'):
-        ratio: Array = (2.0 * math.pi * parameters['drive.gear_ratio']
-                        / _six(parameters, 'actuator.screw_lead', math.nan))
+        ratio: Array = (2.0 * math.pi * parameters.drive.gear_ratio
+                        / six_of(parameters.actuator.screw_lead, math.nan))
     return ratio
 
 
 def drive_constants(p: Parameters) -> Array:
     """Return the constants (6, 8) of the drives, see ``leg_drive`` in C; nan if not given."""
     return np.column_stack([
-        motor_ratio(p), p['geometry.zero_length'], p['actuator.reflected_mass'],
-        1.0 / p['drive.efficiency'] - 1.0, p['drive.back_driving_efficiency'] - 1.0,
-        p['actuator.coulomb_velocity'], _six(p, 'drive.torque_constant', math.nan),
-        _six(p, 'drive.resistance', math.nan)])
+        motor_ratio(p), p.geometry.zero_length, p.actuator.reflected_mass,
+        1.0 / p.drive.efficiency - 1.0, p.drive.back_driving_efficiency - 1.0,
+        p.actuator.coulomb_velocity, six_of(p.drive.torque_constant, math.nan),
+        six_of(p.drive.resistance, math.nan)])
 
 
 def drives_structure(p: Parameters) -> Records:
     """Return the structure () of the drives."""
     drives = np.zeros((), record('leg_drives'))
     drives['legs'] = np.ascontiguousarray(drive_constants(p)).view(record('leg_drive'))[:, 0]
-    drives['torque_max'] = _six(p, 'drive.torque_max', math.inf)
-    for field, limit in (('fastest', SPEED_MAX), ('hottest', TEMPERATURE_RISE_MAX)):
-        drives[field] = (1.0 + TOLERANCE) * _six(p, limit, math.inf)
-    # Without thermal resistance there are no temperatures.
-    for field, name in (('thermal_resistance', 'drive.thermal_resistance'),
-                        ('time_constant', 'drive.thermal_time_constant')):
-        drives[field] = p[name] if p['drive.thermal_resistance'] is not None else math.nan
+    drives['torque_max'] = six_of(p.drive.torque_max, math.inf)
+    drives['fastest'] = (1.0 + TOLERANCE) * six_of(p.drive.speed_max, math.inf)
+    drives['hottest'] = (1.0 + TOLERANCE) * six_of(p.drive.temperature_rise_max, math.inf)
+    # Each needs the other; without them there are no temperatures.
+    drives['thermal_resistance'] = six_of(p.drive.thermal_resistance, math.nan)
+    drives['time_constant'] = six_of(p.drive.thermal_time_constant, math.nan)
     return drives
-
-
-def _six(p: Parameters, name: str, missing: float) -> Array:
-    value: Array = np.full(6, missing) if p[name] is None else p[name]
-    return value

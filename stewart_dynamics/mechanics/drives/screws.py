@@ -43,7 +43,7 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, mounts
 from stewart_dynamics.mechanics.rows import PITCH, SCREW
-from stewart_dynamics.parameters.table import Parameters, RIGHT, UNIVERSAL
+from stewart_dynamics.parameters.table import Parameters, RIGHT, six_of, UNIVERSAL
 
 # Sine of the angle between a leg and the fixed axis of its universal joint.
 _ALONG_A_LEG = 0.1
@@ -52,17 +52,17 @@ _ALONG_A_LEG = 0.1
 def motor_turns(p: Parameters) -> Array:
     """Return the turns of the motors for a turn of their legs (6,); 0 with guided screws."""
     turns: Array = np.zeros(6)
-    if p['drive.screw_rotation'] == UNIVERSAL:
-        turns = p['drive.gear_ratio'] * (-1.0 if p['drive.screw_hand'] == RIGHT else 1.0)
+    if p.drive.screw_rotation == UNIVERSAL:
+        turns = p.drive.gear_ratio * (-1.0 if p.drive.screw_hand == RIGHT else 1.0)
     return turns
 
 
 def screw_constants(p: Parameters) -> Array:
     """Return the constants (6, SCREW) of the screws; zero where they are guided."""
     screws = np.zeros((6, SCREW))
-    if p['drive.screw_rotation'] == UNIVERSAL:
-        screws[:, PITCH] = motor_turns(p) * p['actuator.screw_lead'] / (
-            2.0 * math.pi * p['drive.gear_ratio'])
+    if p.drive.screw_rotation == UNIVERSAL:
+        screws[:, PITCH] = motor_turns(p) * six_of(p.actuator.screw_lead, math.nan) / (
+            2.0 * math.pi * p.drive.gear_ratio)
         screws[:, 1:] = universal_axes(p)
     return screws
 
@@ -70,9 +70,9 @@ def screw_constants(p: Parameters) -> Array:
 def universal_axes(p: Parameters) -> Array:
     """Return the unit vectors (6, 6) of the axes fixed to base, base axes, and to platform."""
     rotation = homes(p)[1][0]
-    base = p['drive.base_universal_axes']
+    base = p.drive.base_universal_axes
     base = mounts(p)[:, :, 0] if base is None else base
-    platform = p['drive.platform_universal_axes']
+    platform = p.drive.platform_universal_axes
     platform = base @ rotation if platform is None else platform
     base, platform = (axes / np.linalg.norm(axes, axis=1, keepdims=True)
                       for axes in (base, platform))
@@ -81,7 +81,7 @@ def universal_axes(p: Parameters) -> Array:
         sine = np.linalg.norm(np.cross(axes, s), axis=1)
         if np.any(sine < _ALONG_A_LEG):
             raise ParameterError(
-                f'{p.source}: drive.{end}_universal_axes: {p["joints"][int(np.argmin(sine))]}: '
+                f'{p.source}: drive.{end}_universal_axes: {p.joints[int(np.argmin(sine))]}: '
                 'along the leg at the home pose: must be across it')
     # The axis of a joint has no sense: of its two directions the one with the smaller twist.
     cosine = np.sum(base * w, axis=1) - np.sum(base * s, axis=1) * np.sum(w * s, axis=1)

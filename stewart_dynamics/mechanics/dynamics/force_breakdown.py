@@ -87,7 +87,7 @@ _TOGETHER = 1024
 
 def sources_of(parameters: Parameters) -> tuple[str, ...]:
     """Return SOURCES, without the base's motion, the last, where ``base.source`` is fixed."""
-    return SOURCES[:-1] if parameters['base.source'] == FIXED else SOURCES
+    return SOURCES[:-1] if parameters.base.source == FIXED else SOURCES
 
 
 class ForceBreakdownRows:

@@ -57,8 +57,8 @@ class Friction(NamedTuple):
     @classmethod
     def of(cls, p: Parameters) -> Friction:
         """Return the friction of a hexapod."""
-        return cls(p['actuator.viscous_friction'], p['actuator.coulomb_friction'],
-                   p['actuator.coulomb_velocity'])
+        return cls(p.actuator.viscous_friction, p.actuator.coulomb_friction,
+                   p.actuator.coulomb_velocity)
 
     @property
     def without_viscous(self) -> Friction:

@@ -61,8 +61,8 @@ def legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
 
 def unchecked_legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
     """Return the same; directions are not finite where a length is 0."""
-    arms = np.einsum('...jk,ik->...ij', rotation, parameters['geometry.platform_joints'])
-    vectors = position[..., None, :] + arms - parameters['geometry.base_joints']
+    arms = np.einsum('...jk,ik->...ij', rotation, parameters.geometry.platform_joints)
+    vectors = position[..., None, :] + arms - parameters.geometry.base_joints
     lengths = np.linalg.norm(vectors, axis=-1)
     return Legs(lengths, vectors / lengths[..., None], arms)
 
@@ -188,10 +188,10 @@ class _LegTerms(NamedTuple):
 
 def _leg_terms(parameters: Parameters, at: Legs) -> _LegTerms:
     along = at.directions[..., :, None] * at.directions[..., None, :]
-    piston_distance = at.lengths - parameters['legs.piston.center_of_mass']
-    inertia = (parameters['legs.cylinder.inertia'] + parameters['legs.piston.inertia']
-               + parameters['legs.cylinder.mass'] * parameters['legs.cylinder.center_of_mass'] ** 2
-               + parameters['legs.piston.mass'] * piston_distance ** 2) / at.lengths ** 2
+    piston_distance = at.lengths - parameters.legs.piston.center_of_mass
+    inertia = (parameters.legs.cylinder.inertia + parameters.legs.piston.inertia
+               + parameters.legs.cylinder.mass * parameters.legs.cylinder.center_of_mass ** 2
+               + parameters.legs.piston.mass * piston_distance ** 2) / at.lengths ** 2
     return _LegTerms(along, np.eye(3) - along, piston_distance, inertia)
 
 
@@ -203,7 +203,7 @@ def _each(scalars: Array) -> Array:
 def leg_mass(parameters: Parameters, at: Legs) -> Array:
     """Return M_i = m2 s s^T - (I_e / L^2 + m_ce) skew(s)^2, (..., 6, 3, 3) [kg]."""
     terms = _leg_terms(parameters, at)
-    mass: Array = (_each(parameters['legs.piston.mass']) * terms.along
+    mass: Array = (_each(parameters.legs.piston.mass) * terms.along
                    + _each(terms.inertia) * terms.across)
     return mass
 
@@ -219,7 +219,7 @@ def leg_coriolis(
     C_i x_i', and M_i' - 2 C_i is skew.
     """
     terms = _leg_terms(parameters, at)
-    piston_mass = parameters['legs.piston.mass']
+    piston_mass = parameters.legs.piston.mass
     rate = np.sum(at.directions * joint_rates, axis=-1)
     across_rate = joint_rates - at.directions * rate[..., None]
     outer = at.directions[..., :, None] * across_rate[..., None, :]  # s u^T
@@ -231,7 +231,7 @@ def leg_coriolis(
              + _each((piston_mass - terms.inertia) / at.lengths) * outer
              - _each(0.5 * slope) * (outer - _transposed(outer)))
     else:
-        s2 = parameters['legs.piston.center_of_mass']
+        s2 = parameters.legs.piston.center_of_mass
         c = (_each(slope * rate) * terms.across
              + _each(piston_mass * s2 / at.lengths ** 2) * outer)
     return c
@@ -240,10 +240,10 @@ def leg_coriolis(
 def leg_gravity(parameters: Parameters, at: Legs) -> Array:
     """Return G_i = (m_ge skew(s)^2 - m2 s s^T) g, (..., 6, 3) [N]."""
     terms = _leg_terms(parameters, at)
-    m_ge = (parameters['legs.cylinder.mass'] * parameters['legs.cylinder.center_of_mass']
-            + parameters['legs.piston.mass'] * terms.piston_distance) / at.lengths
+    m_ge = (parameters.legs.cylinder.mass * parameters.legs.cylinder.center_of_mass
+            + parameters.legs.piston.mass * terms.piston_distance) / at.lengths
     g: Array = -(_each(m_ge) * terms.across
-                 + _each(parameters['legs.piston.mass']) * terms.along) @ parameters['gravity']
+                 + _each(parameters.legs.piston.mass) * terms.along) @ parameters.gravity
     return g
 
 
@@ -274,7 +274,7 @@ def mass_matrix(parameters: Parameters, position: Array, rotation: Array,
         parameters.carried.mass * _transposed(j_com) @ j_com
         + _turning(_platform_inertia(parameters, rotation))
         + np.sum(_transposed(j) @ leg_mass(parameters, at) @ j, axis=-3)
-        + _transposed(j_q) @ (parameters['actuator.reflected_mass'][:, None] * j_q))
+        + _transposed(j_q) @ (parameters.actuator.reflected_mass[:, None] * j_q))
     return m
 
 
@@ -296,7 +296,7 @@ def coriolis_matrix(
         + _turning(skew(omega) @ _platform_inertia(parameters, rotation))
         + np.sum(_transposed(j) @ (leg_mass(parameters, at) @ j_rate + c @ j), axis=-3)
         + _transposed(drive_jacobian(at, rotation, screws)) @ (
-            parameters['actuator.reflected_mass'][:, None]
+            parameters.actuator.reflected_mass[:, None]
             * drive_jacobian_rate(at, rotation, velocity, omega, screws)))
     return coriolis
 
@@ -305,7 +305,7 @@ def gravity_vector(parameters: Parameters, position: Array, rotation: Array) -> 
     """Return G = G_p + sum J_i^T G_i, (..., 6) [N, N m]."""
     at = legs(parameters, position, rotation)
     g = leg_gravity(parameters, at)
-    weight = -parameters.carried.mass * parameters['gravity']
+    weight = -parameters.carried.mass * parameters.gravity
     com = _center_of_mass(parameters, rotation)
     force = weight + np.sum(g, axis=-2)
     moment = np.cross(com, weight) + np.sum(np.cross(at.arms, g), axis=-2)
@@ -328,7 +328,7 @@ def base_coriolis_matrix(
     j = _joint_jacobian(at.arms)
     q = np.cross(spin[..., None, :], at.directions)
     outer = q[..., :, None] * at.directions[..., None, :]
-    piston = parameters['legs.piston.mass'] * terms.piston_distance / at.lengths
+    piston = parameters.legs.piston.mass * terms.piston_distance / at.lengths
     along = np.sum(spin[..., None, :] * at.directions, axis=-1)
     of_legs = (_each(2.0 * piston) * (outer - _transposed(outer))
                + _each(2.0 * terms.inertia * along) * skew(at.directions))
@@ -365,14 +365,14 @@ def base_gravity_vector(
     moment = (np.cross(com, force) + (inertia @ spin_rate[..., None])[..., 0]
               + np.cross(spin, momentum))
 
-    piston_mass = parameters['legs.piston.mass']
-    m_ge = (parameters['legs.cylinder.mass'] * parameters['legs.cylinder.center_of_mass']
+    piston_mass = parameters.legs.piston.mass
+    m_ge = (parameters.legs.cylinder.mass * parameters.legs.cylinder.center_of_mass
             + piston_mass * terms.piston_distance) / at.lengths
     weight = _each(m_ge) * terms.across + _each(piston_mass) * terms.along
     q_squared = np.sum(np.cross(spin[..., None, :], at.directions) ** 2, axis=-1)
     carried = np.einsum('...ij,...kj->...ki', field, at.directions)
     on_legs = (
-        (weight @ felt(parameters['geometry.base_joints'])[..., None])[..., 0]
+        (weight @ felt(parameters.geometry.base_joints)[..., None])[..., 0]
         + (_each(terms.inertia * at.lengths) * terms.across @ carried[..., None])[..., 0]
         - (piston_mass * terms.piston_distance * q_squared)[..., None] * at.directions)
     force = force + np.sum(on_legs, axis=-2)

@@ -62,18 +62,17 @@ _ROUNDING = 1e-9
 
 def names_of(p: Parameters) -> tuple[str, ...]:
     """Return the names of the parameters; names of leg parameters end with the leg's name."""
-    return (*_OF_PLATFORM, *(f'{kind}.{leg}' for kind in _OF_LEGS for leg in p['joints']))
+    return (*_OF_PLATFORM, *(f'{kind}.{leg}' for kind in _OF_LEGS for leg in p.joints))
 
 
 def linear_parameters(p: Parameters) -> Array:
     """Return theta (LINEAR,) of a hexapod, SI units."""
     theta = np.zeros(LINEAR)
     theta[PLATFORM] = inertial_parameters(p.carried)
-    for part, of_mass, first, second in _PARTS:
-        masses, distances, inertias = (
-            p[f'legs.{part}.{name}'] for name in ('mass', 'center_of_mass', 'inertia'))
-        theta[of_mass], theta[first] = masses, masses * distances
-        theta[second] = inertias + masses * distances ** 2
+    for name, of_mass, first, second in _PARTS:
+        part = p.legs.parts[name]
+        theta[of_mass], theta[first] = part.mass, part.mass * part.center_of_mass
+        theta[second] = part.inertia + part.mass * part.center_of_mass ** 2
     for name, where in _OF_ACTUATORS.items():
         theta[where] = p[name]
     return theta
@@ -88,9 +87,9 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
     Raises ParameterError: no body has these parameters: a mass is not positive, or a part of a leg
         has moments without mass or a negative inertia about its center of mass.
     """
-    if p['payload.mass'] > 0.0:
+    if p.payload.mass > 0.0:
         theta = theta.copy()
-        theta[PLATFORM] -= inertial_parameters(p.payload)
+        theta[PLATFORM] -= inertial_parameters(p.payload.body)
     mass = float(theta[MASS])
     if not mass > 0.0:
         raise ParameterError(f'platform.mass: {mass:g} kg: must be more than 0')
@@ -102,7 +101,7 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
         masses, firsts, seconds = theta[of_mass], theta[first], theta[second]
         massless = masses == 0.0
         wrong = (masses < 0.0) | (massless & (firsts != 0.0))
-        distances = np.divide(firsts, masses, out=p[f'legs.{part}.center_of_mass'].copy(),
+        distances = np.divide(firsts, masses, out=p.legs.parts[part].center_of_mass.copy(),
                               where=~massless)
         inertias = seconds - firsts * distances * ~massless
         inertias[np.abs(inertias) < _ROUNDING * np.abs(seconds)] = 0.0
@@ -110,7 +109,7 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
         if wrong.any():
             leg = int(np.argmax(wrong))
             raise ParameterError(
-                f'legs.{part} of {p["joints"][leg]}: mass {masses[leg]:g} kg, first moment '
+                f'legs.{part} of {p.joints[leg]}: mass {masses[leg]:g} kg, first moment '
                 f'{firsts[leg]:g} kg m, second moment {seconds[leg]:g} kg m^2: no body has these')
         values |= {f'legs.{part}.mass': masses.copy(),
                    f'legs.{part}.center_of_mass': distances, f'legs.{part}.inertia': inertias}
@@ -133,4 +132,4 @@ def about_origin(mass: float, center: Array, inertia: Array) -> Array:
 def with_point_mass(p: Parameters, added: float, position: ArrayLike) -> Parameters:
     """Return the parameters with a point mass [kg] on the platform, platform frame (3,) [m]."""
     point = Body(added, np.array(position, dtype=float), np.zeros(6))
-    return p.with_payload(p.payload.with_body(point) if p['payload.mass'] > 0.0 else point)
+    return p.with_payload(p.payload.body.with_body(point) if p.payload.mass > 0.0 else point)

@@ -28,7 +28,7 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.parameters.table import AUTO, NEGATIVE, Parameters, POSITIVE
+from stewart_dynamics.parameters.table import AUTO, NEGATIVE, Parameters, POSITIVE, six_of
 
 # Largest length, in larger radii: legs have 1 to 10, legs given in mm 1000 times that.
 _LENGTH_RATIO = 100.0
@@ -135,7 +135,7 @@ def homes(parameters: Parameters) -> tuple[Array, Array]:
 
 
 def shape_of(p: Parameters) -> Shape:
-    base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
+    base, platform = p.geometry.base_joints, p.geometry.platform_joints
     around, carried = base - base.mean(axis=0), platform - platform.mean(axis=0)
     axes = level_axes(around)
     return Shape(around @ axes.T, carried @ axes.T, axes, mean_norm(around),
@@ -170,7 +170,7 @@ def home_of(p: Parameters) -> Home:
         shape = shape_of(p)
         offsets = (turns_about(2, _YAWS) @ shape.platform.T).swapaxes(-1, -2) - shape.base
         above, below = (_reached(p, offsets, side) for side in (1.0, -1.0))
-        given = p['geometry.platform_side']
+        given = p.geometry.platform_side
         certain = given != AUTO or bool(above.any() != below.any())
         side = -1.0 if given == NEGATIVE or given == AUTO and certain and below.any() else 1.0
         reached = above if side > 0.0 else below
@@ -178,10 +178,10 @@ def home_of(p: Parameters) -> Home:
         yaw = float(_YAWS[np.argmin(np.where(reached, angles, np.inf))]) if reached.any() else 0.0
         across = float(np.linalg.norm(offsets[..., :2], axis=-1).max())
         longest = math.hypot(HEIGHTS[-1] * shape.radius, across)
-        low, high = p['limits.length_min'], p['limits.length_max']
+        low, high = p.limits.length_min, p.limits.length_max
         if high is not None and not is_too_long(p, 'limits.length_max', shape):
             longest = float(high.max())
-        length = float(np.mean(p['geometry.zero_length'] if low is None or high is None
+        length = float(np.mean(p.geometry.zero_length if low is None or high is None
                                else 0.5 * (low + high)))
         legs = shape.platform @ turns_about(2, np.array([yaw]))[0].T - shape.base  # at no height
         known = mean_norm(legs) < length < _LENGTH_RATIO * shape.radius
@@ -198,8 +198,7 @@ def _reached(p: Parameters, offsets: Array, side: float) -> Flags:
 
     offsets (turns, 6, 3): the legs while the center of the platform is at that of the base [m].
     """
-    low, high = p['limits.length_min'], p['limits.length_max']
-    low, high = 0.0 if low is None else low, np.inf if high is None else high
+    low, high = six_of(p.limits.length_min, 0.0), six_of(p.limits.length_max, np.inf)
     across, along = np.linalg.norm(offsets[..., :2], axis=-1), side * offsets[..., 2]
     # The height of a leg is that of the platform plus the platform joint's own.
     least = np.sqrt(np.maximum(low ** 2 - across ** 2, 0.0)) - along
@@ -225,9 +224,9 @@ def _height(shape: Shape, side: float, legs: Array, length: float) -> float:
 def poses_of(p: Parameters, shape: Shape, heights: Array, rotations: Array,
              ) -> tuple[Array, Array]:
     """Return positions (N, 3) and rotations (N, 3, 3) at these heights and turns of the shape."""
-    middle = p['geometry.platform_joints'].mean(axis=0)
+    middle = p.geometry.platform_joints.mean(axis=0)
     rotations = shape.axes.T @ rotations @ shape.axes
-    positions = (p['geometry.base_joints'].mean(axis=0) - rotations @ middle
+    positions = (p.geometry.base_joints.mean(axis=0) - rotations @ middle
                  + heights[:, None] * shape.axes[2])
     return positions, rotations
 

@@ -125,7 +125,7 @@ def likely_mistakes(parameters: Parameters) -> Iterator[str]:
             continue
         at_home, bounds = angles[where], parameters[limit]
         leg = int(np.argmax(at_home if bounds is None else at_home - bounds))
-        joint, angle = parameters['joints'][leg], at_home[leg]
+        joint, angle = parameters.joints[leg], at_home[leg]
         if angle > _AWAY:
             yield (f'{axes}: at home {joint} is {angle:.3g} rad from it: does it point from the '
                    'platform to the base, is the platform on the other side of the base '

@@ -31,7 +31,6 @@ from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.parameters.table import BASE_OUTLINE, LEG_SHAPE, Parameters, PLATFORM_OUTLINE
 
 BASE, PLATFORM = 6, 7  # numbers of the plates, where 0 to 5 are legs
@@ -74,7 +73,7 @@ class LegClearance:
             np.empty((0, 3)) if parameters[name] is None else parameters[name].copy()
             for name in (BASE_OUTLINE, PLATFORM_OUTLINE))
         self.reach = float(np.linalg.norm(np.concatenate([
-            parameters['geometry.platform_joints'], self.platform]), axis=1).max())
+            parameters.geometry.platform_joints, self.platform]), axis=1).max())
         self._constants = hexapod_structure(parameters), self.base, self.platform
 
     def __call__(self, motions: Array) -> Array:
@@ -104,4 +103,4 @@ class LegClearance:
 
 def clearance_to_check(parameters: Parameters) -> LegClearance | None:
     """Return the clearance that the limit needs; None without limit."""
-    return None if parameters[CLEARANCE_MIN] is None else LegClearance(parameters)
+    return None if parameters.limits.leg_clearance_min is None else LegClearance(parameters)

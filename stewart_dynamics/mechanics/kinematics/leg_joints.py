@@ -69,9 +69,9 @@ class TreeJoints:
     def __init__(self, parameters: Parameters) -> None:
         self.names = joint_names(parameters)
         self.mounts = mounts(parameters)
-        self._base = parameters['geometry.base_joints']
-        self._platform = parameters['geometry.platform_joints']
-        self._zero_length = parameters['geometry.zero_length']
+        self._base = parameters.geometry.base_joints
+        self._platform = parameters.geometry.platform_joints
+        self._zero_length = parameters.geometry.zero_length
         self._legs = [
             (*base, *platform, *mount, zero) for base, platform, mount, zero in zip(
                 self._base.tolist(), self._platform.tolist(),
@@ -121,14 +121,14 @@ class TreeJoints:
 
 def joint_names(parameters: Parameters) -> tuple[str, ...]:
     """Return the names of all joints (24,); ParameterError if two are the same."""
-    platform = parameters['platform_frame']
+    platform = parameters.platform_frame
     names = [f'{platform}_{each}' for each in PLATFORM_JOINTS]
-    for leg in parameters['joints']:
+    for leg in parameters.joints:
         names += [*(f'{leg}_{each}' for each in UNIVERSAL_JOINTS), leg]
     twice = [name for n, name in enumerate(names) if name in names[:n]]
     if twice:
         raise ParameterError(
-            f'{parameters.source}: joints: {shown(list(parameters["joints"]))}, platform_frame: '
+            f'{parameters.source}: joints: {shown(list(parameters.joints))}, platform_frame: '
             f'{shown(platform)}: two joints of the tree would have the name {shown(twice[0])}')
     return tuple(names)
 
@@ -137,10 +137,10 @@ def home_directions(parameters: Parameters) -> HomeDirections:
     """Return the directions of the legs at the most likely home pose; see ``homes``."""
     positions, rotations = homes(parameters)
     position, rotation = positions[0], rotations[0]
-    legs = (position + parameters['geometry.platform_joints'] @ rotation.T
-            - parameters['geometry.base_joints'])
+    legs = (position + parameters.geometry.platform_joints @ rotation.T
+            - parameters.geometry.base_joints)
     lengths = np.linalg.norm(legs, axis=1, keepdims=True)
-    base = parameters['geometry.base_joints']
+    base = parameters.geometry.base_joints
     normal = level_axes(base - base.mean(axis=0))[2]
     along = np.where(lengths > 0.0, legs / np.where(lengths > 0.0, lengths, 1.0), normal)
     return HomeDirections(along, along @ rotation)
@@ -148,7 +148,7 @@ def home_directions(parameters: Parameters) -> HomeDirections:
 
 def mounts(parameters: Parameters) -> Array:
     """Return the rotations (6, 3, 3) from the axes of each leg's mount to base axes."""
-    base = parameters['geometry.base_joints']
+    base = parameters.geometry.base_joints
     around = base - base.mean(axis=0)
     first, _, normal = level_axes(around)
     found = []

@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose, other_side, shape_of
-from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, TOLERANCE
+from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
 from stewart_dynamics.parameters.table import Parameters
 
@@ -66,7 +66,7 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
     if found is None:
         return _far(parameters, position, rotation)
     home, lengths_at_home, at_home = found
-    low, high = parameters[LENGTH_MIN], parameters[LENGTH_MAX]
+    low, high = parameters.limits.length_min, parameters.limits.length_max
     shortest = _SHORTEST * lengths_at_home if low is None else low * (1.0 - TOLERANCE)
     longest = _LONGEST * lengths_at_home if high is None else high * (1.0 + TOLERANCE)
 
@@ -115,7 +115,7 @@ def _at_home(parameters: Parameters) -> tuple[Pose, Array, float] | None:
 def _far(parameters: Parameters, position: Array, rotation: Array) -> str:
     """Return that a position is in mm if the legs would be a thousand times as long as usual."""
     lengths, _ = _legs(parameters, position, rotation)
-    times = lengths / (parameters[LENGTH_MAX] if parameters[LENGTH_MAX] is not None
+    times = lengths / (parameters.limits.length_max if parameters.limits.length_max is not None
                        else shape_of(parameters).radius)
     thousand = np.all((times > _THOUSAND[0]) & (times < _THOUSAND[1]))
     return f'likely mistake: {_MM}' if thousand else ''

@@ -55,7 +55,7 @@ class Answers:
         self.output: Output | None = None
         self.output_before: Output | None = None
         self.second, self.second_before = Second(now), Second(now)
-        self._timeout: float = parameters['setpoint.timeout']
+        self._timeout = parameters.setpoint.timeout
 
     def add(self, output: Output, seconds: float, now: float) -> None:
         """Note an answer, and its processing time."""
@@ -112,24 +112,25 @@ def singularity_state(output: Output, parameters: Parameters) -> Level:
     state = output.singularity
     if state.stopped:
         is_suppressed = output.demanded_forces is not None and (
-            parameters['singularity.action'] == SUPPRESS_FORCES)
+            parameters.singularity.action == SUPPRESS_FORCES)
         suppressed = ': forces suppressed' if is_suppressed else ''
         return Level(ERROR, f'inside stop_condition{suppressed}: '
-                     + _condition(output, parameters, 'stop_condition'))
+                     + _condition(output, 'stop_condition', parameters.singularity.stop_condition))
     if not state.warning:
         return OK_LEVEL
     if state.cause is Cause.CROSSED:
         return Level(ERROR, 'det(J) crossed zero since the last setpoint')
     if state.cause is Cause.CONDITION:
-        return Level(WARN, _condition(output, parameters, 'warn_condition'))
-    time, bound = state.time_to_crossing, parameters['singularity.warn_time']
+        return Level(WARN, _condition(
+            output, 'warn_condition', parameters.singularity.warn_condition))
+    time, bound = state.time_to_crossing, parameters.singularity.warn_time
     ends = '' if time < bound else f' (the warning ends above {bound / HYSTERESIS:g} s)'
     return Level(WARN, f'crossing of det(J) = 0 predicted in {time:.3g} s, singularity.warn_time '
                  f'is {bound:g} s{ends}')
 
 
-def _condition(output: Output, parameters: Parameters, threshold: str) -> str:
-    bound, condition = parameters[f'singularity.{threshold}'], output.condition
+def _condition(output: Output, threshold: str, bound: float) -> str:
+    condition = output.condition
     if condition >= bound:
         return f'condition number {condition:.4g} exceeds singularity.{threshold}, {bound:g}'
     return (f'condition number {condition:.4g} has exceeded singularity.{threshold}, {bound:g}, '
@@ -194,7 +195,7 @@ class SingularityDiagnostics(StatusPart):
                 ('worst condition number of the last second', f'{of_the_last_second:.6g}'),
                 ('worst condition number since activation', f'{self._largest:.6g}'),
                 ('largest leg force under a unit load', f'{forces[worst]:.6g}'),
-                ('its leg', answers.parameters['joints'][worst])]
+                ('its leg', answers.parameters.joints[worst])]
         return Status(self.name, *answers.state(self.held.at(now), 'clear', now), values)
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
@@ -229,7 +230,7 @@ class LimitsDiagnostics(StatusPart):
     def __init__(self, answers: Answers) -> None:
         super().__init__(*LIMITS)
         self._answers = answers
-        self._joints: tuple[str, ...] = answers.parameters['joints']
+        self._joints = answers.parameters.joints
         self._setpoints = Counter[str]()  # that exceed each limit
         self._worst: dict[str, Exceedance] = {}
         self._suppressed = 0
@@ -252,7 +253,7 @@ class LimitsDiagnostics(StatusPart):
 
     def _note_exceedances(self, output: Output, motion: Sequence[float], now: float) -> None:
         suppressed = output.forces is None and output.demanded_forces is not None and (
-            self._answers.parameters['limits.action'] == SUPPRESS_FORCES)
+            self._answers.parameters.limits.action == SUPPRESS_FORCES)
         self._suppressed += suppressed
         if not any(self.held.of(name, now).level for name in _OF_POSE):
             # At most once in a second: it may take a millisecond.

@@ -137,14 +137,14 @@ class SetpointDiagnostics(StatusPart):
         # Only messages since the last setpoint could have been joined.
         missing = {topic: at for topic, at in self.heard.items() if at <= self._answers.at}
         return 'no setpoint: ' + (
-            _silent_topics(self.heard, parameters['setpoint.timeout'], now)
+            _silent_topics(self.heard, parameters.setpoint.timeout, now)
             or self.held.of(REJECTED, now).message
             or _silent_topics(missing, 0.0, now)
             or 'all topics arrive, but none is joined: ' + (
                 f'header stamps of {self._unstamped} are zero: such messages are joined in order '
                 'of arrival, one of each topic' if self._unstamped else
                 'their stamps differ by more than setpoint.sync_tolerance, '
-                f'{parameters["setpoint.sync_tolerance"]:g} s'))
+                f'{parameters.setpoint.sync_tolerance:g} s'))
 
 
 class BaseDiagnostics(StatusPart):
@@ -154,7 +154,7 @@ class BaseDiagnostics(StatusPart):
 
     def __init__(self, parameters: Parameters, topics: Sequence[str]) -> None:
         super().__init__(REJECTED, _UNKNOWN, MISTAKEN)
-        self._timeout: float = parameters['base.timeout']
+        self._timeout = parameters.base.timeout
         self.heard = dict.fromkeys(topics, NEVER)  # when the last message came on each topic
         self._samples = 0
         self._sampled_at = NEVER

@@ -39,8 +39,8 @@ class ExternalWrenchDiagnostics(StatusPart):
 
     def __init__(self, parameters: Parameters) -> None:
         super().__init__(MISTAKEN, _OVERLOAD, REJECTED)
-        self._joints = parameters['joints']
-        self._timeout: float = parameters['setpoint.timeout']
+        self._joints = parameters.joints
+        self._timeout = parameters.setpoint.timeout
         # Times of the first and the last message, and of the last one that was not rejected.
         self._begun = self.heard_at = self.used_at = NEVER
         self._estimated = 0
