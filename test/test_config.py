@@ -18,7 +18,7 @@ from rosbags.highlevel import AnyReader
 from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.program import DONE
 from stewart_dynamics.replay import main
-from stewart_dynamics.replay.output import RECORDED_TYPES, ROBOT_DESCRIPTION
+from stewart_dynamics.replay.output_bag import RECORDED_TYPES, ROBOT_DESCRIPTION
 import yaml
 
 CONFIG = ROOT / 'config'

@@ -20,8 +20,8 @@ from running import Inside, nanoseconds, Peer, PLATFORM
 from sensor_msgs.msg import Imu, JointState
 from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.cueing.cueing_node import CueingNode
 from stewart_dynamics.cueing.motion_cueing import GRAVITY, MotionCueing
-from stewart_dynamics.cueing.node import CueingNode
 from stewart_dynamics.cueing.vehicle import vehicle_mistake
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform

@@ -17,8 +17,8 @@ from referees import ROOT
 
 from stewart_dynamics import (
     BagError, Parameters, read_legs, read_setpoints, StewartError, StewartPlatform)
-from stewart_dynamics.reference_motion.motion import motion_at, sample_times
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)

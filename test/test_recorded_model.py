@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import Parameters
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.replay.output import (
+from stewart_dynamics.replay.output_bag import (
     RECORDED_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 
 STAMP = 1_700_000_000_123_456_789

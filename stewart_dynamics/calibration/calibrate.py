@@ -5,7 +5,7 @@
 Calibration of a hexapod's geometry from measured poses; computes the result, writes no files.
 
 Outliers are found by robust fits with equal weights; the rest is fitted with the noise given or
-estimated (``fit``). A fit without the held-out poses predicts these by forward kinematics.
+estimated (``geometry_fit``). A fit without the held-out poses predicts them by forward kinematics.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.calibration.calibration_mistakes import (
+    mistakes_of_input, mistakes_of_result, not_identified)
 from stewart_dynamics.calibration.equations import (
     chosen, Equations, Frames, GEOMETRY, GUIDED, names_of, SAME, values_of, with_geometry)
-from stewart_dynamics.calibration.fit import Fit, fit, minimum, Unknowns
 from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
-from stewart_dynamics.calibration.lack_of_fit import lack_of_fit
-from stewart_dynamics.calibration.likely_mistakes import (
-    mistakes_of_input, mistakes_of_result, not_identified)
+from stewart_dynamics.calibration.geometry_fit import Fit, fit, minimum, Unknowns
 from stewart_dynamics.calibration.measured_poses import FEWEST
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.outliers import MOST_OUTLIERS, outliers
+from stewart_dynamics.calibration.residual_causes import lack_of_fit
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
-from stewart_dynamics.mechanics.drives.screws import screw_constants, universal_axes
+from stewart_dynamics.mechanics.drives.turning_screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.least_squares import Identifiability, LARGEST_SHARE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform

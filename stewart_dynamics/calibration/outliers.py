@@ -11,7 +11,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.equations import Equations
-from stewart_dynamics.calibration.fit import minimum, Unknowns
+from stewart_dynamics.calibration.geometry_fit import minimum, Unknowns
 from stewart_dynamics.calibration.noise import ROUNDING
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN, LARGEST_ERROR
 

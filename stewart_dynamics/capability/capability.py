@@ -134,7 +134,7 @@ class Capability:
     """
     Answers to "possible?" and "how far?" of a hexapod: exact, without sampling.
 
-    J_inv is square, as is J_q of screws that turn with their legs (``drives.screws``), so leg
+    J_inv is square, as is J_q of screws that turn with their legs (``turning_screws``), so leg
     forces are an affine function of a load, of an acceleration and of an added mass: each question
     at a pose is six intervals. Poses and directions have any leading shapes that broadcast against
     each other. A direction is six numbers, translation and rotation (or force and moment), base
@@ -596,7 +596,7 @@ class Capability:
             Motion of the base, likewise.
         times : (N,), optional
             Times of a motion (N,) [s]: the motion between the samples counts as well, by the rules
-            of planned trajectories (``planned.trajectory``). Where a limit may be exceeded between
+            of planned trajectories (``planned_trajectory``). Where a limit may be exceeded between
             two samples at the answer of the samples alone, at least 16 samples are put between
             them; the extreme that limits is then found to rounding errors. Wrench and base must
             be constant. By default the samples alone count.

@@ -19,7 +19,7 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.cueing.motion_cueing import GRAVITY
 from stewart_dynamics.errors import BagError, shown, shown_name, StewartError
 from stewart_dynamics.messages import type_names
-from stewart_dynamics.setpoints.inputs import SampleReader, VEHICLE
+from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import Rejections
 
 FORCES, RATES = ('ax', 'ay', 'az'), ('wx', 'wy', 'wz')

@@ -25,9 +25,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.identification.filters import convolved, decimated, LowPass, white_deviation
-from stewart_dynamics.identification.kinematics import motions, poses
 from stewart_dynamics.identification.unknowns import (
     COULOMB_COLUMNS, regressor_of, Unknowns)
+from stewart_dynamics.identification.window_poses import motions, poses
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.measured_efforts import FAR, has_losses, without_losses
 from stewart_dynamics.mechanics.dynamics.friction import slip_in_noise, stribeck

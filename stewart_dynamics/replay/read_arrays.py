@@ -27,7 +27,7 @@ from stewart_dynamics.program import AXES, EULER, NODE, node_name
 from stewart_dynamics.replay.bag_topics import find_measured_legs, name_of
 from stewart_dynamics.replay.recorded_motion import read_motion
 from stewart_dynamics.replay.replay_options import Options
-from stewart_dynamics.setpoints import inputs
+from stewart_dynamics.setpoints import input_messages as inputs
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros, other_nodes, read_value

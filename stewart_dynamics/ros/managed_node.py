@@ -14,7 +14,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.errors import ParameterError, StewartError
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.ros.declared_parameters import (

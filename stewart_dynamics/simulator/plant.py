@@ -20,8 +20,8 @@ the force k torque / c and the reflected mass m_r / c. c depends on the directio
 which is assumed, and assumed again where the load that follows contradicts it.
 
 End stops act between cylinder and piston, along the leg. With the forces of the drives they are
-added up, except where screws turn with their legs (``drives.screws``): drives act with the rows of
-J_q there, end stops with those of J_inv, as a wrench on the platform.
+added up, except where screws turn with their legs (``turning_screws``): drives act with the rows
+of J_q there, end stops with those of J_inv, as a wrench on the platform.
 
 The step is short enough for friction and end stops, whose modes are the fastest by far. With them
 a hexapod is ``M x'' + J^T D J x' + J^T K J x = 0``, with M its mass matrix, D the damping of the
@@ -49,7 +49,7 @@ from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits
 
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 from stewart_dynamics.simulator.end_stops import stiffness_and_damping, stops_of
-from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters, TORQUE
 # The Runge-Kutta method is stable for all modes s with |h s| below 2.6 that do not grow by
 # themselves; up to 1 their error is small as well, with a margin for nonlinear terms.
 _REACH = 1.0

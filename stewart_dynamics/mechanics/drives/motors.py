@@ -23,7 +23,7 @@ the larger of the two torques, the breakaway torque, is what limits are checked 
 
 Where the screw turns with the leg, by its twist, a right-handed thread extends the leg by
 lead / (2 pi) for each radian. The motor takes that back: q is L less that extension
-(``drives.screws``), gear_ratio times the twist is subtracted from the angle, added where the
+(``turning_screws``), gear_ratio times the twist is subtracted from the angle, added where the
 thread is left-handed. The moments of the screws about the legs' axes, force times lead / (2 pi),
 are part of the leg forces: the torque of an ideal screw is f / k, and its power f q'.
 """

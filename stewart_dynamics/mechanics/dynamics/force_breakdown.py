@@ -18,7 +18,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import batch
-from stewart_dynamics.mechanics.drives.screws import screw_constants
+from stewart_dynamics.mechanics.drives.turning_screws import screw_constants
 from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.dynamics.lagrange import drive_rates
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure

@@ -16,8 +16,8 @@ from rclpy.time import Time
 from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.reference_motion.motion import motion_at, sample_count, sample_time
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_count, sample_time
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.declared_parameters import declare_parameters, MADE_WITH
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher

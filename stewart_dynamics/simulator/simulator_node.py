@@ -21,7 +21,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import SECOND, Six
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
@@ -30,15 +30,15 @@ from stewart_dynamics.ros.due_periods import DuePeriods
 from stewart_dynamics.ros.managed_node import keep_present_objects
 from stewart_dynamics.ros.repeated_log import RepeatedLog, WARNING
 from stewart_dynamics.ros.run import run
-from stewart_dynamics.ros.signals import SIGNALS
-from stewart_dynamics.setpoints.inputs import WrenchInput
+from stewart_dynamics.ros.signal_flag import SIGNALS
+from stewart_dynamics.setpoints.input_messages import WrenchInput
 from stewart_dynamics.setpoints.output_messages import MOTOR_STATES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
-from stewart_dynamics.simulator.messages import (
-    BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)
 from stewart_dynamics.simulator.moving_base import BaseOfTopics, BasePeriod, GeneratedBase
-from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
 from stewart_dynamics.simulator.plant import Plant, PlantState
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters, TORQUE
+from stewart_dynamics.simulator.state_messages import (
+    BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)
 
 _TYPES: dict[str, Any] = {
     type_names.POSE_STAMPED: PoseStamped,

@@ -31,13 +31,13 @@ from stewart_dynamics.node.tasks import (
     APPLY_PAYLOAD, inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)
 from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD, TRAVEL
 from stewart_dynamics.parameters.table import AS_MEASURED, Parameters, payload_values
-from stewart_dynamics.planned import messages as planned
+from stewart_dynamics.planned import trajectory_messages as planned
 from stewart_dynamics.ros.managed_node import ManagedNode
 from stewart_dynamics.ros.rclpy_workarounds import OneShotTimer
 from stewart_dynamics.ros.run import run
-from stewart_dynamics.ros.signals import SIGNALS
-from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH, BaseWrench
-from stewart_dynamics.setpoints.inputs import WRENCH
+from stewart_dynamics.ros.signal_flag import SIGNALS
+from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH, BaseWrench
+from stewart_dynamics.setpoints.input_messages import WRENCH
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import (

@@ -17,8 +17,8 @@ from rclpy.time import Time
 from sensor_msgs.msg import Imu, JointState
 
 from stewart_dynamics.arrays import Array, SECOND
+from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.cueing.motion_cueing import CueingStream, MotionCueing
-from stewart_dynamics.cueing.parameters import CueingParameters
 from stewart_dynamics.cueing.vehicle import Vehicle
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.motion import Motion
@@ -36,7 +36,7 @@ from stewart_dynamics.ros.due_periods import DuePeriods
 from stewart_dynamics.ros.managed_node import ManagedNode
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
-from stewart_dynamics.setpoints.inputs import VEHICLE
+from stewart_dynamics.setpoints.input_messages import VEHICLE
 from stewart_dynamics.setpoints.rejections import MALFORMED, Rejection, Rejections
 
 FELT, DIAGNOSTICS, MEASURED_LEGS = 'felt', '/diagnostics', 'measured_legs'
