@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from stewart_dynamics import Parameters
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
+from stewart_dynamics.mechanics.pose_limits import PoseLimits
+from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity_warning import Singularity, STATE
 
 
@@ -21,8 +24,12 @@ def checked(parameters: Parameters, result: NDArray[np.float64],
     stamp, last = np.array([1]), np.array([0])
     before = np.array(state or Singularity(), dtype=float)
     states, flags = np.empty((1, STATE)), np.empty((3, 1), dtype=bool)
+    none: NDArray[np.float64] = np.empty((1, 0))
+    # Limits of joints, clearance and motors are not in a result.
+    unchecked = parameters.replaced(dict.fromkeys((*OF_JOINTS, CLEARANCE_MIN)))
     function('check_many')(
-        hexapod_structure(parameters), 1, stamp, np.array([base_known]), np.array([False]),
-        np.zeros(1), before, last, np.full(6, np.nan), result[None].copy(), np.empty((1, 6)),
-        states, *flags)
+        hexapod_structure(parameters), *PoseLimits(unchecked).arguments, 1, stamp,
+        np.array([base_known]), np.array([False]), np.zeros(1), np.zeros((1, MOTION)), none, none,
+        before, last, np.full(6, np.nan), np.zeros(12), result[None].copy(), np.empty((1, 6)),
+        states, none, *flags)
     return Singularity.of(states[0].tolist()), bool(flags[1, 0])

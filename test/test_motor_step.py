@@ -16,7 +16,7 @@ from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.limits import (
     SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
-from stewart_dynamics.setpoints.motor_step import ANGLES, DEMANDED_TORQUES, RISES, TORQUES
+from stewart_dynamics.setpoints.motor_row import ANGLES, DEMANDED_TORQUES, RISES, TORQUES
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.step import Batch, Output, Setpoint, State, Step
 from test_drives import driven, HEXAPOD, PUBLISHED

@@ -22,16 +22,9 @@
 static const double stop_times[STOP_SAMPLES] = {
   0.0, 0.25, 0.6, 0.95, 1.3, 1.9, 3.2, HUGE_VAL, 0.12, 0.42, 0.77, 1.12, 1.5, 1.7, 2.4, 4.5};
 
-/* A machine and its limits: arguments of the functions that Python calls. */
+/* A hexapod whose limits have the margins of a governor, and what else that keeps. */
 typedef struct {
-  const stewart_platform * platform;
-  const leg_drives * drives;
-  int64_t n_curve;
-  const double * curve;
-  int64_t n_base;
-  const double * base;
-  int64_t n_moving;
-  const double * moving;
+  machine of;
   const governor_limits * limits;
 } governed;
 
@@ -120,32 +113,29 @@ static int exceeded_by(
   const governed * on, const stewart_motion * motion, const stewart_result * result,
   double share) {
   const governor_limits * g = on->limits;
-  const stewart_leg * legs = on->platform->legs;
+  const machine * of = &on->of;
+  const stewart_leg * legs = of->platform->legs;
   unsigned exceeded = 0;
   if (!(result->condition_number < g->condition_max && result->determinant * g->side > 0.0)) {
     return GOVERNED_SINGULARITY + 1;
   }
   for (int i = 0; i < 6; i++) {exceeded |= check_leg(&legs[i], result, i, share);}
-  if (!exceeded && g->with_angles != 0.0) {
+  if (!exceeded && of->checks->angles != 0.0) {
     double angles[12];
-    joint_angles_many(on->platform, g->joint_axes, 1, motion, angles);
+    put_angles(of, motion, angles);
     for (int i = 0; i < 6; i++) {exceeded |= check_angles(&legs[i], angles[i], angles[i + 6]);}
   }
-  if (!exceeded && g->with_clearance != 0.0) {
+  if (!exceeded && of->checks->clearance != 0.0) {
     double clearances[6];
     int64_t nearest[6];
-    clearances_many(on->platform, on->n_base, on->base, on->n_moving, on->moving, 1, motion,
-                    clearances, nearest);
-    for (int i = 0; i < 6; i++) {
-      exceeded |= below(
-        clearances[i], on->platform->leg_clearance_min, STEWART_LEG_CLEARANCE_MIN);
-    }
+    put_clearances(of, motion, clearances, nearest);
+    exceeded |= check_clearances(of, clearances);
   }
-  if (exceeded || g->with_motors == 0.0) {return lowest(exceeded);}
+  if (exceeded || of->checks->motors == 0.0) {return lowest(exceeded);}
   motor_row row;
-  leg_drives at_any_rate = *on->drives;  /* breakaway torques, as if each leg could reverse */
+  leg_drives at_any_rate = *of->drives;  /* breakaway torques, as if each leg could reverse */
   for (int i = 0; i < 6; i++) {at_any_rate.legs[i].slow = HUGE_VAL;}
-  put_motors(on->platform, &at_any_rate, on->n_curve, on->curve, motion, result->forces,
+  put_motors(of->platform, &at_any_rate, of->n_curve, of->curve, motion, result->forces,
              result->forces, &row);
   for (int i = 0; i < 6; i++) {row.available_torques[i] *= g->load_share;}
   return one_above(row.speeds, g->speed_max, share) ? GOVERNED_SPEED_MAX + 1
@@ -176,7 +166,7 @@ static int inadmissible(const governed * on, const coordinates * state) {
       coordinates at = stopped(state, rate, stop_times[first + n] / rate);
       put_motion(on->limits, &at, &motions[n]);
     }
-    solve_many(on->platform, COARSE_SAMPLES, motions, 1, no_wrench, 1, &still, 1, results);
+    solve_many(on->of.platform, COARSE_SAMPLES, motions, 1, no_wrench, 1, &still, 1, results);
     if (first == 0 && !one_exceeded(on, motions, results, COARSE_SHARE)) {return 0;}
     found = one_exceeded(on, motions, results, 1.0);
   }
@@ -289,17 +279,19 @@ static void govern(
 int64_t governed_limit(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const governor_limits * limits, const coordinates * state) {
-  governed on = {platform, drives, n, curve, n_base, base, n_moving, moving, limits};
+  const limit_checks * checks, const governor_limits * limits, const coordinates * state) {
+  governed on = {
+    {platform, drives, n, curve, n_base, base, n_moving, moving, checks}, limits};
   return inadmissible(&on, state);
 }
 
 void govern_many(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const governor_limits * limits, int64_t count, const double * times,
-  const coordinates * demands, governed_stream * stream, stewart_motion * motions) {
-  governed on = {platform, drives, n, curve, n_base, base, n_moving, moving, limits};
+  const limit_checks * checks, const governor_limits * limits, int64_t count,
+  const double * times, const coordinates * demands, governed_stream * stream, stewart_motion * motions) {
+  governed on = {
+    {platform, drives, n, curve, n_base, base, n_moving, moving, checks}, limits};
   for (int64_t k = 0; k < count; k++) {
     if (!isnan(stream->time)) {
       govern(&on, 1, &stream->demand, &demands[k], times[k] - stream->time, &stream->governor);

@@ -75,10 +75,10 @@ int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
   return all_finite(result, sizeof *result) && result->condition_number < UNSOLVABLE_CONDITION;
 }
 
-#include "setpoints.c"
 #include "kinematics.c"
 #include "dynamics.c"
 #include "motors.c"
+#include "setpoints.c"
 #include "plant.c"
 #include "governor.c"
 #include "cueing.c"

@@ -19,21 +19,6 @@ typedef struct {
   double cause, stopped, determinant, time_to_crossing, crossings;
 } warning_state;
 
-/* A setpoint of the node, what it gives, and the state before. Flags are 0 or 1. */
-typedef struct {
-  stewart_motion motion;
-  double wrench[6];
-  stewart_base base;
-  warning_state before;
-  double followed[6]; /* lengths of the last setpoint that was not a jump, or nan [m] */
-  double elapsed;     /* since that setpoint, with the tolerance of stamps; or infinite [s] */
-  double restart, stamp_valid, base_known;
-  stewart_result result; /* forces nan where J_inv cannot be solved or the base is not known */
-  double forces[6];      /* to publish [N]; nan where suppressed */
-  warning_state after;
-  double answered, exceeding, jumped; /* answered: all numbers are finite */
-} one_setpoint;
-
 /* Drive of a leg: turn of the motor by metre [rad/m]; where the angle is zero [m]; reflected mass
    [kg]; losses of a motor that drives, and is driven, less 1; rate below which they are linear
    [m/s]; [N m/A], [Ohm]. */
@@ -62,9 +47,30 @@ typedef struct {
   motor_row drives;
 } checked_motors;
 
-/* The motors of one setpoint: the time since the last one [s], and the state of the windings before
-   and after it: temperature rises [K] and copper heat [W]. */
-typedef struct { double elapsed, windings[12]; checked_motors motors; } one_motors;
+/* Which limits are checked beside those of the legs, flags that are 0 or 1; and the axes of joints,
+   nan where not needed. */
+typedef struct { double angles, clearance, motors, joint_axes[36]; } limit_checks;
+
+/* A setpoint of the node with the state before it, and what it gives. Flags are 0 or 1; windings:
+   temperature rises [K] and copper heat [W]. */
+typedef struct {
+  stewart_motion motion;
+  double wrench[6];
+  stewart_base base;
+  warning_state before;
+  double followed[6]; /* lengths of the last setpoint that was not a jump, or nan [m] */
+  double since;       /* time since that setpoint, 0 where there is none [s] */
+  double elapsed;     /* the same with the tolerance of stamps, infinite where there is none [s] */
+  double windings_before[12];
+  double restart, stamp_valid, base_known;
+  double answered, exceeding, jumped; /* answered: all numbers are finite */
+  stewart_result result; /* forces nan where J_inv cannot be solved or the base is not known */
+  double forces[6];      /* to publish [N]; nan where suppressed, as the motors' commands */
+  warning_state after;
+  double joint_angles[12], clearances[6], nearest[6];
+  double windings[12];
+  checked_motors motors;
+} one_setpoint;
 
 /* A motion under loads, and what a call of one sample gives. */
 typedef struct {
@@ -127,15 +133,13 @@ typedef struct { double value[6], rate[6], acceleration[6]; } coordinates;
 enum { GOVERNED_TORQUE_MAX = 16, GOVERNED_SPEED_MAX = 17, GOVERNED_SINGULARITY = 18 };
 
 /* What a governor keeps besides the limits of the platform's legs: see mechanics/governor.py. All
-   have its margins; flags are 0 or 1. */
+   have its margins. */
 typedef struct {
   stewart_pose home;
   double head[3];                     /* platform frame [m] */
   double stop_rate, return_rate;      /* of the stop, and of the return to the demand [1/s] */
-  double joint_axes[36];
   double speed_max[6], load_share;    /* of motors; part of the available torque that is used */
   double condition_max, side;         /* side: sign of det(J) at home */
-  double with_angles, with_clearance, with_motors;
 } governor_limits;
 
 /* A governed motion, all zero at rest at home; following: it is the demand. */
@@ -171,15 +175,15 @@ typedef struct {
 int64_t governed_limit(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const governor_limits * limits, const coordinates * state);
+  const limit_checks * checks, const governor_limits * limits, const coordinates * state);
 
 /* Motions (count,) that follow demands (count,) at times [s] as far as the limits let them; the
    first is the state of the stream. */
 void govern_many(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const governor_limits * limits, int64_t count, const double * times,
-  const coordinates * demands, governed_stream * stream, stewart_motion * motions);
+  const limit_checks * checks, const governor_limits * limits, int64_t count,
+  const double * times, const coordinates * demands, governed_stream * stream, stewart_motion * motions);
 
 /* Motions (count,) at times [s] of inputs (count, 6), acceleration and angular velocity of the
    vehicle, linear between the times; the state is the one before, of an earlier time, and then the
@@ -187,8 +191,8 @@ void govern_many(
 void cue_many(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const governor_limits * limits, int64_t limited, const washout_filters * filters,
-  int64_t count, const double * times, const double * inputs, cueing_state * state,
+  const limit_checks * checks, const governor_limits * limits, int64_t limited,
+  const washout_filters * filters, int64_t count, const double * times, const double * inputs, cueing_state * state,
   stewart_motion * motions);
 
 /* Specific forces and angular velocities (count, 6) at a head of the platform, platform axes. */
@@ -212,13 +216,19 @@ int64_t forward_kinematics_one(const stewart_platform * platform, one_pose * sam
 int64_t processor_kind(void);
 
 /* Checks of a setpoint and its published forces; and of setpoints in order. */
-void step_one(const stewart_platform * platform, one_setpoint * setpoint);
+void step_one(
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
+  const limit_checks * checks, one_setpoint * setpoint);
 void check_many(
-  const stewart_platform * platform, int64_t count, const int64_t * stamps,
+  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
+  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
+  const limit_checks * checks, int64_t count, const int64_t * stamps,
   const uint8_t * bases_known, const uint8_t * restarts, const double * slack,
-  warning_state * state, int64_t * followed_at, double * followed, stewart_result * results,
-  double * forces, warning_state * states, uint8_t * answered, uint8_t * exceeding,
-  uint8_t * jumped);
+  const stewart_motion * motions, const double * joint_angles, const double * clearances,
+  warning_state * state, int64_t * followed_at, double * followed, double * windings,
+  stewart_result * results, double * forces, warning_state * states, checked_motors * motors,
+  uint8_t * answered, uint8_t * exceeding, uint8_t * jumped);
 
 /* Leg lengths (count, 6) of poses [m]. */
 void lengths_many(
@@ -291,13 +301,6 @@ void motors_many(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t count, const stewart_motion * motions, const stewart_result * results,
   const double * forces, motor_row * rows);
-
-/* The same for setpoints in order, with the windings' rises [K] and heat [W] (12,). */
-void check_motors_many(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t count, const stewart_motion * motions, const stewart_result * results,
-  const double * forces, const double * elapsed, const uint8_t * jumped, double * windings,
-  checked_motors * rows);
 
 /* External wrenches (count, 6) of model forces and measured ones (count, 6), in poses. */
 void external_wrenches_many(

@@ -130,15 +130,3 @@ static void check_motors(
   }
   row->sound = sound, row->exceeding = exceeding || running, row->running = running;
 }
-
-void check_motors_many(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t count, const stewart_motion * motions, const stewart_result * results,
-  const double * forces, const double * elapsed, const uint8_t * jumped, double * windings,
-  checked_motors * rows) {
-  for (int64_t k = 0; k < count; k++) {
-    put_motors(platform, drives, n, curve, &motions[k], results[k].forces, &forces[6 * k],
-               &rows[k].drives);
-    check_motors(drives, elapsed[k], jumped[k], windings, &rows[k]);
-  }
-}

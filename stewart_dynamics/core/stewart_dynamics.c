@@ -275,8 +275,7 @@ static moving_base base_of(const stewart_platform * platform, const stewart_base
   b.felt = subtract(read3(base->gravity), fixed3(platform->gravity));
   b.felt = subtract(read3(base->linear_acceleration), b.felt);
   b.spin = w, b.spin_rate = d;
-  put_matrix(
-    b.carrying, make(-(w.y * w.y + w.z * w.z), w.x * w.y - d.z, w.x * w.z + d.y),
+  put_matrix(b.carrying, make(-(w.y * w.y + w.z * w.z), w.x * w.y - d.z, w.x * w.z + d.y),
     make(w.x * w.y + d.z, -(w.x * w.x + w.z * w.z), w.y * w.z - d.x),
     make(w.x * w.z - d.y, w.y * w.z + d.x, -(w.x * w.x + w.y * w.y)));
   return b;
@@ -626,13 +625,11 @@ static double clearance_of(
 }
 
 /* Return the bit of a limit if a value is past it, above rounding errors; nan never is. */
-static unsigned above(double value, double most, unsigned bit) {
-  return value > most * (1.0 + LIMIT_TOLERANCE) ? bit : 0u;
-}
+static unsigned above(double value, double most, unsigned bit)
+{return value > most * (1.0 + LIMIT_TOLERANCE) ? bit : 0u;}
 
-static unsigned below(double value, double minimum, unsigned bit) {
-  return value < minimum * (1.0 - LIMIT_TOLERANCE) ? bit : 0u;
-}
+static unsigned below(double value, double minimum, unsigned bit)
+{return value < minimum * (1.0 - LIMIT_TOLERANCE) ? bit : 0u;}
 
 /* Return which limits of its joints a leg exceeds. */
 static unsigned check_angles(const stewart_leg * leg, double base_angle, double platform_angle) {
@@ -693,19 +690,20 @@ static unsigned check_leg(
     above(fabs(result->joint_forces[i]), share * leg->joint_force_max, STEWART_JOINT_FORCE_MAX);
 }
 
-/* Write the forces to command: clipped; without_force where they are suppressed or not solved.
- * Return whether they are suppressed. */
-static int command_forces(
-  const stewart_platform * platform, const stewart_result * result, int solved, int stopped,
-  unsigned exceeded, double without_force, double forces[6]) {
-  int suppressed = (stopped && platform->suppress_near_singularity) ||
-    ((exceeded & ~(unsigned)STEWART_FORCE_MAX) && platform->suppress_at_limits);
+/* Whether the forces are suppressed; running: a motor is too fast or too hot. */
+static int suppresses(
+  const stewart_platform * platform, int stopped, unsigned exceeded, int running) {
+  return (stopped && platform->suppress_near_singularity) ||
+    (((exceeded & ~(unsigned)STEWART_FORCE_MAX) || running) && platform->suppress_at_limits);
+}
+
+/* Write the forces within the limit; nan stays nan. */
+static void clip_forces(
+  const stewart_platform * platform, const stewart_result * result, double forces[6]) {
   for (int i = 0; i < 6; i++) {
-    double most = platform->legs[i].force_max;
-    forces[i] = solved && !suppressed
-      ? least(largest(result->forces[i], -most), most) : without_force;
+    double force = result->forces[i], most = platform->legs[i].force_max;
+    forces[i] = force > most ? most : force < -most ? -most : force;
   }
-  return suppressed;
 }
 
 int stewart_step(
@@ -734,9 +732,11 @@ int stewart_step(
     state->followed = 1, state->stamp = stamp;
     for (int i = 0; i < 6; i++) {state->lengths[i] = found.result.lengths[i];}
   }
-  int suppressed = command_forces(platform, &found.result, code == STEWART_OK, state->stopped,
-                                  any, 0.0, found.forces);
-  code = code == STEWART_OK && suppressed ? STEWART_SUPPRESSED : code;
+  clip_forces(platform, &found.result, found.forces);
+  if (code == STEWART_OK && suppresses(platform, state->stopped, any, 0)) {
+    code = STEWART_SUPPRESSED;
+    for (int i = 0; i < 6; i++) {found.forces[i] = 0.0;}
+  }
   *output = found;
   return code;
 }

@@ -37,17 +37,13 @@ from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds
-from stewart_dynamics.mechanics.drives.motors import Drives
 from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, Pose
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
-from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
-from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.limits import (
-    LIMITS, Limits, LOAD, OF_LEGS, short_name, SINGULARITY,
-    SPEED_MAX, TORQUE_MAX)
+    LIMITS, LOAD, OF_LEGS, short_name, SINGULARITY, SPEED_MAX, TORQUE_MAX)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import DETERMINANT, MOTION, POSE
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
@@ -94,24 +90,12 @@ class Governor:
         limits['condition_max'] = (1.0 - _OF_LOADS) * stop_condition_of(parameters)
         limits['side'] = math.copysign(1.0, result[DETERMINANT])
         limits['load_share'] = 1.0 - _OF_LOADS
-        angles = angles_to_check(parameters, Limits(parameters).of_joints)
-        limits['with_angles'] = angles is not None
-        if angles is not None:
-            # Angles that no limit needs have no axes, and are not compared: infinite bounds.
-            limits['joint_axes'] = np.nan_to_num(angles.axes).reshape(36)
-        limits['with_clearance'] = parameters.limits.leg_clearance_min is not None
-        base, platform = (np.empty((0, 3)),) * 2
-        if limits['with_clearance']:
-            shape = LegClearance(parameters)
-            base, platform = shape.base, shape.platform
-        drives = Drives(parameters)
-        limits['with_motors'] = bool(parameters.drives)
         if parameters.drives:
             limits['speed_max'] = (1.0 - _OF_OTHERS) * largest_speeds(parameters)
         self.limits: Records = limits
         self.home = home
-        self.arguments = (within, *drives.arguments[1:], len(base), base, len(platform), platform,
-                          limits)
+        self._pose_limits = PoseLimits(parameters)
+        self.arguments = within, *self._pose_limits.arguments, limits
         self._at_home = row, result
 
     def coordinates(self, motion: Motion) -> Records:
@@ -144,7 +128,7 @@ class Governor:
 
     def check_home(self, parameters: Parameters) -> None:
         """Raise ParameterError where a limit is exceeded at home, at rest."""
-        found = PoseLimits(parameters).first_exceeded(*self._at_home)
+        found = self._pose_limits.first_exceeded(*self._at_home)
         limit = self.limit_of(np.zeros(1, record('coordinates')))
         if found is None and limit is None:
             return

@@ -9,9 +9,12 @@ Lengths, joint angles, clearance, singularities; and forces and torques that hol
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.core.binding import record
 from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
 from stewart_dynamics.mechanics.drives.motors import Drives
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
@@ -31,6 +34,7 @@ class PoseLimits:
     limits: all limits of the legs.
     angles, clearance: of joints and legs; None without limits of them.
     stop_condition: condition number from which on a pose is singular.
+    arguments: those of functions in C that check limits, after the hexapod: drives, plates, which.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -40,6 +44,16 @@ class PoseLimits:
         self.stop_condition = stop_condition_of(parameters)
         self._drives = Drives(parameters) if parameters.drives else None
         self._motors = MotorLimits(parameters)
+        none = np.empty((0, 3))
+        base, platform = (none, none) if self.clearance is None else (
+            self.clearance.base, self.clearance.platform)
+        checks: Any = np.zeros((), record('limit_checks'))
+        checks['angles'], checks['clearance'], checks['motors'] = (
+            self.angles is not None, self.clearance is not None, self._drives is not None)
+        if self.angles is not None:
+            checks['joint_axes'] = self.angles.axes.reshape(36)
+        self.arguments = (*Drives(parameters).arguments[1:], len(base), base, len(platform),
+                          platform, checks)
 
     def values(self, motions: Array, results: Array) -> dict[str, Array]:
         """Return the values (N, 6) of all limits at rows of motion and their results."""

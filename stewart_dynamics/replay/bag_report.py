@@ -45,7 +45,7 @@ from stewart_dynamics.reporting.plots import (
     base_wrench_plots, measured_plots, motion_plots, plotted, spectrum_plots)
 from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
-from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
+from stewart_dynamics.setpoints.motor_row import OF_DRIVES, RISES
 from stewart_dynamics.setpoints.rejections import stamp_of
 from stewart_dynamics.whole_file import FilesOfFolder, write_files
 

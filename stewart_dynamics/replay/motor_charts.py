@@ -18,7 +18,7 @@ from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.limits import TORQUE_MAX
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
-from stewart_dynamics.setpoints.motor_step import OF_DRIVES
+from stewart_dynamics.setpoints.motor_row import OF_DRIVES
 
 # Cells of each motor: magnitude of the speed, torque.
 _CELLS = 128

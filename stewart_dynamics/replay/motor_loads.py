@@ -22,7 +22,7 @@ from stewart_dynamics.mechanics.limits import (
     LIMITS, OF_MOTORS, SPEED_MAX, TORQUE_SPEED)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.block_statistics import Exceeded, Extreme, finite, Integral
-from stewart_dynamics.setpoints.motor_step import OF_DRIVES, RISES
+from stewart_dynamics.setpoints.motor_row import OF_DRIVES, RISES
 
 MARGIN = 1.2  # factor on torques and speed of the motor that is needed
 _OF_VELOCITY = TORQUE_SPEED, SPEED_MAX

@@ -37,7 +37,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.summary import COMPONENTS, unit_key
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
 from stewart_dynamics.reporting.block_statistics import Extreme
-from stewart_dynamics.setpoints.motor_step import OF_DRIVES
+from stewart_dynamics.setpoints.motor_row import OF_DRIVES
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 from stewart_dynamics.setpoints.step import Batch, Outputs
 

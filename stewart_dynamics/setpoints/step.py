@@ -17,19 +17,18 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, NO_WRENCH, Six, Stamps, STAMPS_END
 from stewart_dynamics.core.binding import function, Sample
-from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
-from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
-from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, Limits, result_values)
+from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
+from stewart_dynamics.mechanics.limits import ANGLES, CLEARANCE_MIN, Exceedance, result_values
+from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES,
     UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
     CAUSE, Singularity, STATE, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
-from stewart_dynamics.setpoints.motor_step import (
-    EXCEEDING, MotorStep, RUNNING, times_followed, TORQUES)
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.motor_row import (
+    EXCEEDING, MOTOR_ROW, OF_DRIVES, RISES, SOUND, WINDINGS)
 
 
 # Tolerance of the stamps of setpoints [s]: a leg may move at its rate limit for this additional
@@ -62,7 +61,7 @@ class State(NamedTuple):
     stamp: int = 0  # stamp of the last setpoint that was not a jump [ns]
     lengths: Six | None = None  # leg lengths of that setpoint [m]; None before the first one
     windings: tuple[float, ...] | None = None
-    """Of the motors after that setpoint, see ``motor_step``; None without thermal data."""
+    """Of the motors after that setpoint, see ``motor_row``; None without thermal data."""
 
 
 class Output(NamedTuple):
@@ -81,7 +80,7 @@ class Output(NamedTuple):
     clearances: tuple[float, ...] = ()
     """Distance of the surface of each leg to the nearest other leg [m]; empty without limit."""
     motors: tuple[float, ...] = ()
-    """Begin of a row of motors, see ``motor_step``; empty without ``drive.*``."""
+    """Begin of a row of motors, see ``motor_row``; empty without ``drive.*``."""
     state: State = State()  # for the next setpoint
 
     @property
@@ -160,7 +159,7 @@ def restarts_of(restarts: Flags, kept: Flags, waiting: bool = False) -> tuple[Fl
     Return the restarts of those setpoints (N,) that are kept, and whether one waits for the next.
 
     A restart that is left out passes to the next setpoint that is kept; one was already waiting
-    or not. ``DynamicsNode`` and ``check_many`` in C do so setpoint by setpoint.
+    or not. ``check_many`` in C does so setpoint by setpoint.
     """
     of_kept = np.cumsum(restarts)[kept] + waiting
     still = np.count_nonzero(restarts) + waiting > of_kept.max(initial=0)
@@ -182,7 +181,7 @@ class Outputs(NamedTuple):
     jumped: Flags  # (N,): the legs cannot follow from the last setpoint that was not a jump
     joint_angles: Array  # rows of joint angles (N, 12) [rad], or (N, 0), as in Output
     clearances: Array  # (N, 6) [m], or (N, 0), as in Output
-    motors: Array  # rows of motors (N, MOTOR_ROW), or (N, 0); see ``motor_step``
+    motors: Array  # rows of motors (N, MOTOR_ROW), or (N, 0); see ``motor_row``
     state: State = State()  # for the next setpoint
 
     @property
@@ -242,6 +241,8 @@ def _known(forces: tuple[float, ...]) -> Six | None:
 
 _FIRST = Singularity()
 _NO_LENGTHS = (math.nan,) * 6  # no setpoint is a jump from these
+_COLD = (0.0,) * WINDINGS
+_UNCHECKED: tuple[tuple[float, ...], ...] = ((), (), ())  # joints, clearance, nearest
 
 
 class Step:
@@ -255,24 +256,20 @@ class Step:
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self._platform = StewartPlatform(parameters)
-        self._limits = Limits(parameters)
-        self._sample = sample = Sample(
-            'one_setpoint', 'base_known', 'answered', 'exceeding', 'jumped', 'result', 'forces',
-            'after')
-        self._limits_suppress = parameters.limits.action == SUPPRESS_FORCES
+        self._of_poses = of_poses = PoseLimits(parameters)
+        self._limits, self._motors = of_poses.limits, MotorLimits(parameters)
+        self._with_motors = bool(parameters.drives)
+        self._warms = parameters.drive.thermal_resistance is not None
         # Margin by which the time between two setpoints may exceed that between their stamps [s].
         self._slack = JITTER + parameters.setpoint.sync_tolerance
         self._slack_of_arrival = JITTER + parameters.setpoint.timeout
-        self._angles = angles_to_check(parameters, self._limits.of_joints)
-        self._angles_of_one = (
-            None if self._angles is None else self._angles.of_one(sample['motion']))
-        self._clearance = clearance_to_check(parameters)
-        self._clearance_of_one = (
-            None if self._clearance is None else self._clearance.of_one(sample['motion']))
-        self._motors = MotorStep(
-            parameters, sample['motion'], sample['result'], sample['forces'],
-            ) if parameters.drives else None
-        self._solve = function('step_one').bound(self._platform.structure, sample.numbers)
+        self._sample = sample = Sample(
+            'one_setpoint', 'base_known', 'answered', 'exceeding', 'jumped', 'result', 'forces',
+            'after', *(('joint_angles', 'clearances', 'nearest')
+                       if of_poses.angles or of_poses.clearance or self._with_motors else ()),
+            *(('windings', 'motors') if self._with_motors else ()))
+        self._arguments = self._platform.structure, *of_poses.arguments
+        self._solve = function('step_one').bound(*self._arguments, sample.numbers)
 
     def __call__(self, setpoint: Setpoint, before: State | None) -> Output | None:
         """
@@ -288,78 +285,53 @@ class Step:
             elapsed = since + (self._slack if setpoint.stamped else self._slack_of_arrival)
         self._sample.write(
             *setpoint.motion, *setpoint.wrench, *(setpoint.base or NO_BASE),
-            *(before.singularity or _FIRST), *(before.lengths or _NO_LENGTHS), elapsed,
-            setpoint.restart, -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
+            *(before.singularity or _FIRST), *(before.lengths or _NO_LENGTHS), since, elapsed,
+            *(before.windings or _COLD), setpoint.restart, -STAMPS_END <= stamp < STAMPS_END,
+            setpoint.base_known)
         self._solve()
-        answered, exceeding, jumped, result, commanded, after = self._sample.read()
+        answered, exceeding, jumped, result, commanded, after, *checked = self._sample.read()
         if not answered:
             return None
-        forces, lengths = _known(commanded), result[LENGTHS]
+        angles, clearances, nearest, *of_motors = checked or _UNCHECKED
+        windings, motors = of_motors or (None, ())
+        if motors and not motors[SOUND]:
+            motors = ()
+        lengths = result[LENGTHS]
+        angles = angles if self._of_poses.angles else ()
+        clearances = clearances if self._of_poses.clearance else ()
+        exceedances: tuple[Exceedance, ...] = ()
+        if exceeding:
+            exceedances = self._limits.exceeded(result_values(self._sample['result']))
+            if jumped and before.lengths:
+                exceedances += self._limits.jumps(lengths, before.lengths, elapsed)
+            exceedances += self._limits.exceeded(
+                {name: angles[where] for name, where in ANGLES.items()}
+                | {CLEARANCE_MIN: clearances}, tuple(map(int, nearest)))
+            if motors and motors[EXCEEDING]:
+                row = np.array(motors)
+                exceedances += self._motors.exceeded(row[OF_DRIVES], row[RISES])
         singularity = Singularity.of(after)
-        exceedances = (self._limits.exceeded(result_values(self._sample['result']))
-                       if exceeding else ())
-        if jumped and before.lengths:
-            exceedances += self._limits.jumps(lengths, before.lengths, elapsed)
-        # Limits that are not checked in C.
-        of_pose: tuple[Exceedance, ...] = ()
-        angles: tuple[float, ...] = ()
-        if self._angles_of_one is not None:
-            angles = self._angles_of_one()
-            of_pose = self._limits.exceeded(
-                {name: angles[where] for name, where in ANGLES.items()})
-        clearances: tuple[float, ...] = ()
-        if self._clearance_of_one is not None:
-            clearances, nearest = self._clearance_of_one()
-            of_pose += self._limits.exceeded({CLEARANCE_MIN: clearances}, nearest)
-        motors, of_motors, windings = self._motors(since, before.windings) if (
-            self._motors is not None) else ((), (), before.windings)
-        if self._limits_suppress and (of_pose or of_motors and motors[RUNNING]):
-            forces = None
+        if not self._warms:
+            windings = None
         return Output(
-            stamp, result, forces, singularity,
+            stamp, result, _known(commanded), singularity,
             before.singularity is None or singularity.warning != before.singularity.warning,
-            exceedances + of_pose + of_motors, angles, clearances, motors,
+            exceedances, angles, clearances, motors,
             before._replace(singularity=singularity) if jumped
             else State(singularity, stamp, lengths, windings))
 
     def many(self, setpoints: Batch, before: State | None) -> Outputs:
         """Return the outputs of a sequence of setpoints, as calls for one setpoint would."""
-        before = before or State()
-        outputs = self._checked(setpoints, before)
-        answered, forces, exceeding = outputs.answered, outputs.forces, outputs.exceeding
-        motions, restarts = setpoints.motions, setpoints.restarts
-        if not answered.all():
-            motions = motions[answered]
-            restarts, _ = restarts_of(restarts, answered)
-        none: Array = np.empty((len(forces), 0))
-        angles = none if self._angles is None else self._angles(motions)
-        clearances = none if self._clearance is None else self._clearance(motions)
-        of_poses = {name: angles[:, ANGLES[name]] for name in self._limits.of_joints}
-        if self._clearance is not None:
-            of_poses[CLEARANCE_MIN] = clearances
-        for name, values in of_poses.items():
-            exceeded = self._limits.exceeds(name, values).any(axis=1)
-            exceeding |= exceeded
-            if self._limits_suppress:
-                forces[exceeded] = np.nan
-        motors, windings = none, before.windings
-        if self._motors is not None:
-            motors, windings = self._motors.many(
-                times_followed(outputs.stamps, restarts, outputs.jumped, before.stamp),
-                outputs.jumped, motions, outputs.results, forces, windings)
-            exceeding |= motors[:, EXCEEDING] > 0.0
-            if self._limits_suppress:
-                forces[motors[:, RUNNING] > 0.0] = np.nan
-            motors[np.isnan(forces[:, 0]), TORQUES] = np.nan
-        return outputs._replace(joint_angles=angles, clearances=clearances, motors=motors,
-                                state=outputs.state._replace(windings=windings))
-
-    def _checked(self, setpoints: Batch, before: State) -> Outputs:
-        """Return the outputs as far as they are checked in C: no joints, no motors."""
-        results = self._platform.solve(
-            setpoints.motions, setpoints.wrenches, setpoints.bases)
+        before, motions = before or State(), setpoints.motions
+        results = self._platform.solve(motions, setpoints.wrenches, setpoints.bases)
         number = len(results)
+        none: Array = np.empty((number, 0))
+        angles = none if self._of_poses.angles is None else self._of_poses.angles(motions)
+        clearances = none if self._of_poses.clearance is None else (
+            self._of_poses.clearance(motions))
+        motors = np.empty((number, MOTOR_ROW if self._with_motors else 0))
         state = np.array(before.singularity or _FIRST)
+        windings = np.array(before.windings or _COLD)
         followed_at = np.array([before.stamp])
         followed = np.array(before.lengths or _NO_LENGTHS)
         forces, states = np.empty((number, 6)), np.empty((number, STATE))
@@ -368,13 +340,14 @@ class Step:
         if setpoints.stamped is not None:
             slack[~setpoints.stamped] = self._slack_of_arrival
         function('check_many')(
-            self._platform.structure, number, setpoints.stamps, setpoints.base_known,
-            setpoints.restarts, slack, state, followed_at, followed, results, forces, states,
-            answered, exceeding, jumped)
+            *self._arguments, number, setpoints.stamps, setpoints.base_known, setpoints.restarts,
+            slack, np.ascontiguousarray(motions), angles, clearances, state, followed_at, followed,
+            windings, results, forces, states, motors, answered, exceeding, jumped)
         stamps = setpoints.stamps
         if not answered.all():
-            stamps, results, forces, states, exceeding, jumped = (
-                each[answered] for each in (stamps, results, forces, states, exceeding, jumped))
+            stamps, results, forces, states, exceeding, jumped, angles, clearances, motors = (
+                each[answered] for each in (stamps, results, forces, states, exceeding, jumped,
+                                            angles, clearances, motors))
         singularity = before.singularity
         warnings = states[:, CAUSE] > 0.0
         changed = np.empty(len(states), dtype=bool)
@@ -383,8 +356,9 @@ class Step:
         if len(states):
             singularity = Singularity.of(states[-1].tolist())
         a, b, c, d, e, f = followed.tolist()
-        none = np.empty((len(states), 0))
+        warm = tuple(windings.tolist()) if self._warms and len(states) else before.windings
         return Outputs(
-            answered, stamps, results, forces, states, changed, exceeding, jumped, none, none,
-            none, State(singularity, int(followed_at[0]),
-                        None if math.isnan(a) else (a, b, c, d, e, f)))
+            answered, stamps, results, forces, states, changed, exceeding, jumped, angles,
+            clearances, motors, State(
+                singularity, int(followed_at[0]),
+                None if math.isnan(a) else (a, b, c, d, e, f), warm))

@@ -17,7 +17,7 @@ derivative at angle zero, too, and loses no digits there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 import math
 
 import numpy as np
@@ -78,18 +78,6 @@ class JointAngles:
         angles = np.empty((len(motions), JOINT_ANGLES))
         batch.in_parts(joint_angles, (self._hexapod, self.axes), batch.compact(motions), angles)
         return angles
-
-    def of_one(self, motion: Array) -> Callable[[], tuple[float, ...]]:
-        """Return a function that gives the angles (JOINT_ANGLES,) of a row's current values."""
-        angles = np.empty((1, JOINT_ANGLES))
-        compute = function('joint_angles_many').bound(
-            self._hexapod, self.axes, 1, motion, angles)
-
-        def of_row() -> tuple[float, ...]:
-            compute()
-            return tuple(angles[0].tolist())
-
-        return of_row
 
     def haversines(self, motions: Array) -> tuple[Array, Array]:
         """Return sin^2(angle / 2) and its rate [1/s], both (N, JOINT_ANGLES), in motions."""

@@ -22,8 +22,6 @@ the polygon is nearest, or an edge is.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers, Records
@@ -86,19 +84,6 @@ class LegClearance:
         batch.in_parts(leg_clearances, self._constants, batch.compact(motions), clearances,
                        nearest)
         return clearances, nearest
-
-    def of_one(self, motion: Array) -> Callable[[], tuple[tuple[float, ...], tuple[int, ...]]]:
-        """Return a function that gives ``nearest`` (6,) of a row's current values."""
-        clearances, nearest = np.empty((1, 6)), np.empty((1, 6), np.int64)
-        hexapod, base, platform = self._constants
-        compute = function('clearances_many').bound(
-            hexapod, len(base), base, len(platform), platform, 1, motion, clearances, nearest)
-
-        def of_row() -> tuple[tuple[float, ...], tuple[int, ...]]:
-            compute()
-            return tuple(clearances[0].tolist()), tuple(nearest[0].tolist())
-
-        return of_row
 
 
 def clearance_to_check(parameters: Parameters) -> LegClearance | None:

@@ -25,7 +25,7 @@ from stewart_dynamics.mechanics.singularity_warning import Cause, HYSTERESIS
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
-from stewart_dynamics.setpoints.motor_step import DEMANDED_TORQUES, RISES, SPEEDS
+from stewart_dynamics.setpoints.motor_row import DEMANDED_TORQUES, RISES, SPEEDS
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 from stewart_dynamics.setpoints.step import Output
 
