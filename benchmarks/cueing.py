@@ -5,17 +5,31 @@
 Speed of motion cueing, and random flights and drives under the governor: limits exceeded.
 
 Half of the motions are wild: steps of 5 g, spins, noise; the other half are those of vehicles.
+
+--latency measures the node instead, from the message of a vehicle to the first setpoint that has
+its acceleration, which steps at random times. Beside it a bare node publishes the last reading in
+the same messages, at the same rate, and computes nothing; they take turns.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+import random
+import signal
+import subprocess
+import sys
 import time
+from typing import Any
 
+from inverse_dynamics import markdown, processor_name, write
 import numpy as np
 
 from stewart_dynamics import Motion, MotionCueing, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
 from stewart_dynamics.mechanics.drives.motors import Drives
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
@@ -23,6 +37,15 @@ from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, RATE
 
 RATE = 250.0
 PIECE = 40.0  # [s]
+GRAVITY = 9.80665
+
+BEGIN, END = '<!-- cueing: begin -->', '<!-- cueing: end -->'
+NODES = {'stewart_cueing': '`stewart_cueing`', 'bare': 'bare node'}
+DOMAIN = '101'  # the tests have those below
+VEHICLE_RATE = 100.0  # [Hz]
+STEP = 1.0  # of the acceleration [m/s^2]; setpoints have the half, by the default gain
+STEP_EVERY = 5  # messages
+FADE = 1.5  # of the node at the begin of a turn, not measured [s]
 
 
 def vehicle(generator: np.random.Generator, times: Array, wild: bool) -> tuple[Array, Array]:
@@ -70,13 +93,180 @@ def exceeded(platform: StewartPlatform, motion: Motion) -> int:
     return int(found.sum())
 
 
+class Bare:
+    """A node that publishes the last reading at the rate, and computes nothing."""
+
+    def __init__(self) -> None:
+        from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped
+        from rclpy.clock import Clock, ClockType
+        from rclpy.node import Node
+        from rclpy.qos import QoSProfile
+        from sensor_msgs.msg import Imu
+        self.node = Node('bare')
+        qos = QoSProfile(depth=1000)
+        self._messages = PoseStamped(), TwistStamped(), AccelStamped()
+        self._publishers = [
+            self.node.create_publisher(type(message), f'/of_bare/setpoint/{name}', qos)
+            for name, message in zip(('pose', 'twist', 'accel'), self._messages, strict=True)]
+        self.node.create_subscription(Imu, '/bare/vehicle', self._on_vehicle, qos)
+        self.node.create_timer(
+            1.0 / RATE, self._on_time, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _on_vehicle(self, message: Any) -> None:
+        self._messages[2].accel.linear = message.linear_acceleration
+
+    def _on_time(self) -> None:
+        stamp = self.node.get_clock().now().to_msg()
+        for publisher, message in zip(self._publishers, self._messages, strict=True):
+            message.header.stamp = stamp
+            publisher.publish(message)
+
+
+class Drive:
+    """The vehicle, and the accelerations in the setpoints of both nodes."""
+
+    def __init__(self) -> None:
+        import rclpy
+        from geometry_msgs.msg import AccelStamped
+        from rclpy.qos import QoSProfile
+        from rclpy.serialization import deserialize_message
+        from sensor_msgs.msg import Imu
+        self.node = rclpy.create_node('drive')
+        qos = QoSProfile(depth=1000)
+        self.heard: dict[str, list[tuple[int, float]]] = {name: [] for name in NODES}
+
+        def listen(name: str) -> Any:
+            def note(data: bytes) -> None:
+                now = time.monotonic_ns()
+                accel = deserialize_message(data, AccelStamped).accel.linear.x
+                self.heard[name].append((now, accel))
+            return note
+
+        self._publishers = {}
+        for name in NODES:
+            self.node.create_subscription(
+                AccelStamped, f'/of_{name}/setpoint/accel', listen(name), qos, raw=True)
+            self._publishers[name] = self.node.create_publisher(Imu, f'/{name}/vehicle', qos)
+        self._message = Imu()
+        self._message.linear_acceleration.z = GRAVITY
+
+    def ready(self) -> bool:
+        """Return whether both nodes are there and publish."""
+        return all(self.heard.values()) and all(
+            each.get_subscription_count() for each in self._publishers.values())
+
+    def turn(self, name: str, seconds: float, spin: Any) -> Array:
+        """Drive with one of the nodes and return the latencies of its steps [us]."""
+        self.heard[name].clear()
+        steps: list[int] = []
+        begin = due = time.monotonic()
+        n = 0
+        while due < begin + seconds:
+            # At any time within the period of the setpoints, whatever that of the messages is.
+            due = begin + n / VEHICLE_RATE + random.random() / RATE
+            while (left := due - time.monotonic()) > 0.0:
+                spin(left)
+            step = n % STEP_EVERY == 0
+            if step:
+                self._message.linear_acceleration.x = (
+                    -0.5 * STEP if self._message.linear_acceleration.x > 0.0 else 0.5 * STEP)
+            self._message.header.stamp = self.node.get_clock().now().to_msg()
+            if step and due > begin + FADE:
+                steps.append(time.monotonic_ns())
+            self._publishers[name].publish(self._message)
+            n += 1
+        end = time.monotonic() + 0.1
+        while time.monotonic() < end:
+            spin(0.01)
+        times, values = (np.array(each) for each in zip(*self.heard[name], strict=True))
+        jumps = np.append(times[1:][np.abs(np.diff(values)) > 0.2 * STEP], np.iinfo(np.int64).max)
+        arrived = jumps[np.searchsorted(jumps, steps)]
+        # Where the computer is so late that a step and the next one are in one setpoint: neither.
+        known = arrived < np.append(steps[1:], steps[-1] + 10 ** 9)
+        if known.mean() < 0.8:
+            raise SystemExit(f'{name}: {(~known).sum()} of {len(steps)} steps did not arrive')
+        latencies: Array = (arrived - np.array(steps))[known] * 1e-3
+        return latencies
+
+
+@contextmanager
+def running() -> Iterator[None]:
+    """Run both nodes."""
+    commands = {
+        'stewart_cueing': [
+            str(executable('stewart_cueing')), '--ros-args', '--params-file',
+            'config/platform.yaml', '-p', 'target:=/of_stewart_cueing', '-p',
+            f'cueing.rate:={RATE}', '-p', 'start_timeout:=0.1'],
+        'bare': [sys.executable, __file__, '--bare']}
+    processes = [subprocess.Popen(command) for command in commands.values()]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.send_signal(signal.SIGINT)
+        for process in processes:
+            process.wait(30)
+
+
+def latency(rounds: int, seconds: float) -> list[str]:
+    """Return the table of the latencies."""
+    import rclpy
+    from rclpy.experimental.events_executor import EventsExecutor
+    os.environ.update(ROS_DOMAIN_ID=DOMAIN, ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
+    rclpy.init(args=[])
+    drive = Drive()
+    executor = EventsExecutor()
+    executor.add_node(drive.node)
+
+    def spin(timeout: float) -> None:
+        executor.spin_once(timeout_sec=timeout)
+
+    turns: dict[str, list[Array]] = {name: [] for name in NODES}
+    with running():
+        while not drive.ready():
+            spin(0.1)
+        for n in range(rounds):
+            for name in sorted(NODES, reverse=n % 2 == 0):
+                turns[name].append(drive.turn(name, FADE + seconds, spin))
+    executor.shutdown()
+    rclpy.try_shutdown()
+    cells: list[tuple[str, ...]] = [(
+        'latency (ms)', 'p50', 'p99', 'max', 'p50, times bare', 'p99, times bare')]
+    for name, title in NODES.items():
+        ratios = np.median([
+            np.percentile(ours, (50, 99)) / np.percentile(bare, (50, 99))
+            for ours, bare in zip(turns[name], turns['bare'], strict=True)], axis=0)
+        values = np.percentile(np.concatenate(turns[name]), (50, 99, 100)) * 1e-3
+        cells.append((title, *(f'{each:.2f}' for each in values),
+                      *(f'{each:.2f}' for each in ratios)))
+    return ['', *markdown(cells), '', f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. '
+            f'{rounds} turns of {seconds:g} s each, {sum(map(len, turns["bare"]))} steps.', '']
+
+
 def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--params', default='config/platform.yaml')
     parser.add_argument('--seconds', type=float, default=10_000.0, help='of random motions')
     parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--latency', action='store_true', help='of the node')
+    parser.add_argument('--rounds', type=int, default=6, help='turns of each node')
+    parser.add_argument('--turn', type=float, default=10.0, help='duration of a turn [s]')
+    parser.add_argument('--write', action='store_true', help='put the latency into README.md')
+    parser.add_argument('--bare', action='store_true', help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.bare:
+        import rclpy
+        from pass_through import spin
+        rclpy.init(args=[])
+        spin(Bare().node)
+        return
+    if options.latency:
+        lines = latency(options.rounds, options.turn)
+        print('\n'.join(lines))
+        if options.write:
+            write(lines, BEGIN, END)
+        return
     parameters = Parameters.from_yaml(options.params)
     cueing = MotionCueing(parameters.replaced({'cueing.input': 'acceleration'}))
     platform = StewartPlatform(parameters)

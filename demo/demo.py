@@ -145,8 +145,7 @@ def main() -> None:
             demo = Demo(options.bag)
             executor = SingleThreadedExecutor()
             executor.add_node(demo)
-            print(f'starting {NODE} with {options.params.name}; the first start compiles, which '
-                  'takes seconds', flush=True)
+            print(f'starting {NODE} with {options.params.name}', flush=True)
             _wait(executor, 'the node is not active', 60.0, demo.connected, process)
             play(demo, executor, process)
             print()

@@ -30,6 +30,7 @@ from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.launch_arguments import check_launch_arguments
+import yaml
 
 PACKAGES = ('controller_manager', 'joint_state_broadcaster', 'joint_trajectory_controller',
             'robot_state_publisher')
@@ -38,16 +39,25 @@ FILES = {
     'params_file': ('platform.yaml', 'YAML file with the parameters of the hexapod'),
     'controllers_file': ('controllers/trajectory_position_effort.yaml',
                          f'YAML file of the controller manager, with {CONTROLLER}')}
-# The command interfaces of the default controllers_file.
-INTERFACES = ('position', 'effort')
 
 
-def robot_description(params_file: str, urdf_file: str) -> str:
+def command_interfaces(controllers_file: str) -> list[str]:
+    """Return the interfaces of the legs that a file commands."""
+    document = yaml.safe_load(Path(controllers_file).read_text(encoding='utf-8'))
+    try:
+        interfaces: list[str] = document[CONTROLLER]['ros__parameters']['command_interfaces']
+    except (KeyError, TypeError):
+        raise RuntimeError(f'controllers_file: {controllers_file}: has no {CONTROLLER} with '
+                           'command_interfaces') from None
+    return interfaces
+
+
+def robot_description(params_file: str, urdf_file: str, interfaces: list[str]) -> str:
     """Return the URDF of a file, or that of the hexapod with mock hardware."""
     if urdf_file:
         return Path(urdf_file).read_text(encoding='utf-8')
     return urdf(Hexapod(Parameters.from_yaml(params_file)), 'hexapod',
-                Ros2Control(INTERFACES, MOCK))
+                Ros2Control(interfaces, MOCK))
 
 
 def nodes(context: LaunchContext) -> list[Action]:
@@ -61,8 +71,9 @@ def nodes(context: LaunchContext) -> list[Action]:
         raise RuntimeError(f'urdf_file: {urdf_file}: no such file')
     for package in PACKAGES:
         FindPackageShare(package).perform(context)  # raises before anything has started
-    description = robot_description(files['params_file'], urdf_file)
     controllers = files['controllers_file']
+    interfaces = command_interfaces(controllers)
+    description = robot_description(files['params_file'], urdf_file, interfaces)
     return [
         LogInfo(msg=', '.join(f'{name}: {file}' for name, file in (
             files | {'urdf_file': urdf_file or 'written from params_file'}).items())),
@@ -77,7 +88,9 @@ def nodes(context: LaunchContext) -> list[Action]:
              arguments=['joint_state_broadcaster', CONTROLLER, '--param-file', controllers],
              output='screen'),
         Node(package='stewart_dynamics', executable='stewart_dynamics', name='stewart_dynamics',
-             parameters=[files['params_file']],
+             # The controller rejects efforts that it does not command.
+             parameters=[files['params_file'], *(
+                 [] if 'effort' in interfaces else [{'trajectory.effort': False}])],
              remappings=[('~/leg_trajectory', f'/{CONTROLLER}/joint_trajectory'),
                          ('~/measured_legs', '/joint_states')],
              output='screen')]

@@ -94,12 +94,17 @@ class FilesOfFolder:
                 raise StewartError(f'{path}: another run has written it meanwhile: it is not '
                                    'replaced')
 
-    def write(self, files: Mapping[str, str | bytes]) -> list[Path]:
+    def write(self, files: Mapping[str, str | bytes], beside: Mapping[str, str] | None = None,
+              ) -> list[Path]:
         """
         Make the folder if it is missing, write the files and return their paths.
 
         Either all of them are written, or the folder stays as it was.
+
+        beside: more files, which may be there already if they have this content.
         """
+        files = {**files, **{name: text for name, text in (beside or {}).items()
+                             if not self._has(name, text.encode())}}
         self.check(files)
         paths = {self._folder / name: content for name, content in files.items()}
         with named(self._folder):
@@ -109,6 +114,16 @@ class FilesOfFolder:
             self.check(files)
             _rename(partial)
         return list(paths)
+
+    def _has(self, name: str, content: bytes) -> bool:
+        """Return whether there is a file, not a link, with this content."""
+        path = self._folder / name
+        try:
+            found = path.lstat()
+            return (stat.S_ISREG(found.st_mode) and found.st_size == len(content)
+                    and path.read_bytes() == content)
+        except OSError:
+            return False
 
 
 @contextmanager

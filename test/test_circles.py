@@ -79,12 +79,31 @@ def test_changes_of_points_and_circles_take_the_place_of_each_other() -> None:
      'file: geometry.base_angles: 12.0 rad: must be at least -6.28319, at most 6.28319: in '
      'degrees?'),
     ({'geometry.base_radius': 0.0}, 'file: geometry.base_radius: 0.0 m: must be more than 0'),
+    ({'geometry.platform_angles': [0.0, 2.0 * math.pi] * 3},
+     'file: geometry.platform_angles: all six are at one point'),
     ({'geometry.base_angles': BASE[:5]},
      'file: geometry.base_angles: ')])
 def test_half_a_circle_and_both_are_rejected(changes: dict[str, Any], expected: str) -> None:
     with pytest.raises(ParameterError) as found:
         Parameters({**OTHERS, **CIRCLES, **changes}, 'file')
     assert str(found.value).startswith(expected)
+
+
+def test_mistakes_in_circles_name_what_was_given() -> None:
+    def mistakes(**changes: float) -> str:
+        return ' '.join(StewartPlatform(ON_CIRCLES.replaced(
+            {f'geometry.{name}': value for name, value in changes.items()})).check())
+
+    assert mistakes() == ''
+    # And nothing that would follow from it, as other units.
+    assert StewartPlatform(ON_CIRCLES.replaced({'geometry.base_angles': [1.0] * 6})).check() == (
+        'geometry.base_angles: all six are at one point: the legs hold the platform in no pose',)
+    assert 'geometry.platform_radius: 600 m from their center' in mistakes(
+        base_radius=900.0, platform_radius=600.0)
+    assert 'geometry.platform_radius: 0.9 m from their center, the base joints only' in mistakes(
+        base_radius=0.6, platform_radius=0.9)
+    assert 'geometry.platform_radius: 0.6 m from their center, the base joints 900 m' in mistakes(
+        base_radius=900.0)
 
 
 def test_a_height_with_points_is_rejected() -> None:

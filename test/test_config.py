@@ -10,12 +10,15 @@ import json
 from pathlib import Path
 import re
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
 from stewart_dynamics import Parameters, Pose, StewartPlatform
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
 from stewart_dynamics.program import DONE
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.output_bag import RECORDED_TYPES, ROBOT_DESCRIPTION
@@ -165,8 +168,9 @@ OF_TRAJECTORY = {
         'p', 'i', 'd', 'i_clamp_max', 'i_clamp_min', 'ff_velocity_scale', 'u_clamp_max',
         'u_clamp_min', 'tracking_time_constant', 'error_deadband')},
     'gains.JOINT.antiwindup_strategy': str}
-# joint_trajectory_controller/validate_jtc_parameters.hpp, with effort in it.
-COMMANDS = (['effort'], ['position', 'effort'])
+# Some of those that joint_trajectory_controller/validate_jtc_parameters.hpp admits.
+COMMANDS = (['effort'], ['position'], ['position', 'effort'], ['velocity'])
+WITH_PID = (['effort'], ['velocity'])
 ANTIWINDUP = ('back_calculation', 'conditional_integration', 'legacy', 'none')
 
 
@@ -209,11 +213,35 @@ def test_controllers_have_parameters_that_they_know(path: Any) -> None:
     if known is OF_TRAJECTORY:
         assert parameters['command_interfaces'] in COMMANDS
         assert parameters['state_interfaces'] == ['position', 'velocity']
-        has_gains = parameters['command_interfaces'] == ['effort']
+        has_gains = parameters['command_interfaces'] in WITH_PID
         assert set(given[name].get('gains', {})) == (set(JOINTS) if has_gains else set())
         assert JOINTS == [key for key in given[name]['constraints'] if key in JOINTS]
         assert {value for key, value in parameters.items()
                 if key.endswith('antiwindup_strategy')} <= set(ANTIWINDUP)
+
+
+@pytest.mark.parametrize('path', CONTROLLERS, ids=lambda path: path.name)
+def test_controllers_use_interfaces_that_the_described_hexapod_has(path: Any) -> None:
+    """Names and interfaces are those in the URDF of stewart_describe, and the file says how."""
+    types, given = sections(path)
+    (name, parameters), = given.items()
+    commands = parameters.get('command_interfaces', ['effort'])
+    assert path.name == '_'.join([*(['trajectory'] if 'trajectory' in name else []), *commands]
+                                 ) + '.yaml'
+    block = ET.fromstring(urdf(Hexapod(Parameters.from_yaml(CONFIG / 'platform.yaml')), 'hexapod',
+                               Ros2Control(commands, MOCK))).find('ros2_control')
+    assert block is not None
+    described = {
+        kind: {(joint.get('name'), each.get('name')) for joint in block.findall('joint')
+               for each in joint.findall(f'{kind}_interface')} for kind in ('command', 'state')}
+    joints = parameters['joints']
+    assert described['command'] == {(joint, each) for joint in joints for each in commands}
+    assert described['state'] >= {(joint, each) for joint in joints
+                                  for each in parameters.get('state_interfaces', ())}
+    # The commands in the comment: without effort the controller rejects points that have one.
+    text = path.read_text(encoding='utf-8')
+    assert f'{name}/' in text and f'spawner joint_state_broadcaster {name}' in text
+    assert ('-p trajectory.effort:=false' in text) == ('effort' not in commands)
 
 
 def test_the_example_gains_damp_every_mode_of_the_hexapod() -> None:

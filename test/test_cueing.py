@@ -322,6 +322,29 @@ def test_governor_returns_to_the_washout() -> None:
     assert np.array_equal(motion.rows[-100:], demand.rows[-100:])
 
 
+@pytest.mark.parametrize('govern', [False, True])
+@pytest.mark.parametrize('rate_max', [0.001, 0.03, 0.1])
+def test_a_changed_rate_of_tilt_is_neared_without_a_jerk(rate_max: float, govern: bool) -> None:
+    """While it tilts at the limit: never faster than the larger of both, and gently."""
+    times = np.arange(1500) * 0.004
+    force = step(0, 2.0, times)
+    before = cueing_of(GAIN_1, {'cueing.govern': govern})
+    stream = before.stream()
+    first = stream.advance(times[:400], force[:400])
+    stream.use(MotionCueing(before.parameters.replaced({'cueing.tilt.rate_max': rate_max})))
+    motion = stream.advance(times[400:], force[400:])
+    rates = np.concatenate([each.angular_velocity[:, 1] for each in (first, motion)])
+    assert rates[399] == pytest.approx(-0.0524, abs=1e-4)
+    assert np.abs(rates).max() <= max(0.0524, rate_max) * (1.0 + 1e-9)
+    # The exponential with 4/s has this acceleration; a step of the input needs ten times as much.
+    accelerations = motion.angular_acceleration[:, 1]
+    assert np.abs(accelerations).max() < 4.0 * abs(rate_max - 0.0524) + 0.01
+    assert np.abs(first.angular_acceleration).max() > 2.0
+    assert np.abs(np.diff(accelerations)).max() < 0.2 * 4.0 * abs(rate_max - 0.0524)
+    if rate_max < 0.0524:
+        assert abs(rates[-1]) <= rate_max * 1.01
+
+
 @pytest.mark.parametrize('changes', [
     {'cueing.translation.gain': [0.9, 0.2, 0.7], 'cueing.tilt.gain': [0.8, 0.1],
      'cueing.rotation.gain': [0.1, 0.9, 0.6], 'cueing.translation.natural_frequency': [4.0] * 3,

@@ -16,6 +16,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 from running import Inside, nanoseconds, Peer, PLATFORM
 from sensor_msgs.msg import Imu, JointState
 from stewart_dynamics import Parameters
@@ -44,6 +45,7 @@ class Cueing:
         self.diagnostics = self.peer.listen('/diagnostics', DiagnosticArray)
         self.vehicle = self.peer.writer(f'{NODE}/vehicle', Imu)
         self.legs = self.peer.writer(f'{NODE}/measured_legs', JointState)
+        self.clock = self.peer.writer('/clock', Clock)
         self.stamp = 1_000_000_000
         self.read: list[tuple[int, list[float]]] = []
         nodes: list[CueingNode] = []
@@ -67,6 +69,12 @@ class Cueing:
         message.angular_velocity.x, message.angular_velocity.y, \
             message.angular_velocity.z = map(float, rates)
         self.vehicle.publish(message)
+
+    def tick(self, now: int, count: int) -> None:
+        """Publish a time on /clock [ns], and wait until a number of setpoints has come."""
+        message = Clock(clock=Time(nanoseconds=now).to_msg())
+        self.peer.until(lambda: self.clock.publish(message) or len(self.raw['accel']) >= count,
+                        f'{count} setpoints at {now}')
 
     def rows(self) -> tuple[Array, Array]:
         """Return stamps (N,) [ns], and position, velocity and acceleration (N, 9)."""
@@ -146,6 +154,37 @@ def test_begins_with_the_approach_from_the_measured_legs(cueing: Any) -> None:
     np.testing.assert_allclose(rows[0, :3], pose, atol=1e-9)
     assert np.abs(np.diff(rows[:, 2])).max() < 0.01
     np.testing.assert_allclose(rows[-1, 3:], 0.0, atol=1e-9)
+
+
+def test_in_simulated_time_setpoints_are_due_by_the_clock(cueing: Any) -> None:
+    """As with Gazebo or a bag that is played: stamps, rate and silence are those of /clock."""
+    node = cueing('use_sim_time:=true', 'start_timeout:=0.1', 'vehicle_timeout:=0.5')
+    node.until(lambda: node.diagnostics and 'waits for /clock' in node.status.message,
+               'it waits')
+    assert not node.raw['accel']
+    second, period = 1_000_000_000, round(1e9 / RATE)
+    node.tick(5 * second, 1)
+    node.send((2.0, 0.0, GRAVITY))
+    node.until(lambda: node.node._vehicle.reading, 'it has the vehicle')
+    # However coarse the clock is, each setpoint has its own stamp; while it stands, none comes.
+    node.tick(5 * second + 40 * period, 41)
+    node.tick(5 * second + 40 * period, 41)
+    reports = len(node.diagnostics)
+    node.until(lambda: len(node.diagnostics) > reports + 1, 'time passes')
+    assert len(node.raw['accel']) == 41
+    assert node.status.message == 'follows the vehicle'  # it has not been silent for 0.5 s
+    # It has: the motion fades out, after a jump of the clock, too.
+    node.tick(6 * second, 101)
+    node.until(lambda: 'no ~/vehicle: for 1.0 s' in node.status.message, 'it is silent')
+    node.tick(2 * second, 102)
+    node.tick(3 * second, 202)
+    stamps, rows = node.rows()
+    assert np.array_equal(stamps, np.concatenate([
+        5 * second + period * np.arange(101), 2 * second + period * np.arange(101)]))
+    assert 0.0 < rows[:41, 3].max() and np.abs(np.diff(rows[:, 6])).max() < 0.1
+    # The jump is one of the stamps, not of the motion.
+    np.testing.assert_allclose(np.diff(rows[:, 0]), 0.5 / RATE * (rows[1:, 3] + rows[:-1, 3]),
+                               atol=2e-5)
 
 
 def test_changed_parameters_blend_in_and_wrong_ones_are_rejected(cueing: Any) -> None:

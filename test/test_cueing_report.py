@@ -129,10 +129,23 @@ def test_units_in_brackets(tmp_path: Path) -> None:
     np.testing.assert_allclose(vehicle.rates[1], [0.0, 0.0, np.pi / 2.0])
 
 
+def test_units_are_those_of_other_recordings(tmp_path: Path) -> None:
+    """In the spellings that a CSV file of setpoints has, too."""
+    path = tmp_path / 'motion.csv'
+    path.write_text('T [us],AX [ft/s^2],ay [mm/s2],az [m s^-2],wx [mrad/s],wy [°/s],wz\n'
+                    '0,0,0,9.8,0,0,0\n10000,1,1000,9.8,1000,180,1\n', encoding='utf-8')
+    vehicle = read_vehicle(path, None)
+    np.testing.assert_allclose(vehicle.times, [0.0, 0.01])
+    np.testing.assert_allclose(vehicle.forces[1], [0.3048, 1.0, 9.8])
+    np.testing.assert_allclose(vehicle.rates[1], [1.0, np.pi, 1.0])
+
+
 @pytest.mark.parametrize('text, words', [
     ('', 'is empty: row 1 must name the columns'),
     ('t,ax,ay\n0,1,2\n', 'row 1: no column az: t, ax, ay'),
-    ('t,ax [ft/s^2],ay,az\n0,1,2,3\n', "column ax: unit 'ft/s^2': must be one of m/s^2"),
+    ('t,ax [furlong/s^2],ay,az\n0,1,2,3\n',
+     'row 1: column ax: unit furlong/s^2: must be one of m/s^2, mm/s^2'),
+    ('t,ax,ay,az,ax\n0,1,2,3,4\n', 'row 1: column ax: is there twice'),
     ('t,ax,ay,az\n0,1,2,3\n', '1 samples: must be at least 2'),
     ('t,ax,ay,az\n0,1,2,3\n0,1,2,3\n', 'row 3: t: 0 s: must be after 0 s'),
     ('t,ax,ay,az\n0,1,2,3\n1,1,x,3\n', "row 3: ay: 'x': must be a finite number"),

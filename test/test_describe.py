@@ -132,10 +132,25 @@ def test_joints_on_circles_are_written_as_points(tmp_path):
     assert run('--params', on_circles, '--output', tmp_path) == 0
     written = Parameters.from_yaml(tmp_path / 'circles_points.yaml')
     assert written == ON_CIRCLES.with_points()
+    text = (tmp_path / 'circles_points.yaml').read_text()
+    assert not any(each in text for each in ('_radius', '_angles', '_height'))
     assert 'geometry.base_joints' in written.given
     assert run('--from', tmp_path / 'circles.urdf', '--output', tmp_path / 'read') == 0
     read = Parameters.from_yaml(tmp_path / 'read' / 'circles.yaml')
     assert np.array_equal(read['geometry.base_joints'], written['geometry.base_joints'])
+
+
+def test_a_description_is_read_back_in_its_own_folder(tmp_path, capsys):
+    """The picture that is there already needs no --force, but another one is not replaced."""
+    assert run('--params', PLATFORM, '--output', tmp_path) == 0
+    assert run('--from', tmp_path / 'platform.urdf', '--output', tmp_path) == 0
+    assert Parameters.from_yaml(tmp_path / 'platform.yaml')
+    (tmp_path / 'platform.yaml').unlink()
+    (tmp_path / 'platform.svg').write_text('<svg>of mine</svg>')
+    assert run('--from', tmp_path / 'platform.urdf', '--output', tmp_path) == 2
+    assert 'platform.svg: exists; --force replaces it' in capsys.readouterr().err
+    assert not (tmp_path / 'platform.yaml').exists()
+    assert (tmp_path / 'platform.svg').read_text() == '<svg>of mine</svg>'
 
 
 @pytest.mark.parametrize('source', ['params', 'from'])

@@ -218,8 +218,32 @@ def test_topics_of_a_node_are_recorded_and_its_service_is_called(
     assert len(again.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
+def test_parameters_are_set_all_or_none(
+        start: Callable[..., DynamicsNode], run: Run, tmp_path: Path) -> None:
+    node = start()
+    node.until_active()
+    set_ = partial(run, 'set_parameters.py', node.domain)
+    file = tmp_path / 'payload.yaml'
+    file.write_text('/**: {ros__parameters: {payload: {mass: 20.0, '
+                    'center_of_mass: [0.0, 0.0, 0.3]}}}\n', encoding='utf-8')
+    node.answer()
+    program = set_('--file', file, 'payload.mass=82.0')  # the later one counts
+    assert program.wait() == 0, program.stderr
+    assert program.stdout == '3 parameters of /stewart_dynamics set\n'
+    laden = StewartPlatform(node.platform.parameters.replaced({
+        'payload.mass': 82.0, 'payload.center_of_mass': [0.0, 0.0, 0.3]}))
+    node.answer(platform=laden)
+    program = set_('payload.mass=1.0', 'payload.inertia=[-1.0, 0.0, 0.0, 1.0, 0.0, 1.0]')
+    assert program.wait() == 1
+    assert program.stderr.startswith('set_parameters: payload.inertia: ')
+    assert len(program.stderr.splitlines()) == 1
+    node.answer(platform=laden)
+
+
 @pytest.mark.parametrize('name', [
-    'call_service.py', 'plan_motion.py', 'push_platform.py', 'stream_setpoints.py'])
+    'call_service.py', 'plan_motion.py', 'push_platform.py', 'set_parameters.py',
+    'stream_setpoints.py'])
 def test_without_a_node_it_ends_with_one_line(domain: int, name: str) -> None:
     assert 'within 0.5 s' in line_at_the_end(name, domain, '--timeout', '0.5')
 

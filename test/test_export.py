@@ -54,6 +54,14 @@ PLATFORM_FILE = ROOT / 'config' / 'platform.yaml'
 COMPILERS = [name for name in ('gcc', 'clang', 'cc') if shutil.which(name)][:2]
 WARNINGS = ['-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wdouble-promotion', '-Wshadow',
             '-Werror']
+
+
+def knows_cpp(compiler: str) -> bool:
+    """Return whether a compiler compiles C++, for which gcc needs the package g++."""
+    return subprocess.run([compiler, '-xc++', '-fsyntax-only', '-'], input=b'#include <cmath>',
+                          stderr=subprocess.DEVNULL, check=False).returncode == 0
+
+
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason='needs a C compiler')
 
 SAMPLES, MOTIONS = 100_000, 5  # of each hexapod
@@ -321,6 +329,8 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize('compiler', COMPILERS)
 def test_golden_vectors_are_met_and_nothing_warns(
         exported: Path, tmp_path: Path, compiler: str, language: list[str]) -> None:
+    if '-xc++' in language and not knows_cpp(compiler):
+        pytest.skip(f'{compiler} compiles no C++')
     made = compile_c(tmp_path, *language, '-O2', *WARNINGS, *exported.glob('*.c'), '-x', 'none',
                      compiler=compiler)
     done = subprocess.run([made], capture_output=True, text=True)
@@ -437,6 +447,8 @@ def test_cmake_builds_tests_and_installs(exported: Path, tmp_path: Path) -> None
         [str(Path(sys.executable).parent), os.environ['PATH']]))
     if cmake is None:
         pytest.skip('needs cmake')
+    if not any(map(shutil.which, ('c++', 'g++', 'clang++'))):
+        pytest.skip('needs a C++ compiler')
 
     def run(*arguments: str | Path) -> None:
         done = subprocess.run([str(each) for each in arguments], capture_output=True, text=True)

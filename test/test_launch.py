@@ -8,14 +8,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import os
 from pathlib import Path
+import runpy
 import sys
+from xml.etree import ElementTree
 
 import pytest
 
 pytest.importorskip('launch_ros', reason='launch_ros comes with a ROS installation')
 
+from rclpy.serialization import deserialize_message  # noqa: E402
 from running import executable, own_domain, Peer, Program, ROOT  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
+from sensor_msgs.msg import Imu, JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
 
 NAME = 'stewart_dynamics'
@@ -49,7 +52,7 @@ def prefix(tmp_path: Path) -> Path:
     (index / NAME).touch()
     for name in ('config', 'examples', 'launch'):
         (share / name).symlink_to(ROOT / name)
-    for name in ('stewart_dynamics', 'stewart_simulator', 'stewart_trajectory'):
+    for name in ('stewart_cueing', 'stewart_dynamics', 'stewart_simulator', 'stewart_trajectory'):
         (scripts / name).symlink_to(executable(name))
     return folder
 
@@ -118,6 +121,22 @@ def test_a_wrong_argument_is_named_and_starts_nothing(
     assert 'process started' not in said(program)
 
 
+@pytest.mark.parametrize('path', sorted((ROOT / 'config' / 'controllers').glob('*.yaml')),
+                         ids=lambda path: path.name)
+def test_the_mock_hardware_has_the_interfaces_of_the_controllers_file(path: Path) -> None:
+    module = runpy.run_path(str(ROOT / 'launch' / 'ros2_control.launch.py'))
+    if path.name == 'effort.yaml':
+        with pytest.raises(RuntimeError, match='effort.yaml: has no leg_trajectory_controller'):
+            module['command_interfaces'](str(path))
+        return
+    interfaces = module['command_interfaces'](str(path))
+    assert path.name == f'trajectory_{"_".join(interfaces)}.yaml'
+    described = ElementTree.fromstring(module['robot_description'](
+        str(ROOT / 'config' / 'platform.yaml'), '', interfaces))
+    for joint in described.findall('ros2_control/joint'):
+        assert [each.get('name') for each in joint.findall('command_interface')] == interfaces
+
+
 @pytest.mark.slow
 def test_topics_of_the_node_are_remapped(launch: Launch, peer: Peer) -> None:
     program = launch(
@@ -145,6 +164,25 @@ def test_the_demo_runs_and_ends(launch: Launch, peer: Peer) -> None:
         'leg_controller', 'stewart_dynamics', 'stewart_simulator', 'stewart_trajectory'}
     assert program.stop() == 0
     assert said(program).count('process has finished cleanly') == 4, said(program)
+    peer.until(lambda: nodes(peer) == set(), 'all have ended')
+
+
+@pytest.mark.slow
+def test_a_drive_moves_the_simulated_hexapod(launch: Launch, peer: Peer) -> None:
+    """Vehicle, motion cueing, node, simulator and controller: the legs follow, and all end."""
+    felt = peer.listen('/stewart_cueing/felt', Imu)
+    legs = peer.listen('/stewart_simulator/leg_states', JointState)
+    program = launch('cueing.launch.py')
+
+    def moved() -> bool:
+        positions = [deserialize_message(data, JointState).position[0] for data in legs[::100]]
+        return bool(felt) and max(positions, default=0.0) - min(positions, default=0.0) > 5e-3
+
+    peer.until(moved, 'the simulated legs move')
+    assert nodes(peer) == {'leg_controller', 'stewart_cueing', 'stewart_dynamics',
+                           'stewart_simulator', 'town_drive'}
+    assert program.stop() == 0
+    assert said(program).count('process has finished cleanly') == 5, said(program)
     peer.until(lambda: nodes(peer) == set(), 'all have ended')
 
 

@@ -17,6 +17,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 from stewart_dynamics import Parameters
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
 import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -58,17 +60,33 @@ def test_parameters_are_those_of_the_node() -> None:
         assert f'"{name}"' in source, name  # read, and named in errors
 
 
-def test_example_is_the_hexapod_of_the_node() -> None:
+LEGS, LIVE = 'leg_feed_forward.yaml', 'platform_feed_forward.yaml'
+
+
+@pytest.mark.parametrize('file', [LEGS, LIVE])
+def test_example_is_the_hexapod_of_the_node(file: str) -> None:
     """The example has the values of config/platform.yaml, and interfaces that fit together."""
-    document = yaml.safe_load((PACKAGE / 'config' / 'leg_feed_forward.yaml').read_text())
+    document = yaml.safe_load((PACKAGE / 'config' / file).read_text())
     given = {key: value for key, value in document[NAME]['ros__parameters'].items()
              if key not in ('reference', 'command_interfaces', 'initial_pose')}
     example = Parameters(dict(_flat(given)))
     expected = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
     for name, value in _flat(given):
         assert np.all(example[name] == expected[name]), (name, value)
-    leader = document['leg_trajectory_controller']['ros__parameters']
-    assert leader['command_joints'] == [f'{NAME}/{joint}' for joint in expected['joints']]
+    own = document[NAME]['ros__parameters']
+    commands = own['command_interfaces']
+    if own['reference'] == 'legs':  # of the controller before it
+        leader = document['leg_trajectory_controller']['ros__parameters']
+        assert leader['command_joints'] == [f'{NAME}/{joint}' for joint in expected['joints']]
+        assert commands == ['position', 'effort']
+    else:
+        assert list(document) == ['controller_manager', NAME]
+        assert commands == ['position', 'velocity', 'effort']
+    described = ET.fromstring(urdf(Hexapod(expected), 'hexapod', Ros2Control(commands, MOCK)))
+    assert [(joint.get('name'), each.get('name'))
+            for joint in described.findall('ros2_control/joint')
+            for each in joint.findall('command_interface')] == [
+                (joint, each) for joint in own['joints'] for each in commands]
     types = document['controller_manager']['ros__parameters']
     plugin = ET.parse(PACKAGE / f'{NAME}.xml').getroot()[0]
     assert types[NAME]['type'] == plugin.get('name')

@@ -168,7 +168,9 @@ def test_meshes_take_the_place_of_the_simple_shapes():
     assert links['base'].find('visual/geometry/cylinder') is not None
 
 
-@pytest.mark.parametrize('interfaces', [['effort'], ['velocity'], ['position', 'effort']])
+@pytest.mark.parametrize('interfaces', [
+    ['effort'], ['velocity'], ['velocity', 'effort'], ['position', 'effort'],
+    ['position', 'velocity', 'effort']])
 def test_the_block_of_ros2_control_has_the_six_legs(interfaces):
     p = Parameters.from_yaml(PLATFORM)
     block = ET.fromstring(urdf(Hexapod(p), 'hexapod', Ros2Control(interfaces, 'mock'))).find(
@@ -179,7 +181,11 @@ def test_the_block_of_ros2_control_has_the_six_legs(interfaces):
         assert [each.get('name') for each in joint.iter('command_interface')] == interfaces
     home = StewartPlatform(p).home_pose()
     lengths = StewartPlatform(p).inverse_kinematics(home) - p['geometry.zero_length']
-    assert [float(each.text) for each in block.iter('param')] == pytest.approx(lengths, abs=1e-15)
+    initial = block.findall('joint/state_interface/param')
+    assert [float(each.text) for each in initial] == pytest.approx(lengths, abs=1e-15)
+    # mock_components copies commands into states; positions that it does not get it integrates.
+    assert [(each.get('name'), each.text) for each in block.findall('hardware/param')] == (
+        [('calculate_dynamics', 'true')] if interfaces[0] == 'velocity' else [])
 
 
 @pytest.mark.parametrize(('changes', 'name'), [

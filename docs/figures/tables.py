@@ -43,7 +43,7 @@ CONTROLLER = (
     Parameter('reference', 'string', 'reference interfaces: motion of the platform, or of the '
               'legs', '', 'legs', choices=('legs', 'platform')),
     Parameter('command_interfaces', 'string', 'interfaces of each joint that are commanded; '
-              'effort must be one of them', default=('effort',), sizes=(1, 2, 3),
+              'position or effort must be one of them', default=('effort',), sizes=(1, 2, 3),
               choices=('position', 'velocity', 'effort')),
     Parameter('initial_pose', 'double', 'x y z alpha beta gamma near which the platform is when '
               'the controller starts; required where reference is legs', 'm, rad', (),

@@ -12,7 +12,7 @@ earthquake, is integrated from the home pose, see ``baseline``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 import re
 from typing import NamedTuple
@@ -71,7 +71,7 @@ _GROUP_OF = {name: group for group in _GROUPS for name in group.columns}
 _HEADER = re.compile(r'(?P<name>[^\[\]]*?)\s*(\[\s*(?P<unit>[^\[\]]*?)\s*\])?')
 
 
-def _split(cell: str) -> tuple[str, str]:
+def split(cell: str) -> tuple[str, str]:
     """Return name and unit of a column; an empty unit if it is not given."""
     found = _HEADER.fullmatch(cell.strip())
     if found is None:
@@ -80,7 +80,7 @@ def _split(cell: str) -> tuple[str, str]:
 
 
 def _is_known(cell: str) -> bool:
-    return _split(cell)[0] in _GROUP_OF
+    return split(cell)[0] in _GROUP_OF
 
 
 def factor(group: Group, unit: str) -> float | None:
@@ -97,6 +97,29 @@ def factor(group: Group, unit: str) -> float | None:
     if not plain.endswith(ending):
         return None
     return group.units.get(plain.removesuffix(ending))
+
+
+def columns_of(path: Path, header: Sequence[str], groups: Sequence[Group],
+               ) -> dict[str, tuple[int, float]]:
+    """
+    Return place and unit in SI of each column of these groups, from row 1 of a file.
+
+    Raises BagError: a column is there twice, or has a unit that is not one of its group.
+    """
+    group_of = {name: group for group in groups for name in group.columns}
+    found: dict[str, tuple[int, float]] = {}
+    for place, cell in enumerate(header):
+        name, unit = split(cell)
+        if name not in group_of:
+            continue
+        if name in found:
+            raise BagError(f'{path}: row 1: column {name}: is there twice')
+        si = factor(group_of[name], unit)
+        if si is None:
+            raise BagError(f'{path}: row 1: column {name}: unit {shown_name(unit)}: '
+                           f'must be {_units(group_of[name])}')
+        found[name] = place, si
+    return found
 
 
 class CsvMotion:
@@ -159,19 +182,7 @@ class CsvMotion:
 
     def _found(self, table: Table) -> dict[str, tuple[int, float]]:
         """Return place and unit of each known column."""
-        found: dict[str, tuple[int, float]] = {}
-        for place, cell in enumerate(table.header):
-            name, unit = _split(cell)
-            if name not in _GROUP_OF:
-                continue
-            if name in found:
-                raise BagError(f'{self._path}: row 1: column {name}: is there twice')
-            group = _GROUP_OF[name]
-            si = factor(group, unit)
-            if si is None:
-                raise BagError(f'{self._path}: row 1: column {name}: unit {shown_name(unit)}: '
-                               f'must be {_units(group)}')
-            found[name] = place, si
+        found = columns_of(self._path, table.header, _GROUPS)
         if 't' not in found:
             raise BagError(f'{self._path}: row 1: has no column t; it has '
                            f'{shown_name(", ".join(table.header))}')

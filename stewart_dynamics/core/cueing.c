@@ -12,6 +12,7 @@
 #define STANDARD_GRAVITY 9.80665
 #define MOST_TILT 0.6         /* sine of the largest tilt that is demanded: 37 degrees */
 #define LIMITER 10.0          /* rate with which the rate of tilt nears its limit, times w */
+#define BLENDING 4.0           /* rate with which the limit nears one that was changed [1/s] */
 #define BISECTIONS 40
 
 /* Advance x, x', ... of x^(n) + a[n-1] x^(n-1) + ... + a[0] x = u + slope t by a time.
@@ -112,10 +113,10 @@ static double sine_of_tilt(const washout_filters * f, int i, double u) {
 
 /* The tilt's filter between two inputs a time apart. */
 static tilt_filter tilt_between(
-  const washout_filters * f, int i, double from, double to, double time) {
+  const washout_filters * f, double rate_max, int i, double from, double to, double time) {
   double begin = sine_of_tilt(f, i, from), end = sine_of_tilt(f, i, to);
   tilt_filter found = {f->tilt_frequency[i], f->tilt_damping[i],
-    (1.0 - 1e-12) * f->tilt_rate_max, begin,  /* rounding does not exceed it */
+    (1.0 - 1e-12) * rate_max, begin,  /* rounding does not exceed it */
     time > 0.0 ? (end - begin) / time : 0.0};
   return found;
 }
@@ -137,7 +138,8 @@ static void put_demand(const washout_filters * f, cueing_state * state, coordina
   }
   for (int i = 0; i < 2; i++) {
     const double * y = &state->tilt[2 * i];
-    tilt_filter tilt = tilt_between(f, i, state->input[i], state->input[i], 0.0);
+    tilt_filter tilt = tilt_between(
+      f, state->tilt_rate_max, i, state->input[i], state->input[i], 0.0);
     int axis = i == 0 ? 4 : 3, side = tilt_side(&tilt, 0.0, y);
     double sign = i == 0 ? -1.0 : 1.0, rate = y[1] / sqrt(1.0 - y[0] * y[0]);
     demand->value[axis] += sign * asin(y[0]);
@@ -159,8 +161,11 @@ static void wash_out(
     advance(1, &f->rotation_frequency[i], f->rotation_frequency[i], gain * state->input[3 + i],
             gain * state->slope[3 + i], time, &state->rotation[i]);
   }
+  /* A step of the limit would be one of the acceleration. */
+  state->tilt_rate_max += (f->tilt_rate_max - state->tilt_rate_max) * -expm1(-BLENDING * time);
   for (int i = 0; i < 2; i++) {
-    tilt_filter tilt = tilt_between(f, i, state->input[i], input[i], time);
+    tilt_filter tilt = tilt_between(
+      f, state->tilt_rate_max, i, state->input[i], input[i], time);
     advance_tilt(&tilt, time, &state->tilt[2 * i]);
   }
   memcpy(state->input, input, sizeof state->input);
@@ -172,6 +177,7 @@ static void begin_cueing(
   cueing_state * state) {
   coordinates first;
   memcpy(state->input, input, sizeof state->input);
+  state->tilt_rate_max = f->tilt_rate_max;
   put_demand(f, state, &first);
   state->governor.following = !limited || !inadmissible(on, &first);
   if (state->governor.following != 0.0) {state->governor.now = first;}

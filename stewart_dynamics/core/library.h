@@ -167,6 +167,7 @@ typedef struct {
   double time, input[6], slope[6];
   double surge[3], sway[3], heave[3]; /* z, z', z'' */
   double tilt[4];                     /* sine of the pitch down and its rate, and of the roll */
+  double tilt_rate_max;               /* it nears the one of the filters, where that was changed */
   double rotation[3];
   governor_state governor;
 } cueing_state;

@@ -11,7 +11,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock, ClockType, JumpHandle, JumpThreshold, ROSClock
+from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from sensor_msgs.msg import Imu, JointState
@@ -32,7 +33,6 @@ from stewart_dynamics.messages.setpoint import ImuWriter
 from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, OK, Status, WARN
 from stewart_dynamics.node.publishers_at_rate import diagnostic_array
 from stewart_dynamics.planned.approach import approach
-from stewart_dynamics.ros.due_periods import DuePeriods
 from stewart_dynamics.ros.managed_node import ManagedNode
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
@@ -43,6 +43,9 @@ FELT, DIAGNOSTICS, MEASURED_LEGS = 'felt', '/diagnostics', 'measured_legs'
 _TICK = 0.2  # between two looks at the input [s]
 _TICKS_A_REPORT = 5
 _FADE = 1.0  # in which the motion of the vehicle fades in, or out [s]
+# Time that is skipped where it is longer, by a steady clock, and by /clock, which may be coarse
+# [ns].
+_BACKLOG, _JUMP = 100_000_000, 1_000_000_000
 _REST = 1e-4  # velocity of a platform at rest [m/s, rad/s]
 _LONGEST_STOP = 5.0  # [s]
 _AWAY = 1e-3  # legs this near to their lengths at home need no approach [m]
@@ -51,6 +54,9 @@ _AWAY = 1e-3  # legs this near to their lengths at home need no approach [m]
 class CueingNode(ManagedNode[CueingParameters]):
     """
     Moves the platform as the motion of the vehicle demands, within its limits.
+
+    Time is that of a steady clock, or with ``use_sim_time`` that of /clock: setpoints are due by
+    it and published as soon as it comes; while it stands still, nothing moves.
 
     Raises ParameterError if the parameters break a rule: then nothing starts.
     """
@@ -74,8 +80,8 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._held: dict[str, float] = {}
         self._ticks = 0
         self._due = 0  # index of the next setpoint, from the begin
-        self._periods = DuePeriods(
-            self._settings.cueing.rate, lambda text: self._on_notice(f'late: {text}'))
+        self._begin: int | None = None  # by the clock [ns]
+        self._reported = 0  # index of the next setpoint at the last report
         self._activated = time.monotonic()
         if self._last is not None:
             self._start_from(Motion.of_rows(self._last))
@@ -98,6 +104,10 @@ class CueingNode(ManagedNode[CueingParameters]):
             (self.destroy_timer, self.create_timer(
                 1.0 / p.cueing.rate, self._on_time, clock=self._steady)),
             (self.destroy_timer, self.create_timer(_TICK, self._on_tick, clock=self._steady)),
+            (JumpHandle.unregister, self.get_clock().create_jump_callback(
+                JumpThreshold(min_forward=Duration(nanoseconds=1),
+                              min_backward=Duration(nanoseconds=-1), on_clock_change=False),
+                post_callback=lambda jump: self._on_time())),
             *((self.destroy_publisher, each) for each in (
                 self._felt, self._diagnostics, *self._setpoints.publishers))]
         self.get_logger().info(
@@ -113,11 +123,11 @@ class CueingNode(ManagedNode[CueingParameters]):
 
     def _on_vehicle(self, data: bytes) -> None:
         if self._active:
-            self._vehicle.take(data, time.monotonic())
+            self._vehicle.take(data, self._now / SECOND)
 
     def _on_legs(self, data: bytes) -> None:
         """Start the approach from where the platform stands."""
-        if not self._active or self._periods.begun:
+        if not self._active or self._begin is not None or not self._now:
             return
         platform = StewartPlatform(self._settings)
         try:
@@ -144,22 +154,49 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._go()
 
     def _go(self) -> None:
-        self._periods.begin(self.get_clock().now().nanoseconds)
-        self._due = 0
+        self._begin, self._stamp = self._now, self.get_clock().now().nanoseconds
+        self._due = self._reported = 0
         self._stream = self._cueing.stream()
 
     # -- setpoints --------------------------------------------------------------------------
 
+    @property
+    def _simulated(self) -> bool:
+        """Whether time is that of /clock."""
+        clock = self.get_clock()
+        return isinstance(clock, ROSClock) and clock.ros_time_is_active
+
+    @property
+    def _now(self) -> int:
+        """Time of the clock by which setpoints are due [ns]; 0 before the first /clock."""
+        return self.get_clock().now().nanoseconds if self._simulated else time.monotonic_ns()
+
     def _on_time(self) -> None:
         """Publish the setpoints that are due, each with its own stamp."""
-        if self._active:
-            for _ in self._periods.due(self._due):
-                self._publish_next()
+        if not self._active or self._begin is None:
+            return
+        now = self._now
+        late = now - self._begin - self._time_of(self._due)
+        simulated = self._simulated
+        if late > (_JUMP if simulated else _BACKLOG) or late < -_JUMP:
+            self._begin += late
+            self._stamp += late
+            self._on_notice(
+                f'/clock jumped by {late / SECOND:.3f} s: the motion goes on from there'
+                if simulated else
+                f'late: fell behind by {late / SECOND:.3f} s: that time is skipped')
+        while self._time_of(self._due) <= self._now - self._begin:
+            self._publish_next()
+
+    def _time_of(self, index: int) -> int:
+        """Return the time of a setpoint from the begin on [ns]; rounding does not add up."""
+        rate = self._settings.cueing.rate
+        return round(index * SECOND / rate)
 
     def _publish_next(self) -> None:
         at, stream = self._due, self._stream
         assert stream is not None  # made before the first setpoint
-        stamp = self._periods.stamp_of(at)
+        stamp = self._stamp + self._time_of(at)
         if at < len(self._approach):
             self._last = self._approach[at]
             felt = np.concatenate(self._cueing.felt(Motion.of_rows(self._last))).tolist()
@@ -178,12 +215,12 @@ class CueingNode(ManagedNode[CueingParameters]):
         """Advance the cueing to the next setpoint."""
         vehicle, gravity = self._vehicle, float(self._cueing.at_rest[2])
         heard = (vehicle.reading is not None and not vehicle.mistake
-                 and time.monotonic() - vehicle.heard < self._silence)
+                 and vehicle.silent(self._now / SECOND) < self._silence)
         change = 1.0 / (_FADE * self._settings.cueing.rate)
         share = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
         self._presence = share
         x, y, z, *rates = vehicle.reading or (0.0, 0.0, gravity, 0.0, 0.0, 0.0)
-        stream.advance_by_one(1e-9 * self._periods.time_of(self._due), (
+        stream.advance_by_one(1e-9 * self._time_of(self._due), (
             share * x, share * y, gravity + share * (z - gravity), *(share * w for w in rates)))
 
     @property
@@ -193,13 +230,16 @@ class CueingNode(ManagedNode[CueingParameters]):
 
     def end_work(self) -> None:
         """Bring the platform to rest within its limits, an approach to its end."""
-        if not self._periods.begun or self._stream is None:
+        if self._begin is None or self._stream is None:
             return
         self._stream.stop()
+        # In real time, also with use_sim_time: /clock is not heard meanwhile.
+        begin = time.monotonic_ns() - self._time_of(self._due)
         end = time.monotonic() + _LONGEST_STOP
         while time.monotonic() < end and self._last is not None and (
                 self._due < len(self._approach) or np.abs(self._last[TWIST]).max() > _REST):
-            time.sleep(max(self._periods.until(self._due), 0) / SECOND)
+            wait = self._time_of(self._due) - (time.monotonic_ns() - begin)
+            time.sleep(max(wait, 0) / SECOND)
             self._publish_next()
 
     # -- diagnostics ------------------------------------------------------------------------
@@ -210,17 +250,20 @@ class CueingNode(ManagedNode[CueingParameters]):
         if not self._active:
             return
         mistake = self._vehicle.mistake
-        self._vehicle.check(now)
+        self._vehicle.check(self._now / SECOND)
         if self._vehicle.mistake and self._vehicle.mistake != mistake:
             self._log.write([LogLine(WARN, f'vehicle: {self._vehicle.mistake}', 'mistake')])
-        if not self._periods.begun and now - self._activated > self._settings.start_timeout:
-            self.get_logger().warning('no ~/measured_legs: starts at the home pose')
-            self._go()
+        if self._begin is None and now - self._activated > self._settings.start_timeout:
+            if self._now:
+                self.get_logger().warning('no ~/measured_legs: starts at the home pose')
+                self._go()
+            else:
+                self.get_logger().warning('waiting for /clock', once=True)
         self._ticks += 1
         if self._ticks % _TICKS_A_REPORT == 0:
-            self._diagnostics.publish(diagnostic_array(self, [self._status(now)]))
+            self._diagnostics.publish(diagnostic_array(self, [self._status()]))
 
-    def _status(self, now: float) -> Status:
+    def _status(self) -> Status:
         level, message = OK, 'follows the vehicle'
         held: dict[str, float] = {}
         shares: dict[str, float] = {}
@@ -228,18 +271,20 @@ class CueingNode(ManagedNode[CueingParameters]):
             total = self._stream.held
             held = {name: value - self._held.get(name, 0.0) for name, value in total.items()}
             self._held, shares = total, self._stream.shares
-        period = _TICK * _TICKS_A_REPORT
+        period = (self._due - self._reported or 1) / self._settings.cueing.rate
+        self._reported = self._due
+        silent = self._vehicle.silent(self._now / SECOND)
         worst = max(held, key=held.__getitem__, default='')
-        if not self._periods.begun:
-            level, message = WARN, 'waits for ~/measured_legs'
+        if self._begin is None:
+            level, message = WARN, f'waits for {"~/measured_legs" if self._now else "/clock"}'
         elif self._due < len(self._approach):
             message = 'approaches the home pose'
         elif self._vehicle.mistake:
             level, message = ERROR, f'vehicle: {self._vehicle.mistake}'
-        elif now - self._vehicle.heard > self._silence:
+        elif silent > self._silence:
             level, message = WARN, 'no ~/vehicle: ' + (
-                'never heard' if math.isinf(self._vehicle.heard)
-                else f'for {now - self._vehicle.heard:.1f} s') + ': washes out to rest'
+                'never heard' if math.isinf(silent)
+                else f'for {silent:.1f} s') + ': washes out to rest'
         elif worst and held[worst] > 0.0:
             level, message = WARN, (f'{worst} holds the demand back by '
                                     f'{100.0 * held[worst] / period:.0f} %')

@@ -17,8 +17,9 @@ simulation motion-base drive algorithms, UTIAS Report 296, 1985:
 Between samples the input is linear, and the filters are exact: Taylor series to rounding, so that
 samples may be any time apart. Velocities and accelerations are the derivatives of the filters'
 states. Near ``tilt.rate_max`` the acceleration of the tilt is limited to 10 w_l times the rate
-that is left; the sine of the tilt that is demanded is at most 0.6. The computation is
-``core/cueing.c``; the governor is ``mechanics/governor.py``.
+that is left; where it is changed, the limit nears its new value with 4/s. The sine of the tilt
+that is demanded is at most 0.6. The computation is ``core/cueing.c``; the governor is
+``mechanics/governor.py``.
 """
 
 from __future__ import annotations

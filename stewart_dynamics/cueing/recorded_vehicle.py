@@ -6,29 +6,23 @@
 from __future__ import annotations
 
 from contextlib import closing
-import math
 from pathlib import Path
-import re
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND
+from stewart_dynamics.bags.csv_motion import (
+    ACCELERATION, ANGULAR_VELOCITY, columns_of, split, TIME)
 from stewart_dynamics.bags.csv_table import read_table
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.cueing.motion_cueing import GRAVITY
-from stewart_dynamics.errors import BagError, shown, shown_name, StewartError
+from stewart_dynamics.errors import BagError, shown_name, StewartError
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import Rejections
 
-FORCES, RATES = ('ax', 'ay', 'az'), ('wx', 'wy', 'wz')
-_COLUMNS = ('t', *FORCES, *RATES)
-_UNITS = {
-    't': {'s': 1.0, 'ms': 1e-3},
-    'a': {'m/s^2': 1.0, 'm/s2': 1.0, 'g': GRAVITY},
-    'w': {'rad/s': 1.0, 'deg/s': math.radians(1.0)}}
-_COLUMN = re.compile(r'\s*(\w+)\s*(?:\[([^\[\]]*)\])?\s*')
+_GROUPS = TIME, ACCELERATION, ANGULAR_VELOCITY
+_COLUMNS = tuple(name for group in _GROUPS for name in group.columns)
 _LARGEST = 1 << 30  # [bytes]
 
 
@@ -47,8 +41,8 @@ def read_vehicle(path: Path, topic: str | None) -> RecordedVehicle:
     Return the motion of a vehicle that was recorded.
 
     A CSV file has columns t [s], ax, ay, az [m/s^2] and, if the vehicle turns, wx, wy, wz
-    [rad/s]; other units are in brackets behind the names: g, deg/s, ms. StewartError for a file
-    that cannot be read, or whose times are not strictly increasing.
+    [rad/s]; other units are in brackets behind the names, as in ``csv_motion``. StewartError for
+    a file that cannot be read, or whose times are not strictly increasing.
     """
     found = _read_csv(path) if path.suffix.lower() == '.csv' else _read_bag(path, topic)
     if len(found.times) < 2:
@@ -89,23 +83,15 @@ def _read_bag(path: Path, given: str | None) -> RecordedVehicle:
 
 
 def _read_csv(path: Path) -> RecordedVehicle:
-    table = read_table(path, lambda cell: _named(cell)[0] in _COLUMNS, _LARGEST)
-    columns = [_named(cell) for cell in table.header]
-    names = [name for name, _ in columns]
-    turning = any(name in names for name in RATES)
-    places, scales = [], []
-    for name in _COLUMNS if turning else _COLUMNS[:4]:
-        if names.count(name) != 1:
+    table = read_table(path, lambda cell: split(cell)[0] in _COLUMNS, _LARGEST)
+    columns = columns_of(path, table.header, _GROUPS)
+    turning = any(name in columns for name in ANGULAR_VELOCITY.columns)
+    names = _COLUMNS if turning else _COLUMNS[:4]
+    for name in names:
+        if name not in columns:
             raise StewartError(
-                f'{path}: row 1: {"more than one" if name in names else "no"} column {name}: '
-                f'{shown_name(", ".join(table.header))}')
-        place = names.index(name)
-        unit, units = columns[place][1], _UNITS[name[0]]
-        if unit is not None and unit not in units:
-            raise StewartError(f'{path}: column {name}: unit {shown(unit)}: must be one of '
-                               f'{", ".join(units)}')
-        places.append(place)
-        scales.append(1.0 if unit is None else units[unit])
+                f'{path}: row 1: no column {name}: {shown_name(", ".join(table.header))}')
+    places, scales = zip(*(columns[name] for name in names), strict=True)
     # a cell that is missing is named, as an empty one
     rows = [row + [''] * (len(table.header) - len(row)) for row in table.rows]
     values = np.zeros((len(rows), 7))
@@ -116,9 +102,3 @@ def _read_csv(path: Path) -> RecordedVehicle:
         raise StewartError(f'{path}: row {table.lines[n + 1]}: t: {times[n + 1]:.9g} s: must be '
                            f'after {times[n]:.9g} s')
     return RecordedVehicle(times, values[:, 1:4], values[:, 4:])
-
-
-def _named(cell: str) -> tuple[str, str | None]:
-    """Return the name of a column and its unit, from the cell of row 1."""
-    found = _COLUMN.fullmatch(cell)
-    return (found[1], found[2]) if found else ('', None)

@@ -39,7 +39,7 @@ def _arguments() -> argparse.ArgumentParser:
               'parameters with the proposed gains.')
     parser.add_argument('vehicle', type=Path, metavar='RECORDING',
                         help='bag with sensor_msgs/Imu, or CSV file with columns t [s], ax, ay, '
-                             'az [m/s^2], wx, wy, wz [rad/s]; g, deg/s and ms in brackets')
+                             'az [m/s^2], wx, wy, wz [rad/s]; other units in brackets')
     add_parameters(parser, ', with cueing.*')
     _PROGRAM.add_results(parser, CUEING_FOLDER)
     add_report(parser)

@@ -89,7 +89,7 @@ class Vehicle:
         self.kind = parameters.cueing.input
 
     def take(self, data: bytes, now: float) -> None:
-        """Take a message at a time of a steady clock [s]."""
+        """Take a message at a time [s]."""
         read = self._reader.read(data)
         if read is None or not self._in_order(read[0]):
             return
@@ -104,11 +104,17 @@ class Vehicle:
     def rate(self) -> float:
         """Return the rate of the messages of the last seconds [Hz]."""
         recent = self._recent
-        return (len(recent) - 1) / (recent[-1][0] - recent[0][0]) if len(recent) > 1 else 0.0
+        duration = recent[-1][0] - recent[0][0] if recent else 0.0
+        return (len(recent) - 1) / duration if duration > 0.0 else 0.0
+
+    def silent(self, now: float) -> float:
+        """Return the time since the last message [s]; infinite without one."""
+        # After a jump back of the clock there is no message yet.
+        return now - self.heard if now >= self.heard else math.inf
 
     def check(self, now: float) -> None:
         """Look for a likely mistake in the last seconds; an earlier one lasts until it is gone."""
-        while self._recent and self._recent[0][0] < now - _WINDOW:
+        while self._recent and not now - _WINDOW <= self._recent[0][0] <= now:
             self._recent.popleft()
         recent = np.array(self._recent)
         # At least two, and most of the window.

@@ -122,8 +122,9 @@ def _read(given: argparse.Namespace, files: FilesOfFolder) -> int:
     found = read_hexapod(given.source, given.geometry_only)
     text = found.parameters.yaml_text(_STANDS_FOR_NONE if given.geometry_only else None)
     name = given.name or given.source.stem
-    for path in files.write({f'{name}.yaml': text,
-                             f'{name}.svg': picture(Hexapod(found.parameters), name)}):
+    # The folder of the description has the same picture already.
+    for path in files.write({f'{name}.yaml': text},
+                            {f'{name}.svg': picture(Hexapod(found.parameters), name)}):
         _PROGRAM.say(str(path))
     for remark in found.remarks:
         _PROGRAM.complain(remark)

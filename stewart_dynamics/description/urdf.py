@@ -169,6 +169,10 @@ def _ros2_control(root: ET.Element, hexapod: Hexapod, name: str, control: Ros2Co
     if control.hardware == TOPIC:
         add(hardware, 'param', '/hexapod/joint_commands', name='joint_commands_topic')
         add(hardware, 'param', '/hexapod/joint_states', name='joint_states_topic')
+    if control.hardware == MOCK and {'position', 'velocity'} & set(control.interfaces) == {
+            'velocity'}:
+        # Otherwise the position would stay where it is.
+        add(hardware, 'param', 'true', name='calculate_dynamics')
     for leg in hexapod.legs:
         joint = add(system, 'joint', name=leg.name)
         for interface in control.interfaces:

@@ -31,8 +31,10 @@ from stewart_dynamics.mechanics.kinematics.pose_mistakes import typed_pose_mista
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
+from stewart_dynamics.parameters.circles import circle_names
 from stewart_dynamics.parameters.table import (
-    BY_IMU, DRIVE_INERTIAS, FIXED, inertia_matrix, NO_MASS, Parameters, STANDARD_GRAVITY)
+    BY_IMU, DRIVE_INERTIAS, FIXED, inertia_matrix, NO_MASS, ONE_POINT, Parameters,
+    STANDARD_GRAVITY)
 
 # Digits of the position of a joint in a message.
 _DIGITS = 5
@@ -115,6 +117,8 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
     # An overflow of numbers near the largest double is not reported by itself.
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)
+        if one_point := _base_at_one_point(parameters, shape):
+            return (one_point,)  # all others would follow from it
         sizes = [*_sizes(parameters, shape)]
         found = [*sizes, *_inertia(parameters, shape),
                  *_reflected_mass(parameters, shape), *drives.likely_mistakes(parameters),
@@ -144,19 +148,34 @@ def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
                'without masses: write the mass of the platform')
         return
     if base > _LARGEST_RADIUS:
-        yield (f'geometry.base_joints: {base:.3g} m from their center: larger than any hexapod '
+        yield (f'{_joints_of(p, "base")}: {base:.3g} m from their center: larger than any hexapod '
                'known: in mm?')
     if platform > _SMALL_RADIUS and mass < _THINNEST * platform * platform * platform:
-        yield (f'geometry.platform_joints: {platform:.3g} m from their center, and '
+        yield (f'{_joints_of(p, "platform")}: {platform:.3g} m from their center, and '
                f'platform.mass only {mass:.3g} kg: in mm?')
     if max(base, platform) > _LARGEST_RATIO * min(base, platform):
-        yield (f'geometry.platform_joints: {platform:.3g} m from their center, the base joints '
+        yield (f'{_joints_of(p, "platform")}: {platform:.3g} m from their center, the base joints '
                f'{base:.3g} m: one of them in mm?')
     for name in ('singularity.characteristic_length', 'geometry.zero_length',
                  'limits.length_min', 'limits.length_max'):
         if is_too_long(p, name, shape):
             yield (f'{name}: {np.max(p[name]):.3g} m, but the joints are {shape.radius:.3g} m '
                    'from their center: in mm?')
+
+
+def _base_at_one_point(p: Parameters, shape: Shape) -> str:
+    """Return that all base joints are at one point; empty if they are not."""
+    reach = max(shape.platform_radius, np.abs(p.geometry.base_joints).max())
+    if shape.base_radius > ONE_POINT * reach:
+        return ''
+    name = ('geometry.base_joints' if p.geometry.base_angles is None else 'geometry.base_angles')
+    return f'{name}: all six are at one point: the legs hold the platform in no pose'
+
+
+def _joints_of(p: Parameters, body: str) -> str:
+    """Return the parameter that says how far the joints of a body are from their center."""
+    radius = circle_names(body)[0]
+    return f'geometry.{body}_joints' if p[radius] is None else radius
 
 
 def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
@@ -229,7 +248,8 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
     shape = home.shape
     away = shape.axes[2] * home.side  # from the base to the platform
     if shape.platform_radius > _LARGEST_PLATFORM_RATIO * shape.base_radius:
-        yield (f'geometry.platform_joints: {shape.platform_radius:.3g} m from their center, the '
+        joints = _joints_of(p, 'platform')
+        yield (f'{joints}: {shape.platform_radius:.3g} m from their center, the '
                f'base joints only {shape.base_radius:.3g} m: base and platform exchanged?')
     if p.base.source == FIXED and gravity_mistakes.likely_mistake(
             p.gravity, home) == gravity_mistakes.AWAY:

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 CENTER_UNCERTAINTY = 0.1  # default of uncertainty.center_of_mass, by the characteristic length
 # Moments of an inertia that rounding made negative, by the largest.
 _ROUNDING = 1e-12
+ONE_POINT = 1e-12
+"""Joints that are this near to their center, in terms of their coordinates, are at one point."""
 # Corners of a plate are in a plane to this part of its size.
 _FLAT = 1e-6
 NO_MASS = 1e-15
@@ -593,7 +595,9 @@ class Parameters(ParameterSet):
     autostart: bool = declare('configure and activate the node when it starts', default=True)
 
     node = 'stewart_dynamics'
-    described = 'cueing.', 'drive.', 'actuator.reflected_mass'  # which may follow from drive.*
+    # The reflected mass may follow from drive.*; heights belong to circles.
+    described = ('cueing.', 'drive.', 'actuator.reflected_mass',
+                 *(circle_names(body)[2] for body in BODIES))
     drives: tuple[str, ...]  # names of drive.* that are given; without them no motors are computed
     carried: Body  # by the legs: platform and payload as one
 
@@ -622,10 +626,12 @@ class Parameters(ParameterSet):
         if not is_unit(length):
             raise ParameterError(f'{source}: base.imu.orientation: '
                                  f'{self.base.imu.orientation.tolist()}: {unit_rule(length)}')
-        size = mean_radius(self.geometry.platform_joints)
-        if size == 0.0:
-            raise ParameterError(
-                f'{source}: geometry.platform_joints: all six are at one point')
+        platform_joints = self.geometry.platform_joints
+        size = mean_radius(platform_joints)
+        if size <= ONE_POINT * np.abs(platform_joints).max():
+            name = ('geometry.platform_joints' if self.geometry.platform_angles is None
+                    else 'geometry.platform_angles')
+            raise ParameterError(f'{source}: {name}: all six are at one point')
         if self.singularity.characteristic_length is None:
             self._complete('singularity.characteristic_length', size)
         if self.uncertainty.center_of_mass is None:

@@ -44,9 +44,13 @@ CallbackReturn StewartDynamicsController::on_configure(const rclcpp_lifecycle::S
 {
   changed_.set(std::nullopt);
   parameters_ = parameter_listener_->get_params();
+  // Velocities alone would drift: no position of the legs is read.
   const auto & commanded = parameters_.command_interfaces;
-  if (std::find(commanded.begin(), commanded.end(), "effort") == commanded.end()) {
-    RCLCPP_ERROR(get_node()->get_logger(), "command_interfaces: effort must be one of them");
+  if (std::none_of(commanded.begin(), commanded.end(), [](const std::string & each) {
+      return each == "position" || each == "effort";}))
+  {
+    RCLCPP_ERROR(
+      get_node()->get_logger(), "command_interfaces: position or effort must be one of them");
     return CallbackReturn::ERROR;
   }
   try {
