@@ -29,8 +29,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics.executables import executable
-from stewart_dynamics.reference_motion.motion import sample_times
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 HERE = Path(__file__).resolve().parent
 NODE = 'stewart_dynamics'

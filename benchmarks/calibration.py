@@ -20,11 +20,11 @@ import numpy as np
 import scipy
 from scipy.stats import binom
 from stewart_dynamics import calibrate, Parameters, Pose, StewartPlatform
-from stewart_dynamics.calibration.design import design_poses
 from stewart_dynamics.calibration.equations import Equations, GEOMETRY, values_of, with_geometry
-from stewart_dynamics.calibration.fit import fit, Unknowns
 from stewart_dynamics.calibration.frames import pose_errors
+from stewart_dynamics.calibration.geometry_fit import fit, Unknowns
 from stewart_dynamics.calibration.noise import Noise
+from stewart_dynamics.calibration.pose_design import design_poses
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 

@@ -19,8 +19,8 @@ import time
 from inverse_dynamics import Array, HERE, markdown, processor_name, write
 import numpy as np
 from stewart_dynamics import Parameters
-from stewart_dynamics.identification.design import Design, design, predicted_half_widths
 from stewart_dynamics.identification.identification_options import DesignOptions
+from stewart_dynamics.identification.motion_design import Design, design, predicted_half_widths
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 sys.path.insert(0, str(HERE.parent / 'test'))

@@ -41,8 +41,8 @@ from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, layout_of, pose, twist
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 from visualization_msgs.msg import MarkerArray

@@ -24,7 +24,7 @@ from stewart_dynamics.mechanics.dynamics import forward_dynamics
 from stewart_dynamics.mechanics.rows import FORCES, RESULT
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_POSE, BASE_TWIST
+from stewart_dynamics.setpoints.input_messages import BASE_ACCEL, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import Rejections
 
 BEGIN, END = '<!-- moving base: begin -->', '<!-- moving base: end -->'

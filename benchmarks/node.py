@@ -38,8 +38,8 @@ from stewart_dynamics.external_wrench.estimate import ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs
 from stewart_dynamics.node.markers import Markers
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.security import PROFILES
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.step import Setpoint, Step

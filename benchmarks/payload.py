@@ -28,8 +28,8 @@ from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.estimate import Estimate
 from stewart_dynamics.external_wrench.measured_legs import LegHistory
 from stewart_dynamics.external_wrench.payload import identify, NAMES, numbers_of, PayloadOutcome
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 BEGIN, END = '<!-- payload: begin -->', '<!-- payload: end -->'
 BEGIN_COVERAGE, END_COVERAGE = '<!-- payload coverage: begin -->', '<!-- payload coverage: end -->'

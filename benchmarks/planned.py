@@ -25,7 +25,7 @@ import numpy as np
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.planned import messages as planned
+from stewart_dynamics.planned import trajectory_messages as planned
 
 BEGIN, END = '<!-- planned: begin -->', '<!-- planned: end -->'
 POINTS = 10_000

@@ -35,8 +35,8 @@ from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.whole_file import write_json
 
 BEGIN, END = '<!-- replay: begin -->', '<!-- replay: end -->'
@@ -83,7 +83,7 @@ from pathlib import Path
 import sys
 from stewart_dynamics import Parameters
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.setpoints.inputs import SOURCES
+from stewart_dynamics.setpoints.input_messages import SOURCES
 from stewart_dynamics.setpoints.joining import Setpoints
 
 many = 0

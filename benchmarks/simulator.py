@@ -39,9 +39,9 @@ from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.messages.standard import float64_array
 from stewart_dynamics.parameters.yaml_file import read_yaml
-from stewart_dynamics.simulator.messages import StateMessages
-from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
+from stewart_dynamics.simulator.state_messages import StateMessages
 
 sys.path.append(str(HERE.parent / 'test'))
 from referees import energies, rng, smooth_motion  # noqa: E402, I100, I202

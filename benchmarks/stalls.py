@@ -17,7 +17,7 @@ import time
 
 import rclpy
 
-from stewart_dynamics.node.node import DynamicsNode
+from stewart_dynamics.node.dynamics_node import DynamicsNode
 from stewart_dynamics.ros.repeated_log import RepeatedLog, WARNING
 
 REPEATED = 21

@@ -30,8 +30,8 @@ import rclpy
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.executables import executable
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.reference_motion.motion import motion_at, sample_times
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.whole_file import write_json
 
 matplotlib.use('Agg')

@@ -23,9 +23,9 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.ros.run import run
-from stewart_dynamics.simulator.node import SimulatorNode
-from stewart_dynamics.simulator.parameters import FORCE, SimulatorParameters
 from stewart_dynamics.simulator.plant import PlantState
+from stewart_dynamics.simulator.simulator_node import SimulatorNode
+from stewart_dynamics.simulator.simulator_parameters import FORCE, SimulatorParameters
 
 # Coordinates of the MJCF: three of each leg, then the platform's free joint.
 _LEGS, _POSITION, _QUATERNION = slice(2, 18, 3), slice(18, 21), slice(21, 25)

@@ -30,7 +30,7 @@ from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
 from stewart_dynamics.executables import executable
 from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.moving_base import GeneratedBaseMotion
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 from stewart_dynamics.whole_file import write_json
 
 matplotlib.use('Agg')

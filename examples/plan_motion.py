@@ -34,8 +34,8 @@ from sensor_msgs.msg import JointState
 from stewart_dynamics import Capability, Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_euler, to_quaternion
-from stewart_dynamics.reference_motion.motion import motion_at, sample_times
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 

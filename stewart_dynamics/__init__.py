@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from stewart_dynamics.mechanics.stiffness import NaturalModes
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.planned.approach import approach, rest_to_rest, TimedMotion
-    from stewart_dynamics.planned.trajectory import check_planned_trajectory, PlannedTrajectory
+    from stewart_dynamics.planned.planned_trajectory import (
+        check_planned_trajectory, PlannedTrajectory)
     from stewart_dynamics.replay.read_arrays import (
         read_legs, read_setpoints, RecordedLegStates, RecordedSetpoints)
 
@@ -59,7 +60,7 @@ _MODULES = {
     'mechanics.stiffness': ('NaturalModes',),
     'parameters.table': ('Parameters',),
     'planned.approach': ('TimedMotion', 'approach', 'rest_to_rest'),
-    'planned.trajectory': ('PlannedTrajectory', 'check_planned_trajectory'),
+    'planned.planned_trajectory': ('PlannedTrajectory', 'check_planned_trajectory'),
     'replay.read_arrays': ('RecordedLegStates', 'RecordedSetpoints', 'read_legs',
                            'read_setpoints'),
 }

@@ -29,8 +29,8 @@ from stewart_dynamics.external_wrench.estimate import Estimate
 from stewart_dynamics.external_wrench.measured_legs import LegHistory
 from stewart_dynamics.external_wrench.payload import identify, rows_of
 from stewart_dynamics.identification.identification_options import IdentificationOptions
+from stewart_dynamics.identification.identification_results import document
 from stewart_dynamics.identification.identify import Identification
-from stewart_dynamics.identification.results import document
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.rows import NO_BASE
 

@@ -16,7 +16,7 @@ from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.setpoints.inputs import WRENCH as WRENCH_TOPIC
+from stewart_dynamics.setpoints.input_messages import WRENCH as WRENCH_TOPIC
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import Rejection
 from stewart_dynamics.setpoints.step import Setpoint

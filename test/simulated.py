@@ -11,7 +11,7 @@ from referees import random_parameters, rng, ROOT, size_of
 
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import read_yaml
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 HEXAPOD = read_yaml(ROOT / 'config' / 'platform.yaml', 'stewart_simulator')
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics import Motion
-from stewart_dynamics.identification.design import DesignLimits
 from stewart_dynamics.identification.identification_options import DesignOptions
+from stewart_dynamics.identification.motion_design import DesignLimits
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 Array = NDArray[np.float64]

@@ -14,10 +14,10 @@ from snapshot import Snapshot
 from stewart_dynamics import (
     approach, check_planned_trajectory, Motion, MotionError, Pose, rest_to_rest, StewartPlatform)
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.planned import messages as planned
-from stewart_dynamics.planned.messages import PlannedOutcome
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.planned import trajectory_messages as planned
+from stewart_dynamics.planned.trajectory_messages import PlannedOutcome
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from trajectories import Array, decoded, PARAMETERS, rows_of, STAMP
 
 PLATFORM = StewartPlatform(PARAMETERS)

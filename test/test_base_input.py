@@ -24,7 +24,7 @@ from stewart_dynamics import BaseMotion, Motion, Pose
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.setpoint import imu, layout_of
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.inputs import (
+from stewart_dynamics.setpoints.input_messages import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, LARGEST, POSE, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (

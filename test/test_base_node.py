@@ -18,7 +18,7 @@ from running import DynamicsNode, nanoseconds, NODE, Sample
 from sensor_msgs.msg import Imu, JointState
 from stewart_dynamics import BaseMotion, StewartPlatform
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.inputs import (
+from stewart_dynamics.setpoints.input_messages import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST)
 from stewart_dynamics.setpoints.rejections import (
     MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, Rejections, WRONG_FRAME)

@@ -26,7 +26,7 @@ from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     linear_parameters, parameter_values, with_point_mass)
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.table import inertia_matrix, payload_values
 

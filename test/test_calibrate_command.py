@@ -23,13 +23,13 @@ from stewart_dynamics import (
 from stewart_dynamics.calibration import main
 from stewart_dynamics.calibration.calibrate import calibrate
 from stewart_dynamics.calibration.calibration_report import _arrow_scale, _view
-from stewart_dynamics.calibration.design import design_poses, NOISE
 from stewart_dynamics.calibration.equations import (
     BASE, Equations, PLATFORM as PLATFORM_JOINTS, values_of)
-from stewart_dynamics.calibration.fit import fit, Unknowns
+from stewart_dynamics.calibration.geometry_fit import fit, Unknowns
 from stewart_dynamics.calibration.measured_poses import poses_csv, read_poses
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.one_run import CalibrationOptions, run
+from stewart_dynamics.calibration.pose_design import design_poses, NOISE
 from stewart_dynamics.calibration.recorded_poses import read_bag
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics.frames.rotation import from_euler

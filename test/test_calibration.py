@@ -15,10 +15,10 @@ from stewart_dynamics import (
     StewartPlatform)
 from stewart_dynamics.calibration.equations import (
     ALL, Equations, Frames, GEOMETRY, inverse, product, values_of, with_geometry)
-from stewart_dynamics.calibration.fit import fit, Unknowns
 from stewart_dynamics.calibration.frames import find_frames
+from stewart_dynamics.calibration.geometry_fit import fit, Unknowns
 from stewart_dynamics.calibration.noise import covariances, Noise
-from stewart_dynamics.mechanics.drives.screws import screw_constants, universal_axes
+from stewart_dynamics.mechanics.drives.turning_screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 
 pytestmark = pytest.mark.slow

@@ -17,7 +17,7 @@ from snapshot import Snapshot
 from stewart_dynamics import (
     BaseMotion, Capability, Motion, MotionError, ParameterError, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.datasheet.ratings import Payloads
+from stewart_dynamics.datasheet.pose_ratings import Payloads
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 PLATFORM = StewartPlatform.from_yaml(CONFIG / 'platform.yaml')

@@ -21,7 +21,7 @@ from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
 from stewart_dynamics.program import DONE
 from stewart_dynamics.replay import main
-from stewart_dynamics.replay.output import RECORDED_TYPES, ROBOT_DESCRIPTION
+from stewart_dynamics.replay.output_bag import RECORDED_TYPES, ROBOT_DESCRIPTION
 import yaml
 
 CONFIG = ROOT / 'config'

@@ -26,12 +26,12 @@ from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
     POSE, POSITION, ROTATION, TWIST)
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.consistency import Consistency
 from stewart_dynamics.setpoints.inconsistency import (
     ACCELERATION as ACCEL, Inconsistency, SPIN, SPIN_RATE, VELOCITY)
-from stewart_dynamics.setpoints.inputs import (
+from stewart_dynamics.setpoints.input_messages import (
     ACCEL as ACCELS, BASE_ACCEL, BASE_POSE, BASE_TWIST, POSE as POSES, TWIST as TWISTS)
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'

@@ -18,10 +18,10 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.executables import executable
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.console_scripts import check_arguments, usage
 from stewart_dynamics.ros.launch_arguments import check_launch_arguments
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 PROGRAM = 'stewart_dynamics'
 

@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped
 import numpy as np
 import pytest
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
@@ -20,8 +21,8 @@ from running import Inside, nanoseconds, Peer, PLATFORM
 from sensor_msgs.msg import Imu, JointState
 from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.cueing.cueing_node import CueingNode
 from stewart_dynamics.cueing.motion_cueing import GRAVITY, MotionCueing
-from stewart_dynamics.cueing.node import CueingNode
 from stewart_dynamics.cueing.vehicle import vehicle_mistake
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -221,6 +222,26 @@ def test_deactivation_brings_the_platform_to_rest(cueing: Any) -> None:
                'it moves', (2.0, 1.0, GRAVITY))
     node.node.trigger_deactivate()
     node.until(lambda: np.abs(node.last[3:6]).max() < 2e-4, 'it is at rest')
+
+
+def test_the_whole_lifecycle(cueing: Any) -> None:
+    """An unconfigured node takes another rate, and begins anew with it."""
+    node = cueing('start_timeout:=0.1', 'autostart:=false')
+    for change in (node.node.trigger_configure, node.node.trigger_activate):
+        assert change() == TransitionCallbackReturn.SUCCESS
+    node.until(lambda: len(node.raw['accel']) > 10, 'setpoints come')
+    for change in (node.node.trigger_deactivate, node.node.trigger_cleanup):
+        assert change() == TransitionCallbackReturn.SUCCESS
+    node.until(lambda: not node.vehicle.get_subscription_count(), 'its topics are closed')
+    assert node.node.set_parameters_atomically([
+        RosParameter('cueing.rate', value=50.0)]).successful
+    before = len(node.raw['accel'])
+    for change in (node.node.trigger_configure, node.node.trigger_activate):
+        assert change() == TransitionCallbackReturn.SUCCESS
+    node.until(lambda: len(node.raw['accel']) > before + 10, 'setpoints come again')
+    stamps, _ = node.rows()
+    assert (np.diff(stamps[before + 2:]) == 20_000_000).all()
+    assert node.node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
 
 
 @pytest.mark.parametrize('force, text', [

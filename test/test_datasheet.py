@@ -36,9 +36,9 @@ from stewart_dynamics.datasheet.datasheet_text import (
     rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
+from stewart_dynamics.datasheet.pose_ratings import at_pose, AXES, KEYS, Payloads, stiffness
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
-from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS, Payloads, stiffness
-from stewart_dynamics.mechanics.likely_mistakes import mistakes_in_options
+from stewart_dynamics.mechanics.parameter_mistakes import mistakes_in_options
 from stewart_dynamics.replay import main as replay
 from stewart_dynamics.replay.recorded_motion import read_motion, RecordedMotion
 from stewart_dynamics.replay.replay_options import NODE, Options

@@ -31,7 +31,7 @@ from snapshot import Snapshot
 from stewart_dynamics import ParameterError, Parameters
 from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.parameters.table import PARAMETERS
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.declared_parameters import declare_parameters, log_changes
 from stewart_dynamics.ros.rclpy_workarounds import reject_impossible_times
 

@@ -17,11 +17,11 @@ from running import log_lines, PLATFORM, Program, ROOT
 from snapshot import Snapshot
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.identification.identification_options import IdentificationOptions
+from stewart_dynamics.identification.identification_results import document
 from stewart_dynamics.identification.identify import Identification
-from stewart_dynamics.identification.results import document
 from stewart_dynamics.messages.joint_state import JointStateWriter
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 
 @pytest.fixture(scope='module')

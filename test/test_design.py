@@ -13,12 +13,12 @@ import pytest
 from referees import ROOT
 from snapshot import Snapshot
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
-from stewart_dynamics.identification.design import (
-    columns_of, Design, design, predicted_half_widths)
 from stewart_dynamics.identification.identification_options import DesignOptions
 from stewart_dynamics.identification.identify_command_line import main
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.identification.motion_design import (
+    columns_of, Design, design, predicted_half_widths)
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from sweeps import sweep
 
 PROGRAM = 'stewart_identify'

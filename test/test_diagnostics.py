@@ -22,7 +22,7 @@ from stewart_dynamics.node.diagnostics.levels import ERROR, OK, STALE, Status, W
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.ros.repeated_log import RepeatedLog, SECONDS
 from stewart_dynamics.setpoints.consistency import Mistake
-from stewart_dynamics.setpoints.inputs import ACCEL, BASE_IMU, POSE, TWIST
+from stewart_dynamics.setpoints.input_messages import ACCEL, BASE_IMU, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_FINITE, NOT_JOINED, Rejection, STAMP_ZERO, TWICE)
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step

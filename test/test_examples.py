@@ -28,8 +28,8 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics import approach, Capability, Motion, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.setpoint import pose, StampedWriter, twist
-from stewart_dynamics.reference_motion.motion import motion_at, sample_times
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from trajectory_msgs.msg import JointTrajectory
 
 EXAMPLES = ROOT / 'examples'

@@ -40,9 +40,9 @@ from stewart_dynamics.mechanics.limits import JUMP, LIMITS, OF_LEGS, TOLERANCE
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, DETERMINANT, FORCES, JOINT_FORCES, LENGTHS, MOTION, RESULT,
     UNIT_LOAD_FORCES, WRENCH)
-from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import HYSTERESIS, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import OUTLINES
-from stewart_dynamics.parameters.tolerances import HYSTERESIS, QUATERNION_TOLERANCE
+from stewart_dynamics.parameters.tolerances import QUATERNION_TOLERANCE
 from stewart_dynamics.setpoints.step import JITTER, Setpoint, Step
 from test_drives import driven
 

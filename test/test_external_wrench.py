@@ -28,10 +28,10 @@ from stewart_dynamics.external_wrench.measured_legs import (
     MEASURED_LEGS, MeasuredLegs, NOT_CONVERGED, SINGULAR, UNSTAMPED)
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS, UNEVEN
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.inputs import BASE_IMU
+from stewart_dynamics.setpoints.input_messages import BASE_IMU
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, MALFORMED, NOT_FINITE, OUT_OF_RANGE, Rejection, Rejections, TOO_OLD, TWICE)
 from stewart_dynamics.simulator.plant import Plant

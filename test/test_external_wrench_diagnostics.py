@@ -21,7 +21,7 @@ from stewart_dynamics.node.diagnostics.levels import (
 from stewart_dynamics.node.diagnostics.outcomes import ExternalWrenchDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
+from stewart_dynamics.setpoints.input_messages import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import NOT_MEASURED, Rejection, Rejections
 from stewart_dynamics.setpoints.step import Setpoint
 from test_external_wrench import (

@@ -23,11 +23,11 @@ from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.identification.filters import convolved, decimated, LowPass, white_deviation
-from stewart_dynamics.identification.fit import consistent
 from stewart_dynamics.identification.identify_command_line import main
-from stewart_dynamics.identification.kinematics import motions, pose_near, poses
+from stewart_dynamics.identification.parameter_fit import consistent
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
 from stewart_dynamics.identification.unknowns import regressor_of, Unknowns
+from stewart_dynamics.identification.window_poses import motions, pose_near, poses
 from stewart_dynamics.identification.windows import interpolated, Signal, uniform
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import is_consistent
 

@@ -19,10 +19,10 @@ from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.joint_angles import (
     AXES, BASE_AXES, JointAngles, PLATFORM_AXES)
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.limits import BASE_ANGLE_MAX, OF_JOINTS, PLATFORM_ANGLE_MAX
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.planned.checks import LIMIT
-from stewart_dynamics.planned.trajectory import check_planned_trajectory
+from stewart_dynamics.planned.planned_trajectory import check_planned_trajectory
 from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
 
 SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1})

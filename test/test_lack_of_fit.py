@@ -20,14 +20,14 @@ from referees import rng
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.identification.identification_options import IdentificationOptions
+from stewart_dynamics.identification.identification_results import document, result_text
 from stewart_dynamics.identification.identify import Identification, Identified
-from stewart_dynamics.identification.kinematics import pose_near
 from stewart_dynamics.identification.lack_of_fit import deviations, LEFT_BY_FILTERS
-from stewart_dynamics.identification.results import document, result_text
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.window_poses import pose_near
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 import wrong_models
 from wrong_models import (
     Case, CAUSES, GIVEN, identify, NOISE, RATE, SECONDS, simulated, true_hexapod)

@@ -21,7 +21,7 @@ from stewart_dynamics.mechanics.kinematics.leg_clearance import BASE, LegClearan
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.parameters.table import LEG_SHAPE, OUTLINES
 from stewart_dynamics.planned.checks import LIMIT
-from stewart_dynamics.planned.trajectory import check_planned_trajectory
+from stewart_dynamics.planned.planned_trajectory import check_planned_trajectory
 from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
 from test_capability import limited, moved, random_travel
 from test_capability_boxes import poses_in, some_ranges

@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
 from stewart_dynamics.setpoints.step import Outputs
-from test_output import answered, base_wrenches_of, LEGS, turning
+from test_output_bag import answered, base_wrenches_of, LEGS, turning
 
 RESULTS = 27
 

@@ -29,8 +29,8 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.parameters.yaml_file import read_yaml
-from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 SECONDS = 0.5
 MOTION = ROOT / 'config' / 'trajectory_loop.yaml'

@@ -15,7 +15,7 @@ from referees import rng, rotation_about, symmetric_parameters
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.setpoints.inputs import BASE_IMU, BASE_POSE
+from stewart_dynamics.setpoints.input_messages import BASE_IMU, BASE_POSE
 
 G = 9.80665
 RATE = 100.0

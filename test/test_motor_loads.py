@@ -24,7 +24,7 @@ from stewart_dynamics.replay.motor_charts import Deliverable, motor_charts, Oper
 from stewart_dynamics.replay.motor_loads import MARGIN, needed
 from stewart_dynamics.replay.statements import Card, cards, motion_statements
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
-from stewart_dynamics.setpoints.base_wrench import BaseWrench
+from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
 from stewart_dynamics.setpoints.motor_row import DEMANDED_TORQUES, MOTOR_ROW, SPEEDS
 from stewart_dynamics.setpoints.step import Batch, Step
 from stewart_dynamics.whole_file import to_json

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from stewart_dynamics import Motion, StewartPlatform
-from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 pytest.importorskip('mujoco')
 pytest.importorskip('rclpy')

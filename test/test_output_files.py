@@ -15,7 +15,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.replay_options import Options
 from test_legs_table import motions_of
-from test_output import answered, PARAMETERS, times_of, turning
+from test_output_bag import answered, PARAMETERS, times_of, turning
 
 PROGRAM = 'stewart_replay'
 

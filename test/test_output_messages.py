@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
-from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
+from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
 from test_step import (

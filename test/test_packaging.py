@@ -5,6 +5,7 @@
 """Files built and installed by colcon and by pip, and the metadata in package.xml."""
 
 import ast
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 import importlib.metadata
@@ -245,6 +246,12 @@ def test_pip_puts_executables_on_the_path(wheel: Path, tmp_path: Path) -> None:
 def test_no_module_has_the_name_of_one_of_python() -> None:
     for path in python_files(NAME):  # A005 of flake8-builtins
         assert path.stem not in sys.stdlib_module_names, path
+
+
+def test_no_two_modules_have_the_same_name() -> None:
+    """A file is found by its name alone."""
+    names = Counter(path.name for path in python_files(NAME) if path.name != '__init__.py')
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 @pytest.mark.parametrize('name', EXECUTABLES)

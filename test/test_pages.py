@@ -23,15 +23,15 @@ from scipy.spatial.transform import Rotation
 import snapshot
 import stewart_dynamics
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import PARAMETERS
-from stewart_dynamics.reference_motion.motion import motion_at, sample_times
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.inputs import BASE_SOURCES
+from stewart_dynamics.setpoints.input_messages import BASE_SOURCES
 from stewart_dynamics.setpoints.output_messages import MOTOR_STATES, MOTOR_TYPES
 from stewart_dynamics.setpoints.rejections import Rejections
-from stewart_dynamics.simulator import messages as simulator_messages
+from stewart_dynamics.simulator import state_messages as simulator_messages
 
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md')])
 TEXTS = {page.relative_to(ROOT).as_posix(): page.read_text(encoding='utf-8') for page in PAGES}

@@ -18,9 +18,9 @@ from rcl_interfaces.srv import (
     SetParametersAtomically)
 from rclpy.task import Future
 from running import Inside, Peer, PLATFORM, ROOT
-from stewart_dynamics.node.node import DynamicsNode
-from stewart_dynamics.reference_motion.node import TrajectoryNode
-from stewart_dynamics.simulator.node import SimulatorNode
+from stewart_dynamics.node.dynamics_node import DynamicsNode
+from stewart_dynamics.reference_motion.trajectory_node import TrajectoryNode
+from stewart_dynamics.simulator.simulator_node import SimulatorNode
 from type_description_interfaces.srv import GetTypeDescription
 
 SERVICES: dict[str, Any] = {

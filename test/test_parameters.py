@@ -23,12 +23,12 @@ from snapshot import Snapshot
 from stewart_dynamics import (
     MotionError, ParameterError, Parameters, PoseError, StewartError)
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.cueing.parameters import CueingParameters
+from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.parameters.parameter_set import declare, ParameterGroup, ParameterSet
 from stewart_dynamics.parameters.table import PARAMETERS
 from stewart_dynamics.parameters.yaml_file import flat, other_nodes, read_yaml
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 import yaml
 
 GOOD = """\

@@ -28,8 +28,8 @@ from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.node.diagnostics.outcomes import PayloadDiagnostics
 from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.table import inertia_matrix
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.limits import (
     SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.planned.interpolation import Interpolation
-from stewart_dynamics.planned.trajectory import check_planned_trajectory
+from stewart_dynamics.planned.planned_trajectory import check_planned_trajectory
 from test_drives import driven
 from test_planned_trajectory import random_trajectory
 from trajectories import Array, FREE

@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, POSITION, RATES)
 from stewart_dynamics.planned.checks import LIMIT, SINGULAR
 from stewart_dynamics.planned.interpolation import Interpolation
-from stewart_dynamics.planned.trajectory import check_planned_trajectory, PlannedTrajectory
+from stewart_dynamics.planned.planned_trajectory import check_planned_trajectory, PlannedTrajectory
 from stewart_dynamics.setpoints.step import Setpoint, Step
 from stewart_dynamics.simulator.plant import Plant
 from trajectories import (

@@ -23,9 +23,9 @@ from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, OK, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.node.tasks import LENGTH, TaskQueue
-from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
-from stewart_dynamics.planned.messages import PlannedOutcome
-from stewart_dynamics.planned.trajectory import NOT_INCREASING, PIECE, TOO_FAR
+from stewart_dynamics.planned import planned_trajectory, trajectory_messages as planned
+from stewart_dynamics.planned.planned_trajectory import NOT_INCREASING, PIECE, TOO_FAR
+from stewart_dynamics.planned.trajectory_messages import PlannedOutcome
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, NOT_FINITE, NOT_UNIT
 from trajectories import (
     Array, counted, decoded, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, STAMP,

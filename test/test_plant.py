@@ -20,9 +20,9 @@ from simulated import FRICTIONLESS, HEXAPOD, MASSLESS, random_simulated, simulat
 from snapshot import Snapshot
 from stewart_dynamics import BaseMotion, Motion, ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
-from stewart_dynamics.simulator.messages import OUTPUT_TYPES, StateMessages
-from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import largest_eigenvalue, Plant, PlantState, substeps
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
+from stewart_dynamics.simulator.state_messages import OUTPUT_TYPES, StateMessages
 
 PROGRAM = 'stewart_simulator'
 

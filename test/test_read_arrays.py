@@ -18,8 +18,8 @@ from snapshot import Snapshot
 
 from stewart_dynamics import (
     BagError, Parameters, read_legs, read_setpoints, StewartError, StewartPlatform)
-from stewart_dynamics.reference_motion.motion import motion_at, sample_times
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 PROGRAM = 'stewart_replay'
 

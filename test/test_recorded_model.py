@@ -18,7 +18,7 @@ from snapshot import Snapshot
 from stewart_dynamics import Parameters
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.replay.output import (
+from stewart_dynamics.replay.output_bag import (
     RECORDED_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 
 PROGRAM = 'stewart_replay'

@@ -43,7 +43,7 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.program import PARTLY_READ
 from stewart_dynamics.replay.one_bag import replay as replay_one
 from stewart_dynamics.replay.replay_options import NODE, Options
-from stewart_dynamics.setpoints.inputs import INPUT_TYPES, POSE, TWIST
+from stewart_dynamics.setpoints.input_messages import INPUT_TYPES, POSE, TWIST
 import zstandard
 
 PROGRAM = 'stewart_replay'

@@ -17,9 +17,9 @@ from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import Singularity
-from stewart_dynamics.reference_motion.motion import motion_at, sample_time, sample_times
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_time, sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.reference_motion.multisine import multisine
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 PROGRAM = 'stewart_trajectory'
 

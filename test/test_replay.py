@@ -46,11 +46,12 @@ from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.program import BAD_INPUT, DONE, INTERRUPTED, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
-from stewart_dynamics.replay.output import (
+from stewart_dynamics.replay.output_bag import (
     RECORDED_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
 from stewart_dynamics.replay.summary import Summary
-from stewart_dynamics.setpoints.inputs import ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH
+from stewart_dynamics.setpoints.input_messages import (
+    ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
 from test_recording import write_ros_1
@@ -802,7 +803,7 @@ def test_it_needs_no_ros() -> None:
     done = subprocess.run(
         [sys.executable, '-c', 'import sys, stewart_dynamics.replay; '
          'print([n for n in sys.modules if n.startswith(("rclpy", "rcl_interfaces", "rosidl", '
-         '"geometry_msgs", "sensor_msgs", "std_msgs", "stewart_dynamics.node.node")) '
+         '"geometry_msgs", "sensor_msgs", "std_msgs", "stewart_dynamics.node.dynamics_node")) '
          'or n == "stewart_dynamics.ros.run"])'],
         capture_output=True, text=True, timeout=300, check=True)
     assert done.stdout.strip() == '[]'

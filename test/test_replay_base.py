@@ -25,8 +25,8 @@ from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay import one_bag
 from stewart_dynamics.replay.replay_command_line import main
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
-from stewart_dynamics.setpoints.base_wrench import BaseWrench
-from stewart_dynamics.setpoints.inputs import (
+from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
+from stewart_dynamics.setpoints.input_messages import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
     TWIST, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints

@@ -24,8 +24,8 @@ from stewart_dynamics.mechanics.frames.rotation import (
     from_rotation_vector, to_quaternion, to_rotation_vector)
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
-from stewart_dynamics.reference_motion.motion import motion_at, sample_times
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.even_samples import Run, Runs
 from stewart_dynamics.replay.frequency_response import periodic_parts

@@ -22,7 +22,7 @@ from referees import rng, symmetric_parameters
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.setpoints.inputs import (
+from stewart_dynamics.setpoints.input_messages import (
     ACCEL, COMBINED, POSE, SampleReader, TWIST, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (

@@ -22,7 +22,7 @@ from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.messages.setpoint import ImuWriter
 from stewart_dynamics.simulator.imu import SimulatedImu
 from stewart_dynamics.simulator.moving_base import GeneratedBase, GeneratedBaseMotion
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 Array = NDArray[np.float64]
 

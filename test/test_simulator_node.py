@@ -30,12 +30,12 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.yaml_file import read_yaml
-from stewart_dynamics.simulator.messages import (
-    BASE_TYPES, BaseMessages, IMU, IMU_TYPE, OUTPUT_TYPES, StateMessages)
 from stewart_dynamics.simulator.moving_base import GeneratedBase, GeneratedBaseMotion
-from stewart_dynamics.simulator.node import SimulatorNode
-from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
+from stewart_dynamics.simulator.simulator_node import SimulatorNode
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
+from stewart_dynamics.simulator.state_messages import (
+    BASE_TYPES, BaseMessages, IMU, IMU_TYPE, OUTPUT_TYPES, StateMessages)
 from trajectories import FREE
 
 SIMULATOR = '/stewart_simulator'

@@ -19,8 +19,7 @@ from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatfor
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import (
-    Cause, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
-from stewart_dynamics.parameters.tolerances import HYSTERESIS
+    Cause, HYSTERESIS, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
 
 PARAMETERS = symmetric_parameters().replaced({
     'singularity.warn_condition': 50.0, 'singularity.stop_condition': 500.0,

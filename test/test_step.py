@@ -28,7 +28,7 @@ from stewart_dynamics.mechanics.rows import (
     FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import LEG_SHAPE
-from stewart_dynamics.setpoints.base_wrench import BaseWrench
+from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
 from stewart_dynamics.setpoints.step import Batch, JITTER, Output, Setpoint, State, Step
 
 PARAMETERS = symmetric_parameters()

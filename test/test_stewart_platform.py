@@ -25,7 +25,7 @@ from stewart_dynamics import (
     ParameterError, Parameters, Pose, SingularityError, StewartError, StewartPlatform)
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 
 Array = NDArray[np.float64]
 

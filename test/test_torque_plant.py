@@ -16,8 +16,8 @@ from snapshot import Snapshot
 from stewart_dynamics import Motion, ParameterError, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant, PlantState
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 from test_drives import driven
 from test_plant import motion_of, ZERO
 

@@ -24,9 +24,9 @@ from running import (
     SEPARATE)
 
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.reference_motion.motion import motion_at, sample_times
-from stewart_dynamics.reference_motion.node import TrajectoryNode
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.trajectory_node import TrajectoryNode
 
 MOTION = """\
 stewart_trajectory:

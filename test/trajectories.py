@@ -16,9 +16,9 @@ from referees import rng, ROOT
 from stewart_dynamics import Motion, Parameters
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
-from stewart_dynamics.planned.messages import OUTPUT_TYPE, PlannedOutcome
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.planned.trajectory_messages import OUTPUT_TYPE, PlannedOutcome
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 Array = NDArray[np.float64]
 

@@ -20,16 +20,16 @@ import math
 from pathlib import Path
 from typing import Any
 
-from stewart_dynamics.cueing.parameters import CueingParameters
+from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.mechanics.hexapod_structure import (
     FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
-from stewart_dynamics.node.node import BACKLOG
+from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.sample_joining import WAITING
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 import yaml
 
 HERE = Path(__file__).resolve().parent

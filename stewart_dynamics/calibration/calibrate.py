@@ -5,7 +5,7 @@
 Calibration of a hexapod's geometry from measured poses; computes the result, writes no files.
 
 Outliers are found by robust fits with equal weights; the rest is fitted with the noise given or
-estimated (``fit``). A fit without the held-out poses predicts these by forward kinematics.
+estimated (``geometry_fit``). A fit without the held-out poses predicts them by forward kinematics.
 """
 
 from __future__ import annotations
@@ -18,18 +18,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.calibration.calibration_mistakes import (
+    mistakes_of_input, mistakes_of_result, not_identified)
 from stewart_dynamics.calibration.equations import (
     chosen, Equations, Frames, GEOMETRY, GUIDED, names_of, SAME, values_of, with_geometry)
-from stewart_dynamics.calibration.fit import Fit, fit, minimum, outliers, Unknowns
 from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
-from stewart_dynamics.calibration.lack_of_fit import lack_of_fit
-from stewart_dynamics.calibration.likely_mistakes import (
-    mistakes_of_input, mistakes_of_result, not_identified)
+from stewart_dynamics.calibration.geometry_fit import Fit, fit, minimum, Unknowns
 from stewart_dynamics.calibration.measured_poses import FEWEST
 from stewart_dynamics.calibration.noise import Noise
+from stewart_dynamics.calibration.outliers import MOST_OUTLIERS, outliers
+from stewart_dynamics.calibration.residual_causes import lack_of_fit
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
-from stewart_dynamics.mechanics.drives.screws import screw_constants, universal_axes
+from stewart_dynamics.mechanics.drives.turning_screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.least_squares import Identifiability, LARGEST_SHARE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -39,10 +40,6 @@ from stewart_dynamics.reporting.estimates import (
 
 # Held-out poses are the middle ones of equal groups; below this number of others, no pose is.
 _FEWEST_OTHERS = 12
-# A larger part of the poses that are outliers is no accident.
-_MOST_OUTLIERS = 0.2
-# A leg that alone is off in a larger part of the poses has play: these are not outliers.
-_OFTEN_ALONE = 0.1
 # Errors of held-out poses may grow by this factor: a good file, and few poses.
 _WORSE = 1.2
 # Numbers of the file are rounded to a hundredth of this part of their standard errors [m].
@@ -170,12 +167,12 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     size = p.singularity.characteristic_length
     unknowns = Unknowns.of(values_of(p, known), size, held, unknown)
     first = outliers(measured, unknowns)
-    sound: Flags = ~np.any(first.outlying & ~_often_alone(first.outlying), axis=1)
+    sound: Flags = ~first.left_out
     used = measured.part(sound)
     if len(used.lengths) * 6 <= unknowns.basis.shape[1]:
         raise StewartError(f'{len(used.lengths)} poses for {unknowns.basis.shape[1]} unknowns: '
                            f'at least {unknowns.basis.shape[1] // 6 + 1} are needed')
-    if np.mean(sound) < 1.0 - _MOST_OUTLIERS:
+    if np.mean(sound) < 1.0 - MOST_OUTLIERS:
         refuse([LikelyMistake(
             'outliers', f'{np.sum(~sound)} of {len(sound)} poses do not fit the geometry that '
             'fits all others: lengths and poses must be of the same instants, at rest')])
@@ -240,13 +237,6 @@ def _screws(p: Parameters, drive_positions: bool) -> Array:
         return np.column_stack([np.zeros(6), universal_axes(p)])
     except StewartError:  # no home pose
         return GUIDED
-
-
-def _often_alone(outlying: Flags) -> Flags:
-    """Return the legs (6,) that are often off without the others: play, not outliers."""
-    alone = outlying & (np.sum(outlying, axis=1, keepdims=True) == 1)
-    often: Flags = np.mean(alone, axis=0) > _OFTEN_ALONE
-    return often
 
 
 def check_number(poses: int) -> None:

@@ -84,12 +84,12 @@ def _arguments() -> argparse.ArgumentParser:
 def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import is_bag_file
+    from stewart_dynamics.calibration.calibration_results import result_text
     from stewart_dynamics.calibration.measured_poses import read_poses
     from stewart_dynamics.calibration.noise import Noise
     from stewart_dynamics.calibration.one_run import CalibrationOptions, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
-    from stewart_dynamics.calibration.results import result_text
-    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()

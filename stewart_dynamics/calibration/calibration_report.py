@@ -14,8 +14,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.calibrate import Calibration
+from stewart_dynamics.calibration.calibration_results import outlier_text, validation_text
 from stewart_dynamics.calibration.equations import BASE, PLATFORM, ZERO
-from stewart_dynamics.calibration.results import outlier_text, validation_text
 from stewart_dynamics.estimation.confidence_level import INTERVAL, TWO_SIDED
 from stewart_dynamics.reporting.estimates import FIXED, page_values
 from stewart_dynamics.reporting.pages import digits, page

@@ -31,11 +31,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace, parameters: Parameters, folder: Path) -> str:
     """Design poses, write them into a folder and return the text for the terminal."""
     # Imported here, so that --help is fast.
-    from stewart_dynamics.calibration.design import design_poses, NOISE, trajectory_csv, visit
     from stewart_dynamics.calibration.equations import BASE, PLATFORM, ZERO
     from stewart_dynamics.calibration.measured_poses import poses_csv
     from stewart_dynamics.calibration.noise import Noise
     from stewart_dynamics.calibration.one_run import CalibrationOptions
+    from stewart_dynamics.calibration.pose_design import design_poses, NOISE, trajectory_csv, visit
     from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
     from stewart_dynamics.reporting.results_folder import (
         check_free, remove_abandoned, whole_folder)

@@ -11,7 +11,7 @@ length less the zero length and the measured position. A and c are identities wh
 measures the platform frame in the base frame.
 
 Positions of drives whose screws turn with their legs are ``L + pitch psi`` less the zero length,
-with the twist psi of the leg (``mechanics.drives.screws``): pitch psi is added to the length.
+with the twist psi of the leg (``turning_screws``): pitch psi is added to the length.
 """
 
 from __future__ import annotations

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 from stewart_dynamics.calibration.calibrate import calibrate
 from stewart_dynamics.calibration.calibration_report import write_report
+from stewart_dynamics.calibration.calibration_results import comments, document
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.calibration.noise import Noise
-from stewart_dynamics.calibration.results import comments, document
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import HOLD_OUT

@@ -31,6 +31,7 @@ from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, wrong_type)
 from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
@@ -133,7 +134,7 @@ class Capability:
     """
     Answers to "possible?" and "how far?" of a hexapod: exact, without sampling.
 
-    J_inv is square, as is J_q of screws that turn with their legs (``drives.screws``), so leg
+    J_inv is square, as is J_q of screws that turn with their legs (``turning_screws``), so leg
     forces are an affine function of a load, of an acceleration and of an added mass: each question
     at a pose is six intervals. Poses and directions have any leading shapes that broadcast against
     each other. A direction is six numbers, translation and rotation (or force and moment), base
@@ -595,7 +596,7 @@ class Capability:
             Motion of the base, likewise.
         times : (N,), optional
             Times of a motion (N,) [s]: the motion between the samples counts as well, by the rules
-            of planned trajectories (``planned.trajectory``). Where a limit may be exceeded between
+            of planned trajectories (``planned_trajectory``). Where a limit may be exceeded between
             two samples at the answer of the samples alone, at least 16 samples are put between
             them; the extreme that limits is then found to rounding errors. Wrench and base must
             be constant. By default the samples alone count.
@@ -725,27 +726,20 @@ class Capability:
             for name in self._limits.of_loads if name != limits.FORCE_MAX]
         strongest = self._limits.bounds.get(limits.FORCE_MAX)
         constant, linear, square = _of_limit(limits.FORCE_MAX, powers)
-        p, rates = self.platform.parameters, self.platform.drive_rates(rows, solved.rates)
-        linear = linear + p.actuator.viscous_friction * rates
-        coulomb, band = p.actuator.coulomb_friction, p.actuator.coulomb_velocity
-        with np.errstate(divide='ignore'):
-            knee = band / np.abs(rates)
-        sign = np.sign(rates)
-        # (forces by powers of k, direction of the drive, begin, end)
-        pieces = (
-            ((constant, linear + coulomb * rates / band, square), 0.0 * sign,
-             np.zeros(()), knee),
-            ((constant + coulomb * sign, linear, square), sign, knee, np.full((), math.inf)))
-        for forces, direction, begin, end in pieces:
+        friction = Friction.of(self.platform.parameters)
+        rates = self.platform.drive_rates(rows, solved.rates)
+        linear = linear + friction.viscous * rates
+        for piece in friction.coulomb_by_speed(rates):
+            forces = constant + piece.constant, linear + piece.linear, square
             if strongest is not None:
-                found.append((quadratic_exit(forces, strongest, begin, end),
+                found.append((quadratic_exit(forces, strongest, piece.begin, piece.end),
                               limits.short_name(limits.FORCE_MAX)))
             if self._motors is not None and torques:
                 motors = self._motors.moving(rows, solved.rows)
                 none = np.zeros(6)
                 found.append(self._motors.exits(
                     (*forces[:2], forces[2] - motors.inertial), (none, none, motors.own),
-                    motors.speeds, direction, begin, end, growing=True))
+                    motors.speeds, piece.direction, piece.begin, piece.end, growing=True))
         return found
 
     def _held(self, pose: Pose | Motion, motion: Motion | None = None) -> Motion:
@@ -816,7 +810,7 @@ class Capability:
             accelerated[..., ACCELERATION] += directions
             more = bounds.moving(accelerated, solved.rows)
         rates = self.platform.drive_rates(rows, solved.rates)
-        slow = np.abs(rates) < self.platform.parameters.actuator.coulomb_velocity
+        slow = Friction.of(self.platform.parameters).is_linear(rates)
         return bounds.exits(
             (forces - motors.inertial, change - (more.inertial - motors.inertial), none),
             (motors.own, more.own - motors.own, none), motors.speeds,

@@ -24,8 +24,8 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.interpolation import (
     Interpolation, motion_of, rates_of_vector, rotation_vector)
+from stewart_dynamics.planned.planned_trajectory import MOST_SAMPLES
 from stewart_dynamics.planned.sampling import Sampling
-from stewart_dynamics.planned.trajectory import MOST_SAMPLES
 
 LARGEST = 2.0 ** 20  # a factor that nothing limits grows by doubling up to this one
 # Rounds in which the sample that limits is found between two, and samples of a round.

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Structures, codes and functions of the C library, read from its headers.
+Structures, codes, functions and constants of the C library, read from its text.
 
 ``record('stewart_motion')`` is the numpy type of a structure, ``CODES['STEWART_OK']`` a code,
-``function('solve_many')`` a function. A call passes arrays by their addresses, after a check of
-their types; their sizes are the caller's concern.
+``CONSTANTS['HYSTERESIS']`` a number, ``function('solve_many')`` a function. A call passes arrays
+by their addresses, after a check of their types; their sizes are the caller's concern.
 """
 
 from __future__ import annotations
@@ -47,6 +47,11 @@ _TEXT = _declarations()
 CODES = {name: int(value) for enum in re.findall(r'enum \{(.*?)\};', _TEXT, re.DOTALL)
          for name, value in re.findall(r'(\w+) = (\d+)', enum)}
 """Return codes, causes of the singularity warning, and bits of exceeded limits."""
+
+CONSTANTS = {name: float(value) for file in ('stewart_dynamics.c', 'plant.c')
+             for name, value in re.findall(
+                 r'^#define ([A-Z_]+) ([0-9.e-]+)\b', header(file), re.MULTILINE)}
+"""Tolerances and other numbers that the source defines."""
 
 
 @cache

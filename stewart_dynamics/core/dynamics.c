@@ -350,10 +350,9 @@ static void put_regressor(
       row[PISTON_MASS + k] = dot(by, columns[k].of_piston);
       row[PISTON_FIRST + k] = dot(by, columns[k].of_piston_first);
     }
-    double slip = columns[i].rate / platform->legs[i].coulomb_velocity;
     row[REFLECTED_MASS + i] = columns[i].acceleration;
     row[VISCOUS_FRICTION + i] = columns[i].rate;
-    row[COULOMB_FRICTION + i] = slip < -1.0 ? -1.0 : slip > 1.0 ? 1.0 : slip;
+    row[COULOMB_FRICTION + i] = slip(columns[i].rate / platform->legs[i].coulomb_velocity);
     row[OFFSET + i] = 1.0;
   }
 }

@@ -290,6 +290,12 @@ void warm_many(
   int64_t count, const double * times, const double * heat, const double * resistance,
   const double * time_constant, double * rises);
 
+/* Forces (count, 6) of drives without losses, whose motors have the torques of forces with them, at
+   rates and accelerations of the drives. */
+void without_losses_many(
+  const leg_drives * drives, int64_t count, const double * forces, const double * rates,
+  const double * accelerations, double * loads);
+
 /* Motors of motions, with demanded forces in the results, for published forces (count, 6) [N]; the
    curve has n points of speed and torque. */
 void motors_many(

@@ -9,9 +9,9 @@ void friction_many(
   const double * rates, double * forces) {
   for (int64_t n = 0; n < count; n++) {
     for (int i = 0; i < 6; i++) {
-      double rate = rates[6 * n + i], slip = rate / coulomb_velocity[i];
-      forces[6 * n + i] = 0.0 + viscous[i] * rate +
-        coulomb[i] * (slip < -1.0 ? -1.0 : slip > 1.0 ? 1.0 : slip);
+      stewart_leg leg = {.viscous_friction = viscous[i], .coulomb_friction = coulomb[i],
+                         .coulomb_velocity = coulomb_velocity[i]};
+      forces[6 * n + i] = move_actuator(&leg, rates[6 * n + i], 0.0);
     }
   }
 }
@@ -48,14 +48,22 @@ static double curve_torque(int64_t n, const double * curve, double speed) {
 static double clipped(double torque, double available)
 {return torque > available ? available : torque < -available ? -available : torque;}
 
-/* Return c for a rate of the drive and the sign of the power that its load takes. */
-static double torque_factor(const leg_drive * drive, double power, double rate) {
-  double slip = fabs(rate) / drive->slow;
-  return 1.0 + (power > 0.0 ? drive->driving : drive->driven) * (slip > 1.0 ? 1.0 : slip);
-}
+/* Return c for a rate of the drive and the power that its load takes. */
+static double factor_of(const leg_drive * drive, double power, double rate)
+{return torque_factor(power, slip(rate / drive->slow), drive->driving, drive->driven);}
 
 static double screw_torque(const leg_drive * drive, double through, double rate)
-{return through / drive->ratio * torque_factor(drive, through * rate, rate);}
+{return through / drive->ratio * factor_of(drive, through * rate, rate);}
+
+void without_losses_many(
+  const leg_drives * drives, int64_t count, const double * forces, const double * rates,
+  const double * accelerations, double * loads) {
+  for (int64_t k = 0; k < 6 * count; k++) {
+    const leg_drive * drive = &drives->legs[k % 6];
+    double inertial = drive->mass * accelerations[k], through = forces[k] - inertial;
+    loads[k] = through / factor_of(drive, through * rates[k], rates[k]) + inertial;
+  }
+}
 
 static void put_motors(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,

@@ -29,7 +29,7 @@ static void accelerate_by_torques(
   for (int attempt = 0, settled = 0; attempt < MOST_ATTEMPTS && !settled; attempt++) {
     for (int i = 0; i < 6; i++) {
       const leg_drive * drive = &drives->legs[i];
-      factor[i] = torque_factor(drive, power[i], move_drive(&platform->legs[i], motion).rate);
+      factor[i] = factor_of(drive, power[i], move_drive(&platform->legs[i], motion).rate);
       changed.legs[i].reflected_mass = drive->mass / factor[i];
       pushes[i] = drive->ratio * torques[i] / factor[i] + others[i];
     }

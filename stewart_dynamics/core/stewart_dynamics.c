@@ -63,8 +63,7 @@ typedef struct { real x, y, z; } vector;
 
 static vector make(real x, real y, real z) {vector v = {x, y, z}; return v;}
 static vector read3(const real a[3]) {return make(a[0], a[1], a[2]);}
-static vector fixed3(const double a[3])
-{return make(number(a[0]), number(a[1]), number(a[2]));}
+static vector fixed3(const double a[3]) {return make(number(a[0]), number(a[1]), number(a[2]));}
 static vector add(vector a, vector b) {return make(a.x + b.x, a.y + b.y, a.z + b.z);}
 static vector subtract(vector a, vector b) {return make(a.x - b.x, a.y - b.y, a.z - b.z);}
 static vector scale(real k, vector a) {return make(k * a.x, k * a.y, k * a.z);}
@@ -84,8 +83,7 @@ static vector rotate_back(const real r[9], vector a)  /* R^T a */
 
 /* I a, I of xx xy xz yy yz zz */
 static vector symmetric(const double i[6], vector a) {
-  return make(
-    i[0] * a.x + i[1] * a.y + i[2] * a.z, i[1] * a.x + i[3] * a.y + i[4] * a.z,
+  return make(i[0] * a.x + i[1] * a.y + i[2] * a.z, i[1] * a.x + i[3] * a.y + i[4] * a.z,
     i[2] * a.x + i[4] * a.y + i[5] * a.z);
 }
 
@@ -126,12 +124,13 @@ static leg_pose pose_of(const stewart_leg * leg, const real position[3], const r
 
 typedef struct { vector force, moment; } load;  /* moment about the platform's origin */
 
+/* Return Coulomb friction by its full force, at a rate by that below which it is linear. */
+static real slip(real a) {return choose(a < -1.0, number(-1.0), choose(a > 1.0, number(1.0), a));}
+
 /* Return the force that moves an actuator at a rate and an acceleration of its drive. */
 static real move_actuator(const stewart_leg * leg, real rate, real acceleration) {
-  real slip = rate / leg->coulomb_velocity;
-  slip = choose(slip < -1.0, number(-1.0), choose(slip > 1.0, number(1.0), slip));
   return leg->reflected_mass * acceleration + leg->viscous_friction * rate +
-    leg->coulomb_friction * slip;
+    leg->coulomb_friction * slip(rate / leg->coulomb_velocity);
 }
 
 /* Return the load that moves leg i; write its length, its rate, the force that moves its actuator,
@@ -276,8 +275,7 @@ static moving_base base_of(const stewart_platform * platform, const stewart_base
   b.felt = subtract(read3(base->gravity), fixed3(platform->gravity));
   b.felt = subtract(read3(base->linear_acceleration), b.felt);
   b.spin = w, b.spin_rate = d;
-  put_matrix(
-    b.carrying, make(-(w.y * w.y + w.z * w.z), w.x * w.y - d.z, w.x * w.z + d.y),
+  put_matrix(b.carrying, make(-(w.y * w.y + w.z * w.z), w.x * w.y - d.z, w.x * w.z + d.y),
     make(w.x * w.y + d.z, -(w.x * w.x + w.z * w.z), w.y * w.z - d.x),
     make(w.x * w.z - d.y, w.y * w.z + d.x, -(w.x * w.x + w.y * w.y)));
   return b;
@@ -619,8 +617,7 @@ static double clearance_of(
     double u_end = thick ? least(a->cylinder_length, p->length) : p->length;
     double v_end = other_thick ? least(b->cylinder_length, q->length) : q->length;
     vector d = shortest_of(gap, s, t, u, u_end, v_end);
-    double between = sqrt(dot(d, d)) -
-      (thick ? a->cylinder_radius : a->piston_radius) -
+    double between = sqrt(dot(d, d)) - (thick ? a->cylinder_radius : a->piston_radius) -
       (other_thick ? b->cylinder_radius : b->piston_radius);
     clearance = least(clearance, between);
   }
@@ -746,6 +743,10 @@ int stewart_step(
 
 /* ---- motors --------------------------------------------------------------------------------- */
 
+/* Return the torque of a screw by that of an ideal one; losses are friction by the load. */
+static double torque_factor(double power, double slipping, double driving, double driven)
+{return 1.0 + (power > 0.0 ? driving : driven) * fabs(slipping);}
+
 int stewart_motor_torques(
   const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
   stewart_motors * motors) {
@@ -760,10 +761,9 @@ int stewart_motor_torques(
     found.speeds[i] = ratio * rate;
     found.accelerations[i] = ratio * drive.acceleration;
     double through = forces[i] - leg->reflected_mass * drive.acceleration;  /* the screw */
-    double slip = fabs(rate) / leg->coulomb_velocity;
-    double loss = through * rate > 0.0 ? 1.0 / leg->efficiency : leg->back_driving_efficiency;
     found.torques[i] = leg->reflected_mass / ratio / ratio * found.accelerations[i] +
-      through / ratio * (1.0 + (loss - 1.0) * (slip > 1.0 ? 1.0 : slip));
+      through / ratio * torque_factor(through * rate, slip(rate / leg->coulomb_velocity),
+        1.0 / leg->efficiency - 1.0, leg->back_driving_efficiency - 1.0);
   }
   if (!all_finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
   *motors = found;

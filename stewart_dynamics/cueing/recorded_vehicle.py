@@ -18,7 +18,7 @@ from stewart_dynamics.bags.csv_table import read_table
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, shown_name, StewartError
 from stewart_dynamics.messages import type_names
-from stewart_dynamics.setpoints.inputs import SampleReader, VEHICLE
+from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import Rejections
 
 _GROUPS = TIME, ACCELERATION, ANGULAR_VELOCITY

@@ -52,18 +52,18 @@ def _arguments() -> argparse.ArgumentParser:
 
 def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
+    from stewart_dynamics.bags.setpoint_bag import write_setpoint_bag
     from stewart_dynamics.cueing import report
     from stewart_dynamics.cueing.motion_cueing import MotionCueing
     from stewart_dynamics.cueing.recorded_vehicle import read_vehicle
     from stewart_dynamics.cueing.report_page import write_page
     from stewart_dynamics.cueing.vehicle import vehicle_mistake
-    from stewart_dynamics.bags.setpoint_bag import write_setpoint_bag
-    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
-    from stewart_dynamics.whole_file import now
     from stewart_dynamics.reporting.results_folder import (
         check_free, CUEING, CUEING_PARAMETERS, MOTION_BAG, remove_abandoned, REPORT_PAGE,
         whole_folder)
+    from stewart_dynamics.whole_file import now
     from stewart_dynamics.whole_file import write_json
 
     interrupt_on_signals()

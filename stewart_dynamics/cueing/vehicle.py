@@ -15,7 +15,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.mechanics.gravity_mistakes import IN_G, IN_MM, likely_mistake
 from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE
-from stewart_dynamics.setpoints.inputs import SampleReader, VEHICLE
+from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import (
     jumped_back, Rejections, stamp_words, TOO_OLD, too_old, TWICE)
 

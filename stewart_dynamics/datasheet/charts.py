@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.capability.workspace import Section
-from stewart_dynamics.datasheet.workspace import Boundary, Frequencies
+from stewart_dynamics.datasheet.rated_workspace import Boundary, Frequencies
 from stewart_dynamics.reporting.curves import Curves
 from stewart_dynamics.reporting.vector_picture import Chart, Picture, tick_text, ticks
 

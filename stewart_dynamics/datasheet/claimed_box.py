@@ -14,7 +14,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.reachable import SMALLEST
-from stewart_dynamics.datasheet.ratings import AXES
+from stewart_dynamics.datasheet.pose_ratings import AXES
 from stewart_dynamics.errors import ParameterError, shown, shown_name
 from stewart_dynamics.mechanics.kinematics.home_pose import shape_of
 from stewart_dynamics.parameters.table import Parameters

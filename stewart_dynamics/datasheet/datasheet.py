@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.datasheet import claimed_box, ratings, workspace
+from stewart_dynamics.datasheet import (
+    claimed_box, pose_ratings as ratings, rated_workspace as workspace)
 from stewart_dynamics.datasheet.claimed_box import largest_length, LARGEST_RULE
 from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
+from stewart_dynamics.datasheet.pose_ratings import answer, AXES
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
-from stewart_dynamics.datasheet.ratings import answer, AXES
 from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_euler

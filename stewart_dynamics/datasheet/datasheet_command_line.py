@@ -79,7 +79,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.datasheet.datasheet_text import sheet_text
     from stewart_dynamics.datasheet.rated_hexapod import Payload
     from stewart_dynamics.mechanics.frames.motion import Pose
-    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes, mistakes_in_options
+    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes, mistakes_in_options
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.reporting.results_folder import (
         check_free, DATASHEET, remove_abandoned)

@@ -22,9 +22,9 @@ from stewart_dynamics.datasheet.datasheet_text import (
     stuck_rows,
     unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
+from stewart_dynamics.datasheet.pose_ratings import AXES, grid, Payloads, poses_of
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
-from stewart_dynamics.datasheet.ratings import AXES, grid, Payloads, poses_of
-from stewart_dynamics.datasheet.workspace import (
+from stewart_dynamics.datasheet.rated_workspace import (
     Boundary, Frequencies, PLANES, rotations_over_height)
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.parameters.table import inertia_matrix, PARAMETERS

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.datasheet.ratings import AXES
+from stewart_dynamics.datasheet.pose_ratings import AXES
 from stewart_dynamics.mechanics.limits import (
     LIMITS, OF_POSES, short_name, SINGULARITY, TORQUE_CONTINUOUS)
 from stewart_dynamics.parameters.table import FIXED

@@ -12,7 +12,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.capability.motor_bounds import MotorBounds
-from stewart_dynamics.datasheet.ratings import answer
+from stewart_dynamics.datasheet.pose_ratings import answer
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion

@@ -134,7 +134,7 @@ def _read(given: argparse.Namespace, files: FilesOfFolder) -> int:
 def _judge(parameters: Parameters, given: argparse.Namespace, warnings: tuple[str, ...] = (),
            ) -> int:
     """Print warnings and likely mistakes and return the exit code."""
-    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 
     mistakes = warnings + likely_mistakes(parameters)
     for mistake in mistakes:

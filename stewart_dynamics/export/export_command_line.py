@@ -48,7 +48,7 @@ def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
     from stewart_dynamics.export.c_project import c_project, check_name
     from stewart_dynamics.export.drive_files import drive_files
     from stewart_dynamics.export.fmu import find_compiler, fmu, has_binaries
-    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()

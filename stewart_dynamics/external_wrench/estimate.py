@@ -10,7 +10,7 @@ give the forces f_model of the same motion without it, so
 
     w_ext = J_inv^T (f_model - f)
 
-(J_q in place of J_inv where screws turn with their legs: ``drives.screws``), with the sign of
+(J_q in place of J_inv where screws turn with their legs: ``turning_screws``), with the sign of
 ``~/wrench``: the load that the surroundings put on the platform at its origin,
 base axes. It includes all forces that the model lacks: a wrong payload or friction, a brake, an
 end stop. ``external_wrenches`` is this equation for recorded samples, as the replay uses it.

@@ -23,12 +23,13 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, SECOND
-from stewart_dynamics.estimation.noisy_rates import rates_in_noise, smoothed_law
+from stewart_dynamics.estimation.noisy_rates import rates_in_noise
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.external_wrench.body_fit import (
     about, BodyFit, FittedBody, LegSamples, ROUNDS, TEN)
 from stewart_dynamics.external_wrench.measured_legs import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, stamps_of, TURNED)
+from stewart_dynamics.mechanics.dynamics.friction import Friction, slip_in_noise
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     BODY_UNITS, COULOMB_FRICTION, FIRST_MOMENT, LINEAR, linear_parameters, PLATFORM,
     VISCOUS_FRICTION)
@@ -179,8 +180,7 @@ class _Windows:
         self._force_max = table.six_of(p.limits.force_max, math.inf)
         self._shortest = table.six_of(p.limits.length_min, 0.0)
         self._longest = table.six_of(p.limits.length_max, math.inf)
-        self._coulomb = p.actuator.coulomb_friction
-        self._coulomb_velocity = p.actuator.coulomb_velocity
+        self._friction = Friction.of(p)
         self.excluded = 0
         self._steps = np.diff(self.seconds)
         self._sound = self._steps <= p.setpoint.timeout
@@ -221,7 +221,7 @@ class _Windows:
         rates, sliding = (values[:, _LEGS, kind.start + _LEGS] for kind in (
             VISCOUS_FRICTION, COULOMB_FRICTION))
         values[:, _LEGS, COULOMB_FRICTION.start + _LEGS] = 0.0
-        model = results[:, FORCES] - self._coulomb * sliding
+        model = results[:, FORCES] - self._friction.coulomb * sliding
         values[..., LINEAR], values[..., LINEAR + 1] = forces - model, model
         right &= np.isfinite(values).all(axis=(1, 2))  # not where J_inv cannot be solved
         used = at[right]
@@ -261,12 +261,12 @@ class _Windows:
     def add_friction(self, some: slice) -> None:
         """Add the Coulomb friction of used measurements."""
         rates, deviations = rates_in_noise(self._rates[some], self._rate_deviations)
-        law = smoothed_law(rates, self._coulomb_velocity, deviations)
+        slip = slip_in_noise(rates, self._friction.coulomb_velocity, deviations)
         windows, share = self._share(self.used[some])
-        means = share @ law
+        means = share @ slip
         self._sums[windows, _LEGS, COULOMB_FRICTION.start + _LEGS] += means
-        self._sums[windows, :, LINEAR] -= self._coulomb * means
-        self._sums[windows, :, LINEAR + 1] += self._coulomb * means
+        self._sums[windows, :, LINEAR] -= self._friction.coulomb * means
+        self._sums[windows, :, LINEAR + 1] += self._friction.coulomb * means
 
     def _turns(self, at: Integers) -> Integers:
         """Return the windows in the first half of which measurements are, less one."""
@@ -301,8 +301,8 @@ class _Windows:
         differences, modelled = means[..., LINEAR], means[..., LINEAR + 1]
         p = self._platform.parameters
         of_friction = np.zeros(LINEAR)
-        of_friction[VISCOUS_FRICTION] = p.actuator.viscous_friction
-        of_friction[COULOMB_FRICTION] = p.actuator.coulomb_friction
+        of_friction[VISCOUS_FRICTION] = self._friction.viscous
+        of_friction[COULOMB_FRICTION] = self._friction.coulomb
         root = root_of_covariance(p, p.carried, of_friction)
         yield
         root[FIRST_MOMENT] *= p.carried.mass
@@ -311,10 +311,10 @@ class _Windows:
         root = root[:, np.any(root != 0.0, axis=0) | (np.arange(LINEAR) < TEN)]
         by_tilt = self._by_tilt(motions, bases)
         yield
-        standing = np.abs(means[:, _LEGS, VISCOUS_FRICTION.start + _LEGS]) < self._coulomb_velocity
+        standing = self._friction.is_linear(means[:, _LEGS, VISCOUS_FRICTION.start + _LEGS])
         weight = self.scale * modelled
         parts = (means[..., :LINEAR] @ root,
-                 (standing * _STATIC * self._coulomb)[..., None] * np.eye(6),
+                 (standing * _STATIC * self._friction.coulomb)[..., None] * np.eye(6),
                  p.uncertainty.tilt * by_tilt,
                  p.uncertainty.effort_gain * weight[..., None], differences[..., None])
         columns = np.zeros((len(full), 6, sum(part.shape[-1] for part in parts)))

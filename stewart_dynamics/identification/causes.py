@@ -19,9 +19,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.identification.extraction import Extract, SLIP
-from stewart_dynamics.identification.fit import Fit
-from stewart_dynamics.identification.kinematics import motions
+from stewart_dynamics.identification.parameter_fit import Fit
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.window_poses import motions
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 

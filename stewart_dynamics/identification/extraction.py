@@ -24,13 +24,13 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
-from stewart_dynamics.estimation.noisy_rates import smoothed_law
 from stewart_dynamics.identification.filters import convolved, decimated, LowPass, white_deviation
-from stewart_dynamics.identification.kinematics import motions, poses
 from stewart_dynamics.identification.unknowns import (
     COULOMB_COLUMNS, regressor_of, Unknowns)
+from stewart_dynamics.identification.window_poses import motions, poses
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.measured_efforts import FAR, has_losses, without_losses
+from stewart_dynamics.mechanics.dynamics.friction import slip_in_noise, stribeck
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -206,7 +206,7 @@ class Extraction:
         squares = self._coulomb_velocity ** 2
         narrower = np.sqrt(squares - 3.0 * np.clip(-variance, 0.0, _WIDTH * squares))
         slides = bool(np.ptp(lengths, axis=0).max() > _MOVES * deviations[0])
-        sliding = slides * smoothed_law(drive_rates, narrower, math.sqrt(max(variance, 0.0)))
+        sliding = slides * slip_in_noise(drive_rates, narrower, math.sqrt(max(variance, 0.0)))
         columns = np.concatenate([self._decimated(rows, sliding), efforts], axis=-1)
         wrong, stops = self._wrong(window)
         count = len(columns)
@@ -218,7 +218,7 @@ class Extraction:
                          for each in (lengths, rates, accelerations)], axis=-1)
         at = self._narrow.half + self.step * np.arange(count)
         slip = decimated(np.stack([sliding, *(
-            sliding * np.exp(-(drive_rates / speed) ** 2) for speed in speeds)], axis=-1),
+            stribeck(sliding, drive_rates, speed) for speed in speeds)], axis=-1),
             taps, self.step)
         extract = Extract(times, columns, ~wrong[:count], legs, slip, found.rows[at][:, POSE])
         return WindowRead(extract, deviations, stops, Pose.of_rows(found.rows[-1]), moves,

@@ -6,7 +6,7 @@ Identification of a hexapod from bags; computes the result and writes no files.
 
 Windows of each bag are converted into extracts (``extraction``). Stretches in which the platform
 does not follow the model, as with brakes or in contact, are left out; the rest is fitted
-(``fit``), and the end of each bag is predicted by a fit to its begin, and by the file.
+(``parameter_fit``), and the end of each bag is predicted by a fit to its begin, and by the file.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from stewart_dynamics.errors import BagError, ParameterError, PoseError, Singula
 from stewart_dynamics.identification.extraction import (
     Extract, Extraction, Extracts, WindowRead)
 from stewart_dynamics.identification.filters import LowPass
-from stewart_dynamics.identification.fit import (
-    best_for_file, Fit, fit, Noisy, residual_of)
 from stewart_dynamics.identification.identification_options import IdentificationOptions
-from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import (
     lack_of_fit, LackOfFit, LEFT_BY_FILTERS, long_pieces)
-from stewart_dynamics.identification.likely_mistakes import (
-    Comparison, LONGEST_LAG, most_motion, of_efforts, of_fit, of_no_pose, of_validation)
+from stewart_dynamics.identification.parameter_fit import (
+    best_for_file, Fit, fit, Noisy, residual_of)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
+from stewart_dynamics.identification.recording_mistakes import (
+    Comparison, LONGEST_LAG, most_motion, of_efforts, of_fit, of_no_pose, of_validation)
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.window_poses import first_pose
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.measured_efforts import FAR, force_per_effort
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of

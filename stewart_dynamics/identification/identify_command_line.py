@@ -24,7 +24,7 @@ from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_MOTION,
 from stewart_dynamics.signals import interrupt_on_signals
 
 if TYPE_CHECKING:
-    from stewart_dynamics.identification.design import Design
+    from stewart_dynamics.identification.motion_design import Design
     from stewart_dynamics.parameters.table import Parameters
 
 _PROGRAM = Program(
@@ -115,8 +115,8 @@ def _add_design(parser: argparse.ArgumentParser) -> None:
 def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import find_bags
-    from stewart_dynamics.identification.results import result_text, run
-    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes, mistakes_in_options
+    from stewart_dynamics.identification.identification_results import result_text, run
+    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes, mistakes_in_options
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
@@ -150,7 +150,7 @@ def _kinds(text: str) -> tuple[str, ...]:
 def _design(given: argparse.Namespace, parameters: Parameters) -> None:
     """Design a motion, write it and print its predicted intervals."""
     # Imported here, so that --help is fast.
-    from stewart_dynamics.identification.design import design
+    from stewart_dynamics.identification.motion_design import design
     from stewart_dynamics.parameters.yaml_file import write_yaml
     from stewart_dynamics.reporting.results_folder import (
         check_free, remove_abandoned, whole_folder)

@@ -37,6 +37,7 @@ from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, Pose
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
@@ -222,7 +223,7 @@ def _within(parameters: Parameters) -> Records:
         part = _OF_LOADS if limit.depends == LOAD else _OF_OTHERS
         legs[short_name(name)] *= 1.0 - part
     # Friction changes its sign where a leg reverses between two samples.
-    legs['force_max'] -= 2.0 * parameters.actuator.coulomb_friction
+    legs['force_max'] -= Friction.of(parameters).largest_change
     margin = _OF_STROKE * _stroke(parameters)
     legs['length_min'] += margin
     legs['length_max'] -= margin

@@ -12,7 +12,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import record
-from stewart_dynamics.mechanics.drives.screws import motor_turns, screw_constants
+from stewart_dynamics.mechanics.drives.turning_screws import motor_turns, screw_constants
 from stewart_dynamics.mechanics.rows import BASE_AXIS, PLATFORM_AXIS
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
 

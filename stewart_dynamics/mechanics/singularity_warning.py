@@ -18,11 +18,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stewart_dynamics.core.binding import CONSTANTS
 from stewart_dynamics.parameters.table import Parameters
 
 # At this condition number a solution of J_inv^T f = wrench has fewer than four valid digits of
 # sixteen: forces are neither computed nor published.
-UNSOLVABLE_CONDITION = 1e12
+UNSOLVABLE_CONDITION = CONSTANTS['UNSOLVABLE_CONDITION']
+
+HYSTERESIS = CONSTANTS['HYSTERESIS']
+"""
+A singularity warning or stop ends below this part of the condition number at which it began, or
+when the predicted time to the crossing exceeds warn_time divided by it.
+"""
 
 
 def stop_condition_of(parameters: Parameters) -> float:

@@ -18,7 +18,7 @@ from stewart_dynamics.mechanics import batch, stiffness
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, optional_array, place, wrong_type)
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL, MOTORS, Motors
-from stewart_dynamics.mechanics.drives.screws import screw_constants
+from stewart_dynamics.mechanics.drives.turning_screws import screw_constants
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, lagrange, regressor
 from stewart_dynamics.mechanics.dynamics.force_breakdown import (
     ForceBreakdown, ForceBreakdownRows, SOURCES)
@@ -32,8 +32,8 @@ from stewart_dynamics.mechanics.frames.motion import (
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
     FORCES, GRAVITY, JOINT_ANGLES, JOINT_FORCES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE,
@@ -65,7 +65,7 @@ class StewartPlatform:
     constants : (n,)
         As the functions that numba compiles take it, see ``hexapod_constants``.
     screws : (6, SCREW)
-        The screws as the readable functions take them, see ``drives.screws``; zero if guided.
+        The screws as the readable functions take them, see ``turning_screws``; zero if guided.
     solve : callable
         ``mechanics.batch.solve`` of this hexapod: rows of motion, and optionally rows of wrenches
         and of the base's motion, to rows of results, unchecked.
@@ -413,7 +413,7 @@ class StewartPlatform:
         Return J_q (..., 6, 6): rates of the drives = J_q [v; w], J_q^T forces = wrench.
 
         It is J_inv unless ``drive.screw_rotation`` is universal: there a drive makes up for the
-        turn of its leg, and its force acts with the moment of its screw (``drives.screws``).
+        turn of its leg, and its force acts with the moment of its screw (``turning_screws``).
         """
         with np.errstate(all='ignore'):
             return check_finite('pose', lagrange.drive_jacobian(

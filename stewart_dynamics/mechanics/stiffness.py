@@ -7,7 +7,7 @@ Stiffness of the platform on its legs, and its natural modes.
 Legs of stiffness k_i hold a small displacement ``dX = [dx; dtheta]`` (base axes) with the wrench
 ``K dX``, ``K = J_inv^T diag(k) J_inv`` (Merlet, Parallel Robots, 2nd ed., 2006, 9.2). Where screws
 turn with their legs, the springs are those of the drives at held motors: J_q in place of J_inv
-(``drives.screws``). Forces f of the legs turn with them, by
+(``turning_screws``). Forces f of the legs turn with them, by
 ``ds = (1 - s s^T) / L (dx + dtheta x a)``, and so do the arms a, by ``dtheta x a``:
 ``geometric_stiffness`` is minus the derivative of their wrench. Undamped small vibrations obey
 ``M dX'' + K dX = 0``: modes are the solutions of ``K phi = omega^2 M phi``.
@@ -77,7 +77,7 @@ def geometric_stiffness(legs: Legs, forces: Array, rotation: Array, screws: Arra
     Return the part (..., 6, 6) of K that is due to the forces of the legs.
 
     It is symmetric if the moment of all forces (..., 6) [N] about the platform's origin is zero.
-    screws (6, SCREW): constants of the screws, see ``drives.screws``.
+    screws (6, SCREW): constants of the screws, see ``turning_screws``.
     """
     slopes = np.stack([drive_jacobian_rate(legs, rotation, each[:3], each[3:], screws)
                        for each in np.eye(6)], axis=-1)

@@ -17,7 +17,7 @@ from stewart_dynamics.messages.cdr import (
     aligned8, COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, READ_ERRORS, sequence,
     SEVEN, SIX, Stamped, stamped, text, TIME_AND_LENGTH)
 from stewart_dynamics.messages.layout import Layout
-from stewart_dynamics.messages.trajectory import points_of
+from stewart_dynamics.messages.trajectory_layouts import points_of
 
 _IMU = {0: Struct('>37d'), 1: Struct('<37d')}
 _DURATION = {0: Struct('>iI'), 1: Struct('<iI')}

@@ -28,9 +28,9 @@ from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.node.tasks import LENGTH
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.planned import messages as planned
-from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
-from stewart_dynamics.setpoints.inputs import (
+from stewart_dynamics.planned import trajectory_messages as planned
+from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
+from stewart_dynamics.setpoints.input_messages import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
     SOURCES, TWIST, WRENCH)
 from stewart_dynamics.setpoints.output_messages import (

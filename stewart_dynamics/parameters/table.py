@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import CONSTANTS
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.circles import (
@@ -25,7 +26,7 @@ from stewart_dynamics.parameters.circles import (
 from stewart_dynamics.parameters.parameter_set import (
     declare, Parameter, ParameterGroup, ParameterSet)
 from stewart_dynamics.parameters.tolerances import (
-    HYSTERESIS, is_unit, REFLECTED_MASS_TOLERANCE, START_TOLERANCE, unit_rule)
+    is_unit, REFLECTED_MASS_TOLERANCE, START_TOLERANCE, unit_rule)
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -40,6 +41,7 @@ _FLAT = 1e-6
 NO_MASS = 1e-15
 """Mass of a platform in a cube on its radius that stands for none: forces are zero [kg/m^3]."""
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s^2]
+_HYSTERESIS = CONSTANTS['HYSTERESIS']
 
 
 GUIDED, UNIVERSAL = 'guided', 'universal'  # values of drive.screw_rotation
@@ -345,10 +347,10 @@ class SingularityGroup(ParameterGroup):
         'the platform joints from their center', 'm', minimum=0.0, above=True)
     warn_condition: float = declare(
         'condition number of J_inv at which the singularity warning begins; it ends below '
-        f'{HYSTERESIS:g} of this', '', 20.0, minimum=1.0, while_active=True)
+        f'{_HYSTERESIS:g} of this', '', 20.0, minimum=1.0, while_active=True)
     stop_condition: float = declare(
         'condition number at which singularity.action begins; it ends below '
-        f'{HYSTERESIS:g} of this', '', 100.0, minimum=1.0, while_active=True)
+        f'{_HYSTERESIS:g} of this', '', 100.0, minimum=1.0, while_active=True)
     warn_time: float = declare(
         'warn when the predicted time to a crossing of det(J) = 0 is shorter than this', 's', 0.5,
         minimum=0.0, while_active=True)

@@ -5,14 +5,10 @@
 
 from typing import Any
 
-QUATERNION_TOLERANCE = 1e-3
-"""The length of a given quaternion may differ from one by this; the quaternion is normalized."""
+from stewart_dynamics.core.binding import CONSTANTS
 
-HYSTERESIS = 0.8
-"""
-A singularity warning or stop ends below this part of the condition number at which it began, or
-when the predicted time to the crossing exceeds warn_time divided by it.
-"""
+QUATERNION_TOLERANCE = CONSTANTS['QUATERNION_TOLERANCE']
+"""The length of a given quaternion may differ from one by this; the quaternion is normalized."""
 
 REFLECTED_MASS_TOLERANCE = 0.01
 """

@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.limits import OF_LOADS, OF_RATES
 from stewart_dynamics.mechanics.rows import MOTION, POSE, RATES, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.interpolation import Interpolation
-from stewart_dynamics.planned.trajectory import check_in_pieces
+from stewart_dynamics.planned.planned_trajectory import check_in_pieces
 
 # Points of a motion per second.
 RATE = 100.0

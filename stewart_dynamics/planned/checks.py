@@ -21,7 +21,7 @@ from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
 from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS as ACCELERATIONS_OF_MOTORS, ANGLES as ANGLES_OF_MOTORS, AVAILABLE_TORQUES,
     Drives, motor_ratio, Motors, SPEEDS)
-from stewart_dynamics.mechanics.dynamics.friction import friction
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
@@ -104,8 +104,7 @@ class Checks:
         self._clearance = clearance_to_check(parameters)
         self._clearance_tolerance = _CLEARANCE * parameters.singularity.characteristic_length
         self._stop = stop_condition_of(parameters)
-        self._coulomb = parameters.actuator.coulomb_friction
-        self._coulomb_velocity = parameters.actuator.coulomb_velocity
+        self._friction = Friction.of(parameters)
         self._parameters = parameters
         self._drives = Drives(parameters) if parameters.drives else None
         self._motor_limits = MotorLimits(parameters)
@@ -197,11 +196,12 @@ class Checks:
         rates = rows[:, SPEEDS] / ratio
         inertial = p.actuator.reflected_mass / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
         highest = (np.abs(inertial) + (np.abs(samples.results[:, FORCES] - inertial)
-                                       + 2.0 * self._coulomb) / p.drive.efficiency) / ratio
+                                       + self._friction.largest_change)
+                   / p.drive.efficiency) / ratio
         may = exceeds(np.maximum(highest[:-1], highest[1:]), np.minimum(
             rows[:-1, AVAILABLE_TORQUES], rows[1:, AVAILABLE_TORQUES]))
         reverses = (rates[:-1] * rates[1:] < 0.0) & (np.maximum(
-            np.abs(rates[:-1]), np.abs(rates[1:])) > self._coulomb_velocity)
+            np.abs(rates[:-1]), np.abs(rates[1:])) > self._friction.coulomb_velocity)
         unclear: list[int] = np.flatnonzero(
             samples.near & (may & reverses).any(axis=1)).tolist()
         return unclear
@@ -261,8 +261,8 @@ class Checks:
         results, durations = samples.results, samples.durations
         forces = np.abs(results[:, FORCES])
         which = np.flatnonzero(samples.near & self._exceed_known(
-            np.maximum(forces[:-1], forces[1:]) + 2.0 * self._coulomb))
-        if not len(which) or not self._coulomb.any():
+            np.maximum(forces[:-1], forces[1:]) + self._friction.largest_change))
+        if not len(which) or not self._friction.coulomb.any():
             return []
         here, there = results[which], results[which + 1]
         at_here, rate_here = self._of_drives(samples.motions[which], here)
@@ -270,8 +270,7 @@ class Checks:
         middle = Cubics(
             at_here, at_there, rate_here * durations[which, None],
             rate_there * durations[which, None]).middle_rate() / durations[which, None]
-        of_rates = np.stack([friction(np.ascontiguousarray(rates), np.zeros(6), self._coulomb,
-                                      self._coulomb_velocity)
+        of_rates = np.stack([self._friction.without_viscous.forces(rates)
                              for rates in (rate_here, rate_there, middle)])
         others = here[:, FORCES] - of_rates[0], there[:, FORCES] - of_rates[1]
         highest = np.maximum(*others) + of_rates.max(axis=0)

@@ -19,6 +19,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.drives.motor_limits import force_limits, rate_limits
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.limits import (
     FORCE_MAX, JOINT_FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
@@ -52,9 +53,7 @@ class Sampling:
         self._tolerance = tolerance
         self._arm = arm = parameters.singularity.characteristic_length
         self._limits = Limits(parameters)
-        self._viscous = parameters.actuator.viscous_friction
-        self._coulomb = parameters.actuator.coulomb_friction
-        self._coulomb_velocity = parameters.actuator.coulomb_velocity
+        self._friction = Friction.of(parameters)
         self._reflected = parameters.actuator.reflected_mass
         self._parameters = parameters
         # Rates above which a leg or its motor may exceed a limit.
@@ -130,11 +129,11 @@ class Sampling:
         acceleration = self._acceleration_deviation(
             durations, bounds, inverse_radius, results, bases)[:, None]
         gains = self._gains(results)
-        deviation = self._viscous * rate_deviation + gains[FORCE_MAX] * acceleration
+        deviation = self._friction.viscous * rate_deviation + gains[FORCE_MAX] * acceleration
         # Coulomb friction changes where a rate is, or may come, near zero.
-        changes = (_smaller(np.abs(rates)) - rate_deviation < self._coulomb_velocity) | (
+        changes = (_smaller(np.abs(rates)) - rate_deviation < self._friction.coulomb_velocity) | (
             rates[:-1] * rates[1:] < 0.0)
-        friction = np.where(changes, 2.0 * self._coulomb, 0.0)
+        friction = np.where(changes, self._friction.largest_change, 0.0)
         strongest = self._limits.force_max
         if self._parameters.drives:
             # Losses in the screw change there as well. A curve may end at zero.

@@ -21,8 +21,8 @@ from stewart_dynamics.mechanics.frames.motion import listed, Motion, Pose
 from stewart_dynamics.mechanics.limits import USUAL
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.reference_motion.multisine import multisine
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.reference_motion.quintic import quintic
 
 # Fade in and out, in periods; the time at rest between two axes [s].

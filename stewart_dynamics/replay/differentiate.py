@@ -20,7 +20,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
-from stewart_dynamics.setpoints.inputs import LARGEST
+from stewart_dynamics.setpoints.input_messages import LARGEST
 from stewart_dynamics.setpoints.step import Batch, restarts_of
 
 # Poses in a window.

@@ -26,7 +26,7 @@ from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.messages.recorded import Messages
@@ -42,8 +42,8 @@ from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
-from stewart_dynamics.setpoints import inputs
-from stewart_dynamics.setpoints.base_wrench import BaseWrench
+from stewart_dynamics.setpoints import input_messages as inputs
+from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection, stamp_of
 from stewart_dynamics.setpoints.step import Batch, restarts_of, State, Step

@@ -27,7 +27,7 @@ from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import unexpected
 from stewart_dynamics.replay.legs_table import kind_of_table
-from stewart_dynamics.replay.output import OutputBag, RecordedModel
+from stewart_dynamics.replay.output_bag import OutputBag, RecordedModel
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.setpoints.output_messages import OutputMessages

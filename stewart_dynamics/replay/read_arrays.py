@@ -19,7 +19,7 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.bags.source_axes import axes_matrix
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.leg_curves import columns, data_frame
+from stewart_dynamics.mechanics.leg_columns import columns, data_frame
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import COMBINED, Parameters, POSES_ALONE, SEPARATE
@@ -27,7 +27,7 @@ from stewart_dynamics.program import AXES, EULER, NODE, node_name
 from stewart_dynamics.replay.bag_topics import find_measured_legs, name_of
 from stewart_dynamics.replay.recorded_motion import read_motion
 from stewart_dynamics.replay.replay_options import Options
-from stewart_dynamics.setpoints import inputs
+from stewart_dynamics.setpoints import input_messages as inputs
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -32,8 +32,8 @@ from stewart_dynamics.replay.even_samples import (
     at_even_times, check_overlap, clock_notices, Runs, Track, Tracks)
 from stewart_dynamics.replay.frequency_response import signal_module
 from stewart_dynamics.replay.response import AXES, axes_response, legs_response
-from stewart_dynamics.setpoints import inputs
-from stewart_dynamics.setpoints.inputs import SampleReader
+from stewart_dynamics.setpoints import input_messages as inputs
+from stewart_dynamics.setpoints.input_messages import SampleReader
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejections
 from stewart_dynamics.setpoints.step import Batch
 

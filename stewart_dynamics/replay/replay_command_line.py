@@ -117,7 +117,7 @@ def _options(given: argparse.Namespace) -> Options:
 def _run(given: argparse.Namespace, options: Options) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import FLEET_PAGE, folders_of_results
-    from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.replay.bag_report import share_plotly
     from stewart_dynamics.replay.many_bags import replay_fleet

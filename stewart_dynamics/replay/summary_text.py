@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import textwrap
 from typing import Any
 
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.response import AXES
 from stewart_dynamics.replay.statements import (

@@ -15,7 +15,7 @@ from importlib import import_module
 import sys
 from typing import Any, NoReturn, TYPE_CHECKING
 
-from stewart_dynamics.ros.signals import SIGNALS
+from stewart_dynamics.ros.signal_flag import SIGNALS
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
@@ -64,23 +64,24 @@ def given_parameters(arguments: Sequence[str], node: str, kind: type[ParameterSe
 
 def cueing() -> int:
     """Run the node stewart_cueing; return its exit code."""
-    return _run('cueing.parameters', 'CueingParameters', 'cueing.node')
+    return _run('cueing.cueing_parameters', 'CueingParameters', 'cueing.cueing_node')
 
 
 def dynamics() -> int:
     """Run the node stewart_dynamics; return its exit code."""
-    return _run('parameters.table', 'Parameters', 'node.node')
+    return _run('parameters.table', 'Parameters', 'node.dynamics_node')
 
 
 def simulator() -> int:
     """Run the node stewart_simulator; return its exit code."""
-    return _run('simulator.parameters', 'SimulatorParameters', 'simulator.node')
+    return _run('simulator.simulator_parameters', 'SimulatorParameters',
+                'simulator.simulator_node')
 
 
 def trajectory() -> int:
     """Run the node stewart_trajectory; return its exit code."""
-    return _run('reference_motion.parameters', 'ReferenceMotionParameters',
-                'reference_motion.node')
+    return _run('reference_motion.motion_parameters', 'ReferenceMotionParameters',
+                'reference_motion.trajectory_node')
 
 
 def usage(kind: type[ParameterSet]) -> str:

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros, other_nodes, read_value
@@ -37,14 +37,19 @@ _NUMBERS = (
 
 Kind = TypeVar('Kind', bound=ParameterSet)
 
+# Arguments of a node whose parameters are declared here. Undeclared parameters are allowed so that
+# our own check rejects them, with a better text.
+MADE_WITH: dict[str, Any] = {
+    'automatically_declare_parameters_from_overrides': True, 'allow_undeclared_parameters': True}
+
 
 def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     """
     Return the node's parameters, checked, and declare all of the table.
 
-    The node must have been made with ``automatically_declare_parameters_from_overrides``. Types
-    and ranges are left to the table's own check, whose texts are more precise than those of ROS.
-    A node without a lifecycle accepts no changes.
+    The node must have been made with the arguments ``MADE_WITH``. Types and ranges are left to the
+    table's own check, whose texts are more precise than those of ROS. A node without a
+    lifecycle accepts no changes.
 
     Raises ParameterError where a rule is broken or a name unknown.
     """

@@ -15,7 +15,7 @@ import math
 import time
 from typing import Any
 
-INFO, WARNING = 0, 1  # levels of diagnostic_msgs/DiagnosticStatus
+INFO, WARNING, ERROR = 0, 1, 2  # levels of diagnostic_msgs/DiagnosticStatus
 
 # Time without an event after which a series ends, and interval of the lines while it lasts [s].
 SECONDS = 5.0

@@ -25,7 +25,7 @@ from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.ros.console_scripts import parameter_files
 from stewart_dynamics.ros.rclpy_workarounds import reject_impossible_times, shut_down, spin
 from stewart_dynamics.ros.security import check_environment, without_security_libraries
-from stewart_dynamics.ros.signals import SIGNALS
+from stewart_dynamics.ros.signal_flag import SIGNALS
 
 # Errors that the user can correct: reported in one line. All others are defects of this package.
 _OF_THE_USER = (StewartError, RCLError, NameValidationException)

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 from stewart_dynamics.parameters.table import COMBINED
-from stewart_dynamics.setpoints import inputs
+from stewart_dynamics.setpoints import input_messages as inputs
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 SetpointRow = Sequence[list[float]]

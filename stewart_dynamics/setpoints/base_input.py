@@ -28,7 +28,7 @@ from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import BY_IMU, MOVING, Parameters
 from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, Mistake
 from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
-from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_SOURCES, BASE_TWIST
+from stewart_dynamics.setpoints.input_messages import BASE_ACCEL, BASE_SOURCES, BASE_TWIST
 from stewart_dynamics.setpoints.measured_gravity import MeasuredGravity
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.setpoints.sample_joining import Joined, SampleJoining

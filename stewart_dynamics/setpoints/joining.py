@@ -26,7 +26,7 @@ from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, Mistake
 from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
-from stewart_dynamics.setpoints.inputs import (
+from stewart_dynamics.setpoints.input_messages import (
     ACCEL, COMBINED, SOURCES, TopicSamples, TWIST, WRENCH, WrenchInput)
 from stewart_dynamics.setpoints.rejections import Rejection, Rejections
 from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining

@@ -18,7 +18,7 @@ from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.messages.standard import (
     boolean, FLOAT64, float64, FLOAT64_ARRAY, float64_array)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
+from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.motor_row import ANGLES, SOUND, SPEEDS, TORQUES
 from stewart_dynamics.setpoints.step import Output, Outputs
 

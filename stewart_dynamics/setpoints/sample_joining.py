@@ -18,7 +18,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Integers, SECOND, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.setpoints.inputs import SampleReader, TopicSamples
+from stewart_dynamics.setpoints.input_messages import SampleReader, TopicSamples
 from stewart_dynamics.setpoints.rejections import (
     jumped_back, NOT_JOINED, Rejections, stamp_words, STAMP_ZERO, TOO_OLD, too_old, TWICE)
 

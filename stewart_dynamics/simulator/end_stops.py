@@ -12,7 +12,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import record
 from stewart_dynamics.parameters.table import six_of
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 
 def stiffness_and_damping(parameters: SimulatorParameters) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from stewart_dynamics.mechanics.frames.motion import matrix_of_quaternion
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
 from stewart_dynamics.mechanics.vectors import add, subtract, Vector3
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 
 class SimulatedImu:

@@ -30,9 +30,9 @@ from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import ACCELERATION, BASE, GRAVITY, POSITION, TWIST
 from stewart_dynamics.reference_motion.quintic import quintic
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.inputs import LARGEST
+from stewart_dynamics.setpoints.input_messages import LARGEST
 from stewart_dynamics.setpoints.rejections import Rejections
-from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 _WAVES = 60
 _LOWEST, _HIGHEST = 0.5, 2.5  # frequencies of waves, relative to the peak

@@ -20,8 +20,8 @@ the force k torque / c and the reflected mass m_r / c. c depends on the directio
 which is assumed, and assumed again where the load that follows contradicts it.
 
 End stops act between cylinder and piston, along the leg. With the forces of the drives they are
-added up, except where screws turn with their legs (``drives.screws``): drives act with the rows of
-J_q there, end stops with those of J_inv, as a wrench on the platform.
+added up, except where screws turn with their legs (``turning_screws``): drives act with the rows
+of J_q there, end stops with those of J_inv, as a wrench on the platform.
 
 The step is short enough for friction and end stops, whose modes are the fastest by far. With them
 a hexapod is ``M x'' + J^T D J x' + J^T K J x = 0``, with M its mass matrix, D the damping of the
@@ -39,16 +39,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
-from stewart_dynamics.core.binding import function, record, Sample
+from stewart_dynamics.core.binding import CONSTANTS, function, record, Sample
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits
 
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 from stewart_dynamics.simulator.end_stops import stiffness_and_damping, stops_of
-from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters, TORQUE
 # The Runge-Kutta method is stable for all modes s with |h s| below 2.6 that do not grow by
 # themselves; up to 1 their error is small as well, with a margin for nonlinear terms.
 _REACH = 1.0
@@ -63,9 +64,9 @@ def substeps(parameters: SimulatorParameters) -> int:
     """
     step = parameters.step
     with np.errstate(all='ignore'):
-        viscous = parameters.actuator.viscous_friction
-        coulomb = (parameters.actuator.coulomb_friction + screw_friction(parameters)
-                   ) / parameters.actuator.coulomb_velocity
+        friction = Friction.of(parameters)
+        viscous = friction.viscous
+        coulomb = friction.slope(friction.coulomb + screw_friction(parameters))
         stiffness, damping = stiffness_and_damping(parameters)
         fastest = max(largest_eigenvalue(parameters, viscous + coulomb + damping),
                       math.sqrt(largest_eigenvalue(parameters, stiffness)))
@@ -84,8 +85,7 @@ def substeps(parameters: SimulatorParameters) -> int:
     value = parameters[name]
     text = str(value.tolist() if isinstance(value, np.ndarray) else value)
     if name == 'actuator.coulomb_friction':
-        velocity = parameters.actuator.coulomb_velocity.tolist()
-        text += f' N within actuator.coulomb_velocity {velocity} m/s'
+        text += f' N within actuator.coulomb_velocity {friction.coulomb_velocity.tolist()} m/s'
     raise ParameterError(
         f'{name}: {text}: too large for a '
         f'platform of {parameters.carried.mass:g} kg: the integration would need steps of '
@@ -125,7 +125,7 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
 
 # In one step the platform may turn by at most this [rad], and a platform joint move by at most
 # this part of its leg's length: a larger move would not be resolved.
-LARGEST_MOVE = 0.5
+LARGEST_MOVE = CONSTANTS['LARGEST_MOVE']
 
 
 class PlantState(NamedTuple):

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.drives.motors import motor_ratio
+from stewart_dynamics.mechanics.drives.motors import drives_structure, motor_ratio
 from stewart_dynamics.parameters.table import AUTO, Parameters, STANDARD_GRAVITY
 
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
@@ -77,12 +78,9 @@ def without_losses(forces: Array, rates: Array, accelerations: Array, p: Paramet
 
     rates, accelerations (N, 6): of the drives, q' and q'' [m/s, m/s^2].
     """
-    of_rotors = p.actuator.reflected_mass * accelerations
-    through = forces - of_rotors
-    slip = np.minimum(np.abs(rates) / p.actuator.coulomb_velocity, 1.0)
-    full = np.where(through * rates > 0.0, 1.0 / p.drive.efficiency,
-                    p.drive.back_driving_efficiency)
-    loads: Array = through / (1.0 + (full - 1.0) * slip) + of_rotors
+    loads = np.empty((len(forces), 6))
+    function('without_losses_many')(drives_structure(p), len(forces), *map(
+        np.ascontiguousarray, (forces, rates, accelerations)), loads)
     return loads
 
 

@@ -23,7 +23,7 @@ the larger of the two torques, the breakaway torque, is what limits are checked 
 
 Where the screw turns with the leg, by its twist, a right-handed thread extends the leg by
 lead / (2 pi) for each radian. The motor takes that back: q is L less that extension
-(``drives.screws``), gear_ratio times the twist is subtracted from the angle, added where the
+(``turning_screws``), gear_ratio times the twist is subtracted from the angle, added where the
 thread is left-handed. The moments of the screws about the legs' axes, force times lead / (2 pi),
 are part of the leg forces: the torque of an ideal screw is f / k, and its power f q'.
 """
@@ -41,7 +41,7 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
-from stewart_dynamics.mechanics.leg_curves import columns, figure, LEGS
+from stewart_dynamics.mechanics.leg_columns import columns, LEGS
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import FORCES
 from stewart_dynamics.parameters.table import Parameters, six_of
@@ -125,10 +125,11 @@ class Motors(NamedTuple):
 
         Arguments and errors are those of ``InverseDynamics.plot``.
         """
+        from stewart_dynamics.reporting.result_figures import figure_of_legs
         curves = {'speed [rad/s]': self.speeds, 'torque [N m]': self.torques,
                   'current [A]': self.currents, 'power [W]': self.power}
         known = {name: each for name, each in curves.items() if np.isfinite(each).any()}
-        return figure(known or curves, times, joints)
+        return figure_of_legs(known or curves, times, joints)
 
     def __repr__(self) -> str:
         """Return the shape, not the arrays."""

@@ -18,8 +18,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import batch
-from stewart_dynamics.mechanics.drives.screws import screw_constants
-from stewart_dynamics.mechanics.dynamics.friction import friction
+from stewart_dynamics.mechanics.drives.turning_screws import screw_constants
+from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.dynamics.lagrange import drive_rates
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.rows import (
@@ -94,9 +94,7 @@ class ForceBreakdownRows:
     """The force breakdown of rows of motion, as one array."""
 
     def __init__(self, parameters: Parameters) -> None:
-        actuator = parameters.actuator
-        self._friction = tuple(each.copy() for each in (
-            actuator.viscous_friction, actuator.coulomb_friction, actuator.coulomb_velocity))
+        self._friction = Friction.of(parameters)
         self._parameters, self._screws = parameters, screw_constants(parameters)
         self._whole = hexapod_structure(parameters)
         self._weightless = hexapod_structure(
@@ -157,7 +155,7 @@ class ForceBreakdownRows:
         # By the friction law: as a difference it would lose its digits near a singularity.
         rates = results[:, RATES].copy() if not self._screws.any() else drive_rates(
             self._parameters, rows, self._screws)
-        by.friction[:] = friction(rates, *self._friction)
+        by.friction[:] = self._friction.forces(rates)
         by.base_motion[:] = 0.0 if bases is None else (
             solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)
         forces[unknown] = np.nan

@@ -8,7 +8,7 @@ Forward dynamics: how the platform accelerates under given leg forces.
 base, with the functions of the inverse dynamics for the load without acceleration, and with M as
 a sum over the legs, ``M = M_p + sum (e_i J_i^T J_i + (m2 + m_r - e_i) j_i j_i^T)`` with
 J_i = [1, -skew(a_i)], j_i the leg's row of J_inv and e_i its effective mass across the leg. Where
-screws turn with their legs, f, friction and m_r have the rows of J_q (``drives.screws``). M is
+screws turn with their legs, f, friction and m_r have the rows of J_q (``turning_screws``). M is
 positive definite for every hexapod, so Cholesky solves it without a pivot (Golub and Van Loan,
 Matrix Computations, 4th ed., 4.2).
 """

@@ -6,9 +6,9 @@ The Lagrange equations as the paper assembles them: the readable reference.
 
 ``M(X) X'' + C(X, X') X' + G(X) = J_inv^T f + wrench`` in twist coordinates ``X' = [v; w]``,
 base axes. Where screws turn with their legs, their J_q replaces J_inv for the forces f and the
-reflected masses: ``drives.screws``. Numbers in brackets are equations of Alwan and Sarhan, Dynamic
-Analysis of Gough Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon Eng.
-Sci. 26(10), 2018, in their correct form: docs/misprints.md lists the misprints.
+reflected masses: ``turning_screws``. Numbers in brackets are equations of Alwan and Sarhan,
+Dynamic Analysis of Gough Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon
+Eng. Sci. 26(10), 2018, in their correct form: docs/misprints.md lists the misprints.
 ``inverse_dynamics`` computes the same forces without a matrix and is validated against these.
 Every function takes any leading shape of samples.
 """
@@ -93,7 +93,7 @@ def drive_jacobian(at: Legs, rotation: Array, screws: Array | None = None) -> Ar
     """
     Return J_q (..., 6, 6): rates of the drives = J_q [v; w], J_q^T forces = wrench.
 
-    screws (6, SCREW): constants of the screws, see ``drives.screws``; by default they are guided,
+    screws (6, SCREW): constants of the screws, see ``turning_screws``; by default they are guided,
         and J_q is J_inv.
     """
     if screws is None or not screws.any():

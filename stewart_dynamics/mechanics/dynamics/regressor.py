@@ -8,7 +8,7 @@ theta are the parameters in which leg forces are linear, see ``linear_parameters
 ``base_wrench``, velocities and accelerations are those in axes that do not turn, accelerations
 less gravity: ``A = a_B - g + W' x r + W x (W x r) + 2 W x r' + r''`` at a point r. So a moving
 base needs nothing more. Row n of (J_inv^T)^-1, or of (J_q^T)^-1 where screws turn with their legs
-(``drives.screws``), in halves u (for forces) and h (for moments),
+(``turning_screws``), in halves u (for forces) and h (for moments),
 gives the force of leg n:
 
 - platform, in platform axes, with its origin's A and its absolute w and w': the mass gives u . A,

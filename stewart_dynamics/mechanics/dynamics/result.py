@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.motion import listed
-from stewart_dynamics.mechanics.leg_curves import columns, data_frame, figure, LEGS
+from stewart_dynamics.mechanics.leg_columns import columns, data_frame, LEGS
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, RATES, RESULT,
     UNIT_LOAD_FORCES)
@@ -138,8 +138,9 @@ class InverseDynamics:
             There is one sample alone, or times do not fit.
 
         """
-        return figure({'length [m]': self.lengths, 'rate [m/s]': self.rates,
-                       'force [N]': self.forces}, times, joints)
+        from stewart_dynamics.reporting.result_figures import figure_of_legs
+        return figure_of_legs({'length [m]': self.lengths, 'rate [m/s]': self.rates,
+                               'force [N]': self.forces}, times, joints)
 
     def __repr__(self) -> str:
         """Return the numbers of a single sample, or the shape."""

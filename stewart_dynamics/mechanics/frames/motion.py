@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import CONSTANTS
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import (
     as_array, common_shape, first_of, optional_array, wrong_type)
@@ -132,7 +133,7 @@ def listed(numbers: Array, digits: int = 6) -> str:
 
 
 # A rotation matrix further from orthogonal than this is rejected.
-ORTHOGONALITY = 1e-6
+ORTHOGONALITY = CONSTANTS['ORTHOGONALITY']
 # Rounding cannot make one that is nearer than this exceed it.
 _WELL = 0.9 * ORTHOGONALITY
 

@@ -11,16 +11,17 @@ starts there and never steps to where det(J) has the other sign: another assembl
 side of a singularity. Where it does not converge, near singularities, the lengths are led from
 those of the guess to those given in parts, along a straight line of their squares (homotopy).
 Squares are linear in the position; along a line of the lengths themselves the pose more often
-meets a singularity.
+meets a singularity. The search, its steps and their bounds: ``newton`` and ``find_pose`` in
+core/stewart_dynamics.c.
 """
 
 from __future__ import annotations
 
 from stewart_dynamics.arrays import Array, Integers, Records
-from stewart_dynamics.core.binding import CODES, function
+from stewart_dynamics.core.binding import CODES, CONSTANTS, function
 
 # The lengths of a pose that is found differ by at most this from those given [m].
-RESIDUAL = 1e-12
+RESIDUAL = CONSTANTS['RESIDUAL']
 
 # The outcome of a search.
 FOUND, NO_POSE, SINGULAR = (

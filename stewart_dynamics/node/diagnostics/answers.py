@@ -21,11 +21,10 @@ from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, Exceedance, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS, OF_LOADS, OF_RESULTS,
     SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX)
-from stewart_dynamics.mechanics.singularity_warning import Cause
+from stewart_dynamics.mechanics.singularity_warning import Cause, HYSTERESIS
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
-from stewart_dynamics.parameters.tolerances import HYSTERESIS
 from stewart_dynamics.setpoints.motor_row import DEMANDED_TORQUES, RISES, SPEEDS
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 from stewart_dynamics.setpoints.step import Output

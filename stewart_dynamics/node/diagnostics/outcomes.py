@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, MISTAKEN, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.planned.messages import PlannedOutcome
+from stewart_dynamics.planned.trajectory_messages import PlannedOutcome
 from stewart_dynamics.setpoints.consistency import Mistake
 
 _OVERLOAD = 'overload'  # a cause of a level

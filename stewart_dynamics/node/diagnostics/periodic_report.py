@@ -12,7 +12,7 @@ from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.node.diagnostics.answers import (
     Answers, LimitsDiagnostics, SingularityDiagnostics, TimingDiagnostics)
-from stewart_dynamics.node.diagnostics.inputs import (
+from stewart_dynamics.node.diagnostics.input_statuses import (
     BaseDiagnostics, INCOMPLETE, SetpointDiagnostics)
 from stewart_dynamics.node.diagnostics.levels import LogLine, PERIOD, REJECTED, Status, StatusPart
 from stewart_dynamics.node.diagnostics.outcomes import (

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Integers, SECOND
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.reference_motion.quintic import quintic
 from stewart_dynamics.reference_motion.response_motion import duration, response_motion
 

@@ -4,7 +4,7 @@
 """
 Design of a motion that minimizes identification intervals within the limits of the hexapod.
 
-The motion is a Fourier series of all six coordinates about home (``reference_motion.motion``).
+The motion is a Fourier series of all six coordinates about home (``motion_functions``).
 Its coefficients minimize the sum of the squared standard errors of the requested parameters, each
 divided by its scale (A-optimal; J. Swevers et al., "Optimal robot excitation and
 identification", IEEE Trans. Robotics and Automation 13, 1997, doi:10.1109/70.631234). Every set of
@@ -38,8 +38,8 @@ from stewart_dynamics.mechanics.rows import (
     CONDITION, MOTION, POSE, POSITION, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.reference_motion.motion import motion_at
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 
 # Margins, as fractions of the stroke (at each end), rates, forces, and of joint angles and

@@ -12,13 +12,13 @@ from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import ImuWriter, StampedWriter
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints import inputs
+from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.output_messages import (
     LEG_STATES, MOTOR_STATES, motor_states_writer)
 from stewart_dynamics.simulator.imu import SimulatedImu
 from stewart_dynamics.simulator.moving_base import BasePeriod
-from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import PlantState
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 # Under the node's name; those that it publishes in their order.
 INPUT_TYPES = {

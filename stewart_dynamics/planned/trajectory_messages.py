@@ -27,13 +27,13 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError
-from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
+from stewart_dynamics.messages.trajectory_layouts import LegTrajectory, PlatformTrajectory
 from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
 from stewart_dynamics.parameters.tolerances import START_TOLERANCE, unit_rule
 from stewart_dynamics.planned.approach import approach_in_pieces, MOST_POINTS
-from stewart_dynamics.planned.trajectory import (
+from stewart_dynamics.planned.planned_trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
-from stewart_dynamics.setpoints.inputs import unit_quaternions
+from stewart_dynamics.setpoints.input_messages import unit_quaternions
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
 

@@ -21,7 +21,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.calibration.calibrate import check_number
 from stewart_dynamics.calibration.equations import Equations, GEOMETRY, names_of, values_of
-from stewart_dynamics.calibration.fit import Unknowns
+from stewart_dynamics.calibration.geometry_fit import Unknowns
 from stewart_dynamics.calibration.measured_poses import POSITION, QUATERNION
 from stewart_dynamics.calibration.noise import covariances, Noise, whitening
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError

@@ -20,7 +20,7 @@ from stewart_dynamics.calibration.equations import (
 from stewart_dynamics.calibration.noise import (
     covariances, Noise, ROUNDING, VarianceComponents, whitening)
 from stewart_dynamics.mechanics.least_squares import (
-    BY_MEDIAN, Identifiability, identifiability, LARGEST_ERROR, normal)
+    Identifiability, identifiability, LARGEST_ERROR, normal)
 
 # Change of a joint that would matter, by the characteristic length; the same of a frame's angles.
 _SCALE = 0.01
@@ -29,9 +29,6 @@ _ROUNDS, _SETTLED = 20, 0.01
 # A fit ends with a step that changes the residuals by a smaller part of them (least squares,
 # robust), or of the largest coordinate: a rounding error. Most steps; damping of a second try.
 _DONE, _EXACT, _STEPS, _DAMPING = (1e-6, 1e-3), 1e-15, 100, 1e-3
-# Residuals above this multiple of the leg's deviation are outliers; robust fits are repeated while
-# the deviations fall below this part.
-_OUTLIER, _FALLS = 8.0, 0.8
 
 
 class Fit(NamedTuple):
@@ -156,48 +153,3 @@ def minimum(equations: Equations, start: Array, known: Array, whiten: Array,
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values ** 2)))
-
-
-class Outliers(NamedTuple):
-    """Poses with outliers, and a fit to the others with equal weights, leg by leg."""
-
-    residuals: Array  # (N, 6) [m], of all poses
-    deviations: Array  # (6,) robust standard deviations [m]
-    outlying: Flags  # (N, 6): which measured lengths are outliers
-    values: Array
-
-
-def outliers(equations: Equations, unknowns: Unknowns) -> Outliers:
-    """Return the outliers, by a robust fit and then by fits to the other poses."""
-    lin = equations.at(unknowns.start)
-    everything = np.ones(len(equations.lengths), dtype=bool)
-
-    def fitted(deviation: float, largest_error: float, sound: Flags, robust: bool = False,
-               ) -> Outliers:
-        whiten = np.eye(6) / deviation
-        what = unknowns.identifiability(lin, whiten, largest_error)
-        values = minimum(equations.part(sound), unknowns.start, what.known, whiten, robust)
-        r = equations.at(values).residuals
-        count = 6 * np.count_nonzero(sound)
-        wider = np.sqrt(count / max(count - what.rank, 1))
-        deviations = BY_MEDIAN * wider * np.median(np.abs(r[sound]), axis=0) + (
-            10.0 * ROUNDING * unknowns.size)
-        return Outliers(r, deviations, np.abs(r) > _OUTLIER * deviations, values)
-
-    # All directions are free at first, so that the deviations are those of noise.
-    found = fitted(unknowns.size, np.inf, everything)
-    first = found = fitted(float(np.median(found.deviations)), LARGEST_ERROR, everything)
-    for _ in range(_ROUNDS):  # outliers lose weight as the deviations approach those of the others
-        before, found = found, fitted(
-            float(np.median(found.deviations)), LARGEST_ERROR, everything, True)
-        if np.median(found.deviations) > _FALLS * np.median(before.deviations):
-            break
-    for _ in range(_ROUNDS):
-        sound: Flags = ~np.any(found.outlying, axis=1)
-        if 6 * np.count_nonzero(sound) <= unknowns.basis.shape[1]:
-            return first._replace(outlying=np.zeros_like(first.outlying))
-        before, found = found, fitted(float(np.median(found.deviations)), LARGEST_ERROR, sound)
-        if (found.outlying == before.outlying).all() and np.allclose(
-                found.deviations, before.deviations):
-            break
-    return found

@@ -16,9 +16,9 @@ from rclpy.time import Time
 from stewart_dynamics.arrays import NANOSECOND, SECOND
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.reference_motion.motion import motion_at, sample_count, sample_time
-from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
-from stewart_dynamics.ros.declared_parameters import declare_parameters
+from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_count, sample_time
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.ros.declared_parameters import declare_parameters, MADE_WITH
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
 
@@ -41,9 +41,7 @@ class TrajectoryNode(Node):
     """
 
     def __init__(self, done: Future) -> None:
-        super().__init__(
-            ReferenceMotionParameters.node, automatically_declare_parameters_from_overrides=True,
-            allow_undeclared_parameters=True)
+        super().__init__(ReferenceMotionParameters.node, **MADE_WITH)
         self._settings = declare_parameters(self, ReferenceMotionParameters)
         self._done = done
         self._loop = self._settings.loop

@@ -20,7 +20,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import gravity_mistakes
-from stewart_dynamics.mechanics.drives import likely_mistakes as drives
+from stewart_dynamics.mechanics.drives import drive_mistakes as drives
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import listed

@@ -20,10 +20,10 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.extraction import Extract, Extraction, ORDERS
-from stewart_dynamics.identification.fit import Fit, residual_of, shifted_by
-from stewart_dynamics.identification.kinematics import first_pose
 from stewart_dynamics.identification.lack_of_fit import LackOfFit, LEFT_BY_FILTERS
+from stewart_dynamics.identification.parameter_fit import Fit, residual_of, shifted_by
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.window_poses import first_pose
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.measured_efforts import (
     FAR, known_scales, mistake_of_scale)

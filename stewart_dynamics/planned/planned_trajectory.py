@@ -51,7 +51,7 @@ class PlannedTrajectory:
     duration: float
     """From the first point to the last [s]."""
     reason: str = ''
-    """Reason of the rejection, a constant of ``planned.trajectory`` or ``planned.checks``."""
+    """Reason of the rejection, a constant of ``planned_trajectory`` or ``planned.checks``."""
     time: float = math.nan
     """Time of the first violation [s]."""
     leg: int | None = None

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Six numbers for each sample of a result, as columns of a table and as curves of a figure."""
+"""The library's results as figures of matplotlib: curves of the six legs, one above the other."""
 
 from __future__ import annotations
 
@@ -17,43 +17,16 @@ from stewart_dynamics.mechanics.arguments import as_array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from pandas import DataFrame
 
-LEGS = tuple(f'leg_{leg}' for leg in range(1, 7))
 _HEIGHT = 2.6  # of one plot [in]
 
 
-def columns(quantities: Mapping[str, Array]) -> dict[str, Array]:
-    """Return quantities (..., 6) as columns (N,), whose names end in _1 to _6."""
-    return {f'{name}_{leg + 1}': values.reshape(-1, 6)[:, leg]
-            for name, values in quantities.items() for leg in range(6)}
-
-
-def data_frame(table: Mapping[str, Array]) -> DataFrame:
+def figure_of_legs(quantities: Mapping[str, Array], times: ArrayLike | None,
+                   joints: Sequence[str]) -> Figure:
     """
-    Return columns as a ``pandas.DataFrame``.
+    Return a figure of quantities (N, 6), by their titles, with units.
 
-    Raises ModuleNotFoundError: pandas is not installed.
-    """
-    try:
-        from pandas import DataFrame
-    except ModuleNotFoundError as exc:
-        raise ModuleNotFoundError('to_dataframe: pandas is not installed: '
-                                  'pip install "stewart_dynamics[pandas]"') from exc
-    return DataFrame(table)
-
-
-def figure(quantities: Mapping[str, Array], times: ArrayLike | None, joints: Sequence[str],
-           ) -> Figure:
-    """
-    Return a matplotlib figure of quantities (N, 6), one above the other.
-
-    quantities: by their titles, with units.
-    times (N,): [s]; None: the axis shows sample numbers.
-    joints: names of the legs.
-
-    Raises ModuleNotFoundError: matplotlib is not installed.
-    Raises MotionError: there is one sample alone, or times do not fit.
+    Arguments and errors are those of ``InverseDynamics.plot``.
     """
     try:
         from matplotlib.figure import Figure

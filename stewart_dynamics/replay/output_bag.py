@@ -44,7 +44,7 @@ from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.standard import string, transforms
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.summary import Answered
-from stewart_dynamics.setpoints.inputs import INPUT_TYPES
+from stewart_dynamics.setpoints.input_messages import INPUT_TYPES
 from stewart_dynamics.setpoints.output_messages import OutputMessages, WARNING, Written
 from stewart_dynamics.setpoints.step import Outputs
 import yaml  # type: ignore[import-untyped]

@@ -18,7 +18,7 @@ from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPl
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of, homes
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import inertia_matrix, PARAMETERS
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -19,8 +19,8 @@ from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, BASE_AXIS, PITCH, PLATFORM_AXIS, TWIST)
-from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 from test_drives import driven
 
 # Coefficients of the first derivative by central differences of 8th order, of steps -4 to 4.

@@ -29,7 +29,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.equations import Equations, GEOMETRY
-from stewart_dynamics.calibration.fit import Fit, Unknowns
+from stewart_dynamics.calibration.geometry_fit import Fit, Unknowns
 from stewart_dynamics.calibration.noise import covariances, whitening
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import to_euler

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from functools import partial
-import gc
 import math
 import time
 from typing import Any, ClassVar
@@ -22,22 +21,24 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import SECOND, Six
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
-from stewart_dynamics.ros.declared_parameters import declare_parameters
+from stewart_dynamics.ros.declared_parameters import declare_parameters, MADE_WITH
+from stewart_dynamics.ros.due_periods import DuePeriods
+from stewart_dynamics.ros.managed_node import keep_present_objects
 from stewart_dynamics.ros.repeated_log import RepeatedLog, WARNING
 from stewart_dynamics.ros.run import run
-from stewart_dynamics.ros.signals import SIGNALS
-from stewart_dynamics.setpoints.inputs import WrenchInput
+from stewart_dynamics.ros.signal_flag import SIGNALS
+from stewart_dynamics.setpoints.input_messages import WrenchInput
 from stewart_dynamics.setpoints.output_messages import MOTOR_STATES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
-from stewart_dynamics.simulator.messages import (
-    BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)
 from stewart_dynamics.simulator.moving_base import BaseOfTopics, BasePeriod, GeneratedBase
-from stewart_dynamics.simulator.parameters import SimulatorParameters, TORQUE
 from stewart_dynamics.simulator.plant import Plant, PlantState
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters, TORQUE
+from stewart_dynamics.simulator.state_messages import (
+    BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)
 
 _TYPES: dict[str, Any] = {
     type_names.POSE_STAMPED: PoseStamped,
@@ -53,7 +54,6 @@ _QUEUE = 1000
 # Simulated time begins here [ns]: zero is no stamp.
 _BEGIN = SECOND
 _ANNOUNCE_SECONDS = 0.1
-_BACKLOG = 100_000_000  # [ns]
 _WATCH_SECONDS = 1.0
 
 NOT_SIX = 'not six numbers'
@@ -76,9 +76,7 @@ class SimulatorNode(Node):
     plant: ClassVar[Callable[[SimulatorParameters], Any]] = Plant
 
     def __init__(self) -> None:
-        super().__init__(
-            SimulatorParameters.node, automatically_declare_parameters_from_overrides=True,
-            allow_undeclared_parameters=True)
+        super().__init__(SimulatorParameters.node, **MADE_WITH)
         self._settings = declare_parameters(self, SimulatorParameters)
         self._stepped = bool(self.get_parameter('use_sim_time').value)
         self._log = RepeatedLog(self.get_logger())
@@ -97,14 +95,14 @@ class SimulatorNode(Node):
         self._base_now: BasePeriod | None = None
         self._commands: Six | None = None
         self._torques = self._settings.commands == TORQUE
-        self._stamp = _BEGIN
         self._index = 0
         self._braked = False
         self._commanded = 0  # the index at the last command
         self._begun = 0  # the index at the first one
         timeout = self._settings.command_timeout
         self._patience = math.inf if timeout is None else timeout * self._settings.rate
-        self._rate = self._settings.rate
+        rate: float = self._settings.rate
+        self._periods = DuePeriods(rate, partial(self._say, 'late'), _BEGIN)
         qos = QoSProfile(depth=_QUEUE)
         self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
                          for topic, kind in self._output_types().items()}
@@ -119,19 +117,16 @@ class SimulatorNode(Node):
         self.get_logger().info(
             f'dynamics ready after {time.monotonic() - begun:.1f} s; ' + (
                 'one period for each command' if self._stepped else 'in real time')
-            + f', {self._rate:g} periods per second of {self._plant.steps} steps each')
+            + f', {rate:g} periods per second of {self._plant.steps} steps each')
         if self._stepped:
             self._clock_output = self.create_publisher(Clock, '/clock', qos)
             self._move_base()
             self._messages = self._messages_now()
             self._announcing = self._timer(_ANNOUNCE_SECONDS, self._announce)
         else:
-            self._start: int | None = None
-            self._timer(1.0 / self._rate, self._on_time)
+            self._timer(1.0 / rate, self._on_time)
         self._timer(_WATCH_SECONDS, self._on_watch)
-        # The objects that exist now stay: see DynamicsNode.
-        gc.collect()
-        gc.freeze()
+        keep_present_objects()
 
     def _output_types(self) -> dict[str, str]:
         types = OUTPUT_TYPES | (
@@ -171,25 +166,14 @@ class SimulatorNode(Node):
             self._advance()
 
     def _on_base(self, base: BaseOfTopics, topic: str, data: bytes) -> None:
-        base.input.take(topic, data, lambda: self._stamp + self._time_of(self._index))
+        base.input.take(topic, data, lambda: self._periods.stamp_of(self._index))
 
     def _on_time(self) -> None:
         """Take the periods that are due."""
-        now = time.monotonic_ns()
-        if self._start is None:
-            self._start, self._stamp = now, self.get_clock().now().nanoseconds
-        late = now - self._start - self._time_of(self._index + 1)
-        if late > _BACKLOG:
-            # Stamps go on with the clock, the motion where it was.
-            self._start += late
-            self._stamp += late
-            self._say('late', f'fell behind by {late / SECOND:.3f} s: that time is skipped')
-        while self._time_of(self._index + 1) <= now - self._start:
+        if not self._periods.begun:
+            self._periods.begin(self.get_clock().now().nanoseconds)
+        for _ in self._periods.due(self._index + 1):
             self._advance()
-
-    def _time_of(self, index: int) -> int:
-        """Return the time of a period's end since the start [ns]; rounding does not add up."""
-        return round(index * SECOND / self._rate)
 
     def _advance(self) -> None:
         """Take one period, with the brakes on until there is a command, and when they stop."""
@@ -221,10 +205,10 @@ class SimulatorNode(Node):
         """Move the base, if it moves, on to the end of the present period."""
         if self._base is not None:
             moved = 0 if self._commands is None else self._index - self._begun
-            self._base_now = self._base.period(moved, self._stamp + self._time_of(self._index))
+            self._base_now = self._base.period(moved, self._periods.stamp_of(self._index))
 
     def _messages_now(self) -> list[tuple[str, bytes]]:
-        stamp = self._stamp + self._time_of(self._index)
+        stamp = self._periods.stamp_of(self._index)
         # The base first: who answers a state with a command has its motion, too.
         return [*(() if self._base_now is None else self._base_messages.write(
             stamp, self._index, self._base_now)),
@@ -244,7 +228,7 @@ class SimulatorNode(Node):
             self._publish_clock()
 
     def _publish_clock(self) -> None:
-        self._clock_output.publish(clock(self._stamp + self._time_of(self._index)))
+        self._clock_output.publish(clock(self._periods.stamp_of(self._index)))
 
     # -- logging --------------------------------------------------------------------------
 

@@ -7,27 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-import gc
 import math
 import time
 from typing import Any, NamedTuple
 
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
-from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.external_wrench import payload
 from stewart_dynamics.external_wrench.estimate import (
     EXTERNAL_WRENCH, ExternalWrench, Target)
 from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs)
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, WARN
+from stewart_dynamics.node.diagnostics.levels import LogLine, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics, TICK
 from stewart_dynamics.node.markers import Markers
 from stewart_dynamics.node.publishers_at_rate import (
@@ -36,16 +31,13 @@ from stewart_dynamics.node.tasks import (
     APPLY_PAYLOAD, inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)
 from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD, TRAVEL
 from stewart_dynamics.parameters.table import AS_MEASURED, Parameters, payload_values
-from stewart_dynamics.parameters.yaml_file import is_of_ros
-from stewart_dynamics.planned import messages as planned
-from stewart_dynamics.ros.declared_parameters import changed, declare_parameters, log_changes
-from stewart_dynamics.ros.rclpy_workarounds import (
-    answer_impossible_transitions, OneShotTimer)
-from stewart_dynamics.ros.repeated_log import RepeatedLog
+from stewart_dynamics.planned import trajectory_messages as planned
+from stewart_dynamics.ros.managed_node import ManagedNode
+from stewart_dynamics.ros.rclpy_workarounds import OneShotTimer
 from stewart_dynamics.ros.run import run
-from stewart_dynamics.ros.signals import SIGNALS
-from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH, BaseWrench
-from stewart_dynamics.setpoints.inputs import WRENCH
+from stewart_dynamics.ros.signal_flag import SIGNALS
+from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH, BaseWrench
+from stewart_dynamics.setpoints.input_messages import WRENCH
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import (
@@ -74,7 +66,7 @@ class _Models(NamedTuple):
         return cls(Step(parameters), ExternalWrench(parameters), BaseWrench(parameters))
 
 
-class DynamicsNode(LifecycleNode):
+class DynamicsNode(ManagedNode[Parameters]):
     """
     Answers each joined setpoint with leg lengths, rates and forces.
 
@@ -82,14 +74,7 @@ class DynamicsNode(LifecycleNode):
     """
 
     def __init__(self) -> None:
-        # Undeclared parameters are allowed so that our own check rejects them, with a better
-        # text.
-        super().__init__(Parameters.node, automatically_declare_parameters_from_overrides=True,
-                         allow_undeclared_parameters=True)
-        self._settings = declare_parameters(self, Parameters)
-        self._log = RepeatedLog(self.get_logger())
-        self._active = False
-        self._configured = False
+        super().__init__(Parameters)
         self._topics = NodeTopics(self)
         self._base_wrench_read = False  # it has a subscriber
         self._planned: TaskQueue[planned.PlannedOutcome] = TaskQueue(
@@ -97,36 +82,13 @@ class DynamicsNode(LifecycleNode):
         self._payload = PayloadService(self, self._identify_payload, self._on_payload)
         self._identified: payload.Payload | None = None  # the last one
         self.create_service(Trigger, f'~/{APPLY_PAYLOAD}', self._on_apply_payload)
-        self.add_on_set_parameters_callback(self._on_set_parameters)
         # A steady clock: ROS time may stand still or jump.
         self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        answer_impossible_transitions(
-            self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
-        self._starting = self._settings.autostart
-        if self._starting:
-            if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
-                raise StewartError(f'cannot be configured: {self._fault}')
-            self._starting = False
-            self.trigger_activate()
-        else:
-            self.get_logger().info('unconfigured: autostart is false')
+        self.start()
 
     # -- lifecycle --------------------------------------------------------------------------
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make the models and open the topics."""
-        try:
-            self._configure()
-        except Exception as exc:
-            # rclpy turns an exception in a transition into ERROR and logs nothing.
-            self._fault = ' '.join(f'{type(exc).__name__}: {exc}'.split())
-            if not self._starting:  # else the program ends with this text
-                self.get_logger().error(f'cannot be configured: {self._fault}')
-            self._close()
-            return TransitionCallbackReturn.FAILURE
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def begin_work(self) -> None:
         """Begin to answer; earlier messages are not used."""
         parameters, models = self._settings, self._models
         self._identified = None
@@ -151,36 +113,9 @@ class DynamicsNode(LifecycleNode):
         self._travel = TravelPublisher(parameters, publishers[TRAVEL])
         self._model_measured = parameters.joint_states.source == AS_MEASURED
         self._handled, self._rested = -math.inf, False
-        self._active = True
-        return TransitionCallbackReturn.SUCCESS
 
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop answering."""
-        self._active = False
-        self._drop_work()
-        self._log.write_last()
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Close the topics."""
-        self._close()
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop answering and close the topics."""
-        self._active = False
-        self._drop_work()
-        self._close()
-        return TransitionCallbackReturn.SUCCESS
-
-    def destroy_node(self) -> None:
-        """Log the last line of each series, and end."""
-        self._log.write_last()
-        super().destroy_node()
-
-    def _configure(self) -> None:
-        for mistake in likely_mistakes(self._settings):
-            self.get_logger().warning(mistake)
+    def open_topics(self) -> None:
+        """Make the models and open the topics."""
         begun = time.monotonic()
         self._models = SIGNALS.interruptible(partial(_Models.of, self._settings))
         self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
@@ -191,15 +126,8 @@ class DynamicsNode(LifecycleNode):
             planned.INPUT: self._on_trajectory})
         self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
         self._exclusive = self._settings.setpoint.exclusive
-        self._configured = True
-        # These objects stay: the collector would go through all of them again and again, for
-        # 50 ms and more, while a setpoint waits.
-        gc.unfreeze()  # the objects of an earlier configuration
-        gc.collect()
-        gc.freeze()
 
-    def _close(self) -> None:
-        self._configured = False
+    def close_topics(self) -> None:
         self._topics.destroy()
 
     # -- setpoints: from the topic to the published answer ----------------------------------
@@ -402,7 +330,8 @@ class DynamicsNode(LifecycleNode):
         self._diagnostics.planned_trajectory.done(outcome, time.monotonic() - came)
         self._report()
 
-    def _drop_work(self) -> None:
+    def end_work(self) -> None:
+        """Drop the work in progress."""
         self._payload.drop('the node is deactivated')
         if number := self._planned.drop():
             self.get_logger().warning(
@@ -439,23 +368,14 @@ class DynamicsNode(LifecycleNode):
 
     # -- parameters -------------------------------------------------------------------------
 
-    def _on_set_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
-        """Change all of these parameters between two setpoints, or reject all."""
-        ours = {change.name: change.value for change in changes if not is_of_ros(change.name)}
-        try:
-            parameters = changed(self._settings, ours, self._configured)
-            models = _Models.of(parameters)
-        except ParameterError as exc:
-            return SetParametersResult(
-                successful=False, reason=str(exc).removeprefix('parameters: '))
-        self._log.write(log_changes(self._settings, parameters))
-        self._settings, self._models = parameters, models
+    def use_parameters(self, parameters: Parameters) -> None:
+        """Use changed parameters from the next setpoint on."""
+        self._models = models = _Models.of(parameters)
         if self._active:
             self._measured_legs.use(parameters, models.external_wrench)
             self._diagnostics.answers.parameters = parameters
             self._markers.write = Markers(parameters).write  # a payload moves the centre of mass
             self._travel.use(parameters)
-        return SetParametersResult(successful=True)
 
 
 def main() -> int:

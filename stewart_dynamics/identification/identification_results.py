@@ -24,11 +24,11 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.estimation.confidence_level import PERCENT, TWO_SIDED
 from stewart_dynamics.estimation.posterior import IDENTIFIABLE
 from stewart_dynamics.identification.extraction import Extracts
-from stewart_dynamics.identification.fit import residual_of, shifted_by
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import (
     Identification, Identified, Residuals)
 from stewart_dynamics.identification.lack_of_fit import PIECE, WHOLE
+from stewart_dynamics.identification.parameter_fit import residual_of, shifted_by
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import Identifiability, identifiability
 from stewart_dynamics.parameters.table import Parameters

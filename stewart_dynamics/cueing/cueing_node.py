@@ -5,30 +5,25 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType, JumpHandle, JumpThreshold, ROSClock
 from rclpy.duration import Duration
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from sensor_msgs.msg import Imu, JointState
 
 from stewart_dynamics.arrays import Array, SECOND
+from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.cueing.motion_cueing import CueingStream, MotionCueing
-from stewart_dynamics.cueing.parameters import CueingParameters
 from stewart_dynamics.cueing.vehicle import Vehicle
-from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import quaternion_of
-from stewart_dynamics.mechanics.likely_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.limits import short_name
 from stewart_dynamics.mechanics.rows import MOTION, ROTATION, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -37,14 +32,11 @@ from stewart_dynamics.messages.joint_state import JointStateError, JointStateRea
 from stewart_dynamics.messages.setpoint import ImuWriter
 from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, OK, Status, WARN
 from stewart_dynamics.node.publishers_at_rate import diagnostic_array
-from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned.approach import approach
-from stewart_dynamics.ros.declared_parameters import changed, declare_parameters, log_changes
-from stewart_dynamics.ros.rclpy_workarounds import answer_impossible_transitions
-from stewart_dynamics.ros.repeated_log import RepeatedLog
+from stewart_dynamics.ros.managed_node import ManagedNode
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
-from stewart_dynamics.setpoints.inputs import VEHICLE
+from stewart_dynamics.setpoints.input_messages import VEHICLE
 from stewart_dynamics.setpoints.rejections import MALFORMED, Rejection, Rejections
 
 FELT, DIAGNOSTICS, MEASURED_LEGS = 'felt', '/diagnostics', 'measured_legs'
@@ -59,7 +51,7 @@ _LONGEST_STOP = 5.0  # [s]
 _AWAY = 1e-3  # legs this near to their lengths at home need no approach [m]
 
 
-class CueingNode(LifecycleNode):
+class CueingNode(ManagedNode[CueingParameters]):
     """
     Moves the platform as the motion of the vehicle demands, within its limits.
 
@@ -70,44 +62,16 @@ class CueingNode(LifecycleNode):
     """
 
     def __init__(self) -> None:
-        super().__init__(
-            CueingParameters.node, automatically_declare_parameters_from_overrides=True,
-            allow_undeclared_parameters=True)
-        self._settings = declare_parameters(self, CueingParameters)
-        self._log = RepeatedLog(self.get_logger())
+        super().__init__(CueingParameters)
         self._rejections = Rejections(self._on_rejection)
-        self._active = self._configured = False
         self._ours: list[Any] = []  # publishers, subscriptions and timers while configured
         self._last: Array | None = None  # the last setpoint
-        self.add_on_set_parameters_callback(self._on_set_parameters)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        answer_impossible_transitions(
-            self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
-        self._starting = self._settings.autostart
-        if self._starting:
-            if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
-                raise StewartError(f'cannot be configured: {self._fault}')
-            self._starting = False
-            self.trigger_activate()
-        else:
-            self.get_logger().info('unconfigured: autostart is false')
+        self.start()
 
     # -- lifecycle --------------------------------------------------------------------------
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make the filters and open the topics."""
-        try:
-            self._configure()
-        except Exception as exc:
-            # rclpy turns an exception in a transition into ERROR and logs nothing.
-            self._fault = ' '.join(f'{type(exc).__name__}: {exc}'.split())
-            if not self._starting:  # else the program ends with this text
-                self.get_logger().error(f'cannot be configured: {self._fault}')
-            self._close()
-            return TransitionCallbackReturn.FAILURE
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def begin_work(self) -> None:
         """Begin with the approach to the home pose."""
         self._vehicle = Vehicle(self._settings, self._rejections, self._on_notice)
         self._stream: CueingStream | None = None
@@ -119,38 +83,12 @@ class CueingNode(LifecycleNode):
         self._begin: int | None = None  # by the clock [ns]
         self._reported = 0  # index of the next setpoint at the last report
         self._activated = time.monotonic()
-        self._active = True
         if self._last is not None:
             self._start_from(Motion.of_rows(self._last))
-        return TransitionCallbackReturn.SUCCESS
 
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Bring the platform to rest, and publish no more setpoints."""
-        self._end_motion()
-        self._log.write_last()
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Close the topics."""
-        self._close()
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Bring the platform to rest and close the topics."""
-        self._end_motion()
-        self._close()
-        return TransitionCallbackReturn.SUCCESS
-
-    def destroy_node(self) -> None:
-        """Bring the platform to rest, and end."""
-        self._end_motion()
-        self._log.write_last()
-        super().destroy_node()
-
-    def _configure(self) -> None:
+    def open_topics(self) -> None:
+        """Make the filters and open the topics."""
         p = self._settings
-        for mistake in likely_mistakes(p):
-            self.get_logger().warning(mistake)
         self._cueing = MotionCueing(p)
         self._setpoints = SetpointPublisher(self, p.target, p.output, p.base_frame)
         qos = QoSProfile(depth=1000)
@@ -172,17 +110,11 @@ class CueingNode(LifecycleNode):
                 post_callback=lambda jump: self._on_time())),
             *((self.destroy_publisher, each) for each in (
                 self._felt, self._diagnostics, *self._setpoints.publishers))]
-        self._configured = True
         self.get_logger().info(
             f'motion cueing at {p.cueing.rate:g} Hz to {p.target}, '
             + ('within the limits of the hexapod' if p.cueing.govern else 'not governed'))
-        # The objects that exist now stay: see DynamicsNode.
-        gc.unfreeze()
-        gc.collect()
-        gc.freeze()
 
-    def _close(self) -> None:
-        self._configured = False
+    def close_topics(self) -> None:
         for destroy, each in self._ours:
             destroy(each)
         self._ours = []
@@ -296,10 +228,9 @@ class CueingNode(LifecycleNode):
         timeout = self._settings.vehicle_timeout
         return timeout
 
-    def _end_motion(self) -> None:
+    def end_work(self) -> None:
         """Bring the platform to rest within its limits, an approach to its end."""
-        active, self._active = self._active, False
-        if not active or self._begin is None or self._stream is None:
+        if self._begin is None or self._stream is None:
             return
         self._stream.stop()
         # In real time, also with use_sim_time: /clock is not heard meanwhile.
@@ -375,22 +306,14 @@ class CueingNode(LifecycleNode):
 
     # -- parameters -------------------------------------------------------------------------
 
-    def _on_set_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
-        """Change all of these parameters, blended into the motion, or reject all."""
-        ours = {change.name: change.value for change in changes if not is_of_ros(change.name)}
-        try:
-            parameters = changed(self._settings, ours, self._configured)
-            cueing = MotionCueing(parameters)
-            if self._active and self._stream is not None:
-                self._stream.use(cueing)
-        except ParameterError as exc:
-            return SetParametersResult(
-                successful=False, reason=str(exc).removeprefix('parameters: '))
-        self._log.write(log_changes(self._settings, parameters))
-        self._settings, self._cueing = parameters, cueing
+    def use_parameters(self, parameters: CueingParameters) -> None:
+        """Use changed parameters, blended into the motion."""
+        cueing = MotionCueing(parameters)
         if self._active:
+            if self._stream is not None:
+                self._stream.use(cueing)
             self._vehicle.kind = parameters.cueing.input
-        return SetParametersResult(successful=True)
+        self._cueing = cueing
 
 
 def main() -> int:

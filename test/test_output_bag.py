@@ -27,7 +27,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.replay.output import OutputBag, RecordedModel
+from stewart_dynamics.replay.output_bag import OutputBag, RecordedModel
 from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
