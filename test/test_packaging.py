@@ -229,7 +229,7 @@ def test_wheel_has_entry_points_and_no_scripts(
     names = {name for name in zipfile.ZipFile(wheel).namelist() if '.data/data/share' not in name}
     assert not [name for name in names if '/scripts/' in name or '/lib/' in name]
     files = {path.relative_to(ROOT).as_posix() for path in (ROOT / NAME).rglob('*')
-             if path.is_file() and path.suffix != '.pyc'}
+             if path.is_file() and '__pycache__' not in path.parts}
     assert {name for name in names if name.startswith(f'{NAME}/')} == files | {
         f'{NAME}/core/library.so'}
     assert not [name for name in names if name.startswith('test/')]
