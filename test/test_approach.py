@@ -71,6 +71,20 @@ def test_an_approach_slows_down_until_forces_are_within_their_limit() -> None:
     assert approach(limited, HOME, end).times[-1] > 1.4 * approach(PLATFORM, HOME, end).times[-1]
 
 
+@pytest.mark.parametrize(('limit', 'value'), [
+    ('drive.speed_max', 100.0), ('drive.torque_max', 1.0),
+    ('drive.torque_speed', [0.0, 5.0, 100.0, 5.0])])
+def test_an_approach_slows_down_until_motors_are_within_their_limits(
+        limit: str, value: Any) -> None:
+    fast = PARAMETERS.replaced({'limits.velocity_max': 2.0, 'limits.force_max': None,
+                                'actuator.screw_lead': 0.01})
+    end = Pose.from_euler([0.0, 0.0, 1.3], [0.0, 0.0, 0.0])
+    platform = StewartPlatform(fast.replaced({limit: value}))
+    times, motion = approach(platform, HOME, end)
+    assert check_planned_trajectory(platform, times, motion).accepted
+    assert times[-1] > 1.4 * approach(StewartPlatform(fast), HOME, end).times[-1]
+
+
 @pytest.mark.parametrize('end', [
     Pose([0.0, 0.0, 2.5], np.eye(3)),
     Pose.from_euler([0.0, 0.0, 1.1], [0.0, 0.0, np.pi / 2.0])])

@@ -22,7 +22,7 @@ from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import optional_array, wrong_type
 from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
-from stewart_dynamics.mechanics.limits import OF_LOADS, OF_RATES
+from stewart_dynamics.mechanics.limits import OF_LOADS, OF_MOTORS, OF_RATES
 from stewart_dynamics.mechanics.rows import MOTION, POSE, RATES, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.interpolation import Interpolation
@@ -35,7 +35,7 @@ MOST_POINTS = 100_000
 # per second.
 _SPEED = 0.5
 _SPEED_WITHOUT_LIMIT = 0.1
-# Factor that lengthens a duration which exceeds limits of rate or force; maximum number of trials.
+# Factor that lengthens a duration which exceeds limits of rate, force or motors; most trials.
 _SLOWER, _MOST_TRIALS = 1.5, 12
 
 
@@ -80,8 +80,8 @@ def approach(platform: StewartPlatform, start: Pose | Motion, end: Pose | Motion
     """
     Return a motion within all limits from rest in a pose to the first point of a motion.
 
-    It takes half of ``limits.velocity_max``, and longer where forces would exceed their limit. Its
-    points are 1 / rate apart, as a stream of setpoints needs them.
+    It takes half of ``limits.velocity_max``, and longer where forces or motors would exceed
+    their limits. Its points are 1 / rate apart, as a stream of setpoints needs them.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def approach_in_pieces(platform: StewartPlatform, start: Array, end: Array, wren
             yield found
             return
         message = f'approach over {duration:.3g} s: {result.message}'
-        if result.limit not in (*OF_RATES, *OF_LOADS):
+        if result.limit not in (*OF_RATES, *OF_LOADS, *OF_MOTORS):
             break
         duration *= _SLOWER
     raise MotionError(message)
