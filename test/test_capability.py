@@ -18,6 +18,7 @@ from stewart_dynamics import (
     BaseMotion, Capability, Motion, MotionError, ParameterError, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet.pose_ratings import Payloads
+from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 PLATFORM = StewartPlatform.from_yaml(CONFIG / 'platform.yaml')
@@ -205,6 +206,39 @@ def test_loads_at_the_limit_bring_a_joint_to_its_largest_force(seed: int) -> Non
     assert capability.force(pose) <= every
     assert Payloads(capability, pose[None]).level() == pytest.approx(
         capability.payload(pose, np.zeros(3)).value, rel=1e-9)
+
+
+@pytest.mark.parametrize('seed', range(10))
+def test_a_payload_beside_a_load_on_a_moving_base_brings_a_leg_to_its_limit(seed: int) -> None:
+    random = rng(seed)
+    platform, _ = limited(random)
+    p = platform.parameters
+    motion = random_motion(p, random, 5)
+    wrench = 0.1 * random.normal(size=6)
+    base = BaseMotion(p.gravity, *random.normal(size=(3, 3)))
+    still = platform.inverse_dynamics(motion, wrench, base, singular='nan')
+    p = p.replaced({'limits.force_max': 10.0 + 1.5 * np.abs(still.forces).max()})
+    center = 0.3 * random.normal(size=3)
+    found = Capability(StewartPlatform(p)).payload(motion, center, wrench=wrench, base=base)
+    heavier = StewartPlatform(with_point_mass(p, found.value, center))
+    ratios = np.abs(heavier.inverse_dynamics(motion, wrench, base).forces) / p.limits.force_max
+    assert ratios.max() == pytest.approx(1.0, abs=1e-9)
+    assert ratios[found.sample].argmax() == found.leg
+
+
+def test_the_joints_of_a_stuck_leg_limit_though_its_actuator_does_not() -> None:
+    parameters = PLATFORM.parameters.replaced({
+        'limits.force_max': 700.0, 'limits.joint_force_max': 1500.0})
+    platform, home = StewartPlatform(parameters), PLATFORM.home_pose()
+    found = Capability(platform).stuck_leg(home, 0)
+    assert found.load is not None
+    largest = np.zeros(6)
+    for wrench, values in zip(found.wrenches, found.load.value, strict=True):
+        for value, sign in zip(values, (1.0, -1.0), strict=True):
+            largest = np.maximum(largest, np.abs(platform.inverse_dynamics(
+                Motion.from_pose(home), -sign * value * wrench).joint_forces))
+    assert 700.0 < largest[0] <= 1500.0 * (1.0 + 1e-9)
+    assert (largest[1:] <= 700.0 * (1.0 + 1e-9)).all()
 
 
 @pytest.mark.parametrize('seed', range(10))

@@ -171,6 +171,9 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         'limits.length_max: [0.165] m: no level pose has all legs within']),
     'forces in kN': ({'limits.force_max': 0.2}, [
         'limits.force_max: [0.2] N: six such legs cannot carry the platform, 1.47e+03 N: in kN?']),
+    'forces of joints in kN': ({'limits.joint_force_max': 6.0}, [
+        'limits.joint_force_max: [6] N: six such legs cannot carry the platform, 1.47e+03 N: '
+        'in kN?']),
     'the zero length in mm': ({'geometry.zero_length': 950.0}, [
         'geometry.zero_length: 950 m, but the joints are 0.9 m from their center: in mm?']),
     'the characteristic length in mm': ({'singularity.characteristic_length': 600.0}, [

@@ -651,6 +651,10 @@ def test_attributes_are_those_of_a_copy_and_cannot_be_set(p: Parameters) -> None
                         (p.legs.cylinder, 'mass')):
         with pytest.raises(AttributeError, match=f'{name}: parameters are immutable'):
             setattr(group, name, None)
+        with pytest.raises(AttributeError, match=f'{name}: parameters are immutable'):
+            delattr(group, name)
+    with pytest.raises(AttributeError, match='do you mean limits.force_max'):
+        setattr(p.limits, 'force_mx', 3.0)
     assert 'velocity_max=None' in repr(p.limits)
     assert 'cylinder.mass=array' in repr(p.legs)
 

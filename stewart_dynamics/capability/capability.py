@@ -407,7 +407,8 @@ class Capability:
         Return the motions that remain while a leg keeps its length, and the loads they can hold.
 
         A brake is on, or a screw has jammed: the leg holds any force, which no motor makes, so
-        that its limits of force and torque do not count.
+        that the limits of its actuator's force and torque do not count. That of the force in its
+        joints does.
 
         Parameters
         ----------
@@ -533,7 +534,8 @@ class Capability:
             directions=directions), sizes)
 
     def payload(self, motion: Pose | Motion, center_of_mass: ArrayLike,
-                times: ArrayLike | None = None, *, continuous: bool = False) -> Extent:
+                times: ArrayLike | None = None, *, continuous: bool = False,
+                wrench: ArrayLike | None = None, base: BaseMotion | None = None) -> Extent:
         """
         Return the largest point mass that can be added to the platform [kg].
 
@@ -547,29 +549,40 @@ class Capability:
             Times of a motion (N,), as in ``speed_factor``.
         continuous : bool
             Held without end, as in ``wrench``: for poses at rest.
+        wrench, base
+            As in ``speed_factor``: the load beside the mass, and the motion of the base.
 
         """
         if continuous and (times is not None or isinstance(motion, Motion)):
             raise MotionError('continuous: must be False for a motion: drive.torque_continuous '
                               'limits what is held at rest')
         if times is not None:
-            return timed(times, motion, lambda each, _: self.payload(each, center_of_mass),
-                         lambda mass: (StewartPlatform(with_point_mass(
-                             self.platform.parameters, mass, center_of_mass)), motion.rows, 1.0))
+            return timed(
+                times, motion, lambda each, _: self.payload(
+                    each, center_of_mass, wrench=wrench, base=base),
+                lambda mass: (StewartPlatform(with_point_mass(
+                    self.platform.parameters, mass, center_of_mass)), motion.rows, 1.0),
+                wrench, base)
         moving = motion if isinstance(motion, Motion) else Motion.from_pose(motion)
         return self._added_mass(
-            moving, self.platform.inverse_dynamics(moving).rows, center_of_mass,
-            whole=isinstance(motion, Motion), continuous=continuous)
+            moving, self.platform.inverse_dynamics(moving, wrench, base).rows, center_of_mass,
+            base, whole=isinstance(motion, Motion), continuous=continuous)
 
     def _added_mass(self, moving: Motion, results: Array, center_of_mass: ArrayLike,
-                    **how: Any) -> Extent:
+                    base: BaseMotion | None = None, **how: Any) -> Extent:
         """Return the largest point mass [kg] beside results; ``how`` as in ``_multiple``."""
         center = as_array('center_of_mass', center_of_mass, (3,))
+        of_base = BaseMotion(self.platform.parameters.gravity) if base is None else base
         with np.errstate(over='ignore', invalid='ignore'):
             arm = moving.rotation @ center
             turning = np.cross(moving.angular_velocity, arm)
-            force = self.platform.parameters.gravity - moving.linear_acceleration - np.cross(
-                moving.angular_acceleration, arm) - np.cross(moving.angular_velocity, turning)
+            carried = np.cross(of_base.angular_velocity, np.cross(
+                of_base.angular_velocity, moving.position + arm)
+                + 2.0 * (moving.linear_velocity + turning)) + np.cross(
+                    of_base.angular_acceleration, moving.position + arm)
+            force = of_base.gravity - of_base.linear_acceleration - carried - (
+                moving.linear_acceleration + np.cross(moving.angular_acceleration, arm)
+                + np.cross(moving.angular_velocity, turning))
             load = check_finite(
                 'center_of_mass', np.concatenate([force, np.cross(arm, force)], axis=-1), 0)
         return self._multiple(moving, results, self._change(moving, wrench=load), **how)
@@ -777,24 +790,27 @@ class Capability:
         results, change (..., RESULT): of the motion, and of a load or acceleration alone.
         ``directions`` (..., 6): the change is that of this acceleration.
         continuous: the load is held without end.
-        stuck: index of a leg whose limits do not count.
+        stuck: index of a leg whose actuator does not limit; its joints do.
         """
         forces, added = results[..., FORCES], change[..., FORCES]
-        found: list[tuple[Array, Any]] = []
+        of_actuators: list[tuple[Array, Any]] = []
+        of_joints: list[tuple[Array, Any]] = []
         if continuous:
-            found.append((largest_multiple(forces, added, self._continuous_forces),
-                          limits.short_name(limits.TORQUE_CONTINUOUS)))
+            of_actuators.append((largest_multiple(forces, added, self._continuous_forces),
+                                 limits.short_name(limits.TORQUE_CONTINUOUS)))
         for name in self._limits.of_loads:
             here, more = _of_limit(name, (results, change))
-            found.append((largest_multiple(here, more, self._limits.bounds[name]),
-                          limits.short_name(name)))
+            (of_actuators if name == limits.FORCE_MAX else of_joints).append((
+                largest_multiple(here, more, self._limits.bounds[name]),
+                limits.short_name(name)))
         if self._motors is not None and self._motors.limited:
-            found.append(self._torques(self._motors, motion, forces, added, directions))
-        if not found:
-            raise self._unlimited((limits.FORCE_MAX,))
-        multiples, names = _tightest(found)
+            of_actuators.append(self._torques(self._motors, motion, forces, added, directions))
         if stuck is not None:
-            multiples[..., stuck] = math.inf
+            for each, _ in of_actuators:
+                each[..., stuck] = math.inf
+        if not (of_actuators or of_joints):
+            raise self._unlimited((limits.FORCE_MAX,))
+        multiples, names = _tightest([*of_actuators, *of_joints])
         return (_of_all if whole else _smallest)(multiples, names)
 
     def _torques(self, bounds: MotorBounds, motion: Motion, forces: Array, change: Array,

@@ -128,5 +128,6 @@ static void check_motors(
     exceeding = exceeding ||
       fabs(torque) > of->available_torques[i] * (1.0 + LIMIT_TOLERANCE);
   }
-  row->sound = sound, row->exceeding = exceeding || running, row->running = running;
+  row->sound = sound;  /* others are not published, and exceed nothing */
+  row->exceeding = sound && (exceeding || running), row->running = sound && running;
 }

@@ -98,7 +98,8 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
         larger = c.amplitude_factor(recorded.motion, None, recorded.wrench, recorded.base)
         amplitude = answer(larger.value, larger.limit, larger.leg, joints)
     if c.limits_forces and found['factor'] != 0.0:
-        more = c.payload(recorded.motion, np.zeros(3))
+        more = c.payload(
+            recorded.motion, np.zeros(3), wrench=recorded.wrench, base=recorded.base)
         payload = answer(more.value, more.limit, more.leg, joints)
     return found | {'between_setpoints': between, 'amplitude': amplitude, 'payload': payload}
 

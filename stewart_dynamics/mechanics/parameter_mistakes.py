@@ -376,6 +376,10 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
     elif most is not None and wrong != gravity_mistakes.IN_MM and weight > most.sum():
         yield (f'limits.force_max: {_listed(np.unique(most))} N: six such legs cannot carry the '
                f'platform, {weight:.3g} N: in kN?')
+    rated = p.limits.joint_force_max
+    if rated is not None and wrong != gravity_mistakes.IN_MM and weight > rated.sum():
+        yield (f'limits.joint_force_max: {_listed(np.unique(rated))} N: six such legs cannot '
+               f'carry the platform, {weight:.3g} N: in kN?')
     friction = p.actuator.coulomb_friction
     if most is not None and weight <= most.sum() and np.any(friction >= most):
         at = int(np.argmax(friction - most))

@@ -252,13 +252,19 @@ class ParameterGroup:
                     raise AttributeError(str(exc)) from None
             raise AttributeError(f'{type(self).__name__} has no {name}')
 
-    def __setattr__(self, name: str, value: object) -> None:
-        """Set an attribute that is no parameter."""
-        if name in self._declarations or name in self._groups:
-            raise AttributeError(
-                f'{self._path}{name}: parameters are immutable: parameters.replaced'
-                f'({{{self._path + name!r}: ...}}) returns a changed copy')
-        super().__setattr__(name, value)
+        def __setattr__(self, name: str, value: object) -> None:
+            """Set an attribute that is no parameter, of a whole set alone."""
+            if name in self._declarations or name in self._groups:
+                raise AttributeError(
+                    f'{self._path}{name}: parameters are immutable: parameters.replaced'
+                    f'({{{self._path + name!r}: ...}}) returns a changed copy')
+            if self._path:
+                getattr(self, name)  # AttributeError, which suggests similar names
+            super().__setattr__(name, value)
+
+        def __delattr__(self, name: str) -> None:
+            """Raise AttributeError."""
+            raise AttributeError(f'{self._path}{name}: parameters are immutable')
 
     def __repr__(self) -> str:
         """Return the values."""

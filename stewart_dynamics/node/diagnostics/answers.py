@@ -253,7 +253,8 @@ class LimitsDiagnostics(StatusPart):
 
     def _note_exceedances(self, output: Output, motion: Sequence[float], now: float) -> None:
         suppressed = output.forces is None and output.demanded_forces is not None and (
-            self._answers.parameters.limits.action == SUPPRESS_FORCES)
+            self._answers.parameters.limits.action == SUPPRESS_FORCES) and any(
+                not LIMITS[each.limit].clips for each in output.exceedances)
         self._suppressed += suppressed
         if not any(self.held.of(name, now).level for name in _OF_POSE):
             # At most once in a second: it may take a millisecond.
