@@ -653,8 +653,9 @@ def test_attributes_are_those_of_a_copy_and_cannot_be_set(p: Parameters) -> None
             setattr(group, name, None)
         with pytest.raises(AttributeError, match=f'{name}: parameters are immutable'):
             delattr(group, name)
+    wrong = 'force_mx'
     with pytest.raises(AttributeError, match='do you mean limits.force_max'):
-        setattr(p.limits, 'force_mx', 3.0)
+        setattr(p.limits, wrong, 3.0)
     assert 'velocity_max=None' in repr(p.limits)
     assert 'cylinder.mass=array' in repr(p.legs)
 
