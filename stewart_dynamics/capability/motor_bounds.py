@@ -12,13 +12,13 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.force_intervals import quadratic_exit
-from stewart_dynamics.mechanics.drives.motor_limits import bound_of, largest_torques
+from stewart_dynamics.mechanics.drives.motor_limits import largest_torques
 from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS, drive_constants, Drives, MOTORS, Motors, SPEEDS)
 from stewart_dynamics.mechanics.limits import (
-    short_name, SPEED_MAX, TORQUE_MAX, TORQUE_SPEED)
+    short_name, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import MOTION, RESULT
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, six_of
 
 # Ratio of a torque to none that is available: finite, for searches.
 _FAR_BEYOND = 1e9
@@ -53,7 +53,8 @@ class MotorBounds:
         self.ratio, self._mass = constants[:, 0], constants[:, 2]
         self._factors = 1.0 + constants[:, 3], 1.0 + constants[:, 4]
         self.inertia = self._mass / self.ratio ** 2
-        self._strongest, self.fastest = bound_of(p, TORQUE_MAX), bound_of(p, SPEED_MAX)
+        self._strongest, self.fastest = (
+            six_of(each, math.inf) for each in (p.drive.torque_max, p.drive.speed_max))
         self.limits_speeds = bool(np.isfinite(self.fastest).any())
         self._curve = p.drive.torque_speed
         self.limited = p.drive.torque_max is not None or self._curve is not None

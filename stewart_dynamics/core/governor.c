@@ -289,7 +289,8 @@ void govern_many(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
   const limit_checks * checks, const governor_limits * limits, int64_t count,
-  const double * times, const coordinates * demands, governed_stream * stream, stewart_motion * motions) {
+  const double * times, const coordinates * demands, governed_stream * stream,
+  stewart_motion * motions) {
   governed on = {
     {platform, drives, n, curve, n_base, base, n_moving, moving, checks}, limits};
   for (int64_t k = 0; k < count; k++) {

@@ -184,7 +184,8 @@ void govern_many(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
   const limit_checks * checks, const governor_limits * limits, int64_t count,
-  const double * times, const coordinates * demands, governed_stream * stream, stewart_motion * motions);
+  const double * times, const coordinates * demands, governed_stream * stream,
+  stewart_motion * motions);
 
 /* Motions (count,) at times [s] of inputs (count, 6), acceleration and angular velocity of the
    vehicle, linear between the times; the state is the one before, of an earlier time, and then the
@@ -193,7 +194,8 @@ void cue_many(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
   const limit_checks * checks, const governor_limits * limits, int64_t limited,
-  const washout_filters * filters, int64_t count, const double * times, const double * inputs, cueing_state * state,
+  const washout_filters * filters, int64_t count, const double * times, const double * inputs,
+  cueing_state * state,
   stewart_motion * motions);
 
 /* Specific forces and angular velocities (count, 6) at a head of the platform, platform axes. */

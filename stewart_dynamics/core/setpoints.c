@@ -87,8 +87,8 @@ static int check_setpoint(
   if (on->checks->clearance != 0.0) {exceeded |= check_clearances(on, clearances);}
   to->jumped = (exceeded & STEWART_JUMP) != 0;
   int running = 0, with_motors = on->checks->motors != 0.0;
+  clip_forces(platform, result, to->forces);
   if (with_motors) {
-    clip_forces(platform, result, to->forces);
     put_motors(platform, on->drives, on->n_curve, on->curve, motion, result->forces, to->forces,
                &to->motors->drives);
     check_motors(on->drives, at->since, to->jumped, windings, to->motors);
@@ -96,7 +96,6 @@ static int check_setpoint(
   }
   int suppressed = !solved || suppresses(platform, state->stopped, exceeded, running);
   to->exceeding = exceeded != 0 || (with_motors && to->motors->exceeding > 0.0);
-  clip_forces(platform, result, to->forces);
   for (int i = 0; suppressed && i < 6; i++) {
     to->forces[i] = NAN;
     if (with_motors) {to->motors->drives.commands[i] = NAN;}

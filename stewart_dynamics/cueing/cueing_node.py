@@ -190,8 +190,7 @@ class CueingNode(ManagedNode[CueingParameters]):
 
     def _time_of(self, index: int) -> int:
         """Return the time of a setpoint from the begin on [ns]; rounding does not add up."""
-        rate = self._settings.cueing.rate
-        return round(index * SECOND / rate)
+        return round(index * SECOND / self._settings.cueing.rate)
 
     def _publish_next(self) -> None:
         at, stream = self._due, self._stream
@@ -215,18 +214,13 @@ class CueingNode(ManagedNode[CueingParameters]):
         """Advance the cueing to the next setpoint."""
         vehicle, gravity = self._vehicle, float(self._cueing.at_rest[2])
         heard = (vehicle.reading is not None and not vehicle.mistake
-                 and vehicle.silent(self._now / SECOND) < self._silence)
+                 and vehicle.silent(self._now / SECOND) < self._settings.vehicle_timeout)
         change = 1.0 / (_FADE * self._settings.cueing.rate)
         share = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
         self._presence = share
         x, y, z, *rates = vehicle.reading or (0.0, 0.0, gravity, 0.0, 0.0, 0.0)
         stream.advance_by_one(1e-9 * self._time_of(self._due), (
             share * x, share * y, gravity + share * (z - gravity), *(share * w for w in rates)))
-
-    @property
-    def _silence(self) -> float:
-        timeout = self._settings.vehicle_timeout
-        return timeout
 
     def end_work(self) -> None:
         """Bring the platform to rest within its limits, an approach to its end."""
@@ -281,7 +275,7 @@ class CueingNode(ManagedNode[CueingParameters]):
             message = 'approaches the home pose'
         elif self._vehicle.mistake:
             level, message = ERROR, f'vehicle: {self._vehicle.mistake}'
-        elif silent > self._silence:
+        elif silent > self._settings.vehicle_timeout:
             level, message = WARN, 'no ~/vehicle: ' + (
                 'never heard' if math.isinf(silent)
                 else f'for {silent:.1f} s') + ': washes out to rest'

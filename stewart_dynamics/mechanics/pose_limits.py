@@ -42,7 +42,8 @@ class PoseLimits:
         self.angles = angles_to_check(parameters, self.limits.of_joints)
         self.clearance = clearance_to_check(parameters)
         self.stop_condition = stop_condition_of(parameters)
-        self._drives = Drives(parameters) if parameters.drives else None
+        drives = Drives(parameters)
+        self._drives = drives if parameters.drives else None
         self._motors = MotorLimits(parameters)
         none = np.empty((0, 3))
         base, platform = (none, none) if self.clearance is None else (
@@ -52,8 +53,8 @@ class PoseLimits:
             self.angles is not None, self.clearance is not None, self._drives is not None)
         if self.angles is not None:
             checks['joint_axes'] = self.angles.axes.reshape(36)
-        self.arguments = (*Drives(parameters).arguments[1:], len(base), base, len(platform),
-                          platform, checks)
+        self.arguments = (
+            *drives.arguments[1:], len(base), base, len(platform), platform, checks)
 
     def values(self, motions: Array, results: Array) -> dict[str, Array]:
         """Return the values (N, 6) of all limits at rows of motion and their results."""

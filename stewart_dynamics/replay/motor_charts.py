@@ -12,11 +12,9 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.mechanics.drives.motor_limits import (
-    bound_of, largest_speeds, largest_torques)
+from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds, largest_torques
 from stewart_dynamics.mechanics.drives.motors import Motors
-from stewart_dynamics.mechanics.limits import TORQUE_MAX
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, six_of
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
 from stewart_dynamics.setpoints.motor_row import OF_DRIVES
 
@@ -96,7 +94,7 @@ class Deliverable:
     def __init__(self, parameters: Parameters, leg: int) -> None:
         self._parameters, self._leg = parameters, leg
         self._curve = parameters.drive.torque_speed
-        self.torque = float(bound_of(parameters, TORQUE_MAX)[leg])
+        self.torque = float(six_of(parameters.drive.torque_max, math.inf)[leg])
         if self._curve is not None:
             self.torque = min(self.torque, float(self._curve[:, 1].max()))
         self.speed = float(largest_speeds(parameters)[leg])

@@ -14,7 +14,7 @@ from stewart_dynamics.mechanics.drives.motors import (
     AVAILABLE_TORQUES, BREAKAWAY_TORQUES, motor_ratio, SPEEDS)
 from stewart_dynamics.mechanics.limits import (
     Exceedance, OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE, TORQUE_MAX, TORQUE_SPEED)
-from stewart_dynamics.parameters.table import Parameters, UNIVERSAL
+from stewart_dynamics.parameters.table import Parameters, six_of, UNIVERSAL
 
 _WITHOUT_TWIST = 0.9
 
@@ -30,7 +30,7 @@ class MotorLimits:
     def __init__(self, parameters: Parameters) -> None:
         self._curve = parameters.drive.torque_speed is not None
         self.bounds: dict[str, Array] = {
-            limit: bound_of(parameters, limit)
+            limit: six_of(parameters[limit], math.inf)
             for limit in OF_MOTORS if limit != TORQUE_SPEED}
 
     def excesses(self, rows: Array, rises: Array) -> dict[str, tuple[Array, Array]]:
@@ -52,18 +52,13 @@ class MotorLimits:
             for leg in np.flatnonzero(exceeds(values, bounds)))
 
 
-def bound_of(p: Parameters, limit: str) -> Array:
-    """Return the values (6,) of one of OF_MOTORS but TORQUE_SPEED; infinite if not given."""
-    return np.full(6, math.inf) if p[limit] is None else np.asarray(p[limit])
-
-
 def largest_torques(p: Parameters, speeds: Array) -> Array:
     """Return the largest torques [N m] at magnitudes of the motors' speeds (..., 6) [rad/s]."""
     torques, curve = np.full(speeds.shape, math.inf), p.drive.torque_speed
     if curve is not None:
         torques = np.where(speeds > curve[-1, 0] * (1.0 + TOLERANCE), 0.0,
                            np.interp(speeds, *curve.T))
-    largest: Array = np.minimum(bound_of(p, TORQUE_MAX), torques)
+    largest: Array = np.minimum(six_of(p.drive.torque_max, math.inf), torques)
     return largest
 
 
@@ -71,7 +66,7 @@ def largest_speeds(p: Parameters) -> Array:
     """Return the largest speeds (6,) [rad/s]: there is no torque beyond the torque-speed curve."""
     curve = p.drive.torque_speed
     speeds: Array = np.minimum(
-        bound_of(p, SPEED_MAX), math.inf if curve is None else curve[-1, 0])
+        six_of(p.drive.speed_max, math.inf), math.inf if curve is None else curve[-1, 0])
     return speeds
 
 
