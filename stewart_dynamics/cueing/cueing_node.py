@@ -33,6 +33,7 @@ from stewart_dynamics.messages.setpoint import ImuWriter
 from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, OK, Status, WARN
 from stewart_dynamics.node.publishers_at_rate import diagnostic_array
 from stewart_dynamics.planned.approach import approach
+from stewart_dynamics.ros.due_periods import BACKLOG, DuePeriods
 from stewart_dynamics.ros.managed_node import ManagedNode
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
@@ -43,9 +44,9 @@ FELT, DIAGNOSTICS, MEASURED_LEGS = 'felt', '/diagnostics', 'measured_legs'
 _TICK = 0.2  # between two looks at the input [s]
 _TICKS_A_REPORT = 5
 _FADE = 1.0  # in which the motion of the vehicle fades in, or out [s]
-# Time that is skipped where it is longer, by a steady clock, and by /clock, which may be coarse
-# [ns].
-_BACKLOG, _JUMP = 100_000_000, 1_000_000_000
+_JUMP = 1_000_000_000  # longest step of /clock, which may be coarse, that is caught up [ns]
+_LATE = 'late: fell behind by {:.3f} s: that time is skipped'
+_JUMPED = '/clock jumped by {:.3f} s: the motion goes on from there'
 _REST = 1e-4  # velocity of a platform at rest [m/s, rad/s]
 _LONGEST_STOP = 5.0  # [s]
 _AWAY = 1e-3  # legs this near to their lengths at home need no approach [m]
@@ -80,7 +81,8 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._held: dict[str, float] = {}
         self._ticks = 0
         self._due = 0  # index of the next setpoint, from the begin
-        self._begin: int | None = None  # by the clock [ns]
+        self._periods = DuePeriods(
+            self._settings.cueing.rate, self._on_notice, now=lambda: self._now)
         self._reported = 0  # index of the next setpoint at the last report
         self._activated = time.monotonic()
         if self._last is not None:
@@ -127,7 +129,7 @@ class CueingNode(ManagedNode[CueingParameters]):
 
     def _on_legs(self, data: bytes) -> None:
         """Start the approach from where the platform stands."""
-        if not self._active or self._begin is not None or not self._now:
+        if not self._active or self._periods.begun or not self._now:
             return
         platform = StewartPlatform(self._settings)
         try:
@@ -154,7 +156,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._go()
 
     def _go(self) -> None:
-        self._begin, self._stamp = self._now, self.get_clock().now().nanoseconds
+        self._periods.begin(self.get_clock().now().nanoseconds)
         self._due = self._reported = 0
         self._stream = self._cueing.stream()
 
@@ -173,29 +175,16 @@ class CueingNode(ManagedNode[CueingParameters]):
 
     def _on_time(self) -> None:
         """Publish the setpoints that are due, each with its own stamp."""
-        if not self._active or self._begin is None:
+        if not self._active:
             return
-        now = self._now
-        late = now - self._begin - self._time_of(self._due)
-        simulated = self._simulated
-        if late > (_JUMP if simulated else _BACKLOG) or late < -_JUMP:
-            self._begin += late
-            self._stamp += late
-            self._on_notice(
-                f'/clock jumped by {late / SECOND:.3f} s: the motion goes on from there'
-                if simulated else
-                f'late: fell behind by {late / SECOND:.3f} s: that time is skipped')
-        while self._time_of(self._due) <= self._now - self._begin:
+        backlog, words = (_JUMP, _JUMPED) if self._simulated else (BACKLOG, _LATE)
+        for _ in self._periods.due(self._due, backlog, _JUMP, words):
             self._publish_next()
-
-    def _time_of(self, index: int) -> int:
-        """Return the time of a setpoint from the begin on [ns]; rounding does not add up."""
-        return round(index * SECOND / self._settings.cueing.rate)
 
     def _publish_next(self) -> None:
         at, stream = self._due, self._stream
         assert stream is not None  # made before the first setpoint
-        stamp = self._stamp + self._time_of(at)
+        stamp = self._periods.stamp_of(at)
         if at < len(self._approach):
             self._last = self._approach[at]
             felt = np.concatenate(self._cueing.felt(Motion.of_rows(self._last))).tolist()
@@ -219,20 +208,20 @@ class CueingNode(ManagedNode[CueingParameters]):
         share = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
         self._presence = share
         x, y, z, *rates = vehicle.reading or (0.0, 0.0, gravity, 0.0, 0.0, 0.0)
-        stream.advance_by_one(1e-9 * self._time_of(self._due), (
+        stream.advance_by_one(1e-9 * self._periods.time_of(self._due), (
             share * x, share * y, gravity + share * (z - gravity), *(share * w for w in rates)))
 
     def end_work(self) -> None:
         """Bring the platform to rest within its limits, an approach to its end."""
-        if self._begin is None or self._stream is None:
+        if self._stream is None:
             return
         self._stream.stop()
         # In real time, also with use_sim_time: /clock is not heard meanwhile.
-        begin = time.monotonic_ns() - self._time_of(self._due)
+        begin = time.monotonic_ns() - self._periods.time_of(self._due)
         end = time.monotonic() + _LONGEST_STOP
         while time.monotonic() < end and self._last is not None and (
                 self._due < len(self._approach) or np.abs(self._last[TWIST]).max() > _REST):
-            wait = self._time_of(self._due) - (time.monotonic_ns() - begin)
+            wait = self._periods.time_of(self._due) - (time.monotonic_ns() - begin)
             time.sleep(max(wait, 0) / SECOND)
             self._publish_next()
 
@@ -247,7 +236,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._vehicle.check(self._now / SECOND)
         if self._vehicle.mistake and self._vehicle.mistake != mistake:
             self._log.write([LogLine(WARN, f'vehicle: {self._vehicle.mistake}', 'mistake')])
-        if self._begin is None and now - self._activated > self._settings.start_timeout:
+        if not self._periods.begun and now - self._activated > self._settings.start_timeout:
             if self._now:
                 self.get_logger().warning('no ~/measured_legs: starts at the home pose')
                 self._go()
@@ -269,7 +258,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._reported = self._due
         silent = self._vehicle.silent(self._now / SECOND)
         worst = max(held, key=held.__getitem__, default='')
-        if self._begin is None:
+        if not self._periods.begun:
             level, message = WARN, f'waits for {"~/measured_legs" if self._now else "/clock"}'
         elif self._due < len(self._approach):
             message = 'approaches the home pose'
