@@ -118,9 +118,10 @@ def decimated(signal: Array, taps: Array, step: int) -> Array:
     if short > 0:
         flat = np.concatenate([flat, np.zeros((short, flat.shape[1]))])
     parts = flat[:(count + blocks - 1) * step].reshape(count + blocks - 1, step, -1)
-    result = np.zeros((count, 1, flat.shape[1]))
+    products = padded.reshape(blocks, step) @ parts
+    result = np.zeros((count, flat.shape[1]))
     for n in range(blocks):
-        result += padded[None, None, n * step:(n + 1) * step] @ parts[n:n + count]
+        result += products[n:n + count, n]
     return result.reshape(count, *signal.shape[1:])
 
 

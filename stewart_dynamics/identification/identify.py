@@ -47,8 +47,6 @@ from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
 _FEWEST_SAMPLES = 10.0
-# Number of times that the delay of a bag is refined.
-_REFINED = 3
 # A notice is given if a larger share of the RMS rate is above the cut-off.
 _MOST_ABOVE = 0.03
 # Samples in a block that is left out where the platform does not follow the model, degrees of
@@ -251,21 +249,17 @@ class Identification:
 
     def _aligned(self, bag: _Bag, window: Window) -> tuple[Window, WindowRead]:
         """Return a window with efforts at the times of its positions, and its extract."""
-        scale = 0.0
-        if not bag.lag_is_known:
-            bag.lag, _, scale = self._lag(bag.extraction, window)
-            if not bag.is_long_enough(window):
-                bag.lag = 0
+        if bag.lag_is_known:
+            window = window.with_lag(bag.lag)
+            return window, self._read_window(bag, window)
+        bag.lag, _, scale = self._lag(bag.extraction, window)
+        if not bag.is_long_enough(window):
+            bag.lag = 0
         window = window.with_lag(bag.lag)
-        read = self._read_window(bag, window)
-        if bag.lag_is_known or not read.moves:
-            return window, read
-        bag.lag_is_known = True
-        if 1.0 / FAR < scale < FAR or scale == 0.0:
-            return window, self._delayed(bag, window, read)
-        # of another unit or sign
-        of_model = window._replace(efforts=window.efforts / scale)
-        self._delayed(bag, of_model, self._read_window(bag, of_model))
+        if scale != 0.0 and not 1.0 / FAR < scale < FAR:  # of another unit or sign
+            self._find_delay(bag, window._replace(efforts=window.efforts / scale))
+        else:
+            self._find_delay(bag, window)
         return window, self._read_window(bag, window)
 
     def _add_read(self, bag: _Bag, window: Window, read: WindowRead) -> None:
@@ -314,7 +308,7 @@ class Identification:
     def _lag(self, extraction: Extraction, window: Window, of_any_scale: bool = True,
              ) -> tuple[int, float, float]:
         """Return the lag of the efforts in samples, the squared misfit, and their scale."""
-        piece = most_motion(window, extraction)
+        piece = most_motion(window, extraction, LONGEST_LAG)
         try:
             return extraction.lag(piece, first_pose(extraction.platform, piece),
                                   LONGEST_LAG if self._options.delay else 0.0, of_any_scale)
@@ -353,21 +347,24 @@ class Identification:
             raise BagError(
                 f'{bag.path}: {of_no_pose(self.parameters, window.positions)}') from exc
 
-    def _delayed(self, bag: _Bag, window: Window, read: WindowRead) -> WindowRead:
+    def _find_delay(self, bag: _Bag, window: Window) -> None:
         """
-        Return a window read with its positions delayed as its efforts are, and so from now on.
+        Delay the positions of a bag as its efforts are from now on, if legs move in a window.
 
         Filters of the efforts cannot do that: friction that jumps between two samples aliases.
         """
-        cutoff = np.array([bag.extraction.cutoff])
+        piece, cutoff = most_motion(window, bag.extraction), np.array([bag.extraction.cutoff])
         with closing(Extracts()) as one:
-            for _ in range(_REFINED):
-                one.clear()
-                one.add(0, 0.0, read)
-                bag.extraction.later += float(
-                    fit(one, self.unknowns, None, cutoff, passes=1).delays[0])
-                read = self._read_window(bag, window)
-        return read
+            for part in piece, piece, window:
+                with suppress(BagError):  # none of a piece is a reason to reject all
+                    read = self._read_window(bag, part)
+                    bag.lag_is_known = read.moves
+                    if not read.moves:
+                        return
+                    one.clear()
+                    one.add(0, 0.0, read)
+                    bag.extraction.later += float(
+                        fit(one, self.unknowns, None, cutoff, passes=1).delays[0])
 
     def _add_noise(self, extraction: Extraction, motion: _Motion) -> None:
         """Add the window with the most motion of a bag with more noise."""

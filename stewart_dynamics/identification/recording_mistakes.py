@@ -11,6 +11,7 @@ squared misfit of data and prior together, twice the logarithm of the likelihood
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from copy import copy
 from itertools import combinations
 import math
@@ -22,11 +23,12 @@ from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.extraction import Extract, Extraction, ORDERS
 from stewart_dynamics.identification.lack_of_fit import LackOfFit, LEFT_BY_FILTERS
 from stewart_dynamics.identification.parameter_fit import Fit, residual_of, shifted_by
-from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.identification.window_poses import first_pose
+from stewart_dynamics.identification.unknowns import COULOMB_COLUMNS, regressor_of, Unknowns
+from stewart_dynamics.identification.window_poses import first_pose, motions, pose_near, poses
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.measured_efforts import (
     FAR, known_scales, mistake_of_scale)
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
@@ -44,6 +46,7 @@ _CLEARLY = 2.0 * math.log(1000.0)
 _LEAST_MASS = 1e-9  # relative to the file's, where the prior judges it
 # Ratio of residuals on held-out time from which the file is better than the fit.
 _WORSE = 1.05
+_LEGS = range(6)
 # Minimum fraction of valid samples for a comparison.
 _FEWEST = 0.5
 # Length of the part that is searched, in cut-off periods, longer if the filters need it.
@@ -176,37 +179,30 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
     late = list(of_delay(delays))
     if residual < _SUSPICIOUS and lack is None and not late:
         return
-    piece, joints = most_motion(window, extraction), p.joints
-    now = _tried(extraction, piece, unknowns, fit.delays[0])
-    found = [(now, 'misfit', (
-        f'the residual is {100.0 * residual:.0f} % of the efforts whatever the parameters: '
-        'positions and efforts may not belong together, or the geometry is wrong'))]
-    best = min(_BETTER, left)
+    platform, piece = extraction.platform, most_motion(window, extraction)
     undelayed = copy(extraction)  # the delay that fits wrong legs best may be any
     undelayed.later = 0.0
-    for a, b in combinations(range(6), 2):
-        order = [{a: b, b: a}.get(leg, leg) for leg in range(6)]
-        efforts, legs = piece.efforts[:, order], piece._replace(
-            positions=piece.positions[:, order],
-            rates=None if piece.rates is None else piece.rates[:, order])
-        for which, swapped in (('positions and efforts', legs._replace(efforts=efforts)),
-                               ('efforts', piece._replace(efforts=efforts)),
-                               ('positions', legs)):
-            misfit = min(_tried(each, swapped, unknowns, delay) for each, delay in (
-                (extraction, fit.delays[0]), (undelayed, 0.0)))
-            if misfit < best * now:
-                found.append((misfit, 'swapped', f'the {which} of {joints[a]} and {joints[b]} '
-                                                 'look swapped'))
-    misfit, what, text = min(found)
-    if misfit < _BETTER * now:
+    tried, now = [], float('inf')
+    with suppress(PoseError, SingularityError):
+        tried = [(each(piece, first_pose(platform, piece)).extract, delay)
+                 for each, delay in ((extraction, fit.delays[0]), (undelayed, 0.0))]
+        now = _misfit(_of_legs(platform, tried[0][0], _LEGS), _LEGS, unknowns, fit.delays[0])
+    swaps = [each for each in _swaps(platform, tried, unknowns)
+             if now - each[0] > _CLEARLY and each[0] < (min(_BETTER, left) ** 2) * now
+             ] if tried else []
+    if swaps:
+        misfit, which, a, b = min(swaps)
         yield LikelyMistake(
-            what, f'{text}: the residual becomes {misfit / now:.2f} times as large')
+            'swapped', f'the {which} of {p.joints[a]} and {p.joints[b]} look swapped: the '
+            f'residual becomes {math.sqrt(misfit / now):.2f} times as large')
     elif late:
         yield from late
     elif lack is not None and lack.cause == 'zero_length' and lack.ranked[0].columns == 6:
         yield LikelyMistake(lack.cause, f'geometry.zero_length looks wrong: {lack.text}')
     elif residual > _UNEXPLAINED:
-        yield LikelyMistake(*found[0][1:])
+        yield LikelyMistake(
+            'misfit', f'the residual is {100.0 * residual:.0f} % of the efforts whatever the '
+            'parameters: positions and efforts may not belong together, or the geometry is wrong')
 
 
 def of_validation(before: Array, after: Array, measured: Array, deviation: float,
@@ -225,9 +221,9 @@ def of_validation(before: Array, after: Array, measured: Array, deviation: float
             'a part of the recording')
 
 
-def most_motion(window: Window, extraction: Extraction) -> Window:
-    """Return the part of a window with the most motion, long enough for the filters."""
-    seconds = _PIECE / extraction.cutoff + LONGEST_LAG
+def most_motion(window: Window, extraction: Extraction, longer: float = 0.0) -> Window:
+    """Return the part of a window with the most motion, by a time [s] longer than usual."""
+    seconds = _PIECE / extraction.cutoff + longer
     many = min(len(window.positions), max(round(seconds / window.period), 4 * extraction.margin))
     moved = np.cumsum(np.abs(np.diff(window.positions, axis=0, prepend=window.positions[:1])
                              ).sum(axis=1))
@@ -236,12 +232,46 @@ def most_motion(window: Window, extraction: Extraction) -> Window:
     return window.part(part, part)
 
 
-def _tried(extraction: Extraction, window: Window, unknowns: Unknowns, delay: float) -> float:
-    """Return the RMS misfit of a window, relative to its efforts; infinite without a pose."""
+def _swaps(platform: StewartPlatform, tried: Sequence[tuple[Extract, float]], unknowns: Unknowns,
+           ) -> Iterator[tuple[float, str, int, int]]:
+    """Yield the least squared misfit of extracts with delays [s], if two legs are swapped."""
+    own = [_of_legs(platform, extract, _LEGS) for extract, _ in tried]
+    for a, b in combinations(range(6), 2):
+        order = list(_LEGS)
+        order[a], order[b] = b, a
+        others = [_of_legs(platform, extract, order) for extract, _ in tried]
+        for which, extracts, of_efforts in (('positions and efforts', others, order),
+                                            ('efforts', own, order), ('positions', others, _LEGS)):
+            yield min(_misfit(extract, of_efforts, unknowns, delay) for extract, (_, delay) in zip(
+                extracts, tried, strict=True)), which, a, b
+
+
+def _of_legs(platform: StewartPlatform, extract: Extract, order: Sequence[int]) -> Extract | None:
+    """
+    Return an extract with positions of other legs; None if they have no poses.
+
+    The regressor is that of the filtered motion, not filtered itself.
+    """
+    zero_length = platform.parameters.geometry.zero_length
+    legs = extract.legs.copy()
+    legs[..., 0] -= zero_length
+    legs = legs[:, order]
+    legs[..., 0] += zero_length
     try:
-        extract = extraction(window, first_pose(extraction.platform, window)).extract
+        found = poses(platform, legs[..., 0], pose_near(platform, legs[0, :, 0]), stride=1)
     except (PoseError, SingularityError):
+        return None
+    regressor = regressor_of(platform, motions(platform, found, legs[..., 1], legs[..., 2]))
+    regressor[:, _LEGS, COULOMB_COLUMNS] = extract.slip[:, order, 0]
+    return extract._replace(
+        columns=np.concatenate([regressor, extract.efforts], axis=-1), legs=legs)
+
+
+def _misfit(extract: Extract | None, order: Sequence[int], unknowns: Unknowns, delay: float,
+            ) -> float:
+    """Return the squared misfit with the efforts of other legs; infinite without a pose."""
+    if extract is None or np.count_nonzero(extract.used) < _FEWEST * extract.used.size:
         return float('inf')
-    if np.count_nonzero(extract.used) < _FEWEST * extract.used.size:
-        return float('inf')
-    return Comparison([extract], unknowns).relative(delay=delay)
+    columns = extract.columns.copy()
+    columns[..., -ORDERS:] = extract.efforts[:, order]
+    return Comparison([extract._replace(columns=columns)], unknowns).misfit(delay=delay)

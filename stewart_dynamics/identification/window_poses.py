@@ -50,17 +50,18 @@ def first_pose(platform: StewartPlatform, window: Window) -> Pose:
         platform, window.positions[0] + platform.parameters.geometry.zero_length)
 
 
-def poses(platform: StewartPlatform, lengths: Array, guess: Pose) -> Pose:
+def poses(platform: StewartPlatform, lengths: Array, guess: Pose, stride: int = _STRIDE) -> Pose:
     """
     Return the poses of lengths (N, 6) [m] that change little between samples.
 
-    ``guess`` is near the first one. Raises the errors of ``forward_kinematics``.
+    ``guess`` is near the first one; only every ``stride``-th is found from the one before. Raises
+    the errors of ``forward_kinematics``.
     """
     anchors = []
-    for each in lengths[::_STRIDE]:
+    for each in lengths[::stride]:
         guess = platform.forward_kinematics(each, guess)
         anchors.append(guess.rows)
-    nearest = np.minimum((np.arange(len(lengths)) + _STRIDE // 2) // _STRIDE, len(anchors) - 1)
+    nearest = np.minimum((np.arange(len(lengths)) + stride // 2) // stride, len(anchors) - 1)
     return platform.forward_kinematics(lengths, Pose.of_rows(np.array(anchors)[nearest]))
 
 

@@ -87,7 +87,8 @@ class _Dynamics(_Memories):
             of_motion[:] = motion.rows
             if self._result == 'motion':
                 of_forces[:] = forces
-            of_wrench[:] = _NO_WRENCH if wrench is None else wrench
+            if wrench is not None:
+                of_wrench[:] = wrench
             if base is not None:
                 of_base[:] = base.rows
                 if of_base[0] != of_base[0]:
@@ -95,9 +96,11 @@ class _Dynamics(_Memories):
             return result.copy() if solve() else None
         except _NO_FLOATS:
             return None
-        finally:
+        finally:  # the next one has no wrench, on a base at rest
+            if wrench is not None:
+                of_wrench[:] = _NO_WRENCH
             if base is not None:
-                of_base[0] = math.nan  # the next one is still
+                of_base[0] = math.nan
             self._free.append(memory)
 
 

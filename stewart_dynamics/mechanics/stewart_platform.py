@@ -62,8 +62,6 @@ class StewartPlatform:
         As given.
     structure : ()
         The hexapod as the functions in C take it, see ``hexapod_structure``.
-    constants : (n,)
-        As the functions that numba compiles take it, see ``hexapod_constants``.
     screws : (6, SCREW)
         The screws as the readable functions take them, see ``turning_screws``; zero if guided.
     solve : callable
