@@ -4,7 +4,7 @@
 """
 Accuracy, coverage of the intervals, and cost of an identification.
 
-Forces are those of Pinocchio, noise is added. Run by hand on Linux, ``make bench-identify``;
+Forces are those of an independent engine, noise is added. Run by hand on Linux, ``make bench-identify``;
 see README.md beside this file.
 """
 
@@ -36,8 +36,9 @@ from stewart_dynamics.reference_motion.motion_functions import motion_at
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 sys.path.append(str(HERE.parent / 'test'))
-from recorded import (  # noqa: E402, I100, I202
-    about, at_rest, fourier, MotionAt, NOISE, pinocchio_forces, Recorded, recorded, write_bag)
+from independent_hexapod import moving  # noqa: E402, I100, I202
+from recorded import (  # noqa: E402, I202
+    about, at_rest, fourier, MotionAt, NOISE, Recorded, recorded, write_bag)
 from referees import random_motion, random_parameters, rng  # noqa: E402, I202
 
 BEGIN, END = '<!-- identification: begin -->', '<!-- identification: end -->'
@@ -109,7 +110,7 @@ def accuracy(folder: Path) -> list[str]:
     """Return the lines of errors on a designed motion, with and without measured rates."""
     motion = designed(folder)
     times = np.arange(round(SECONDS * RATE)) / RATE
-    forces = pinocchio_forces(TRUE, motion(times - NOISE.delay))
+    forces = moving(TRUE, motion(times - NOISE.delay)).forces
     rows = [('largest error, one minute of a designed motion at 1 kHz', 'with rates', 'without',
              'at most', 'unit')]
     columns = []
@@ -275,7 +276,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         times = np.arange(round(SECONDS * RATE)) / RATE
-        forces = pinocchio_forces(TRUE, fourier(SEED)(times - NOISE.delay))
+        forces = moving(TRUE, fourier(SEED)(times - NOISE.delay)).forces
         for part in (accuracy(folder), coverage(forces, options.seeds), not_identifiable(folder),
                      five_masses(folder), volume(folder)):
             print('\n'.join(part), flush=True)

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Recorded legs for tests and benchmarks: motions, forces by Pinocchio, noise, and bags of them.
+Recorded legs for tests and benchmarks: motions, forces, noise, and bags of them.
 
-The forces are not this package's: they are those of ``referees.PinocchioReferee``, in a file of
-the temporary folder between the tests of one run.
+The forces are not this package's: they are those of ``independent_hexapod``.
 """
 
 from __future__ import annotations
@@ -14,13 +13,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from independent_hexapod import moving
 import numpy as np
 from numpy.typing import NDArray
-from referees import PinocchioReferee, rng, rotation_about
+from referees import rng, rotation_about
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
-from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters
 from stewart_dynamics.messages.joint_state import JointStateWriter
 
 Array = NDArray[np.float64]
@@ -104,15 +104,6 @@ def about(axis: Sequence[float], amplitude: float = 0.15, frequency: float = 0.5
     return at
 
 
-def pinocchio_forces(p: Parameters, motion: Motion) -> Array:
-    """Return the forces (N, 6) of a motion by Pinocchio."""
-    referee = PinocchioReferee(p, rng(1))
-    still = np.zeros(6)
-    if np.array_equal(motion.rows, np.tile(motion.rows[:1], (len(motion), 1))):
-        return np.tile(referee.forces(motion[0], still), (len(motion), 1))
-    return np.array([referee.forces(motion[n], still) for n in range(len(motion))])
-
-
 def recorded(p: Parameters, motion: MotionAt, seconds: float, rate: float, seed: int,
              noise: Noise = NOISE, forces: Array | None = None, with_rates: bool = True,
              ) -> Recorded:
@@ -132,7 +123,7 @@ def recorded(p: Parameters, motion: MotionAt, seconds: float, rate: float, seed:
     noise : Noise
         Noise to add.
     forces : (N, 6), optional
-        True forces of the motion, begun ``noise.delay`` earlier; by default Pinocchio's.
+        True forces of the motion, begun ``noise.delay`` earlier; by default those of ``moving``.
     with_rates : bool
         Rates are measured.
 
@@ -140,9 +131,9 @@ def recorded(p: Parameters, motion: MotionAt, seconds: float, rate: float, seed:
     random = rng(1000 + seed)
     times = np.arange(round(seconds * rate)) / rate
     taken = times + noise.jitter * random.normal(size=len(times)) if noise.jitter else times
-    found = StewartPlatform(p).inverse_dynamics(motion(taken))
+    found = moving(p, motion(taken))
     if forces is None:
-        forces = pinocchio_forces(p, motion(taken - noise.delay))
+        forces = moving(p, motion(taken - noise.delay)).forces
     return noise.recorded(
         times, found.lengths - p['geometry.zero_length']
         + noise.length * random.normal(size=(len(times), 6)),

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Identification from bags with Pinocchio's forces: values, intervals, identifiability."""
+"""Identification from bags, forces by another engine: values, intervals, identifiability."""
 
 from __future__ import annotations
 
