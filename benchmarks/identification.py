@@ -4,8 +4,8 @@
 """
 Accuracy, coverage of the intervals, and cost of an identification.
 
-Forces are those of an independent engine, noise is added. Run by hand on Linux, ``make bench-identify``;
-see README.md beside this file.
+Forces are those of an independent engine, noise is added. Run by hand on Linux,
+``make bench-identify``; see README.md beside this file.
 """
 
 from __future__ import annotations

@@ -18,12 +18,12 @@ from referees import PinocchioReferee, random_base_motion, relative, rng, ROOT
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.external_wrench.body_fit import about
 from stewart_dynamics.external_wrench.estimate import Estimate
 from stewart_dynamics.external_wrench.measured_legs import HIGHEST_RATE, LegHistory
 from stewart_dynamics.external_wrench.payload import (
     carried_payload, identify, NAMES, numbers_of, Payload, PayloadOutcome)
-from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin
+from stewart_dynamics.mechanics.dynamics.linear_parameters import (
+    about_origin, inertial_derivative)
 from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.node.diagnostics.outcomes import PayloadDiagnostics
 from stewart_dynamics.parameters.body import Body
@@ -152,14 +152,14 @@ def test_mass_center_and_inertia_are_those_of_pinocchio() -> None:
     assert payload.seconds == pytest.approx((many - 1) / rate)
 
 
-def test_about_moves_a_body() -> None:
+def test_a_body_is_moved_to_the_origin() -> None:
     center, mass, offset = np.array([0.1, -0.2, 0.3]), 7.0, np.array([0.05, 0.02, -0.1])
     inertia = np.array([1.0, 0.1, 0.2, 1.5, -0.1, 2.0])
     there = np.array([mass, *(mass * offset), *(inertia + about_origin(
         mass, offset, np.zeros(6)))])
     whole = center + offset
     expected = [mass, *(mass * whole), *about_origin(mass, whole, inertia)]
-    np.testing.assert_allclose(about(center) @ there, expected, rtol=1e-14)
+    np.testing.assert_allclose(inertial_derivative(1.0, center) @ there, expected, rtol=1e-14)
 
 
 def test_the_intervals_hold() -> None:

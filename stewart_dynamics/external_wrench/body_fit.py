@@ -28,7 +28,8 @@ from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.estimation.posterior import IDENTIFIABLE, Posterior, posterior
 from stewart_dynamics.estimation.whitening import (
     covariance_of_scores, gram_of, spectra_of, Weights, weights_of)
-from stewart_dynamics.mechanics.dynamics.linear_parameters import FIRST_MOMENT, INERTIA, MASS
+from stewart_dynamics.mechanics.dynamics.linear_parameters import (
+    about_origin, FIRST_MOMENT, INERTIA, MASS, point_inertia_derivative)
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import is_consistent
 from stewart_dynamics.parameters.body import Body
 
@@ -59,22 +60,6 @@ class LegSamples(NamedTuple):
     acceleration_noise: Array  # (6, 6) covariance of the noise in the accelerations of one window
     by_acceleration: Array  # (6, 6, n + 1) derivative of the columns by each of the six
     measured: float  # RMS of the efforts [N]
-
-
-def about(center: Array) -> Array:
-    """Return the matrix (10, 10) from ten parameters about a point to those about the origin."""
-    matrix = np.eye(TEN)
-    coupling = _coupling(center)
-    matrix[FIRST_MOMENT, MASS], matrix[INERTIA, MASS] = center, 0.5 * coupling @ center
-    matrix[INERTIA, FIRST_MOMENT] = coupling
-    return matrix
-
-
-def _coupling(a: Array) -> Array:
-    """Return the derivative (6, 3) of the inertia of a mass of 1 at a point, by the point."""
-    x, y, z = a
-    return np.array([[0.0, 2.0 * y, 2.0 * z], [-y, -x, 0.0], [-z, 0.0, -x],
-                     [2.0 * x, 0.0, 2.0 * z], [0.0, -z, -y], [2.0 * x, 2.0 * y, 0.0]])
 
 
 class BodyFit:
@@ -161,15 +146,14 @@ class BodyFit:
         """Return the body for a change of the ten parameters about the given center."""
         mass = self._given.mass + float(change[MASS])
         offset = change[FIRST_MOMENT] / mass
-        inertia = (self._given.inertia + change[INERTIA]
-                   - 0.5 * mass * _coupling(offset) @ offset)
+        inertia = self._given.inertia + about_origin(-mass, offset, change[INERTIA])
         return Body(mass, self._given.center + offset, inertia)
 
     def _derivative(self, change: Array) -> Array:
         """Return the derivative (10, 10) of mass, center and inertia by the change."""
         mass = self._given.mass + float(change[MASS])
         offset = change[FIRST_MOMENT] / mass
-        coupling = _coupling(offset)
+        coupling = point_inertia_derivative(offset)
         matrix = np.eye(TEN)
         matrix[FIRST_MOMENT, MASS] = -offset / mass
         matrix[FIRST_MOMENT, FIRST_MOMENT] /= mass

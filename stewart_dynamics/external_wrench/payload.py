@@ -26,13 +26,13 @@ from stewart_dynamics.arrays import Array, Flags, Integers, NANOSECOND, SECOND
 from stewart_dynamics.estimation.noisy_rates import rates_in_noise
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.external_wrench.body_fit import (
-    about, BodyFit, FittedBody, LegSamples, ROUNDS, TEN)
+    BodyFit, FittedBody, LegSamples, ROUNDS, TEN)
 from stewart_dynamics.external_wrench.measured_legs import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, stamps_of, TURNED)
 from stewart_dynamics.mechanics.dynamics.friction import Friction, slip_in_noise
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    BODY_UNITS, COULOMB_FRICTION, FIRST_MOMENT, LINEAR, linear_parameters, PLATFORM,
-    VISCOUS_FRICTION)
+    BODY_UNITS, COULOMB_FRICTION, FIRST_MOMENT, inertial_derivative, LINEAR, linear_parameters,
+    PLATFORM, VISCOUS_FRICTION)
 from stewart_dynamics.mechanics.rows import ACCELERATION, BASE, FORCES, GRAVITY, LENGTHS, MOTION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
@@ -307,7 +307,7 @@ class _Windows:
         yield
         root[FIRST_MOMENT] *= p.carried.mass
         change = root[PLATFORM, PLATFORM].copy()
-        root[PLATFORM] = about(p.carried.center) @ root[PLATFORM]
+        root[PLATFORM] = inertial_derivative(1.0, p.carried.center) @ root[PLATFORM]
         root = root[:, np.any(root != 0.0, axis=0) | (np.arange(LINEAR) < TEN)]
         by_tilt = self._by_tilt(motions, bases)
         yield

@@ -24,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
-from stewart_dynamics.identification.filters import convolved, decimated, LowPass, white_deviation
+from stewart_dynamics.identification.filters import (
+    convolved, decimated, fast_length, LowPass, white_deviation)
 from stewart_dynamics.identification.unknowns import (
     COULOMB_COLUMNS, regressor_of, Unknowns)
 from stewart_dynamics.identification.window_poses import motions, poses
@@ -190,6 +191,10 @@ class Extraction:
         ``guess`` is near the first pose; ``noise`` adds noise to lengths and rates, as large as
         the noise that they contain.
         """
+        wrong, stops = self._wrong(window)
+        count = fast_length((len(window.positions) - 2 * self.margin - 1) // self.step + 1)
+        part = slice(0, 2 * self.margin + (count - 1) * self.step + 1)
+        window = window.part(part, part)
         deviations = self._deviations(window)
         lengths, rates, accelerations, quick, variance = self._filtered(
             window, deviations, noise)
@@ -208,8 +213,6 @@ class Extraction:
         slides = bool(np.ptp(lengths, axis=0).max() > _MOVES * deviations[0])
         sliding = slides * slip_in_noise(drive_rates, narrower, math.sqrt(max(variance, 0.0)))
         columns = np.concatenate([self._decimated(rows, sliding), efforts], axis=-1)
-        wrong, stops = self._wrong(window)
-        count = len(columns)
         times = self._period * (self.margin + self.step * np.arange(count)).astype(float)
         moves = slides and _rms(rates) > float(np.mean(self._coulomb_velocity))
         speeds = self.speeds or self._chosen_speeds(rates, accelerations, moves)

@@ -28,6 +28,8 @@ _TRANSITION = 5.5
 
 # Frequencies at which derivatives are exact, relative to the cut-off.
 _EXACT = np.array([0.0, 0.05, 0.15, 0.3, 0.45, 0.6])
+# Factors of lengths that a Fourier transform divides into fast parts.
+_FACTORS = (2, 3, 5, 7, 11)
 # Lowest frequency from which measured rates replace differentiated positions, by the cut-off.
 _LEAST = 0.2
 
@@ -123,6 +125,18 @@ def decimated(signal: Array, taps: Array, step: int) -> Array:
     for n in range(blocks):
         result += products[n:n + count, n]
     return result.reshape(count, *signal.shape[1:])
+
+
+def fast_length(most: int) -> int:
+    """Return the largest number of samples up to ``most`` whose Fourier transforms are fast."""
+    for count in range(most, 0, -1):
+        rest = count
+        for factor in _FACTORS:
+            while rest % factor == 0:
+                rest //= factor
+        if rest == 1:
+            return count
+    return most
 
 
 def white_deviation(signal: Array) -> Array:

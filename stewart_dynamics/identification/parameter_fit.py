@@ -35,8 +35,8 @@ from stewart_dynamics.errors import BagError
 from stewart_dynamics.estimation.posterior import Posterior, posterior
 from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
 from stewart_dynamics.identification.extraction import Extract, Extracts, ORDERS, SAMPLES
-from stewart_dynamics.identification.unknowns import (
-    inertial_derivative, ORIGINS, PLATFORM, Unknowns)
+from stewart_dynamics.identification.unknowns import CENTER, ORIGINS, PLATFORM, Unknowns
+from stewart_dynamics.mechanics.dynamics.linear_parameters import inertial_derivative
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
     from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue)
 from stewart_dynamics.parameters.table import Parameters
@@ -332,7 +332,7 @@ def _body(unknowns: Unknowns, values: Array, covariance: Array) -> Array:
     damping = 1e-3
     for _ in range(_BODY_STEPS):
         off = ((found - values)[:PLATFORM]) / scales
-        scaled = inertial_derivative(found[:PLATFORM]) * scales / units[:, None]
+        scaled = inertial_derivative(found[0], found[CENTER]) * scales / units[:, None]
         derivative = np.linalg.pinv(scaled) @ log_cholesky_derivative(eta)
         normal = derivative.T @ metric @ derivative
         step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12),

@@ -19,7 +19,7 @@ of any size.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import math
 from typing import Any
 
@@ -30,11 +30,12 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, BODY_UNITS, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND,
-    FIRST_MOMENT, inertial_parameters, LINEAR, linear_parameters, names_of, OFFSET,
-    parameter_values, PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, UNITS,
+    FIRST_MOMENT, inertial_derivative, inertial_parameters, LINEAR, linear_parameters, names_of,
+    OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, UNITS,
     VISCOUS_FRICTION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
+from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
 
 # Platform parameters as defined in the parameter file.
@@ -75,7 +76,6 @@ for _origin, _part in ((0, MASS), (1, CENTER), (2, INERTIA), (4, REFLECTED_MASS)
 _ACCELERATION = 10.0
 # Rate at which the scale of friction equals that share, relative to sqrt(acceleration size).
 _RATE = 0.1
-_STEP = 1e-30  # imaginary, of derivatives
 
 
 class Tilt:
@@ -93,16 +93,23 @@ class Tilt:
 
     def gravity(self, angles: Array) -> Array:
         """Return gravity, shape (3,), rotated by angles (2,) [rad]."""
-        turned = self._gravity
-        for axis, angle in zip(np.eye(3)[self._axes], angles, strict=True):
-            along = axis * (axis @ turned)
-            turned = along + (turned - along) * np.cos(angle) + np.cross(
-                axis, turned) * np.sin(angle)
-        return turned
+        return self._turns(angles)[-1]
 
     def change(self, angles: Array) -> Array:
         """Return the difference (3,) of rotated gravity and the file's value."""
         return self.gravity(angles) - self._gravity
+
+    def derivative(self, angles: Array) -> Array:
+        """Return the derivative (3, 2) of rotated gravity by the angles."""
+        first, second = self._axes
+        _, once, twice = self._turns(angles)
+        return np.stack([_turned(np.cross(np.eye(3)[first], once), second, angles[1]),
+                         np.cross(np.eye(3)[second], twice)], axis=-1)
+
+    def _turns(self, angles: Array) -> tuple[Array, Array, Array]:
+        """Return gravity before, between and after the rotations."""
+        once = _turned(self._gravity, self._axes[0], angles[0])
+        return self._gravity, once, _turned(once, self._axes[1], angles[1])
 
 
 class Unknowns:
@@ -181,18 +188,18 @@ class Unknowns:
     def derivative(self, values: Array) -> Array:
         """Return the derivative of ``theta`` with respect to the values, (n, k)."""
         d: Array = np.zeros((LINEAR_UNKNOWNS, len(values)))
-        d[:PLATFORM, :PLATFORM] = inertial_derivative(values[:PLATFORM])
+        d[:PLATFORM, :PLATFORM] = inertial_derivative(values[0], values[CENTER])
         d[PLATFORM:, PLATFORM:LINEAR_UNKNOWNS] = np.eye(LINEAR_UNKNOWNS - PLATFORM)
         angles = values[-3:-1]
         products = self.tilt.change(angles)[:, None, None] * d[_WEIGHING]
         products[..., -3:-1] += (self._level(values)[_WEIGHING, None]
-                                 * _derivative(self.tilt.change, angles)[:, None])
+                                 * self.tilt.derivative(angles)[:, None])
         return np.concatenate([d, products.reshape(-1, len(values))])
 
     def _level(self, values: Array) -> Array:
         """Return the linear parameters without those of the tilt."""
         level: Array = np.concatenate([
-            _inertial(values[:PLATFORM]) + self._payload, values[PLATFORM:LINEAR_UNKNOWNS]])
+            self.inertial(values) + self._payload, values[PLATFORM:LINEAR_UNKNOWNS]])
         return level
 
     def with_inertial(self, values: Array, ten: Array) -> Array:
@@ -204,7 +211,7 @@ class Unknowns:
 
     def inertial(self, values: Array) -> Array:
         """Return the platform's ten inertial parameters for values (k,)."""
-        return _inertial(values[:PLATFORM])
+        return inertial_parameters(Body(values[0], values[CENTER], values[INERTIA]))
 
     def not_negative(self) -> Integers:
         """Return the indices of leg parameters that cannot be negative."""
@@ -256,29 +263,13 @@ def _alike(value: Any, other: Any) -> bool:
     return bool(np.allclose(value, other, rtol=1e-9, atol=1e-12 * np.abs(other).max()))
 
 
-def _inertial(platform: Array) -> Array:
-    """Return the ten inertial parameters from mass, center of mass and inertia about it."""
-    mass, center, inertia = platform[0], platform[CENTER], platform[INERTIA]
-    spread = center @ center * np.eye(3) - np.outer(center, center)
-    ten: Array = np.concatenate([
-        [mass], mass * center, inertia + mass * spread[np.triu_indices(3)]])
-    return ten
-
-
-def inertial_derivative(platform: Array) -> Array:
-    """Return the derivative (10, 10) of the inertial parameters by mass, center and inertia."""
-    return _derivative(_inertial, platform)
-
-
-def _derivative(function: Callable[[Array], Array], at: Array) -> Array:
-    """
-    Return the derivative (n, k) of an analytic function at values (k,), exact to rounding.
-
-    A complex step takes no difference (W. Squire, G. Trapp, "Using complex variables to estimate
-    derivatives of real functions", SIAM Review 40, 1998, doi:10.1137/S003614459631241X).
-    """
-    return np.stack([function(at + _STEP * 1j * axis).imag / _STEP for axis in np.eye(len(at))],
-                    axis=-1)
+def _turned(vector: Array, axis: int, angle: float) -> Array:
+    """Return a vector (3,) rotated about x, y or z."""
+    turned, (one, other) = vector.copy(), ((axis + 1) % 3, (axis + 2) % 3)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turned[one] = cosine * vector[one] - sine * vector[other]
+    turned[other] = sine * vector[one] + cosine * vector[other]
+    return turned
 
 
 def _leg_scales(p: Parameters) -> Array:

@@ -26,7 +26,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.rows import consecutive
 from stewart_dynamics.parameters.body import Body
-from stewart_dynamics.parameters.table import inertia_matrix, Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 (PLATFORM, CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND, PISTON_MASS, PISTON_FIRST,
  PISTON_SECOND, REFLECTED_MASS, VISCOUS_FRICTION, COULOMB_FRICTION, OFFSET) = consecutive(
@@ -123,10 +123,25 @@ def inertial_parameters(body: Body) -> Array:
 
 def about_origin(mass: float, center: Array, inertia: Array) -> Array:
     """Return ixx ixy ixz iyy iyz izz about the origin, given about a center of mass (6,)."""
-    whole = inertia_matrix(inertia) + mass * (
-        np.dot(center, center) * np.eye(3) - np.outer(center, center))
-    six: Array = whole[np.triu_indices(3)]
+    six: Array = inertia + 0.5 * mass * point_inertia_derivative(center) @ center
     return six
+
+
+def point_inertia_derivative(point: Array) -> Array:
+    """Return the derivative (6, 3) of the inertia of a mass of 1 at a point, by the point."""
+    x, y, z = point
+    return np.array([[0.0, 2.0 * y, 2.0 * z], [-y, -x, 0.0], [-z, 0.0, -x],
+                     [2.0 * x, 0.0, 2.0 * z], [0.0, -z, -y], [2.0 * x, 2.0 * y, 0.0]])
+
+
+def inertial_derivative(mass: float, center: Array) -> Array:
+    """Return the derivative (10, 10) of ``inertial_parameters`` by mass, center and inertia."""
+    matrix = np.eye(10)
+    coupling = point_inertia_derivative(center)
+    matrix[FIRST_MOMENT, MASS], matrix[INERTIA, MASS] = center, 0.5 * coupling @ center
+    matrix[FIRST_MOMENT, FIRST_MOMENT] *= mass
+    matrix[INERTIA, FIRST_MOMENT] = mass * coupling
+    return matrix
 
 
 def with_point_mass(p: Parameters, added: float, position: ArrayLike) -> Parameters:
