@@ -303,6 +303,15 @@ def test_rates_inside_the_coulomb_friction_band_are_reported(velocity: float, sa
                for each in bag.notices) == said
 
 
+def test_a_platform_of_a_tenth_of_its_mass_is_no_mistake() -> None:
+    # Its delay must not be found by efforts of another unit.
+    truth = drawn(122)
+    assert truth.parameters['platform.mass'] < 0.11 * GIVEN['platform.mass']
+    found = identified([estimate_cases.recorded(truth, 'heave', 122)], truth)
+    assert found.causes == ()
+    assert found.delay == pytest.approx(NOISE.delay, abs=2e-4)
+
+
 @pytest.fixture(scope='module')
 def right() -> tuple[list[Recorded], Identified]:
     """Return a recording of a right model, and the identification from it."""

@@ -235,7 +235,8 @@ class Extraction:
         It is the lag in samples with the smallest misfit, in steps of a fraction of a cut-off
         period; 0 unless the misfit is much smaller than without a lag. The misfit is that of
         efforts and prior, squared and relative to the efforts. The scale is that of the efforts by
-        the file; ``of_any_scale``: efforts are divided by it where it is another unit or sign.
+        the file. ``of_any_scale``: it is 1 unless efforts divided by it, of another unit or sign,
+        fit better.
         """
         extract = self(window, guess).extract
         efforts = convolved(window.efforts[self._wide.half:-self._wide.half], self._narrow.taps())
@@ -245,27 +246,33 @@ class Extraction:
         at: Integers = self.step * np.arange(len(extract.times))
         inside = (at + most < len(efforts)) & (at >= most)
         at, used = at[inside], extract.used[inside]
-        size = _rms(efforts)
-        if not used.any() or size == 0.0:
-            return 0, 1.0, 0.0
+        if not used.any() or not efforts.any():
+            return 0, 1.0, 1.0
         u = self._unknowns
         regressor = extract.regressor[inside][used]
         columns = regressor @ u.derivative(u.start) @ u.root
         modelled = regressor @ u.theta(u.start)
-        scale = float(np.sum(efforts[at][used] * modelled) / (np.sum(modelled ** 2) + 1e-300))
-        if of_any_scale and not 1.0 / FAR < scale < FAR and scale != 0.0:
-            efforts, size = efforts / scale, size / abs(scale)
-        deviation = _ROUGHLY * size
-        inverse = np.linalg.inv(columns.T @ columns / deviation ** 2 + np.eye(len(u.start)))
-        misfits = []
-        for lag in lags:
-            off = (efforts[at + lag][used] - modelled) / deviation
-            vector = columns.T @ off / deviation
-            misfits.append(float(off @ off - vector @ inverse @ vector) * _ROUGHLY ** 2 / off.size)
-        best, none = int(np.argmin(misfits)), len(lags) // 2
-        if misfits[best] > _LESS * misfits[none]:
-            best = none
-        return int(lags[best]), misfits[best], scale
+        shifted = np.stack([efforts[at + lag][used] for lag in lags])
+        none = len(lags) // 2
+        by_file = float(shifted[none] @ modelled / (modelled @ modelled + 1e-300))
+        is_far = by_file != 0.0 and not 1.0 / FAR < by_file < FAR
+        found = []
+        for scale in [1.0, by_file] if of_any_scale and is_far else [1.0]:
+            deviation = _ROUGHLY * _rms(efforts / scale)
+            off = (shifted / scale - modelled) / deviation
+            inverse = np.linalg.inv(columns.T @ columns / deviation ** 2 + np.eye(len(u.start)))
+            z = off @ columns @ inverse / deviation
+            left = off - z @ columns.T / deviation
+            misfits = np.sum(left ** 2, axis=1) + np.sum(z ** 2, axis=1)
+            best = int(np.argmin(misfits))
+            if misfits[best] > _LESS * misfits[none]:
+                best = none
+            # A sign that only a negative mass could explain may also be the other side.
+            of_mass = u.misfit_of_mass(float(z[best, 0])) if of_any_scale else 0.0
+            found.append(((float(misfits[best]) + of_mass) * _ROUGHLY ** 2 / len(modelled), best,
+                          scale))
+        misfit, best, scale = min(found)
+        return int(lags[best]), misfit, scale if of_any_scale else by_file
 
     def _chosen_speeds(self, rates: Array, accelerations: Array, moves: bool,
                        ) -> tuple[float, ...]:

@@ -256,10 +256,7 @@ class Identification:
         if not bag.is_long_enough(window):
             bag.lag = 0
         window = window.with_lag(bag.lag)
-        if scale != 0.0 and not 1.0 / FAR < scale < FAR:  # of another unit or sign
-            self._find_delay(bag, window._replace(efforts=window.efforts / scale))
-        else:
-            self._find_delay(bag, window)
+        self._find_delay(bag, window._replace(efforts=window.efforts / scale))
         return window, self._read_window(bag, window)
 
     def _add_read(self, bag: _Bag, window: Window, read: WindowRead) -> None:

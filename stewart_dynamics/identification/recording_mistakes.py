@@ -43,7 +43,6 @@ _BETTER = 0.7
 _ROUGHLY, _WELL = 0.01, 0.1
 # Twice the logarithm of the likelihood ratio from which another hypothesis is taken.
 _CLEARLY = 2.0 * math.log(1000.0)
-_LEAST_MASS = 1e-9  # relative to the file's, where the prior judges it
 # Ratio of residuals on held-out time from which the file is better than the fit.
 _WORSE = 1.05
 _LEGS = range(6)
@@ -102,13 +101,8 @@ class Comparison:
         weight, inverse = self._solved(scale)
         z = inverse @ (weight * self._columns.T @ self._gram @ c)
         left = c - self._columns @ z
-        misfit = weight * float(left @ self._gram @ left) + float(z @ z)
-        # A mass is positive: the prior judges the logarithm of its ratio to the file's.
-        part = self._unknowns.root[0, 0] / self._unknowns.start[0]
-        if part > 0.0:
-            mass = max(1.0 + part * float(z[0]), _LEAST_MASS)
-            misfit += (math.log(mass) / part) ** 2 - float(z[0]) ** 2
-        return misfit
+        return (weight * float(left @ self._gram @ left) + float(z @ z)
+                + self._unknowns.misfit_of_mass(float(z[0])))
 
     def relative(self, scale: float = 1.0, delay: float = 0.0) -> float:
         """Return the RMS misfit, relative to the efforts."""

@@ -72,6 +72,7 @@ for _origin, _part in ((0, MASS), (1, CENTER), (2, INERTIA), (4, REFLECTED_MASS)
                        (5, VISCOUS_FRICTION), (5, COULOMB_FRICTION), (6, OFFSET)):
     _ORIGIN_OF[_part] = _origin
 
+_LEAST_MASS = 1e-9  # relative to the file's, where the prior judges it
 # Acceleration at which the scale of inertial effects equals a leg's share of the weight [m/s^2].
 _ACCELERATION = 10.0
 # Rate at which the scale of friction equals that share, relative to sqrt(acceleration size).
@@ -168,6 +169,13 @@ class Unknowns:
         """Return the prior standard deviations (k,)."""
         deviations: Array = np.sqrt(np.sum(self.root ** 2, axis=1))
         return deviations
+
+    def misfit_of_mass(self, z: float) -> float:
+        """Return what z^2 lacks: a mass is positive, the logarithm of its ratio is judged."""
+        part = self.root[0, 0] / self.start[0]
+        if not part > 0.0:
+            return 0.0
+        return float((math.log(max(1.0 + part * z, _LEAST_MASS)) / part) ** 2 - z ** 2)
 
     def linear(self, values: Array) -> Array:
         """Return the parameters (LINEAR,) of the regressor, under level gravity."""
