@@ -69,9 +69,9 @@ def weights_of(residuals: Array, free: Array, samples: int, least: float) -> Wei
     """
     Return the weights by spectra of residuals (F, 2, 6).
 
-    The logarithms of the legs' spectra have one shape, and deviations from it as large as they show beyond
-    chance (empirical Bayes, as in ``noisy_rates``): the fewer numbers are estimated from the
-    residuals, the less do weights follow the residuals that they weigh.
+    The logarithms of the legs' spectra have one shape, and deviations from it as large as they
+    show beyond chance (empirical Bayes, as in ``noisy_rates``): the fewer numbers are estimated
+    from the residuals, the less do weights follow the residuals that they weigh.
 
     ``free`` (F, 2, 6) are the parts of their variance that the fit leaves, ``least`` the smallest
     deviation [N].
