@@ -177,7 +177,9 @@ class _Windows:
         self._platform, self._rows = platform, rows
         stamps = stamps_of(rows)
         self.stamp, self.seconds = int(stamps[-1]), (stamps - stamps[0]) * NANOSECOND
-        self._force_max = table.six_of(p.limits.force_max, math.inf)
+        parts = np.abs(rows[:, ACTED]) / table.six_of(p.limits.force_max, math.inf)
+        self._saturated: Flags = np.any(
+            (parts > _SATURATED[0]) & (parts < _SATURATED[1]), axis=1)
         self._shortest = table.six_of(p.limits.length_min, 0.0)
         self._longest = table.six_of(p.limits.length_max, math.inf)
         self._friction = Friction.of(p)
@@ -213,7 +215,7 @@ class _Windows:
         results = self._platform.solve(motions, rows[:, LOADED], bases)
         lengths = results[:, LENGTHS]
         # Efforts have no part of the force of an end stop.
-        right = ~(self._saturated(rows) | self._saturated(following)) & np.all(
+        right = ~(self._saturated[at] | self._saturated[at + 1]) & np.all(
             (lengths > self._shortest) & (lengths < self._longest), axis=1)
         self.excluded += int(np.count_nonzero(~right))
         values = np.empty((len(at), 6, LINEAR + 2))
@@ -223,7 +225,7 @@ class _Windows:
         values[:, _LEGS, COULOMB_FRICTION.start + _LEGS] = 0.0
         model = results[:, FORCES] - self._friction.coulomb * sliding
         values[..., LINEAR], values[..., LINEAR + 1] = forces - model, model
-        right &= np.isfinite(values).all(axis=(1, 2))  # not where J_inv cannot be solved
+        right &= np.isfinite(values.sum(axis=(1, 2)))  # not where J_inv cannot be solved
         used = at[right]
         if not len(used):
             return
@@ -234,11 +236,6 @@ class _Windows:
         of_window, first = np.unique(self._turns(used), return_index=True)
         self._motions[of_window], self._bases[of_window] = (
             motions[right][first], bases[right][first])
-
-    def _saturated(self, rows: Array) -> Flags:
-        parts = np.abs(rows[:, ACTED]) / self._force_max
-        saturated: Flags = np.any((parts > _SATURATED[0]) & (parts < _SATURATED[1]), axis=1)
-        return saturated
 
     def end(self) -> Iterator[None]:
         """End the adding, yield after each piece of the work; friction follows."""
