@@ -293,7 +293,8 @@ def table(only: str) -> list[str]:
     rows = in_processes(answer, [each for each in ROWS if only in each])
     return ['', *markdown([('recording', 'answer'), *rows]), '',
             f'The payload of {PAYLOAD_SECONDS:.0f} s at 1 kHz takes {milliseconds():.0f} ms of '
-            f'processor time, an identification from {SECONDS:.0f} s at 1 kHz {seconds():.1f} s.', '']
+            f'processor time, an identification from {SECONDS:.0f} s at 1 kHz {seconds():.1f} s.',
+            '']
 
 
 def main() -> None:
