@@ -33,6 +33,7 @@ class PoseLimits:
 
     limits: all limits of the legs.
     angles, clearance: of joints and legs; None without limits of them.
+    drives, motors: motors at rows of motion, None without any, and their limits.
     stop_condition: condition number from which on a pose is singular.
     arguments: those of functions in C that check limits, after the hexapod: drives, plates, which.
     """
@@ -43,14 +44,14 @@ class PoseLimits:
         self.clearance = clearance_to_check(parameters)
         self.stop_condition = stop_condition_of(parameters)
         drives = Drives(parameters)
-        self._drives = drives if parameters.drives else None
-        self._motors = MotorLimits(parameters)
+        self.drives = drives if parameters.drives else None
+        self.motors = MotorLimits(parameters)
         none = np.empty((0, 3))
         base, platform = (none, none) if self.clearance is None else (
             self.clearance.base, self.clearance.platform)
         checks: Any = np.zeros((), record('limit_checks'))
         checks['angles'], checks['clearance'], checks['motors'] = (
-            self.angles is not None, self.clearance is not None, self._drives is not None)
+            self.angles is not None, self.clearance is not None, self.drives is not None)
         if self.angles is not None:
             checks['joint_axes'] = self.angles.axes.reshape(36)
         self.arguments = (
@@ -90,8 +91,8 @@ class PoseLimits:
         found = {name: (results[:, LIMITS[name].columns],
                         np.broadcast_to(self.limits.bounds[name], shape))
                  for name in self.limits.of_loads}
-        if self._drives is not None:
-            of_motors = self._motors.excesses(self._drives(motions, results), np.zeros(shape))
+        if self.drives is not None:
+            of_motors = self.motors.excesses(self.drives(motions, results), np.zeros(shape))
             found.update((name, of_motors[name]) for name in (TORQUE_MAX, TORQUE_SPEED))
         return found
 

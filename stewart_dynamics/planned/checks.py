@@ -17,20 +17,18 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
-from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
+from stewart_dynamics.mechanics.drives.motor_limits import exceeds
 from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS as ACCELERATIONS_OF_MOTORS, ANGLES as ANGLES_OF_MOTORS, AVAILABLE_TORQUES,
-    Drives, motor_ratio, Motors, SPEEDS)
+    motor_ratio, Motors, SPEEDS)
 from stewart_dynamics.mechanics.dynamics.friction import Friction
-from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
-from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, result_values,
+    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, LIMITS, result_values,
     SPEED_MAX, TEMPERATURE_RISE_MAX, VELOCITY_MAX)
+from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.interpolation import Cubics
 from stewart_dynamics.planned.sampling import TOLERANCE
@@ -99,15 +97,13 @@ class Checks:
         self.force, self.force_leg, self.load = -1.0, 0, 0.0
         self._strongest = np.zeros(6)
         self._joints = parameters.joints
-        self._limits = Limits(parameters)
-        self._angles = angles_to_check(parameters, self._limits.of_joints)
-        self._clearance = clearance_to_check(parameters)
+        poses = PoseLimits(parameters)
+        self._limits, self._stop = poses.limits, poses.stop_condition
+        self._angles, self._clearance = poses.angles, poses.clearance
+        self._drives, self._motor_limits = poses.drives, poses.motors
         self._clearance_tolerance = _CLEARANCE * parameters.singularity.characteristic_length
-        self._stop = stop_condition_of(parameters)
         self._friction = Friction.of(parameters)
         self._parameters = parameters
-        self._drives = Drives(parameters) if parameters.drives else None
-        self._motor_limits = MotorLimits(parameters)
         self._rises = np.zeros(6)
         self.mistake: str | None = None
 
