@@ -895,10 +895,11 @@ def test_the_library_raises_what_the_program_prints(tmp_path: Path, snapshot: Sn
     assert summary_of(tmp_path / 'out') == result.summary
 
 
-def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
+def test_joint_angles_clearance_and_joint_forces_are_in_the_results_where_they_have_limits(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     platform = StewartPlatform(PARAMETERS.replaced({
         'limits.base_joint_angle_max': 0.5, 'limits.leg_clearance_min': 0.1,
+        'limits.joint_force_max': 1e5,
         'legs.cylinder.radius': 0.05, 'legs.cylinder.length': 0.8, 'legs.piston.radius': 0.03}))
     file = tmp_path / 'hexapod.yaml'
     platform.parameters.to_yaml(file)
@@ -925,6 +926,8 @@ def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
         clearance = [float(row[f'{name}_clearance_m']) for row in rows]
         np.testing.assert_allclose(clearance, clearances[:, leg], rtol=0.0, atol=1e-14)
         assert found['clearance_min_m'] == min(clearance)
+        carried = [abs(float(row[f'{name}_joint_force_n'])) for row in rows]
+        assert abs(found['joint_force_peak_n']) == max(carried)
     assert 'limits.base_joint_angle_max, 0.5 rad, exceeded by leg_4' in text
     assert 'clearance between legs: ' in text
     assert 'base joints: 0.5846 rad (33.5 deg) at most, leg_4 at t = 10.00 s; margin' in text

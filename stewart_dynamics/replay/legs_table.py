@@ -27,9 +27,10 @@ _ENDS = (b',0\n', b',1\n')
 
 
 def column_names(legs: Sequence[str], joint_angles: bool = False, clearance: bool = False,
-                 ) -> list[str]:
+                 joint_forces: bool = False) -> list[str]:
     """Return the names of the columns; a name ends with its unit."""
-    limited = (*(('base_joint_angle_rad', 'platform_joint_angle_rad') if joint_angles else ()),
+    limited = (*(('joint_force_n',) if joint_forces else ()),
+               *(('base_joint_angle_rad', 'platform_joint_angle_rad') if joint_angles else ()),
                *(('clearance_m',) if clearance else ()))
     return ['stamp_ns', 'time_s',
             *(f'position_{axis}_m' for axis in 'xyz'),
@@ -48,17 +49,18 @@ class Table(ABC):
 
     folder: folder of the file.
     quasi_static: velocities are not known: columns that depend on them are empty.
-    joint_angles, clearance: there are columns of the joints' angles, and of the clearance between
-        the legs.
+    joint_angles, clearance, joint_forces: there are columns of the joints' angles, of the clearance
+        between the legs, and of the forces in rods and joints.
     """
 
     FILE = ''
 
     def __init__(
             self, folder: Path, legs: Sequence[str], quasi_static: bool = False,
-            joint_angles: bool = False, clearance: bool = False) -> None:
-        self._quasi_static = quasi_static
-        self._open(folder / self.FILE, column_names(legs, joint_angles, clearance))
+            joint_angles: bool = False, clearance: bool = False, joint_forces: bool = False,
+            ) -> None:
+        self._quasi_static, self._joint_forces = quasi_static, joint_forces
+        self._open(folder / self.FILE, column_names(legs, joint_angles, clearance, joint_forces))
 
     def write(self, block: Answered) -> None:
         """Write the rows of N setpoints."""
@@ -73,7 +75,7 @@ class Table(ABC):
             block.seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
             outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
             outputs.determinants, determinant_rates, outputs.conditions, block.base_wrenches,
-            outputs.joint_angles, outputs.clearances])
+            outputs.joint_forces[:, :6 if self._joint_forces else 0], outputs.joint_angles, outputs.clearances])
         self._write(outputs.stamps, numbers, outputs.warnings)
 
     @abstractmethod
@@ -82,7 +84,7 @@ class Table(ABC):
 
     @abstractmethod
     def _write(self, stamps: Stamps, numbers: Array, warnings: Flags) -> None:
-        """Write rows: stamps (N,) [ns], numbers (N, 41 to 59) with nan: not known, warnings."""
+        """Write rows: stamps (N,) [ns], numbers (N, 41 to 65) with nan: not known, warnings."""
 
     @abstractmethod
     def close(self) -> None:

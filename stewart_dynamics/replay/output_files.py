@@ -54,7 +54,8 @@ class OutputFiles:
         self._table = kind_of_table(options.parquet)(
             folder, parameters.joints, quasi_static,
             any(parameters[name] is not None for name in OF_JOINTS),
-            parameters.limits.leg_clearance_min is not None)
+            parameters.limits.leg_clearance_min is not None,
+            parameters.limits.joint_force_max is not None)
         self._bag = OutputBag(folder / OUTPUT_BAG, options.node, OutputMessages(parameters), model,
                               parameters.visualization_rate, inputs)
 
