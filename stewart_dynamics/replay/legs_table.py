@@ -49,8 +49,8 @@ class Table(ABC):
 
     folder: folder of the file.
     quasi_static: velocities are not known: columns that depend on them are empty.
-    joint_angles, clearance, joint_forces: there are columns of the joints' angles, of the clearance
-        between the legs, and of the forces in rods and joints.
+    joint_angles, clearance, joint_forces: there are columns of the angles of the joints, of the
+        clearance between the legs, and of the forces in rods and joints.
     """
 
     FILE = ''
@@ -75,7 +75,8 @@ class Table(ABC):
             block.seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
             outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
             outputs.determinants, determinant_rates, outputs.conditions, block.base_wrenches,
-            outputs.joint_forces[:, :6 if self._joint_forces else 0], outputs.joint_angles, outputs.clearances])
+            outputs.joint_forces[:, :6 if self._joint_forces else 0], outputs.joint_angles,
+            outputs.clearances])
         self._write(outputs.stamps, numbers, outputs.warnings)
 
     @abstractmethod
