@@ -40,6 +40,7 @@ PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 VARIABLES = variables(PARAMETERS)
 REFERENCES = {each.name: n for n, each in enumerate(VARIABLES)}
 FORCES = [REFERENCES[f'forces[{leg}]'] for leg in range(1, 7)]
+JOINT_FORCES = [REFERENCES[f'joint_forces[{leg}]'] for leg in range(1, 7)]
 LENGTHS = [REFERENCES[f'lengths[{leg}]'] for leg in range(1, 7)]
 STATUS = [REFERENCES['status']]
 HOME = [each.start for each in VARIABLES[:47]]
@@ -156,6 +157,7 @@ def test_figure_18(unit: Unit) -> None:
         unit.put(0, row)
         assert unit.step(0.01) == expected.forces[n].tolist(), n
         assert unit.get(LENGTHS) == expected.lengths[n].tolist()
+        assert unit.get(JOINT_FORCES) == expected.joint_forces[n].tolist()
         assert unit.warning == expected.warnings[n]
     assert len(rows) == len(expected.stamps) == 1001
     assert np.sign(expected.determinants).min() < 0.0 < expected.determinants.max()

@@ -150,7 +150,8 @@ def _tunable() -> Iterator[Variable]:
 def _outputs() -> Iterator[Variable]:
     for name, unit, text in (
             ('lengths', 'm', 'length'), ('rates', 'm/s', 'rate of the length'),
-            ('forces', 'N', 'force to command, positive pushes; zero unless status is 0')):
+            ('forces', 'N', 'force to command, positive pushes; zero unless status is 0'),
+            ('joint_forces', 'N', 'force in rod and joints, positive pushes; likewise')):
         for leg in range(1, 7):
             yield Variable(f'{name}[{leg}]', 'output', f'{text} of leg {leg}', unit)
     yield Variable('determinant', 'output', 'det(J), zero at a singularity', 'm3')

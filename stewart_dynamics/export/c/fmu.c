@@ -133,6 +133,7 @@ int fmu_step(fmu_instance * instance, double time)
   }
   for (n = 0; n < 6; n++) {
     values[FMU_FORCES + n] = code == STEWART_OK ? output.forces[n] : 0.0;
+    values[FMU_JOINT_FORCES + n] = code == STEWART_OK ? output.result.joint_forces[n] : 0.0;
   }
   values[FMU_STATUS] = code;
   values[FMU_TIME] = time;

@@ -51,16 +51,17 @@ enum {
   FMU_LENGTHS = 62,  /* the first output */
   FMU_RATES = 68,
   FMU_FORCES = 74,
-  FMU_DETERMINANT = 80,
-  FMU_DETERMINANT_RATE = 81,
-  FMU_CONDITION_NUMBER = 82,
-  FMU_WARNING = 83,
-  FMU_EXCEEDED = 84,
-  FMU_STATUS = 90,
-  FMU_TIME = 91,
-  FMU_MOTOR_SPEEDS = 92,  /* the first of those that exist with drives alone */
-  FMU_MOTOR_TORQUES = 98,
-  FMU_VALUES = 104
+  FMU_JOINT_FORCES = 80,
+  FMU_DETERMINANT = 86,
+  FMU_DETERMINANT_RATE = 87,
+  FMU_CONDITION_NUMBER = 88,
+  FMU_WARNING = 89,
+  FMU_EXCEEDED = 90,
+  FMU_STATUS = 96,
+  FMU_TIME = 97,
+  FMU_MOTOR_SPEEDS = 98,  /* the first of those that exist with drives alone */
+  FMU_MOTOR_TORQUES = 104,
+  FMU_VALUES = 110
 };
 
 typedef enum {FMU_REAL, FMU_INTEGER, FMU_BOOLEAN, FMU_OTHER} fmu_type;
