@@ -9,7 +9,8 @@ from contextlib import closing
 from pathlib import Path
 
 import estimate_cases
-from estimate_cases import drawn, identified, MOTIONS, recording, Truth, with_friction
+from estimate_cases import (
+    braked, drawn, identified, MOTIONS, recording, rich, SENSORS, stopping, Truth, with_friction)
 from independent_hexapod import Legs, moving
 import numpy as np
 from numpy.typing import NDArray
@@ -263,6 +264,17 @@ def test_swapped_legs_are_named_before_a_delay_that_fits_them_best() -> None:
     given = estimate_cases.recorded(drawn(3), 'roll', 3)
     swapped = given._replace(efforts=given.efforts[:, [1, 0, 2, 3, 4, 5]])
     assert identified([swapped], drawn(3)).causes[0] == 'swapped'
+
+
+def test_brakes_before_a_motion_are_no_delay_of_the_efforts() -> None:
+    truth, path = drawn(1), rich(rng(1))._replace(warp=stopping(0.0, 10.0))
+
+    def legs(times: Array) -> Legs:
+        return moving(truth.parameters, path(times))
+
+    given = recording(
+        braked(legs, 0.0, 9.9), 1, SENSORS._replace(delay=20e-3), truth.gain)
+    assert identified([given], truth).delay == pytest.approx(20e-3, abs=5e-4)
 
 
 @pytest.mark.parametrize('seed', [2, 3])

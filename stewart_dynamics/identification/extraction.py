@@ -245,7 +245,7 @@ class Extraction:
         lags: Integers = np.arange(-most, most + 1, steps)
         at: Integers = self.step * np.arange(len(extract.times))
         inside = (at + most < len(efforts)) & (at >= most)
-        at, used = at[inside], extract.used[inside]
+        at, used = at[inside], self.showing_delay(extract)[inside]
         if not used.any() or not efforts.any():
             return 0, 1.0, 1.0
         u = self._unknowns
@@ -273,6 +273,17 @@ class Extraction:
                           scale))
         misfit, best, scale = min(found)
         return int(lags[best]), misfit, scale if of_any_scale else by_file
+
+    def showing_delay(self, extract: Extract) -> Flags:
+        """
+        Return which efforts (N, 6) show a delay: those in motion, if the platform moves at all.
+
+        At rest it may be held, by brakes or a contact.
+        """
+        moving = np.any(
+            np.abs(extract.legs[..., 1]) > self._coulomb_velocity, axis=1, keepdims=True)
+        used: Flags = extract.used & (moving | ~moving.any())
+        return used
 
     def _chosen_speeds(self, rates: Array, accelerations: Array, moves: bool,
                        ) -> tuple[float, ...]:

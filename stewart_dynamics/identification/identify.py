@@ -355,11 +355,12 @@ class Identification:
             for part in piece, piece, window:
                 with suppress(BagError):  # none of a piece is a reason to reject all
                     read = self._read_window(bag, part)
-                    bag.lag_is_known = read.moves
-                    if not read.moves:
+                    bag.lag_is_known = bag.lag_is_known or read.moves
+                    if not bag.lag_is_known:
                         return
                     one.clear()
-                    one.add(0, 0.0, read)
+                    one.add(0, 0.0, read._replace(extract=read.extract._replace(
+                        used=bag.extraction.showing_delay(read.extract))))
                     bag.extraction.later += float(
                         fit(one, self.unknowns, None, cutoff, passes=1).delays[0])
 
