@@ -7,19 +7,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from checked_results import checked
 import numpy as np
 import pytest
 from snapshot import Snapshot
 
 from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics.frames import rotation as rotations
-from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, RESULT)
-from stewart_dynamics.mechanics.singularity_warning import Singularity
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_time, sample_times
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.reference_motion.multisine import multisine
+from stewart_dynamics.setpoints.step import Batch, Step
 
 PROGRAM = 'stewart_trajectory'
 
@@ -251,13 +248,10 @@ def test_files_suit_the_hexapod(path: Path, platform: StewartPlatform) -> None:
     assert np.all(np.abs(result.rates) <= p['limits.velocity_max'])
     singular = path.stem == 'trajectory_singular'
     assert np.any(np.abs(result.forces) > p['limits.force_max']) == singular
-    warned, state, row = False, Singularity(), np.zeros(RESULT)
-    for sample in zip(result.determinant, result.determinant_rate, result.condition_number,
-                      strict=True):
-        row[[DETERMINANT, DETERMINANT_RATE, CONDITION]] = sample
-        state, _ = checked(p, row, state)
-        warned |= state.warning
-    assert warned == singular
+    stamps = np.arange(len(times))
+    answers = Step(p).many(Batch(stamps, motion_at(motion, times).rows, np.zeros((1, 6)),
+                                 np.zeros(len(times), dtype=bool), stamps), None)
+    assert np.any(answers.warnings) == singular
     assert singular or result.condition_number.max() < 5.0
 
 

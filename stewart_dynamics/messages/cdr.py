@@ -62,8 +62,19 @@ def aligned8(offset: int) -> int:
 
 def check_encapsulation(data: bytes) -> None:
     """Raise MalformedError where a message is not plain CDR."""
-    if data[0] != 0:
+    if data[0] != 0 or data[1] not in ORDERS:
         raise MalformedError(f'encapsulation {data[:2].hex()} is not plain CDR')
+
+
+def unreadable(data: bytes) -> MalformedError:
+    """Return the error of bytes that are not plain CDR, or that end before the message does."""
+    try:
+        check_encapsulation(data)
+    except MalformedError as exc:
+        return exc
+    except IndexError:
+        pass
+    return MalformedError(f'{len(data)} bytes: they end before the message does')
 
 
 def nanoseconds(data: bytes, sec: int, nanosec: int) -> int:
@@ -115,7 +126,7 @@ def stamped(data: bytes, numbers: dict[int, Struct]) -> Stamped:
         end = 16 + size
         values = numbers[order].unpack_from(data, aligned8(end))
     except READ_ERRORS as exc:
-        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+        raise unreadable(data) from exc
     return Stamped(nanoseconds(data, sec, nanosec), text(data, 16, size), values)
 
 

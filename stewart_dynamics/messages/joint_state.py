@@ -22,7 +22,8 @@ from stewart_dynamics.arrays import Array, Bytes, Stamps
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.messages.cdr import (
     aligned8, COUNT, finite, header, LITTLE_ENDIAN, MALFORMED, MalformedError, nanoseconds,
-    NOT_FINITE, put_count, put_text, READ_ERRORS, sequence, short_sequence, text, TIME_AND_LENGTH)
+    NOT_FINITE, put_count, put_text, READ_ERRORS, sequence, short_sequence, text, TIME_AND_LENGTH,
+    unreadable)
 from stewart_dynamics.messages.layout import Layout
 
 FIELDS = ('position', 'velocity', 'effort')
@@ -90,7 +91,7 @@ def _fields(data: bytes) -> _Fields:
             numbers.append((at, number))
             at += 8 * number
     except READ_ERRORS as exc:
-        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+        raise unreadable(data) from exc
     if at > len(data):
         raise MalformedError(f'{len(data)} bytes: must be at least {at}')
     return _Fields(stamp, names, tuple(numbers), (*gaps, slice(at, len(data))))

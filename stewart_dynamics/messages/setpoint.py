@@ -15,7 +15,7 @@ from struct import Struct
 
 from stewart_dynamics.messages.cdr import (
     aligned8, COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, READ_ERRORS, sequence,
-    SEVEN, SIX, Stamped, stamped, text, TIME_AND_LENGTH)
+    SEVEN, SIX, Stamped, stamped, text, TIME_AND_LENGTH, unreadable)
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.trajectory_layouts import points_of
 
@@ -58,7 +58,7 @@ def combined(data: bytes) -> Stamped:
         # time_from_start: not used, but it must be there
         _DURATION[order].unpack_from(data, at + layout[order].size)
     except READ_ERRORS as exc:
-        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+        raise unreadable(data) from exc
     return Stamped(nanoseconds(data, sec, nanosec), text(data, 16, size), values)
 
 

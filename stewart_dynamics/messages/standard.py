@@ -10,8 +10,8 @@ from struct import Struct
 
 from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.messages.cdr import (
-    aligned8, check_encapsulation, COUNT, LITTLE_ENDIAN, MalformedError, ORDERS, put_count,
-    put_text, READ_ERRORS, sequence, short_sequence)
+    aligned8, check_encapsulation, COUNT, LITTLE_ENDIAN, ORDERS, put_count, put_text, READ_ERRORS,
+    sequence, short_sequence, unreadable)
 from stewart_dynamics.messages.layout import Layout
 
 _FLOAT64 = Struct('<4sd')
@@ -62,7 +62,7 @@ def float64_values(data: bytes) -> tuple[float, ...]:
         values: tuple[float, ...] = Struct(f'{ORDERS[order]}{number}d').unpack_from(
             data, aligned8(at) if number else at)
     except READ_ERRORS as exc:
-        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+        raise unreadable(data) from exc
     check_encapsulation(data)
     return values
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.messages.cdr import (
     COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, ORDERS, put_count, put_text,
-    READ_ERRORS, sequence, text, TIME_AND_LENGTH)
+    READ_ERRORS, sequence, text, TIME_AND_LENGTH, unreadable)
 
 # A point of a MultiDOFJointTrajectory of one joint or two, and one of a JointTrajectory of six
 # without accelerations. All begin at a multiple of eight bytes but the first, which may begin
@@ -79,7 +79,7 @@ class PlatformTrajectory:
             sec, nanosec, size = TIME_AND_LENGTH[order].unpack_from(data, 4)
             self.names, self.size, self._first = points_of(data, [], 2)
         except READ_ERRORS as exc:
-            raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+            raise unreadable(data) from exc
         self.stamp = nanoseconds(data, sec, nanosec)
         self.frame = text(data, 16, size)
         self._data = data

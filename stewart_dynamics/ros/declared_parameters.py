@@ -151,8 +151,9 @@ def _serve(node: Node, kind: type[ParameterSet]) -> None:
     def set_together(messages: Sequence[Any]) -> SetParametersResult:
         try:
             received = [_received(node, message) for message in messages]
-            return node.set_parameters_atomically(
-                [each for each in received if not _is_present(node, each)])
+            changes = [each for each in received if not _is_present(node, each)]
+            return (node.set_parameters_atomically(changes) if changes
+                    else SetParametersResult(successful=True))
         except (ParameterException, RuntimeError, TypeError, ValueError) as exc:
             return SetParametersResult(successful=False, reason=str(exc))
 
