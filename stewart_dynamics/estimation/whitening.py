@@ -76,11 +76,11 @@ def weights_of(residuals: Array, free: Array, samples: int, least: float) -> Wei
     ``free`` (F, 2, 6) are the parts of their variance that the fit leaves, ``least`` the smallest
     deviation [N].
     """
-    width = max(_FEWEST, round(_SMOOTHING * samples))
+    width = min(max(_FEWEST, round(_SMOOTHING * samples)), len(residuals) - 1)
     power, share = (smoothed(each.sum(axis=1), width) for each in (residuals ** 2, free))
     own = np.log(np.maximum(power / np.maximum(share, _LEAST_FREE), least ** 2))
-    of_legs = own.mean(axis=0)
-    of_all = of_legs + (own - of_legs).mean(axis=1, keepdims=True)
+    of_legs, used = own.mean(axis=0), power.any(axis=0)
+    of_all = of_legs + (own - of_legs) @ (used / max(used.sum(), 1))[:, None]
     variance = np.mean((own - of_all) ** 2, axis=0)
     by_chance = 1.0 / (2 * width + 1)
     part = np.divide(variance - by_chance, variance, out=np.zeros(6), where=variance > by_chance)
