@@ -200,7 +200,7 @@ def test_rotation_about_one_axis_identifies_the_inertia_about_it(
         wanted = np.array([float(name.rpartition('.')[2] in pair) for name in names])
         parts = np.linalg.lstsq(given.T, wanted, rcond=None)[0]
         np.testing.assert_allclose(parts @ given, wanted, atol=0.01)
-        value, error = (np.array([each[what] for each in sums]) for what in (
+        value, error = (np.array([each[name] for each in sums]) for name in (
             'value', 'standard_error'))
         assert abs(parts @ value - wanted @ [VALUES.get(name, 0.0) for name in names]) < (
             4.0 * np.abs(parts) @ error)

@@ -353,7 +353,7 @@ class Identification:
         piece, cutoff = most_motion(window, bag.extraction), np.array([bag.extraction.cutoff])
         with closing(Extracts()) as one:
             for part in piece, piece, window:
-                with suppress(BagError):  # none of a piece is a reason to reject all
+                with suppress(BagError):  # a piece without a pose is no reason to reject the bag
                     read = self._read_window(bag, part)
                     bag.lag_is_known = bag.lag_is_known or read.moves
                     if not bag.lag_is_known:

@@ -171,7 +171,7 @@ class Unknowns:
         return deviations
 
     def misfit_of_mass(self, z: float) -> float:
-        """Return what z^2 lacks: a mass is positive, the logarithm of its ratio is judged."""
+        """Return the misfit that z^2 lacks: of a mass the logarithm of its ratio is judged."""
         part = self.root[0, 0] / self.start[0]
         if not part > 0.0:
             return 0.0
