@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -226,16 +226,17 @@ class _Windows:
         model = results[:, FORCES] - self._friction.coulomb * sliding
         values[..., LINEAR], values[..., LINEAR + 1] = forces - model, model
         right &= np.isfinite(values.sum(axis=(1, 2)))  # not where J_inv cannot be solved
-        used = at[right]
+        which: Any = slice(None) if right.all() else right  # without a copy of all
+        used = at[which]
         if not len(used):
             return
-        self._added.append((used, rates[right]))
+        self._added.append((used, rates[which]))
         windows, share = self._share(used)
-        self._sums[windows] += np.tensordot(share, values[right], 1)
+        self._sums[windows] += np.tensordot(share, values[which], 1)
         self._covered[windows] += share.sum(axis=1)
         of_window, first = np.unique(self._turns(used), return_index=True)
         self._motions[of_window], self._bases[of_window] = (
-            motions[right][first], bases[right][first])
+            motions[which][first], bases[which][first])
 
     def end(self) -> Iterator[None]:
         """End the adding, yield after each piece of the work; friction follows."""
