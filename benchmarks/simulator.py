@@ -92,7 +92,6 @@ def period_rows(rounds: int) -> list[tuple[str, ...]]:
         commands = holding(plant.parameters)
         steps = f'{plant.steps} step{"s: no reflected mass" if plant.steps > 1 else ""}'
         for name, call in (
-                ('the call in C', plant._take_steps),
                 ('`Plant.advance`', partial(plant.advance, commands, NO_WRENCH)),
                 ('its four messages beside',
                  partial(published, StateMessages(plant.parameters), plant))):
