@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.estimation.empirical_bayes import real_share
 
 # Half width of the smoothing of spectra, relative to the rate of the samples, and its minimum in
 # frequencies.
@@ -70,21 +71,19 @@ def weights_of(residuals: Array, free: Array, samples: int, least: float) -> Wei
     Return the weights by spectra of residuals (F, 2, 6).
 
     The logarithms of the legs' spectra have one shape, and deviations from it as large as they
-    show beyond chance (empirical Bayes, as in ``noisy_rates``): the fewer numbers are estimated
-    from the residuals, the less do weights follow the residuals that they weigh.
+    show beyond chance (``empirical_bayes``): the fewer numbers are estimated from the residuals,
+    the less do weights follow the residuals that they weigh.
 
     ``free`` (F, 2, 6) are the parts of their variance that the fit leaves, ``least`` the smallest
     deviation [N].
     """
     width = min(max(_FEWEST, round(_SMOOTHING * samples)), len(residuals) - 1)
-    power, share = (smoothed(each.sum(axis=1), width) for each in (residuals ** 2, free))
-    own = np.log(np.maximum(power / np.maximum(share, _LEAST_FREE), least ** 2))
+    power, left = (smoothed(each.sum(axis=1), width) for each in (residuals ** 2, free))
+    own = np.log(np.maximum(power / np.maximum(left, _LEAST_FREE), least ** 2))
     of_legs, used = own.mean(axis=0), power.any(axis=0)
     of_all = of_legs + (own - of_legs) @ (used / max(used.sum(), 1))[:, None]
-    variance = np.mean((own - of_all) ** 2, axis=0)
-    by_chance = 1.0 / (2 * width + 1)
-    part = np.divide(variance - by_chance, variance, out=np.zeros(6), where=variance > by_chance)
-    deviations = np.exp(0.5 * (of_all + part * (own - of_all)))
+    share = real_share(np.mean((own - of_all) ** 2, axis=0), 1.0 / (2 * width + 1))
+    deviations = np.exp(0.5 * (of_all + share * (own - of_all)))
     along = (residuals / deviations[:, None]).reshape(-1, 6)
     correlation = along.T @ along
     sizes = np.sqrt(np.outer(np.diag(correlation), np.diag(correlation)))

@@ -176,14 +176,14 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
     platform, piece = extraction.platform, most_motion(window, extraction)
     undelayed = copy(extraction)  # the delay that fits wrong legs best may be any
     undelayed.later = 0.0
-    tried, now = [], float('inf')
+    swaps, now = [], math.inf
     with suppress(PoseError, SingularityError):
         tried = [(each(piece, first_pose(platform, piece)).extract, delay)
                  for each, delay in ((extraction, fit.delays[0]), (undelayed, 0.0))]
-        now = _misfit(_of_legs(platform, tried[0][0], _LEGS), _LEGS, unknowns, fit.delays[0])
-    swaps = [each for each in _swaps(platform, tried, unknowns)
-             if now - each[0] > _CLEARLY and each[0] < (min(_BETTER, left) ** 2) * now
-             ] if tried else []
+        own = [_of_legs(platform, extract, _LEGS) for extract, _ in tried]
+        now = _misfit(own[0], _LEGS, unknowns, fit.delays[0])
+        swaps = [each for each in _swaps(platform, tried, own, unknowns)
+                 if now - each[0] > _CLEARLY and each[0] < (min(_BETTER, left) ** 2) * now]
     if swaps:
         misfit, which, a, b = min(swaps)
         yield LikelyMistake(
@@ -226,10 +226,14 @@ def most_motion(window: Window, extraction: Extraction, longer: float = 0.0) -> 
     return window.part(part, part)
 
 
-def _swaps(platform: StewartPlatform, tried: Sequence[tuple[Extract, float]], unknowns: Unknowns,
+def _swaps(platform: StewartPlatform, tried: Sequence[tuple[Extract, float]],
+           own: Sequence[Extract | None], unknowns: Unknowns,
            ) -> Iterator[tuple[float, str, int, int]]:
-    """Yield the least squared misfit of extracts with delays [s], if two legs are swapped."""
-    own = [_of_legs(platform, extract, _LEGS) for extract, _ in tried]
+    """
+    Yield the least squared misfit of extracts with delays [s], if two legs are swapped.
+
+    own: the extracts without a swap, as ``_of_legs`` returns them.
+    """
     for a, b in combinations(range(6), 2):
         order = list(_LEGS)
         order[a], order[b] = b, a
@@ -257,15 +261,13 @@ def _of_legs(platform: StewartPlatform, extract: Extract, order: Sequence[int]) 
         return None
     regressor = regressor_of(platform, motions(platform, found, legs[..., 1], legs[..., 2]))
     regressor[:, _LEGS, COULOMB_COLUMNS] = extract.slip[:, order, 0]
-    return extract._replace(
-        columns=np.concatenate([regressor, extract.efforts], axis=-1), legs=legs)
+    return extract._replace(columns=np.concatenate([regressor, extract.efforts], axis=-1))
 
 
 def _misfit(extract: Extract | None, order: Sequence[int], unknowns: Unknowns, delay: float,
             ) -> float:
     """Return the squared misfit with the efforts of other legs; infinite without a pose."""
     if extract is None or np.count_nonzero(extract.used) < _FEWEST * extract.used.size:
-        return float('inf')
-    columns = extract.columns.copy()
-    columns[..., -ORDERS:] = extract.efforts[:, order]
+        return math.inf
+    columns = np.concatenate([extract.regressor, extract.efforts[:, order]], axis=-1)
     return Comparison([extract._replace(columns=columns)], unknowns).misfit(delay=delay)
