@@ -79,6 +79,28 @@ typedef struct {
 #undef stewart_base
 #undef stewart_result
 
+#if LANES == 2
+
+double condition_of_pair(double a[6][6], double inverse[6][6]);
+
+/* Return condition_of of one sample: the matrix in one lane, its inverse in the other. */
+double condition_of_pair(double a[6][6], double inverse[6][6]) {
+  real both[6][6], trace;
+  for (int i = 0; i < 6; i++) {
+    for (int j = 0; j < 6; j++) {both[i][j][0] = a[i][j], both[i][j][1] = inverse[i][j];}
+  }
+  tridiagonal t = squared(both, &trace);
+  real x = number(1.0 + 1e-14);
+  for (int n = 0; n < LAGUERRE_STEPS; n++) {
+    real nearer = laguerre_step(x, &t);
+    if (!any(nearer < x)) {break;}
+    x = nearer;
+  }
+  return sqrt(trace[0]) * sqrt(trace[1]) * (sqrt(x[0]) * sqrt(x[1]));
+}
+
+#endif
+
 #define JOINED(a, b) a ## b
 #define NAMED(a, b) JOINED(a, b)
 

@@ -5,6 +5,10 @@
  * functions for one leg, one platform, one matrix. Each file has a part of them.
  */
 
+/* In lanes.c; a tenth faster. */
+double condition_of_pair(double a[6][6], double inverse[6][6]);
+#define CONDITION_OF condition_of_pair
+
 #include "stewart_dynamics.c"
 
 #include "library.h"

@@ -342,7 +342,6 @@ static load carry(
 
 /* ---- inverse, determinant, condition number ------------------------------------------------- */
 
-
 /* Replace a by its inverse (Gauss-Jordan, partial pivoting); return det(a). Rows are near 1. */
 static real invert(real a[6][6]) {
   choice swapped[6][6];
@@ -435,6 +434,8 @@ static tridiagonal squared(real a[6][6], real * trace) {
   return tridiagonalize(g, choose(*trace > 0.0, 1.0 / *trace, number(0.0)));
 }
 
+#ifndef CONDITION_OF  /* the library has a faster one, of the same bits: lanes.c */
+#define CONDITION_OF condition_of
 /* Return the product of the largest singular values of a matrix and of its inverse. */
 static real condition_of(real a[6][6], real inverse[6][6]) {
   real trace, inverse_trace;
@@ -448,6 +449,7 @@ static real condition_of(real a[6][6], real inverse[6][6]) {
   }
   return root(trace) * root(inverse_trace) * (root(x) * root(y));
 }
+#endif
 
 /* ---- inverse dynamics ----------------------------------------------------------------------- */
 
@@ -476,15 +478,12 @@ static void solve(
   for (int i = 0; i < 6; i++) {
     result->joint_forces[i] = dot6(inverse[i], balanced);
     result->forces[i] = result->joint_forces[i] + actuators[i];
+    result->unit_load_forces[i] = root(dot6(inverse[i], inverse[i]));
     change += dot6(inverse[i], row_rates[i]);
   }
   determinant *= size * size * size;
   result->determinant = determinant, result->determinant_rate = determinant * change;
-
-  for (int i = 0; i < 6; i++) {
-    result->unit_load_forces[i] = root(dot6(inverse[i], inverse[i]));
-  }
-  result->condition_number = conditioned ? condition_of(rows, inverse) : number(0.0);
+  result->condition_number = conditioned ? CONDITION_OF(rows, inverse) : number(0.0);
   if (pitch_of(&platform->legs[0]) == 0.0) {return;}
 
   /* Screws that turn with their legs: J_q^T f = wrench, by virtual work f q'. */

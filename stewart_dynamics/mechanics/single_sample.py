@@ -34,58 +34,45 @@ class SingleSample:
     """
     The calls for one sample of a hexapod, from any number of threads.
 
-    ``inverse_dynamics``, ``forward_dynamics`` and ``base_wrench`` are ``_Dynamics.call`` and
-    return a row of results (RESULT,), the row of the motion (MOTION,) and a wrench (6,).
-    ``forward_kinematics`` returns the row of the pose (12,).
+    ``inverse_dynamics``, ``forward_dynamics`` and ``base_wrench`` take a motion, the forces of the
+    legs (6,) or None, a wrench (6,) or None, and the base's motion or None. They return a row of
+    results (RESULT,), the row of the motion (MOTION,) and a wrench (6,). ``forward_kinematics``
+    takes leg lengths (6,) and a guess, and returns the row of the pose (12,).
     """
 
     def __init__(self, hexapod: Records) -> None:
-        self.inverse_dynamics = _Dynamics(hexapod, 'solve_one', 'result').call
-        self.forward_dynamics = _Dynamics(hexapod, 'forward_dynamics_one', 'motion').call
-        self.base_wrench = _Dynamics(hexapod, 'base_wrench_one', 'base_wrench').call
-        self.forward_kinematics = _ForwardKinematics(hexapod).call
+        self.inverse_dynamics = _dynamics(hexapod, 'solve_one', 'result')
+        self.forward_dynamics = _dynamics(hexapod, 'forward_dynamics_one', 'motion')
+        self.base_wrench = _dynamics(hexapod, 'base_wrench_one', 'base_wrench')
+        self.forward_kinematics = _forward_kinematics(hexapod)
 
 
-class _Memories:
-    """The memory of calls of a function: as much as there are calls at the same time."""
+# The calls are closures: names of an enclosing function are found faster than attributes.
 
-    def __init__(self, hexapod: Records, name: str, sample: str) -> None:
-        self._hexapod, self._function, self._sample = hexapod, function(name), sample
-        self._places = places(sample)
-        self._free: list[tuple[Any, ...]] = []  # its pop and append are atomic
+def _dynamics(hexapod: Records, name: str, result: str) -> Callable[
+        [Motion, Any, Any, BaseMotion | None], Array | None]:
+    """Return the call of a function of motion, forces, wrench and base."""
+    where, pushed = places('one_motion'), result == 'motion'
+    free: list[tuple[Any, ...]] = []  # as much memory as there are calls at the same time
+    taken, put_back = free.pop, free.append  # atomic
 
-    def _bound(self) -> tuple[Callable[[], Any], Array]:
-        """Return the function bound to new memory, and the memory as numbers."""
-        numbers = np.zeros(record(self._sample).itemsize // 8)
-        return self._function.bound(self._hexapod, numbers), numbers
+    def new() -> tuple[Any, ...]:
+        solve, numbers = _bound(hexapod, name, 'one_motion')
+        numbers[where['base']] = NO_BASE
+        return (solve, *(numbers[where[field]].data for field in (
+            'motion', 'forces', 'wrench', 'base')), numbers[where[result]])
 
-
-class _Dynamics(_Memories):
-    """A call of a function of motion, forces, wrench and base."""
-
-    def __init__(self, hexapod: Records, name: str, result: str) -> None:
-        super().__init__(hexapod, name, 'one_motion')
-        self._result = result
-
-    def _new(self) -> tuple[Any, ...]:
-        solve, numbers = self._bound()
-        numbers[self._places['base']] = NO_BASE
-        return (solve, *(numbers[self._places[name]].data for name in (
-            'motion', 'forces', 'wrench', 'base')), numbers[self._places[self._result]])
-
-    def call(self, motion: Motion, forces: Any, wrench: Any, base: BaseMotion | None,
-             ) -> Array | None:
-        """Return the row of the result; ``forces`` (6,) are those of the forward dynamics."""
+    def call(motion: Motion, forces: Any, wrench: Any, base: BaseMotion | None) -> Array | None:
         if type(motion) is not Motion or (base is not None and type(base) is not BaseMotion):
             return None
         try:
-            memory = self._free.pop()
+            memory = taken()
         except IndexError:
-            memory = self._new()
-        solve, of_motion, of_forces, of_wrench, of_base, result = memory
+            memory = new()
+        solve, of_motion, of_forces, of_wrench, of_base, found = memory
         try:
             of_motion[:] = motion.rows
-            if self._result == 'motion':
+            if pushed:
                 of_forces[:] = forces
             if wrench is not None:
                 of_wrench[:] = wrench
@@ -93,7 +80,7 @@ class _Dynamics(_Memories):
                 of_base[:] = base.rows
                 if of_base[0] != of_base[0]:
                     return None  # nan would be a still base
-            return result.copy() if solve() else None
+            return found.copy() if solve() else None
         except _NO_FLOATS:
             return None
         finally:  # the next one has no wrench, on a base at rest
@@ -101,25 +88,25 @@ class _Dynamics(_Memories):
                 of_wrench[:] = _NO_WRENCH
             if base is not None:
                 of_base[0] = math.nan
-            self._free.append(memory)
+            put_back(memory)
+
+    return call
 
 
-class _ForwardKinematics(_Memories):
-    """The call of the forward kinematics."""
+def _forward_kinematics(hexapod: Records) -> Callable[[Any, Pose | Motion], Array | None]:
+    """Return the call of the forward kinematics."""
+    where = places('one_pose')
+    free: list[tuple[Any, ...]] = []
 
-    def __init__(self, hexapod: Records) -> None:
-        super().__init__(hexapod, 'forward_kinematics_one', 'one_pose')
-
-    def call(self, lengths: Any, guess: Pose | Motion) -> Array | None:
-        """Return the row of the pose (12,) of leg lengths (6,), from a guess."""
+    def call(lengths: Any, guess: Pose | Motion) -> Array | None:
         if type(guess) is not Pose and type(guess) is not Motion:
             return None
         try:
-            memory = self._free.pop()
+            memory = free.pop()
         except IndexError:
-            solve, numbers = self._bound()
-            pose = numbers[self._places['pose']]
-            memory = solve, numbers[self._places['lengths']].data, pose.data, pose
+            solve, numbers = _bound(hexapod, 'forward_kinematics_one', 'one_pose')
+            pose = numbers[where['pose']]
+            memory = solve, numbers[where['lengths']].data, pose.data, pose
         solve, of_lengths, of_pose, pose = memory
         try:
             of_lengths[:] = lengths
@@ -128,4 +115,12 @@ class _ForwardKinematics(_Memories):
         except _NO_FLOATS:
             return None
         finally:
-            self._free.append(memory)
+            free.append(memory)
+
+    return call
+
+
+def _bound(hexapod: Records, name: str, sample: str) -> tuple[Callable[[], Any], Array]:
+    """Return a function of a hexapod, bound to new memory, and the memory as numbers."""
+    numbers = np.zeros(record(sample).itemsize // 8)
+    return function(name).bound(hexapod, numbers), numbers

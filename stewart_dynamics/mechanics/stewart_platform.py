@@ -136,10 +136,10 @@ class StewartPlatform:
             J_inv cannot be solved in a sample; names the sample.
 
         """
-        known = singular in ('raise', 'nan')
-        result = self._single.inverse_dynamics(motion, None, wrench, base) if known else None
-        if result is not None:
-            return InverseDynamics(result)
+        if singular == 'raise':
+            result = self._single.inverse_dynamics(motion, None, wrench, base)
+            if result is not None:
+                return InverseDynamics(result)
         _, _, results, unsolvable, shape = self._solved(motion, wrench, base, singular)
         for forces in FORCES, JOINT_FORCES:
             results[unsolvable, forces] = np.nan
