@@ -82,7 +82,6 @@ extras_require = {
         'mcap-ros2-support',
         'mujoco',
         'mypy',
-        'numba>=0.61',  # a referee, test/independent_hexapod.py
         'packaging',
         'pin',
         'playwright',

@@ -28,7 +28,7 @@ PROGRAM = 'stewart_dynamics'
 PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,
             'trajectory': ReferenceMotionParameters}
 PLATFORM = ROOT / 'config' / 'platform.yaml'
-HEAVY = ('numba', 'scipy', 'rclpy', 'rosbags')
+HEAVY = ('scipy', 'rclpy', 'rosbags')
 
 # Without ROS: none of its modules can be imported. The last line has the exit codes and the loaded
 # modules.

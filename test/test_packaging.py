@@ -39,7 +39,6 @@ KEYS = {
     'hypothesis': 'python3-hypothesis', 'jinja2': 'python3-jinja2', 'lz4': '',
     'matplotlib': 'python3-matplotlib', 'mcap': 'mcap-ros2-support',
     'mcap_ros2': 'mcap-ros2-support', 'mujoco': 'python3-mujoco-pip',
-    'numba': 'python3-numba',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
     'pandas': 'python3-pandas', 'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '',
     'pxr': '', 'pyarrow': '', 'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',
