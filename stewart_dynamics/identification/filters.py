@@ -30,6 +30,8 @@ _TRANSITION = 5.5
 _EXACT = np.array([0.0, 0.05, 0.15, 0.3, 0.45, 0.6])
 # Factors of lengths that a Fourier transform divides into fast parts.
 _FACTORS = (2, 3, 5, 7, 11)
+# Outputs of the decimating filter in one product of matrices.
+_ROWS = 16
 # Lowest frequency from which measured rates replace differentiated positions, by the cut-off.
 _LEAST = 0.2
 
@@ -112,18 +114,17 @@ def convolved(signal: Array, taps: Array) -> Array:
 def decimated(signal: Array, taps: Array, step: int) -> Array:
     """Return every ``step``-th sample of the filtered signal (M, ...)."""
     count = (len(signal) - len(taps)) // step + 1
-    blocks = -(-len(taps) // step)
-    padded = np.zeros(blocks * step)
-    padded[:len(taps)] = taps
     flat: Array = signal.reshape(len(signal), -1)
-    short = (count + blocks - 1) * step - len(flat)
-    if short > 0:
-        flat = np.concatenate([flat, np.zeros((short, flat.shape[1]))])
-    parts = flat[:(count + blocks - 1) * step].reshape(count + blocks - 1, step, -1)
-    products = padded.reshape(blocks, step) @ parts
-    result = np.zeros((count, flat.shape[1]))
-    for n in range(blocks):
-        result += products[n:n + count, n]
+    # Several outputs at once, as a product of matrices: many times faster than one by one.
+    rows = min(count, _ROWS)
+    matrix = np.zeros((rows, (rows - 1) * step + len(taps)))
+    for n in range(rows):
+        matrix[n, n * step:n * step + len(taps)] = taps
+    result = np.empty((count, flat.shape[1]))
+    for first in range(0, count, rows):
+        begin = min(first, count - rows)
+        result[begin:begin + rows] = matrix @ flat[
+            begin * step:begin * step + matrix.shape[1]]
     return result.reshape(count, *signal.shape[1:])
 
 
