@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
   bench-replay clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
-  lint lint-flake8 lint-layers lint-mypy lint-ruff test
+  lint lint-flake8 lint-layers lint-mypy lint-ruff test tools
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -79,26 +79,28 @@ PIP := $(VENV)/bin/python -m pip --quiet
 # One stamp for each kind of environment, with and without a sourced ROS.
 PREPARED := $(VENV)/dependencies-$(ROS)
 INSTALLED := $(VENV)/installed-$(ROS)
+# And with the tools of tests, linters, benchmarks and pages.
+TOOLS := $(VENV)/tools-$(ROS)
 
 # More processes than cores: tests with ROS wait half of the time. One module, one process. Linters
 # look at the pinned environment alone.
-test: $(if $(VERSIONS),$(INSTALLED),lint)
+test: $(if $(VERSIONS),$(TOOLS),lint)
 	$(VENV)/bin/python -m pytest --numprocesses $(TESTERS) --dist loadfile --no-loadscope-reorder
 
 # Beside one another: mypy and flake8 take nearly the same time.
-lint: $(INSTALLED)
+lint: $(TOOLS)
 	@$(MAKE) --no-print-directory --jobs --output-sync lint-mypy lint-flake8 lint-ruff lint-layers
 
-lint-flake8: $(INSTALLED)
+lint-flake8: $(TOOLS)
 	$(VENV)/bin/python -m flake8
 
-lint-layers: $(INSTALLED)
+lint-layers: $(TOOLS)
 	$(VENV)/bin/lint-imports --no-logo --cache-dir $(CACHE)/import_linter
 
-lint-mypy: $(INSTALLED)
+lint-mypy: $(TOOLS)
 	$(VENV)/bin/python -m mypy
 
-lint-ruff: $(INSTALLED)
+lint-ruff: $(TOOLS)
 	$(VENV)/bin/python -m ruff check --quiet .
 
 demo: $(INSTALLED)
@@ -125,46 +127,46 @@ demo-identify: $(INSTALLED)
 export-demo: $(INSTALLED)
 	@$(VENV)/bin/python demo/export.py
 
-bench: $(INSTALLED)
+bench: $(TOOLS)
 	$(VENV)/bin/python benchmarks/bench.py --write
 
-bench-capability: $(INSTALLED)
+bench-capability: $(TOOLS)
 	$(VENV)/bin/python benchmarks/capability.py --write
 
-bench-export: $(INSTALLED)
+bench-export: $(TOOLS)
 	$(VENV)/bin/python benchmarks/exported_source.py --write
 
-bench-loop: $(INSTALLED)
+bench-loop: $(TOOLS)
 	$(VENV)/bin/python benchmarks/simulator.py --write
 
-bench-node: $(INSTALLED)
+bench-node: $(TOOLS)
 	$(VENV)/bin/python benchmarks/node.py --write
 	$(VENV)/bin/python benchmarks/rates.py --write
 
-bench-identify: $(INSTALLED)
+bench-identify: $(TOOLS)
 	$(VENV)/bin/python benchmarks/identification.py --write
 
-bench-calibrate: $(INSTALLED)
+bench-calibrate: $(TOOLS)
 	$(VENV)/bin/python benchmarks/calibration.py --write
 
-bench-coverage: $(INSTALLED)
+bench-coverage: $(TOOLS)
 	$(VENV)/bin/python benchmarks/interval_coverage.py --write
 	$(VENV)/bin/python benchmarks/interval_coverage.py --table --write
 
-bench-lack-of-fit: $(INSTALLED)
+bench-lack-of-fit: $(TOOLS)
 	$(VENV)/bin/python benchmarks/lack_of_fit.py --write
 
-bench-planned: $(INSTALLED)
+bench-planned: $(TOOLS)
 	$(VENV)/bin/python benchmarks/planned.py --write
 
-bench-replay: $(INSTALLED)
+bench-replay: $(TOOLS)
 	$(VENV)/bin/python benchmarks/replay.py --write
 
 bags: $(INSTALLED)
 	$(VENV)/bin/python bags/record.py
 
 # The pictures and the generated tables in README.md and docs/.
-docs: $(INSTALLED)
+docs: $(TOOLS)
 	$(VENV)/bin/python docs/figures/misprints.py
 	$(VENV)/bin/python docs/figures/draw.py
 	$(VENV)/bin/python docs/figures/hexapod.py
@@ -172,12 +174,14 @@ docs: $(INSTALLED)
 	$(VENV)/bin/python demo/cueing.py --output docs/figures/motion_cueing.png
 
 # The pages as a site: docs/_build/html/index.html.
-docs-site: $(INSTALLED)
+docs-site: $(TOOLS)
 	$(VENV)/bin/python -m sphinx -E -a -W --keep-going -q \
 	  docs docs/_build/html
 	@echo 'file://$(CURDIR)/docs/_build/html/index.html'
 
 installed: $(INSTALLED)
+
+tools: $(TOOLS)
 
 $(PREPARED): $(REQUIREMENTS)
 	@for python in $(PYTHONS); do \
@@ -207,10 +211,16 @@ CORE := $(wildcard stewart_dynamics/core/*.[ch])
 
 # Not isolated: the build uses the pinned setuptools. It warns of every editable package that has a
 # folder of its own name.
-$(INSTALLED): $(PREPARED) requirements-fmi.txt setup.py setup.cfg pyproject.toml $(CORE)
-	@$(PIP) install --no-deps --requirement requirements-fmi.txt
+$(INSTALLED): $(PREPARED) setup.py setup.cfg pyproject.toml $(CORE)
 	@echo '#include <math.h>' | $${CC:-cc} -E -x c - > /dev/null 2>&1 || $(PIP) install $(ZIG)
 	@PYTHONWARNINGS=ignore $(PIP) install --no-build-isolation --no-deps --editable .
+	@touch $@
+
+$(TOOLS): $(INSTALLED) requirements-test.txt requirements-fmi.txt
+ifeq ($(VERSIONS),)
+	@$(PIP) install --no-build-isolation --constraint $(VENV)/requirements.txt --requirement requirements-test.txt
+endif
+	@$(PIP) install --no-deps --requirement requirements-fmi.txt
 	@touch $@
 
 clean:

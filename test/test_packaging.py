@@ -301,7 +301,8 @@ def test_pip_requirements(distribution: importlib.metadata.Distribution) -> None
     imported = third_party(*SOURCES) & set(KEYS)
     assert {PIP_NAMES.get(name, name) for name in imported} <= extras
     for ros, other in (('ros', 'ros-kilted'), ('kilted', 'ros')):
-        pins = [Requirement(line) for file in ('requirements.txt', f'requirements-{ros}.txt')
+        pins = [Requirement(line) for file in (
+            'requirements.txt', 'requirements-test.txt', f'requirements-{ros}.txt')
                 for line in (ROOT / file).read_text().splitlines() if not line.startswith('#')]
         assert {str(pin.specifier)[:2] for pin in pins} == {'=='}
         versions = {pin.name: str(pin.specifier)[2:] for pin in pins}
