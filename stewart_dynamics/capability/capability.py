@@ -183,7 +183,7 @@ class Capability:
                 self._bounds[1]).any() else None,
             Angles(self._bounds[2:4], self._axes[:6]) if (
                 self._bounds[2:4] < math.pi).any() else None,
-            Conditioning(self._pose_limits.stop_condition, size),
+            Conditioning(self._pose_limits.stop_condition),
             None if clearance is None else Clearance(
                 clearance.shapes, nearest, size, *map(len, self._plates)), size)
         self._motors = MotorBounds(platform.parameters) if platform.parameters.drives else None
@@ -369,7 +369,7 @@ class Capability:
 
         def ends(directions: Array) -> travel.Ends:
             every: Integers = np.zeros(len(directions), dtype=np.int64)
-            return travel.travels(self._margins, starts.take(every), directions)
+            return travel.travels(self._margins, starts.take(every), directions, shortest=True)
 
         return Boxes(self.platform, self._margins, starts, ends, row, center)
 

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import cached_property
 import math
 from typing import NamedTuple
 
@@ -45,7 +46,7 @@ class Starts(NamedTuple):
 
     centers: Array  # pivot from the base joints (N, 6, 3)
     arms: Array  # platform joints from the pivot (N, 6, 3)
-    levers: Array  # platform joints from the platform's origin (N, 6, 3)
+    levers: Array  # platform joints from its origin, per characteristic length (N, 6, 3)
     axes: Array  # axes of the platform joints (N, 6, 3)
     base: Array  # corners of the base's plate from the pivot (N, M, 3)
     platform: Array  # corners of the platform's plate from the pivot (N, M, 3)
@@ -68,7 +69,8 @@ def starts_at(parameters: Parameters, axes: Array, plates: Sequence[Array], rows
     joints, pivots = parameters.geometry.platform_joints, pivots[:, None]
     centers = rows[:, None, POSITION] + pivots @ turn
     to_centers, arms = centers - parameters.geometry.base_joints, (joints - pivots) @ turn
-    lines, levers = to_centers + arms, joints @ turn
+    lines = to_centers + arms
+    levers = joints @ turn / parameters.singularity.characteristic_length
     with np.errstate(all='ignore'):
         sides = np.linalg.det(np.concatenate([lines, np.cross(levers, lines)], axis=2))
     return Starts(to_centers, arms, levers, axes[6:] @ turn, plates[0] - centers,
@@ -83,7 +85,6 @@ class Moved:
     points, edges (N, 6), (D, N, 6): cells.
 
     shift, joints, lines: translation (N, 1, 3), platform joints and legs (N, 6, 3).
-    squares, lengths, inverse_lengths (N, 6): of the legs.
     """
 
     def __init__(self, starts: Starts, points: Array, edges: Array) -> None:
@@ -107,12 +108,31 @@ class Moved:
             total - reach if len(edges) == 1 else total + 0.0 * reach))[:, None]
         shift = points[:, None, :3]
         self.shift = Enclosure(shift, edges[:, :, None, :3], _EPS * np.abs(shift))
-        arms, centers = self.turned(starts.arms), self.shift + starts.centers
-        self.joints, self.lines = self.shift + arms, centers + arms
-        self.squares = (centers.square() + 2.0 * centers * arms).sum() + (
-            starts.arms * starts.arms).sum(axis=2)
-        self.lengths = self.squares.sqrt()
-        self.inverse_lengths = self.lengths.inverse()
+        self._arms, self._centers = self.turned(starts.arms), self.shift + starts.centers
+        self.joints, self.lines = self.shift + self._arms, self._centers + self._arms
+
+    @cached_property
+    def squares(self) -> Enclosure:
+        """Return the squares of the lengths of the legs (N, 6)."""
+        found: Enclosure = (self._centers.square() + 2.0 * self._centers * self._arms).sum() + (
+            self.starts.arms * self.starts.arms).sum(axis=2)
+        return found
+
+    @cached_property
+    def lengths(self) -> Enclosure:
+        """Return the lengths of the legs (N, 6)."""
+        return self.squares.sqrt()
+
+    @cached_property
+    def inverse_lengths(self) -> Enclosure:
+        """Return the inverses of the lengths (N, 6)."""
+        return self.lengths.inverse()
+
+    @cached_property
+    def matrices(self) -> Enclosure:
+        """Return the scaled J_inv (N, 6, 6)."""
+        directions = unit(self.lines)
+        return joined([directions, cross(self.turned(self.starts.levers), directions)])
 
     def turned(self, vectors: Array) -> Enclosure:
         """Return vectors (N, M, 3) that turn with the platform."""
@@ -244,19 +264,12 @@ class Conditioning(Quantity):
     tolerance, fine, coarse, exact, most = 0.0, 1e-3, 1.15, math.inf, 80_000
     legs, codes = np.array([-1]), np.array([5])
 
-    def __init__(self, stop: float, size: float) -> None:
-        self.stop, self._size = stop, size
+    def __init__(self, stop: float) -> None:
+        self.stop = stop
 
     def weights(self, moved: Moved, slopes: Array) -> Array:
         """Return by how much the edges of cells change the matrix (D, N)."""
-        matrices = self.matrices(moved)
-        return _norm(_inverses(matrices.center) @ matrices.slopes)
-
-    def matrices(self, moved: Moved) -> Enclosure:
-        """Return the scaled J_inv (N, 6, 6)."""
-        directions = unit(moved.lines)
-        return joined([directions, cross(
-            moved.turned(moved.starts.levers / self._size), directions)])
+        return _norm(_inverses(moved.matrices.center) @ moved.matrices.slopes)
 
     def values(self, moved: Moved) -> Array:
         """
@@ -264,11 +277,14 @@ class Conditioning(Quantity):
 
         The condition number counts as negative where det(J) has changed its sign.
         """
-        matrices = self.matrices(moved).center
+        return self._rooms(moved, moved.matrices.center)[:, None] - 1.0
+
+    def _rooms(self, moved: Moved, matrices: Array) -> Array:
+        """Return ``stop / condition`` of matrices (N, 6, 6), with the sign of ``values``."""
         singular = np.linalg.svd(matrices, compute_uv=False)
         room = singular[:, 5] / singular[:, 0] * self.stop
         kept = np.linalg.det(matrices) * moved.starts.sides >= 0.0
-        return (np.where(kept, room, -room) - 1.0)[:, None]
+        return np.where(kept, room, -room)
 
     def excesses(self, margins: Array) -> Array:
         """Return ``condition / stop - 1`` at margins."""
@@ -276,12 +292,14 @@ class Conditioning(Quantity):
 
     def excesses_at(self, moved: Moved) -> Array:
         """Return ``condition / stop - 1`` at points; infinite past a singularity."""
-        room = self.values(moved) + 1.0
-        return np.asarray(np.where(room > 0.0, 1.0 / room - 1.0, math.inf))
+        lines, levers = moved.lines.center, moved.turned(moved.starts.levers).center
+        directions = lines / length(lines)
+        rooms = self._rooms(moved, np.concatenate([directions, np.cross(levers, directions)], 2))
+        return np.asarray(np.where(rooms > 0.0, 1.0 / rooms - 1.0, math.inf))[:, None]
 
     def margins(self, moved: Moved) -> Enclosure:
         """Return margins (N, 1)."""
-        matrices = self.matrices(moved)
+        matrices = moved.matrices
         with np.errstate(all='ignore'):
             inverse = _inverses(matrices.center)
             change = np.abs(inverse @ matrices.slopes).sum(axis=0) + np.abs(

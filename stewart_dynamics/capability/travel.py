@@ -99,19 +99,26 @@ class _Travels:
                      np.zeros((0, len(t), 6)))
 
 
-def travels(margins: PoseMargins, starts: Starts, directions: Array) -> Ends:
-    """Return the ends of travels (N,) in directions (N, 6), not zero."""
+def travels(margins: PoseMargins, starts: Starts, directions: Array, *,
+            shortest: bool = False) -> Ends:
+    """
+    Return the ends of travels (N,) in directions (N, 6), not zero.
+
+    shortest: the smallest value is exact, others may be too large. Most travels are then searched
+    only in part.
+    """
     ends = Ends(np.full(len(directions), math.inf), np.full(len(directions), NOTHING),
                 np.full(len(directions), -1))
     for first in range(0, len(directions), _BLOCK):
         block = slice(first, first + _BLOCK)
         with np.errstate(all='ignore'):
             _shorten(Ends(ends.values[block], ends.codes[block], ends.legs[block]), margins,
-                     _Travels(Starts(*(each[block] for each in starts)), directions[block]))
+                     _Travels(Starts(*(each[block] for each in starts)), directions[block]),
+                     shortest)
     return ends
 
 
-def _shorten(ends: Ends, margins: PoseMargins, block: _Travels) -> None:
+def _shorten(ends: Ends, margins: PoseMargins, block: _Travels, shortest: bool) -> None:
     """Write the ends of a block of travels."""
     still = ~block.velocities.any(axis=1)
     # a platform that only turns is back at its pose after one turn
@@ -124,8 +131,9 @@ def _shorten(ends: Ends, margins: PoseMargins, block: _Travels) -> None:
     for quantity, which in ((margins.lengths, ~closed), (margins.angles, ways > 0.0),
                             (margins.condition, ways > 0.0), (margins.clearance, ways > 0.0)):
         if quantity is not None and which.any():
+            known = np.where(shortest, ends.values.min(), ends.values)
             _keep(ends, np.flatnonzero(which), *_exits(
-                quantity, block.take(which), ends.values[which], ways[which]))
+                quantity, block.take(which), known[which], ways[which], shortest))
     ends.values[ends.codes == NOTHING] = math.inf
 
 
@@ -175,7 +183,7 @@ def _ends_of_lengths(lengths: Lengths, block: _Travels) -> tuple[Array, Integers
     return exits[np.arange(len(best)), best], LENGTH_MAX - best // 6, best % 6
 
 
-def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array,
+def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array, shortest: bool,
            ) -> tuple[Array, Integers, Integers]:
     """
     Return the first t up to ``ends`` at which a margin is negative, its code, and its leg.
@@ -183,6 +191,7 @@ def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array,
     Infinite where no margin is, nan where that is not decided.
 
     ways (N,): parts of the travels in which legs move by the size of the hexapod.
+    shortest: the search of all travels ends at the smallest exit.
     """
     exits, finite = np.full(len(ends), math.inf), np.isfinite(ends)
     bottoms, tops = np.zeros(len(ends)), np.where(finite, ends, _WINDOW * ways)
@@ -192,10 +201,11 @@ def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array,
             bottoms[which, None] > 0.0, _LATER_PARTS, _FIRST_PARTS))
         cuts = bottoms[which, None] + (tops - bottoms)[which, None] * parts
         _search(quantity, block, exits, _NARROW * ways, np.repeat(which, _PIECES),
-                cuts[:, :-1].ravel(), cuts[:, 1:].ravel())
+                cuts[:, :-1].ravel(), cuts[:, 1:].ravel(), shortest)
+        last = exits.min() if shortest else math.inf
         which = which[(exits[which] == math.inf) & ~finite[which]
-                      & (tops[which] < _FARTHEST * ways[which])]
-        bottoms[which], tops[which] = tops[which], _WINDOW * tops[which]
+                      & (tops[which] < np.minimum(_FARTHEST * ways[which], last))]
+        bottoms[which], tops[which] = tops[which], np.minimum(_WINDOW * tops[which], last)
     columns: Integers = np.zeros(len(exits), dtype=np.int64)
     if len(ended := np.flatnonzero(exits < math.inf)):
         columns[ended] = quantity.values(block.at(ended, exits[ended])).argmin(axis=1)
@@ -203,11 +213,12 @@ def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array,
 
 
 def _search(quantity: Quantity, block: _Travels, exits: Array, narrow: Array, of: Integers,
-            low: Array, high: Array) -> None:
+            low: Array, high: Array, shortest: bool) -> None:
     """
     Write the first exit of each travel that has one in its pieces.
 
     of, low, high (M,): pieces of the travels, all that may have an exit.
+    shortest: pieces behind the smallest exit of all travels are left out.
     """
     used = 0
     while len(of):
@@ -237,6 +248,8 @@ def _search(quantity: Quantity, block: _Travels, exits: Array, narrow: Array, of
             exits[new] = _root(quantity, block, new, begins[new], sooner[new], narrow[new])
         ends = exits[of] - np.maximum(narrow[of], _FAR * exits[of])
         high = np.fmin(high, ends)
+        if shortest:
+            high = np.fmin(high, exits.min())
         left = ~short & (low < high)
         of, low, high = of[left], low[left], high[left]
         # toward a new end pieces become shorter and shorter; Newton's method has halved others
