@@ -214,6 +214,11 @@ class Capability:
             A bounded number of steps does not decide whether a limit is exceeded.
 
         """
+        return self._travel(pose, direction, pivot, False)
+
+    def _travel(self, pose: Pose | Motion, direction: ArrayLike, pivot: ArrayLike | None,
+                shortest: bool) -> Extent:
+        """Return the travels; with ``shortest`` only the smallest is needed."""
         check_kind(pose, Pose, Motion)
         directions, sizes = _directions(direction)
         pivots = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
@@ -222,7 +227,9 @@ class Capability:
         rows = motion_rows(pose, shape)
         starts = starts_at(self.platform.parameters, self._axes, self._plates, rows,
                            copies(pivots, shape))
-        values, codes, legs = travel.travels(self._margins, starts, copies(directions, shape))
+        values, codes, legs = travel.travels(
+            self._margins, starts, copies(directions, shape),
+            copies(sizes[..., None], shape)[:, 0] if shortest else None)
         if np.isnan(values).any():
             at = int(np.isnan(values).argmax())
             where = list(map(int, np.unravel_index(at, shape))) if shape else ''
@@ -369,7 +376,8 @@ class Capability:
 
         def ends(directions: Array) -> travel.Ends:
             every: Integers = np.zeros(len(directions), dtype=np.int64)
-            return travel.travels(self._margins, starts.take(every), directions, shortest=True)
+            return travel.travels(self._margins, starts.take(every), directions,
+                                  np.ones(len(directions)))
 
         return Boxes(self.platform, self._margins, starts, ends, row, center)
 
@@ -673,7 +681,7 @@ class Capability:
         moving = np.flatnonzero(deviations.changes[:, 0].any(axis=1))
         path = Extent(math.inf, '', -1)
         if len(moving):
-            travels = self.travel(start, deviations.changes[moving, 0])
+            travels = self._travel(start, deviations.changes[moving, 0], None, True)
             at = int(np.argmin(travels.value))
             path = Extent(float(travels.value[at]), str(travels.limit[at]),
                           int(travels.leg[at]), int(moving[at]))

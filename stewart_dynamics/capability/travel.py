@@ -74,10 +74,15 @@ class PoseMargins(NamedTuple):
 
 
 class _Travels:
-    """Travels (N,) from poses in directions (N, 6)."""
+    """
+    Travels (N,) from poses in directions (N, 6).
 
-    def __init__(self, starts: Starts, directions: Array) -> None:
-        self.starts, self.directions = starts, directions
+    units (N,), least: see ``travels``, and the smallest value of others, in their units.
+    """
+
+    def __init__(self, starts: Starts, directions: Array, units: Array | None,
+                 least: float) -> None:
+        self.starts, self.directions, self._units, self._least = starts, directions, units, least
         self.velocities, turns = directions[:, :3], directions[:, 3:]
         self.rates = np.sqrt((turns * turns).sum(axis=1))
         self.speeds = np.sqrt((self.velocities ** 2).sum(axis=1)) + self.rates * np.sqrt(
@@ -85,7 +90,15 @@ class _Travels:
 
     def take(self, which: Flags) -> _Travels:
         """Return some of the travels."""
-        return _Travels(Starts(*(each[which] for each in self.starts)), self.directions[which])
+        return _Travels(Starts(*(each[which] for each in self.starts)), self.directions[which],
+                        None if self._units is None else self._units[which], self._least)
+
+    def needed(self, ends: Array) -> Array:
+        """Return how far travels with ends (N,) have to be searched."""
+        if self._units is None:
+            return ends
+        least: Array = np.fmin.reduce(ends / self._units, initial=self._least) * self._units
+        return least
 
     def over(self, which: Integers, low: Array, high: Array) -> Moved:
         """Return the legs over pieces of some of the travels."""
@@ -99,26 +112,31 @@ class _Travels:
                      np.zeros((0, len(t), 6)))
 
 
-def travels(margins: PoseMargins, starts: Starts, directions: Array, *,
-            shortest: bool = False) -> Ends:
+def travels(margins: PoseMargins, starts: Starts, directions: Array,
+            units: Array | None = None) -> Ends:
     """
     Return the ends of travels (N,) in directions (N, 6), not zero.
 
-    shortest: the smallest value is exact, others may be too large. Most travels are then searched
-    only in part.
+    units (N,): only the smallest value, each in its unit, is needed. It is exact, others may be
+        too large: travels are not searched behind it.
     """
     ends = Ends(np.full(len(directions), math.inf), np.full(len(directions), NOTHING),
                 np.full(len(directions), -1))
+    least = math.inf
     for first in range(0, len(directions), _BLOCK):
         block = slice(first, first + _BLOCK)
+        own = None if units is None else units[block]
+        values = ends.values[block]
         with np.errstate(all='ignore'):
-            _shorten(Ends(ends.values[block], ends.codes[block], ends.legs[block]), margins,
-                     _Travels(Starts(*(each[block] for each in starts)), directions[block]),
-                     shortest)
+            _shorten(Ends(values, ends.codes[block], ends.legs[block]), margins,
+                     _Travels(Starts(*(each[block] for each in starts)), directions[block], own,
+                              least))
+        if own is not None:
+            least = float(np.fmin.reduce(values / own, initial=least))
     return ends
 
 
-def _shorten(ends: Ends, margins: PoseMargins, block: _Travels, shortest: bool) -> None:
+def _shorten(ends: Ends, margins: PoseMargins, block: _Travels) -> None:
     """Write the ends of a block of travels."""
     still = ~block.velocities.any(axis=1)
     # a platform that only turns is back at its pose after one turn
@@ -131,9 +149,10 @@ def _shorten(ends: Ends, margins: PoseMargins, block: _Travels, shortest: bool) 
     for quantity, which in ((margins.lengths, ~closed), (margins.angles, ways > 0.0),
                             (margins.condition, ways > 0.0), (margins.clearance, ways > 0.0)):
         if quantity is not None and which.any():
-            known = np.where(shortest, ends.values.min(), ends.values)
+            last = np.minimum(ends.values, block.needed(np.where(
+                ends.codes == NOTHING, math.inf, ends.values)))
             _keep(ends, np.flatnonzero(which), *_exits(
-                quantity, block.take(which), known[which], ways[which], shortest))
+                quantity, block.take(which), last[which], ways[which]))
     ends.values[ends.codes == NOTHING] = math.inf
 
 
@@ -183,7 +202,7 @@ def _ends_of_lengths(lengths: Lengths, block: _Travels) -> tuple[Array, Integers
     return exits[np.arange(len(best)), best], LENGTH_MAX - best // 6, best % 6
 
 
-def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array, shortest: bool,
+def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array,
            ) -> tuple[Array, Integers, Integers]:
     """
     Return the first t up to ``ends`` at which a margin is negative, its code, and its leg.
@@ -191,7 +210,6 @@ def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array, shorte
     Infinite where no margin is, nan where that is not decided.
 
     ways (N,): parts of the travels in which legs move by the size of the hexapod.
-    shortest: the search of all travels ends at the smallest exit.
     """
     exits, finite = np.full(len(ends), math.inf), np.isfinite(ends)
     bottoms, tops = np.zeros(len(ends)), np.where(finite, ends, _WINDOW * ways)
@@ -201,11 +219,12 @@ def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array, shorte
             bottoms[which, None] > 0.0, _LATER_PARTS, _FIRST_PARTS))
         cuts = bottoms[which, None] + (tops - bottoms)[which, None] * parts
         _search(quantity, block, exits, _NARROW * ways, np.repeat(which, _PIECES),
-                cuts[:, :-1].ravel(), cuts[:, 1:].ravel(), shortest)
-        last = exits.min() if shortest else math.inf
+                cuts[:, :-1].ravel(), cuts[:, 1:].ravel())
+        needed = block.needed(exits)
         which = which[(exits[which] == math.inf) & ~finite[which]
-                      & (tops[which] < np.minimum(_FARTHEST * ways[which], last))]
-        bottoms[which], tops[which] = tops[which], np.minimum(_WINDOW * tops[which], last)
+                      & (tops[which] < np.minimum(_FARTHEST * ways[which], needed[which]))]
+        bottoms[which], tops[which] = tops[which], np.minimum(
+            _WINDOW * tops[which], needed[which])
     columns: Integers = np.zeros(len(exits), dtype=np.int64)
     if len(ended := np.flatnonzero(exits < math.inf)):
         columns[ended] = quantity.values(block.at(ended, exits[ended])).argmin(axis=1)
@@ -213,12 +232,11 @@ def _exits(quantity: Quantity, block: _Travels, ends: Array, ways: Array, shorte
 
 
 def _search(quantity: Quantity, block: _Travels, exits: Array, narrow: Array, of: Integers,
-            low: Array, high: Array, shortest: bool) -> None:
+            low: Array, high: Array) -> None:
     """
     Write the first exit of each travel that has one in its pieces.
 
     of, low, high (M,): pieces of the travels, all that may have an exit.
-    shortest: pieces behind the smallest exit of all travels are left out.
     """
     used = 0
     while len(of):
@@ -247,9 +265,7 @@ def _search(quantity: Quantity, block: _Travels, exits: Array, narrow: Array, of
         if len(new := np.flatnonzero(sooner < exits)):
             exits[new] = _root(quantity, block, new, begins[new], sooner[new], narrow[new])
         ends = exits[of] - np.maximum(narrow[of], _FAR * exits[of])
-        high = np.fmin(high, ends)
-        if shortest:
-            high = np.fmin(high, exits.min())
+        high = np.fmin(np.fmin(high, ends), block.needed(exits)[of])
         left = ~short & (low < high)
         of, low, high = of[left], low[left], high[left]
         # toward a new end pieces become shorter and shorter; Newton's method has halved others

@@ -28,9 +28,10 @@ USED = 0.9  # share of the limits that proposed gains use
 # Samples of a motion of which the use of limits is computed, evenly spaced.
 _SAMPLES = 20_000
 _HALVINGS = 7
-# A small motion at a frequency: its size [m/s^2, rad/s], rate [Hz], and time until transients of
-# the slowest filter have vanished, by its time constant.
-_SMALL, _RATE, _SETTLED = 1e-3, 250.0, 16.0
+# A small motion at a frequency: its size [m/s^2, rad/s], least rate [Hz] and least number of
+# samples of a period, and time until transients of the slowest filter have vanished, by its time
+# constant.
+_SMALL, _RATE, _SAMPLES_OF_PERIOD, _SETTLED = 1e-3, 100.0, 128, 16.0
 
 
 class Cued(NamedTuple):
@@ -73,7 +74,7 @@ def measured_response(cueing: MotionCueing) -> Array:
     found = np.empty((len(OMCT_FREQUENCIES), 6, 6), dtype=complex)
     for n, frequency in enumerate(OMCT_FREQUENCIES):
         period = 2.0 * np.pi / frequency
-        samples = max(64, int(np.ceil(period * _RATE)))
+        samples = max(_SAMPLES_OF_PERIOD, int(np.ceil(period * _RATE)))
         periods = int(np.ceil(_SETTLED / slowest / period)) + 1
         times = np.arange(periods * samples) * period / samples
         wave = np.exp(1j * frequency * times)
