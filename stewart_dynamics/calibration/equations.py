@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, cross
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
@@ -103,7 +103,7 @@ class Equations(NamedTuple):
                 lagrange.Legs(sizes, s, arms_of_platform), rotation, self.screws)
             sizes = sizes + self.screws[:, PITCH] * self.turns(values)
             s = of_drives[..., :3]
-            moment = of_drives[..., 3:] - np.cross(arms_of_platform, s)
+            moment = of_drives[..., 3:] - cross(arms_of_platform, s)
         s_target = s @ to_target
         found = np.zeros((*sizes.shape, ALL))
         for leg in range(6):
@@ -112,12 +112,12 @@ class Equations(NamedTuple):
             found[:, leg, at:at + 3] = s_target[:, leg] @ turned
             found[:, leg, ZERO.start + leg] = -1.0
         found[..., DEVICE] = np.concatenate([
-            s, (np.cross(of_device, s) + moment) @ euler_rate_matrix(values[DEVICE][3:])], axis=-1)
+            s, (cross(of_device, s) + moment) @ euler_rate_matrix(values[DEVICE][3:])], axis=-1)
         found[..., TARGET] = np.concatenate([
-            s_target, (np.cross(in_target, s_target) + moment @ to_target
+            s_target, (cross(in_target, s_target) + moment @ to_target
                        ) @ euler_rate_matrix(values[TARGET][3:])], axis=-1)
         return Linearization(sizes - values[ZERO] - self.lengths, found, s,
-                             np.cross(arms @ turn.T, s) + moment)
+                             cross(arms @ turn.T, s) + moment)
 
     def turns(self, values: Array) -> Array:
         """Return the twists of the legs (N, 6) [rad], zero if their axes are not known."""

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.arrays import Array, cross, Integers
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
@@ -138,8 +138,8 @@ def motion_of(quaternions: Array, value: Array, rate: Array, acceleration: Array
     turn, turn_rate = value[:, 3:], rate[:, 3:]
     a, b, per_a, per_b = _coefficients(turn)
     along = (turn * turn_rate).sum(axis=1, keepdims=True)
-    once = _cross(turn, turn_rate)
-    twice = _cross(turn, once)
+    once = cross(turn, turn_rate)
+    twice = cross(turn, once)
     rows = np.empty((len(value), MOTION))
     rows[:, POSITION] = value[:, :3]
     rows[:, ROTATION] = np.stack(from_quaternion(*_turned(quaternions, turn).T), axis=1)
@@ -148,7 +148,7 @@ def motion_of(quaternions: Array, value: Array, rate: Array, acceleration: Array
     rows[:, LINEAR_ACCELERATION] = acceleration[:, :3]
     rows[:, ANGULAR_ACCELERATION] = (
         _jacobian(turn, a, b, acceleration[:, 3:])
-        + per_a * along * once + per_b * along * twice + b * _cross(turn_rate, once))
+        + per_a * along * once + per_b * along * twice + b * cross(turn_rate, once))
     return rows
 
 
@@ -172,14 +172,6 @@ def _length(steps: Array, arm: float) -> Array:
     return length
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Return a x b of rows (N, 3); numpy.cross takes ten times as long."""
-    c = np.empty_like(a)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        c[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
-    return c
-
-
 def _coefficients(turn: Array) -> tuple[Array, Array, Array, Array]:
     """Return a, b, a', b' of rotation vectors (N, 3), each (N, 1): see the module."""
     square = (turn * turn).sum(axis=1, keepdims=True)
@@ -200,8 +192,8 @@ def _coefficients(turn: Array) -> tuple[Array, Array, Array, Array]:
 
 def _jacobian(turn: Array, a: Array, b: Array, vector: Array) -> Array:
     """Return J vector."""
-    once = _cross(turn, vector)
-    return vector + a * once + b * _cross(turn, once)
+    once = cross(turn, vector)
+    return vector + a * once + b * cross(turn, once)
 
 
 def rates_of_vector(turn: Array, omega: Array, alpha: Array) -> tuple[Array, Array]:
@@ -211,16 +203,16 @@ def rates_of_vector(turn: Array, omega: Array, alpha: Array) -> tuple[Array, Arr
     c = -per_a / (2.0 * a)  # J^-1 = 1 - skew(r) / 2 + c skew(r)^2
     rate = _jacobian(turn, half, c, omega)
     along = (turn * rate).sum(axis=1, keepdims=True)
-    once = _cross(turn, rate)
-    left = alpha - (per_a * along * once + per_b * along * _cross(turn, once)
-                    + b * _cross(rate, once))
+    once = cross(turn, rate)
+    left = alpha - (per_a * along * once + per_b * along * cross(turn, once)
+                    + b * cross(rate, once))
     return rate, _jacobian(turn, half, c, left)
 
 
 def rotation_vector(start: Array, end: Array) -> Array:
     """Return axis times angle (N, 3) [rad] of the shorter rotation between two."""
     vector = (end[:, :3] * start[:, 3:] - start[:, :3] * end[:, 3:]
-              - _cross(end[:, :3], start[:, :3]))
+              - cross(end[:, :3], start[:, :3]))
     cosine = (end * start).sum(axis=1, keepdims=True)
     sine = np.sqrt((vector * vector).sum(axis=1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, np.abs(cosine))
@@ -234,7 +226,7 @@ def _turned(quaternions: Array, turn: Array) -> Array:
     vector = 0.5 * np.sinc(angle / (2.0 * np.pi)) * turn
     cosine = np.cos(0.5 * angle)
     x, w = quaternions[:, :3], quaternions[:, 3:]
-    return np.concatenate([cosine * x + w * vector + _cross(vector, x),
+    return np.concatenate([cosine * x + w * vector + cross(vector, x),
                            cosine * w - (vector * x).sum(axis=1, keepdims=True)], axis=1)
 
 

@@ -167,4 +167,8 @@ def quaternion_of(rotation: Sequence[float]) -> tuple[float, float, float, float
 
 
 def _matrix(rows: list[list[Array]]) -> Array:
-    return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
+    found = np.empty((*rows[0][0].shape, len(rows), len(rows[0])))
+    for i, row in enumerate(rows):
+        for j, each in enumerate(row):
+            found[..., i, j] = each
+    return found

@@ -209,12 +209,15 @@ def _reached(p: Parameters, offsets: Array, side: float) -> Flags:
 
 def _height(shape: Shape, side: float, legs: Array, length: float) -> float:
     """Return the distance from the base at which the mean leg has a length, on one side."""
-    raised = legs.copy()
+    across, along = (legs[:, :2] ** 2).sum(axis=1).tolist(), legs[:, 2].tolist()
     low, high = 0.0, length + shape.base_radius + shape.platform_radius
     for _ in range(60):
         middle = 0.5 * (low + high)
-        raised[:, 2] = legs[:, 2] + side * middle
-        if mean_norm(raised) < length:
+        total = 0.0
+        for square, height in zip(across, along, strict=True):
+            raised = height + side * middle
+            total += math.sqrt(square + raised * raised)
+        if total / len(along) < length:
             low = middle
         else:
             high = middle
