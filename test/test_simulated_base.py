@@ -90,7 +90,7 @@ def test_a_sine_is_a_sine() -> None:
 
 def test_the_sea_has_its_height_its_period_and_its_responses() -> None:
     parameters = on(base_motion__sea__wave_height=3.0, base_motion__sea__peak_period=8.0, **SEA)
-    x, _, _ = GeneratedBaseMotion(parameters).harmonics.at(np.arange(40_000.0))
+    x, _, _ = GeneratedBaseMotion(parameters).harmonics.at(np.arange(20_000.0))
     # The band to 2.5 times the peak has exp(-1.25 / 2.5^4) of the energy of the spectrum.
     significant = 4.0 * x.std(axis=0) / math.sqrt(math.exp(-1.25 / 2.5 ** 4))
     assert significant == pytest.approx(3.0 * parameters['base_motion.sea.response'], rel=1e-2)
