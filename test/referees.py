@@ -32,11 +32,12 @@ def rng(seed: int = SEED) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-def rotation_about(axis: Any, angle: float) -> Array:
-    """Return the turn by an angle about a unit axis (Rodrigues)."""
+def rotation_about(axis: Any, angle: float | Array) -> Array:
+    """Return the turns by angles (...) about a unit axis (Rodrigues)."""
     x, y, z = axis
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    r: Array = np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+    angles = np.asarray(angle)[..., None, None]
+    r: Array = np.eye(3) + np.sin(angles) * k + (1.0 - np.cos(angles)) * (k @ k)
     return r
 
 

@@ -43,8 +43,7 @@ def limited(random: np.random.Generator, **more: Any) -> tuple[StewartPlatform, 
 def moved(pose: Pose, direction: Array, pivot: Array, by: Array) -> Pose:
     """Return the poses of a travel, by matrix exponentials of their own."""
     rate = float(np.linalg.norm(direction[3:]))
-    turns = np.array([rotation_about(direction[3:] / rate, rate * t) if rate else np.eye(3)
-                      for t in by])
+    turns = rotation_about(direction[3:] / (rate or 1.0), rate * by)
     center = pose.position + pose.rotation @ pivot
     rotations = turns @ pose.rotation
     return Pose(center + by[:, None] * direction[:3] - rotations @ pivot, rotations)

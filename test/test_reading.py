@@ -307,7 +307,7 @@ def test_large_models_take_time_in_proportion_to_their_size(text, tmp_path, snap
     ('<worldbody>' + '<body>' * 50_000 + '</body>' * 50_000 + '</worldbody>', 'MuJoCo: ')])
 def test_mujoco_is_given_bounded_time_and_memory(text, why, tmp_path, monkeypatch):
     pytest.importorskip('mujoco')
-    monkeypatch.setattr(loading, '_TIME', 2)
+    monkeypatch.setattr(loading, '_TIME', 1)
     monkeypatch.setattr(loading, '_WAIT', 6)
     os.mkfifo(tmp_path / 'pipe')
     (tmp_path / 'file.xml').write_text(f'<mujoco>{text}</mujoco>')
