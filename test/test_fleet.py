@@ -48,6 +48,7 @@ from snapshot import Snapshot
 from stewart_dynamics import BagError, Parameters, StewartError
 from stewart_dynamics.bags.find import folders_of_results
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
+from stewart_dynamics.replay import local_processes, many_bags
 from stewart_dynamics.replay.bag_task import finished, kept, replay_task, Task
 from stewart_dynamics.replay.local_processes import _start_server
 from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
@@ -87,18 +88,32 @@ def heave(folder: Path, number: int, amplitude: float = 0.05) -> Path:
 @pytest.fixture(scope='module')
 def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a bag that takes so long that a process can be caught in the middle of it."""
-    return heave(tmp_path_factory.mktemp('long') / 'long', 80_000)
+    return heave(tmp_path_factory.mktemp('long') / 'long', 40_000)
+
+
+@pytest.fixture(scope='module')
+def nine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of nine bags."""
+    folder = tmp_path_factory.mktemp('nine')
+    for n in range(9):
+        heave(folder / f'{n}', 50 + n)
+    return folder
 
 
 @pytest.fixture
-def bags(tmp_path: Path, long_bag: Path) -> Path:
-    """Return a folder of bags: a long one and ten short ones, one of which meets limits."""
+def short(tmp_path: Path, nine: Path) -> Path:
+    """Return a folder of ten short bags, one of which meets limits."""
     folder = tmp_path / 'bags'
-    shutil.copytree(long_bag, folder / 'long')
-    for n in range(9):
-        heave(folder / 'short' / f'{n}', 50 + n)
+    shutil.copytree(nine, folder / 'short')
     shutil.copytree(ROOT / 'bags' / 'singular', folder / 'singular')
     return folder
+
+
+@pytest.fixture
+def bags(short: Path, long_bag: Path) -> Path:
+    """Return a folder of bags: a long one and ten short ones, one of which meets limits."""
+    shutil.copytree(long_bag, short / 'long', copy_function=os.link)
+    return short
 
 
 @pytest.fixture(scope='module')
@@ -117,7 +132,7 @@ def until(condition: Callable[[], Any], what: str) -> Any:
     end = time.monotonic() + 300.0
     while not (found := condition()):
         assert time.monotonic() < end, f'waited for {what}'
-        time.sleep(0.002)
+        time.sleep(0.01)
     return found
 
 
@@ -198,6 +213,9 @@ def test_every_bag_is_replayed_once_with_its_progress(
         monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     # Relative paths mean the same in workers, wherever these were started.
     monkeypatch.chdir(tmp_path)
+    # So often that the long bag is seen in its middle.
+    for module in (local_processes, many_bags):
+        monkeypatch.setattr(module, 'LOCAL_INTERVAL', 0.02)
     output = Path('out') / 'of two'
     pairs = folders_of_results([Path('bags')], output)
     assert len(pairs) == 11
@@ -237,8 +255,9 @@ def test_every_bag_is_replayed_once_with_its_progress(
     assert float(rate.removesuffix('k')) > 0.0
 
 
-def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
-    whole = (bags / 'long' / 'long.mcap').read_bytes()
+def test_bad_bags_do_not_stop_the_others(
+        short: Path, tmp_path: Path, long_bag: Path) -> None:
+    bags, whole = short, (long_bag / 'long.mcap').read_bytes()
     (bags / 'cut').mkdir()
     (bags / 'cut' / 'cut.mcap').write_bytes(whole[:len(whole) // 2])
     (bags / 'noise').mkdir()
@@ -258,7 +277,7 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
     # each is named, with its error, in one line
     head, *told = fleet.text().splitlines()
     assert head == (
-        '16 bags: 10 done, 1 with messages rejected, 1 with a limit or warning, 1 incomplete, '
+        '15 bags: 9 done, 1 with messages rejected, 1 with a limit or warning, 1 incomplete, '
         '3 failed')
     assert len(told) == 4
     for name, why in (('cut', 'cut.mcap: '), ('noise', 'not MCAP, not sqlite3'),
@@ -278,16 +297,16 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
     assert hidden(output) == []
 
 
-def test_results_are_not_overwritten(bags: Path, tmp_path: Path, snapshot: Snapshot) -> None:
+def test_results_are_not_overwritten(short: Path, tmp_path: Path, snapshot: Snapshot) -> None:
     output = tmp_path / 'out'
-    pairs = folders_of_results([bags / 'short'], output)
+    pairs = folders_of_results([short / 'short'], output)
     first = replay_fleet(pairs, PARAMETERS, output, PLAIN)
     before = {path: path.read_bytes() for path in output.rglob('*') if path.is_file()}
     heavy = PARAMETERS.replaced({'platform.mass': 151.0})
     with snapshot.raises(BagError):
         replay_fleet(pairs, heavy, output, PLAIN)
     with snapshot.raises(BagError):
-        replay_fleet(folders_of_results([bags / 'singular'], output), PARAMETERS, output, PLAIN)
+        replay_fleet(folders_of_results([short / 'singular'], output), PARAMETERS, output, PLAIN)
     assert {path: path.read_bytes() for path in output.rglob('*') if path.is_file()} == before
     (tmp_path / 'other').mkdir()
     (tmp_path / 'other' / 'fleet.csv').write_text('ship,port\n')
@@ -302,9 +321,9 @@ def test_results_are_not_overwritten(bags: Path, tmp_path: Path, snapshot: Snaps
         replay_fleet(pairs, PARAMETERS, output, PLAIN._replace(force=True))
 
 
-def test_a_bag_finished_by_the_same_run_is_not_replayed_again(bags: Path, tmp_path: Path) -> None:
+def test_a_bag_finished_by_the_same_run_is_not_replayed_again(short: Path, tmp_path: Path) -> None:
     """As left by a process that dies before it can report it."""
-    (bag, folder), *_ = folders_of_results([bags / 'short'], tmp_path / 'out')
+    (bag, folder), *_ = folders_of_results([short / 'short'], tmp_path / 'out')
     task = Task(0, bag, folder, PARAMETERS, PLAIN._replace(run='this'))
     first = replay_task(task, lambda *_: None)
     before = folder.stat().st_mtime_ns
@@ -366,9 +385,10 @@ def fork_server() -> int:
 
 
 @pytest.mark.parametrize('begun', [False, True])
-def test_a_killed_fork_server_costs_no_bag(bags: Path, tmp_path: Path, begun: bool) -> None:
+def test_a_killed_fork_server_costs_no_bag(
+        tmp_path: Path, begun: bool, request: pytest.FixtureRequest) -> None:
     output = tmp_path / 'out'
-    pairs = folders_of_results([bags], output)
+    pairs = folders_of_results([request.getfixturevalue('bags' if begun else 'short')], output)
     with ThreadPoolExecutor() as apart:
         if not begun:  # before the first process is started
             _start_server()
@@ -381,7 +401,7 @@ def test_a_killed_fork_server_costs_no_bag(bags: Path, tmp_path: Path, begun: bo
     check_each_once(fleet, pairs, output)
 
 
-def test_processes_that_cannot_start_are_reported_at_once(bags: Path, tmp_path: Path) -> None:
+def test_processes_that_cannot_start_are_reported_at_once(short: Path, tmp_path: Path) -> None:
     script = tmp_path / 'script.py'
     script.write_text(
         'from pathlib import Path\n'
@@ -390,7 +410,7 @@ def test_processes_that_cannot_start_are_reported_at_once(bags: Path, tmp_path: 
         'from stewart_dynamics.replay.many_bags import replay_fleet\n'
         'from stewart_dynamics.replay.replay_options import Options\n'
         f'output = Path({str(tmp_path / "out")!r})\n'
-        f'pairs = folders_of_results([Path({str(bags)!r})], output)\n'
+        f'pairs = folders_of_results([Path({str(short)!r})], output)\n'
         f'parameters = Parameters.from_yaml({str(PARAMS)!r})\n'
         # what a process runs, too, that is started by this one
         'try:\n'
@@ -404,10 +424,10 @@ def test_processes_that_cannot_start_are_reported_at_once(bags: Path, tmp_path: 
 
 
 def test_replaced_results_are_restored_if_their_replacement_is_incomplete(
-        bags: Path, tmp_path: Path) -> None:
+        short: Path, tmp_path: Path) -> None:
     """As left by a process that dies between the two renames."""
     output = tmp_path / 'out'
-    pairs = folders_of_results([bags / 'short'], output)
+    pairs = folders_of_results([short / 'short'], output)
     for name in ('.long.{}.replaced', '.0.{}', '.another.{}'):
         path = output / name.format(f'{32 * "a"}.partial.12345678')
         path.mkdir(parents=True)
@@ -436,9 +456,9 @@ def test_hostile_names(
 
 
 @pytest.mark.slow
-def test_an_interrupted_run_continues(bags: Path, tmp_path: Path) -> None:
+def test_an_interrupted_run_continues(short: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
-    pairs = folders_of_results([bags], output)
+    pairs = folders_of_results([short], output)
     for bag, folder in (pairs[0], pairs[-1]):
         replay(bag, PARAMETERS, folder, PLAIN._replace(run='interrupted'))
     (pairs[1][1] / 'bag').mkdir(parents=True)  # not complete: without summary.json
@@ -450,26 +470,26 @@ def test_an_interrupted_run_continues(bags: Path, tmp_path: Path) -> None:
 
     before = times()
     fleet = replay_fleet(pairs, PARAMETERS, output, PLAIN)
-    assert [each.kept for each in fleet.ended] == [True, *[False] * 9, True]
+    assert [each.kept for each in fleet.ended] == [True, *[False] * 8, True]
     assert hidden(output) == []
     assert fleet.text().splitlines() == [
-        '11 bags: 9 done, 1 with a limit or warning, 1 failed; 2 kept from an earlier run, their '
+        '10 bags: 8 done, 1 with a limit or warning, 1 failed; 2 kept from an earlier run, their '
         'inputs have not changed', fleet.ended[1].error]
     assert {folder: when for folder, when in times().items() if folder in before} == before
     (pairs[1][1] / 'bag').rmdir()
     pairs[1][1].rmdir()
     # all are in the table, as if they had been replayed at once
     again = replay_fleet(pairs, PARAMETERS, output, PLAIN)
-    assert [each.kept for each in again.ended] == [True, False, *[True] * 9]
+    assert [each.kept for each in again.ended] == [True, False, *[True] * 8]
     whole = replay_fleet(
-        folders_of_results([bags], tmp_path / 'whole'), PARAMETERS, tmp_path / 'whole', PLAIN)
+        folders_of_results([short], tmp_path / 'whole'), PARAMETERS, tmp_path / 'whole', PLAIN)
     assert [(each.row, each.text) for each in again.ended] == [
         (each.row, each.text) for each in whole.ended]
     assert (output / 'fleet.csv').read_bytes() == (tmp_path / 'whole' / 'fleet.csv').read_bytes()
 
 
-def test_results_are_kept_only_of_unchanged_inputs(bags: Path, tmp_path: Path) -> None:
-    (bag, folder), *_ = folders_of_results([bags / 'short'], tmp_path / 'out')
+def test_results_are_kept_only_of_unchanged_inputs(short: Path, tmp_path: Path) -> None:
+    (bag, folder), (other_bag, _), *_ = folders_of_results([short / 'short'], tmp_path / 'out')
     replay(bag, PARAMETERS, folder, PLAIN)
     task = Task(0, bag, folder, PARAMETERS, PLAIN)
     assert kept(task)
@@ -478,7 +498,7 @@ def test_results_are_kept_only_of_unchanged_inputs(bags: Path, tmp_path: Path) -
             task._replace(options=PLAIN._replace(cutoff=5.0)),
             task._replace(options=PLAIN._replace(topics={'wrench': '/load'})),
             task._replace(options=PLAIN._replace(report=True)),
-            task._replace(bag=bags / 'long' / 'long.mcap')):
+            task._replace(bag=other_bag)):
         assert not kept(other)
     (folder / 'legs.csv').rename(folder / 'moved')
     assert not kept(task)
@@ -529,7 +549,7 @@ def huge(bags: Path) -> Path:
     """Return a folder of bags one of which takes many seconds: a recording in many files."""
     shutil.copytree(bags / 'short', bags / 'more' / 'short')
     (bags / 'more' / 'huge').mkdir()
-    for n in range(10):
+    for n in range(20):
         os.link(bags / 'long' / 'long.mcap', bags / 'more' / 'huge' / f'huge_{n}.mcap')
     return bags / 'more'
 
@@ -573,7 +593,7 @@ def test_an_interrupt_leaves_no_partial_results(
 
 @pytest.mark.slow
 def test_a_signal_while_a_process_starts_is_not_in_its_way(
-        bags: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The signal comes between the start of a process and that of the thread that ends it."""
     start, begun = ProcessPoolExecutor._start_executor_manager_thread, set()
 
@@ -586,8 +606,8 @@ def test_a_signal_while_a_process_starts_is_not_in_its_way(
     output = tmp_path / 'out'
     handler, others = signal.getsignal(signal.SIGINT), set(multiprocessing.active_children())
     try:
-        with pytest.raises(KeyboardInterrupt, match='^0 of 11 bags are done; the same command '):
-            replay_fleet(folders_of_results([bags], output), PARAMETERS, output, PLAIN, jobs=2)
+        with pytest.raises(KeyboardInterrupt, match='^0 of 10 bags are done; the same command '):
+            replay_fleet(folders_of_results([short], output), PARAMETERS, output, PLAIN, jobs=2)
         assert len(begun) == 1  # others are not waited for
         assert set(multiprocessing.active_children()) == others
         assert hidden(output) == []
@@ -649,19 +669,19 @@ def test_a_lost_cluster_is_reported_for_each_bag(
 
 @pytest.mark.parametrize('address', ['tcp://127.0.0.1:1', 'nonsense', 'foo://x', ''])
 def test_a_cluster_that_is_not_there_is_an_error(
-        bags: Path, tmp_path: Path, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        short: Path, tmp_path: Path, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('stewart_dynamics.replay.dask_cluster._PATIENCE', 1.0)
     output = tmp_path / 'out'
     with pytest.raises(StewartError, match=f'^{address}: no Dask scheduler answers there: \\w'):
-        replay_fleet(folders_of_results([bags], output), PARAMETERS, output, PLAIN,
+        replay_fleet(folders_of_results([short], output), PARAMETERS, output, PLAIN,
                      scheduler=address)
     assert list(output.iterdir()) == []
 
 
-def test_dask_is_imported_only_for_a_cluster(bags: Path, tmp_path: Path) -> None:
+def test_dask_is_imported_only_for_a_cluster(short: Path, tmp_path: Path) -> None:
     (tmp_path / 'sitecustomize.py').write_text(
         "import sys\nsys.modules['distributed'] = sys.modules['dask'] = None\n")
-    arguments = [sys.executable, '-m', 'stewart_dynamics.replay', f'{bags / "short"}',
+    arguments = [sys.executable, '-m', 'stewart_dynamics.replay', f'{short / "short"}',
                  '--params', f'{PARAMS}', '--no-report']
     for options, code, said in (
             (['--output', f'{tmp_path / "a"}', '--jobs', '2'], DONE, r'^$'),
