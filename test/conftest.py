@@ -16,7 +16,6 @@ from pathlib import Path
 import re
 import shutil
 import signal
-import sys
 from typing import Any, TYPE_CHECKING
 
 from hypothesis import settings
@@ -30,15 +29,6 @@ if TYPE_CHECKING:
 # Before numpy is imported, in this process and those that it starts: with matrices as small as
 # these, waiting threads cost as much again, and other processes need the cores.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
-# Compiled modules are kept, as with `make test`, whatever the shell says: it takes 6 s to compile
-# the tests in each process that runs them, and 0.2 s the package in each program that they start.
-# Not those of mutants, which differ from one another within the resolution of a file's time.
-if 'MUTATION_DURATIONS' not in os.environ:
-    os.environ.pop('PYTHONDONTWRITEBYTECODE', None)
-    sys.dont_write_bytecode = False
-    sys.pycache_prefix = os.environ.setdefault(
-        'PYTHONPYCACHEPREFIX', f'{Path(__file__).parents[1] / ".cache" / "pycache"}')
 
 # Whoever runs the tests may ignore signals (nohup; a shell's background job), and processes
 # inherit it. The tests send them, and ask what a program does that heeds them.
