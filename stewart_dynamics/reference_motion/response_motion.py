@@ -91,17 +91,16 @@ def _amplitudes_of(parameters: ReferenceMotionParameters) -> Array:
     """Return the peaks of the axes (6,) [m, rad]."""
     if not parameters.motion.response.params_file:
         return parameters.motion.amplitude
-    return np.array(_amplitudes_within(
+    return parameters.motion.response.part * np.array(_amplitudes_within(
         parameters.motion.response.params_file, tuple(parameters.motion.initial.tolist()),
-        parameters.motion.response.part, _highest(parameters),
-        parameters.motion.response.period))
+        _highest(parameters), parameters.motion.response.period))
 
 
 @lru_cache(maxsize=4)
-def _amplitudes_within(path: str, initial: tuple[float, ...], part: float, highest: int,
-                       period: float) -> tuple[float, ...]:
+def _amplitudes_within(path: str, initial: tuple[float, ...], highest: int, period: float,
+                       ) -> tuple[float, ...]:
     """
-    Return peaks of the axes [m, rad] that are a part of the largest within the hexapod's limits.
+    Return the largest peaks of the axes within the hexapod's limits [m, rad].
 
     Raises ParameterError if the hexapod lacks a limit, or is not within them at the center.
     """
@@ -127,5 +126,5 @@ def _amplitudes_within(path: str, initial: tuple[float, ...], part: float, highe
         if not factor > 0.0:
             raise ParameterError(f'motion.initial: {listed(center)}: is not within the limits of '
                                  f'the hexapod in {path}')
-        found.append(part * factor * small)
+        found.append(factor * small)
     return tuple(found)
