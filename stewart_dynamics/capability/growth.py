@@ -31,7 +31,7 @@ STEPS = 64
 Steps in which factors are sampled: up to the end of the path; if it has none, up to 1, and from
 then on up to twice the factor.
 """
-_BLOCK = 256  # samples that are computed at once
+_BLOCK, _AT_ONCE = 256, 13  # samples and factors that are computed at once
 
 
 class _State(NamedTuple):
@@ -132,15 +132,16 @@ class Growth:
 
     def _sampled(self, which: Integers, factors: Array) -> _Brackets | None:
         """Return the samples that exceed a limit at the earliest of the factors (F,), or None."""
-        count = len(factors)
-        exceeded = self._largest(np.repeat(factors, len(which)), np.tile(
-            which, count)).reshape(count, -1) > 1.0
-        at = int(exceeded.any(axis=1).argmax())
-        if not exceeded[at].any():
-            return None
-        samples = which[exceeded[at]]
-        return _Brackets(samples, np.full(len(samples), factors[max(at - 1, 0)]),
-                         np.full(len(samples), factors[at]))
+        for first in range(0, len(factors), _AT_ONCE):
+            some = factors[first:first + _AT_ONCE]
+            exceeded = self._largest(np.repeat(some, len(which)), np.tile(
+                which, len(some))).reshape(len(some), -1) > 1.0
+            at = int(exceeded.any(axis=1).argmax())
+            if exceeded[at].any():
+                samples = which[exceeded[at]]
+                return _Brackets(samples, np.full(len(samples), factors[max(first + at - 1, 0)]),
+                                 np.full(len(samples), some[at]))
+        return None
 
     def _halved(self, brackets: _Brackets) -> _Brackets | None:
         """Return the halves with the exits; None if no number lies between the factors."""
