@@ -22,7 +22,7 @@ CONFIG = Path(__file__).resolve().parent.parent / 'config'
 PLATFORM = StewartPlatform.from_yaml(CONFIG / 'platform.yaml')
 AXES = np.tile([0.0, 0.0, 1.0], 6)
 KINDS = 'lengths', 'joints', 'condition', 'lines'
-SAMPLES = 20_000
+SAMPLES = 10_000
 HARD = 2, 6, 14  # their condition numbers take up to 20 s to be proven
 
 

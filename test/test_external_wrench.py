@@ -515,7 +515,7 @@ def test_loads_and_a_wrong_mass_are_no_mistake_in_the_efforts(
     loads = [np.array(LOAD), push, np.array([0.3 * weight, 0.0, -0.3 * weight, 0.0, 0.0, 0.0])]
     streams = [stream(rate, moving, load) for load in loads] + [
         stream(rate, moving, parameters=HEXAPOD.replaced({'platform.mass': factor * mass}))
-        for factor in (0.8, 1.2, 1.3)]
+        for factor in (0.8, 1.3)]
     for each in streams:
         found = judged(with_noise(each, noise=noise))
         late = found[len(found) // 8 if noise else 0:]

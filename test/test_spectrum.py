@@ -41,8 +41,9 @@ def noise(many: int, channels: int = 2) -> Array:
     return rng().normal(size=(channels, many)) + 2000.0
 
 
-@pytest.mark.parametrize('many', [64, 100, 1001, 5000, 81_919, 81_920, 200_000])
-@pytest.mark.parametrize('rate', [1000.0, 100.0, 3.0])
+@pytest.mark.parametrize(('many', 'rate'), [
+    *((many, rate) for many in (64, 100, 1001, 5000) for rate in (1000.0, 100.0, 3.0)),
+    (81_919, 1000.0), (81_920, 3.0), (200_000, 100.0)])
 def test_it_is_that_of_scipy(many: int, rate: float) -> None:
     values = noise(many)
     found = density_of(np.arange(many) / rate, values)
