@@ -151,7 +151,7 @@ def test_a_load_counts_between_the_samples(load: str) -> None:
     if load == 'wrench':
         more = {'wrench': [0.0, 0.0, -9000.0, 0.0, 0.0, 0.0]}
     whole = motions.Interpolation(np.diff(few), given.rows)
-    where = np.arange(0.0, len(few) - 1.0, 1.0 / 256.0)
+    where = np.arange(0.0, len(few) - 1.0, 1.0 / 64.0)
     which = where.astype(np.int64)
     dense = Motion.of_rows(whole.at(which, where - which))
     for ask in (capability.speed_factor, capability.amplitude_factor):
