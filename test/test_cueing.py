@@ -96,7 +96,7 @@ def test_measured_response_is_the_analytic_one(axis: int) -> None:
     cueing = cueing_of({'cueing.input': 'acceleration'})
     for n, frequency in enumerate(OMCT_FREQUENCIES):
         period = 2.0 * np.pi / frequency
-        rest = np.ceil(60.0 / period)  # transients of 0.25 rad/s are gone
+        rest = np.ceil(40.0 / period)  # transients of 0.25 rad/s are gone
         samples = max(128, round(period / 0.01))
         times = np.arange((rest + 1.0) * samples) * period / samples
         inputs = np.zeros((len(times), 6))
