@@ -8,11 +8,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from referees import random_motion, random_parameters, rng, size_of
+from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import Capability, Motion, Pose, StewartPlatform
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.motions import Deviations
 from stewart_dynamics.mechanics.rows import CONDITION
+from test_capability import limited
 
 COUNT = 20_000
 
@@ -80,6 +82,24 @@ def test_a_motion_without_displacement_grows_with_its_rates(factor: float) -> No
         found = Capability(limited).amplitude_factor(moving, home)
         assert found.value == pytest.approx(factor, rel=1e-9)
         assert found.limit == name
+
+
+def test_poses_grow_until_the_first_of_their_travels_ends() -> None:
+    """Displacements of sizes from 1e-6 on, some without translation or rotation."""
+    for seed in range(12):
+        random = rng(seed)
+        platform, pose = limited(random, **{'limits.velocity_max': None, 'limits.force_max': None})
+        changes = random.uniform(-1.0, 1.0, (40, 6)) * 10.0 ** random.uniform(-6.0, 0.0, (40, 1))
+        changes[::3, 3:], changes[1::3, :3] = 0.0, 0.0
+        moved = Motion.from_pose(Pose(
+            pose.position + changes[:, :3],
+            Rotation.from_rotvec(changes[:, 3:]).as_matrix() @ pose.rotation))
+        found = Capability(platform).amplitude_factor(moved, pose)
+        travels = Capability(platform).travel(pose, changes)
+        assert found.value == pytest.approx(travels.value.min(), rel=1e-9)
+        assert found.sample == travels.value.argmin()
+        assert (found.limit, found.leg) == (
+            travels.limit[found.sample], travels.leg[found.sample])
 
 
 def test_a_motion_into_a_singularity_ends_where_it_cannot_be_solved() -> None:
