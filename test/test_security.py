@@ -164,8 +164,8 @@ def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
         (['output:=separate', 'start_timeout:=1000.0'], 5),
         (['output:=combined', 'start_timeout:=1000.0', 'use_sim_time:=true'], 3)]),
     ('stewart_simulator', ['platform.yaml', 'simulator.yaml'], [
-        (['use_sim_time:=false', *DRIVES], 7), (['use_sim_time:=true'], 7),
-        (['base_motion.source:=sine', *SWAY], 10), (['base_motion.source:=sea', *SWAY], 10),
+        (['use_sim_time:=false', *DRIVES], 7),
+        (['base_motion.source:=sine', *SWAY, 'use_sim_time:=true'], 11),
         (['base_motion.source:=topics'], 7)]),
     ('stewart_cueing', ['platform.yaml'], [
         (['output:=separate'], 8), (['output:=combined', 'use_sim_time:=true'], 6)]),
