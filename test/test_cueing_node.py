@@ -34,6 +34,8 @@ HOME = home_pose(PARAMETERS)
 RATE = 100.0
 KINDS = {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
 NODE = '/stewart_cueing'
+# The head returns to its place in a fifth of the time.
+QUICK = 'start_timeout:=0.1', 'cueing.translation.washout_frequency:=[1.25, 2.0, 2.0]'
 
 
 class Cueing:
@@ -49,6 +51,7 @@ class Cueing:
         self.legs = self.peer.writer(f'{NODE}/measured_legs', JointState)
         self.clock = self.peer.writer('/clock', Clock)
         self.stamp = 1_000_000_000
+        self._decoded, self._last = 0, np.full(9, np.inf)
         nodes: list[CueingNode] = []
         self.program: Any = Inside(lambda: nodes.append(CueingNode()) or nodes[0], [
             '--ros-args', '--params-file', PLATFORM, '-p', f'cueing.rate:={RATE}',
@@ -97,7 +100,10 @@ class Cueing:
     @property
     def last(self) -> Array:
         """The last row; far away without one."""
-        return np.array(self.row(self.complete - 1)[1] if self.complete else [np.inf] * 9)
+        if self.complete != self._decoded:
+            self._decoded = self.complete
+            self._last = np.array(self.row(self.complete - 1)[1])
+        return self._last
 
     def until(self, condition: Any, text: str, force: Any = None) -> None:
         """Wait for a condition, sending the vehicle's motion meanwhile, one for a setpoint."""
@@ -134,7 +140,7 @@ def cueing(domain: int) -> Iterator[Any]:
 
 def test_vehicle_moves_the_platform_and_silence_brings_it_home(cueing: Any) -> None:
     """Without legs it begins at home; each setpoint is the derivative of the one before."""
-    node = cueing('start_timeout:=0.1')
+    node = cueing(*QUICK)
     push = (1.5, 0.0, GRAVITY)
     node.until(lambda: len(node.raw['accel']) > 10, 'setpoints come')
     node.until(lambda: node.last[0] > HOME.position[0] + 0.03, 'it moves', push)
@@ -251,7 +257,7 @@ def test_the_whole_lifecycle(cueing: Any) -> None:
     ((0.0, 0.0, 0.0), 'without gravity, set acceleration')])
 def test_likely_mistakes_are_named(cueing: Any, force: Any, text: str) -> None:
     """The platform stays at home meanwhile."""
-    node = cueing('start_timeout:=0.1')
+    node = cueing(*QUICK)
     node.until(lambda: node.diagnostics and text in node.status.message,
                'the mistake is reported', force)
     at = len(node.raw['accel'])
