@@ -12,7 +12,6 @@ or if the result is not sound; the call for batches then converts the argument o
 from __future__ import annotations
 
 from collections.abc import Callable
-import math
 from typing import Any
 
 import numpy as np
@@ -53,8 +52,9 @@ def _dynamics(hexapod: Records, name: str, result: str) -> Callable[
         [Motion, Any, Any, BaseMotion | None], Array | None]:
     """Return the call of a function of motion, forces, wrench and base."""
     where, pushed = places('one_motion'), result == 'motion'
-    free: list[tuple[Any, ...]] = []  # as much memory as there are calls at the same time
-    taken, put_back = free.pop, free.append  # atomic
+    # As much memory as there are calls at the same time, for a base at rest and for one that moves.
+    at_rest: list[tuple[Any, ...]] = []
+    moving: list[tuple[Any, ...]] = []
 
     def new() -> tuple[Any, ...]:
         solve, numbers = _bound(hexapod, name, 'one_motion')
@@ -65,8 +65,9 @@ def _dynamics(hexapod: Records, name: str, result: str) -> Callable[
     def call(motion: Motion, forces: Any, wrench: Any, base: BaseMotion | None) -> Array | None:
         if type(motion) is not Motion or (base is not None and type(base) is not BaseMotion):
             return None
+        free = at_rest if base is None else moving
         try:
-            memory = taken()
+            memory = free.pop()  # atomic, as append
         except IndexError:
             memory = new()
         solve, of_motion, of_forces, of_wrench, of_base, found = memory
@@ -78,17 +79,16 @@ def _dynamics(hexapod: Records, name: str, result: str) -> Callable[
                 of_wrench[:] = wrench
             if base is not None:
                 of_base[:] = base.rows
-                if of_base[0] != of_base[0]:
-                    return None  # nan would be a still base
+                gravity = of_base[0]
+                if gravity != gravity:
+                    return None  # nan would be a base at rest
             return found.copy() if solve() else None
         except _NO_FLOATS:
             return None
-        finally:  # the next one has no wrench, on a base at rest
+        finally:
             if wrench is not None:
-                of_wrench[:] = _NO_WRENCH
-            if base is not None:
-                of_base[0] = math.nan
-            put_back(memory)
+                of_wrench[:] = _NO_WRENCH  # the next one may have none
+            free.append(memory)
 
     return call
 
