@@ -52,7 +52,7 @@ def _dynamics(hexapod: Records, name: str, result: str) -> Callable[
         [Motion, Any, Any, BaseMotion | None], Array | None]:
     """Return the call of a function of motion, forces, wrench and base."""
     where, pushed = places('one_motion'), result == 'motion'
-    # As much memory as there are calls at the same time, for a base at rest and for one that moves.
+    # As much memory as there are calls at the same time, on a base at rest and on one that moves.
     at_rest: list[tuple[Any, ...]] = []
     moving: list[tuple[Any, ...]] = []
 
