@@ -967,7 +967,7 @@ class Planner:
         """Send long trajectories until the queue is full."""
         while not any('queue full' in line for line in log_lines(
                 self._node.program.stderr, 'ERROR')):
-            self.send_long(10_000, leap=leap)
+            self.send_long(20_000, leap=leap)
             self._node.peer.spin(0.1)
 
     def until_answered(self, number: int) -> JointTrajectory:

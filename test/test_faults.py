@@ -585,7 +585,7 @@ def test_trajectories_for_which_the_queue_is_full_are_rejected(renew: Start) -> 
     planner.fill()
     node.until_reported(
         'planned trajectory', ERROR, 'rejected: queue full: 5 are in work or wait')
-    node.until_status('planned trajectory', OK, 'accepted: 10000 points')
+    node.until_status('planned trajectory', OK, 'accepted: 20000 points')
     node.until(lambda: int(node.values('planned trajectory')['rejected: queue full']) > 0,
                'they are counted')
 

@@ -88,7 +88,7 @@ def test_setpoints_are_answered_while_trajectories_are_in_work(fresh: Start) -> 
         between += 1
         if done() > before:
             longest, between, before = max(longest, between), 0, done()
-            planner.send_long(10_000, leap=0.01)
+            planner.send_long(20_000, leap=0.01)
     assert longest > 8
 
 
