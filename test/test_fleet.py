@@ -48,7 +48,6 @@ from snapshot import Snapshot
 from stewart_dynamics import BagError, Parameters, StewartError
 from stewart_dynamics.bags.find import folders_of_results
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
-from stewart_dynamics.replay import local_processes, many_bags
 from stewart_dynamics.replay.bag_task import finished, kept, replay_task, Task
 from stewart_dynamics.replay.local_processes import _start_server
 from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
@@ -88,7 +87,7 @@ def heave(folder: Path, number: int, amplitude: float = 0.05) -> Path:
 @pytest.fixture(scope='module')
 def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a bag that takes so long that a process can be caught in the middle of it."""
-    return heave(tmp_path_factory.mktemp('long') / 'long', 40_000)
+    return heave(tmp_path_factory.mktemp('long') / 'long', 80_000)
 
 
 @pytest.fixture(scope='module')
@@ -132,7 +131,7 @@ def until(condition: Callable[[], Any], what: str) -> Any:
     end = time.monotonic() + 300.0
     while not (found := condition()):
         assert time.monotonic() < end, f'waited for {what}'
-        time.sleep(0.01)
+        time.sleep(0.002)
     return found
 
 
@@ -213,9 +212,6 @@ def test_every_bag_is_replayed_once_with_its_progress(
         monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     # Relative paths mean the same in workers, wherever these were started.
     monkeypatch.chdir(tmp_path)
-    # So often that the long bag is seen in its middle.
-    for module in (local_processes, many_bags):
-        monkeypatch.setattr(module, 'LOCAL_INTERVAL', 0.02)
     output = Path('out') / 'of two'
     pairs = folders_of_results([Path('bags')], output)
     assert len(pairs) == 11

@@ -450,8 +450,8 @@ def test_large_messages_of_other_topics_are_not_kept_in_memory(file: Path) -> No
 
 def test_long_bags_are_not_kept_in_memory(file: Path) -> None:
     peaks = []
-    for number in (20_000, 60_000):
-        of = [(topic, n, bytes(100)) for topic in ('/a', '/b') for n in range(number)]
+    for number in (20_000, 80_000):
+        of = [(topic, n, bytes(92)) for topic in ('/a', '/b') for n in range(number)]
         file.write_bytes(mcap(of, chunk_size=50_000, index_types=IndexType.CHUNK))
         peaks.append(peak_of(file))
     assert file.stat().st_size > 15_000_000

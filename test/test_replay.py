@@ -812,7 +812,7 @@ def test_it_needs_no_ros() -> None:
 @pytest.fixture(scope='module')
 def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a bag that takes seconds, a part of one each chunk."""
-    return chunked_bag(tmp_path_factory.mktemp('bags') / 'long.mcap', 60_000, 100_000)
+    return chunked_bag(tmp_path_factory.mktemp('bags') / 'long.mcap', 120_000, 100_000)
 
 
 def begun(bag: Path, out: Path) -> subprocess.Popen[str]:
