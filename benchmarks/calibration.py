@@ -25,8 +25,8 @@ from stewart_dynamics.calibration.frames import pose_errors
 from stewart_dynamics.calibration.geometry_fit import fit, Unknowns
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.pose_design import design_poses
+from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 
 BEGIN, END = '<!-- calibration: begin -->', '<!-- calibration: end -->'
 NOISE = Noise(1e-5, 1e-5, 1e-5)

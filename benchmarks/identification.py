@@ -26,12 +26,12 @@ from inverse_dynamics import Array, HERE, markdown, measured_on, write
 import numpy as np
 
 from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.executables import executable
 from stewart_dynamics.identification.extraction import Extraction, Extracts
 from stewart_dynamics.identification.parameter_fit import fit
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.reference_motion.motion_functions import motion_at
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 

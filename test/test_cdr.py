@@ -214,7 +214,7 @@ def test_no_corrupted_message_raises_anything_else(kind: str, data: st.DataObjec
 
 @contextmanager
 def little_memory() -> Iterator[None]:
-    """Assert that what is done takes less than a megabyte."""
+    """Assert that the body allocates less than a megabyte."""
     tracemalloc.start()
     try:
         yield

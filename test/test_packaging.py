@@ -311,6 +311,15 @@ def test_pip_requirements(distribution: importlib.metadata.Distribution) -> None
                 assert item.specifier.contains(versions[item.name]), item
 
 
+def test_programs_beside_the_package_import_names_that_exist() -> None:
+    """Nothing else runs all of the benchmarks."""
+    for path in python_files('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch'):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or '').startswith(NAME):
+                code = compile(ast.Module([node], []), str(path), 'exec')
+                exec(code, {})  # as the program does
+
+
 def test_copyright_headers() -> None:
     """Each source file that is not empty begins with the two lines of SPDX, which REUSE reads."""
     sources = [path for folder in (*SOURCES, 'ros2_control') for path in (ROOT / folder).rglob('*')

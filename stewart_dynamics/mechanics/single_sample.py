@@ -87,7 +87,7 @@ def _dynamics(hexapod: Records, name: str, result: str) -> Callable[
             return None
         finally:
             if wrench is not None:
-                of_wrench[:] = _NO_WRENCH  # the next one may have none
+                of_wrench[:] = _NO_WRENCH  # the next call may have no wrench
             free.append(memory)
 
     return call
