@@ -142,7 +142,7 @@ def one_seed(given: tuple[int, Array]) -> tuple[Array, Array]:
                     np.zeros(made.efforts.shape, dtype=bool))
     read = Extraction(platform, unknowns, 1.0 / RATE, 10.0)(window, platform.home_pose())
     extracts = Extracts()
-    extracts.add(0, 0.0, read.extract)
+    extracts.add(0, 0.0, read)
     found = fit(extracts, unknowns, None, np.array([10.0]))
     extracts.close()
     return (np.append(found.values[unknowns.asked], found.delays[0]),
