@@ -54,7 +54,7 @@ def _library() -> ctypes.CDLL:
 
 
 def _legs(function: str, p: Parameters, count: int, *arguments: Any) -> Legs:
-    """Return what a function in C writes for this many samples."""
+    """Return the legs that a function in C writes for a number of samples."""
     legs = np.empty((count, 3, 6))
     # arrays that live until the call ends
     passed = [each if isinstance(each, (int, float)) else np.ascontiguousarray(each)

@@ -277,14 +277,10 @@ class Conditioning(Quantity):
 
         The condition number counts as negative where det(J) has changed its sign.
         """
-        return self._rooms(moved, moved.matrices.center)[:, None] - 1.0
-
-    def _rooms(self, moved: Moved, matrices: Array) -> Array:
-        """Return ``stop / condition`` of matrices (N, 6, 6), with the sign of ``values``."""
-        singular = np.linalg.svd(matrices, compute_uv=False)
+        singular = np.linalg.svd(moved.matrices.center, compute_uv=False)
         room = singular[:, 5] / singular[:, 0] * self.stop
-        kept = np.linalg.det(matrices) * moved.starts.sides >= 0.0
-        return np.where(kept, room, -room)
+        kept = np.linalg.det(moved.matrices.center) * moved.starts.sides >= 0.0
+        return (np.where(kept, room, -room) - 1.0)[:, None]
 
     def excesses(self, margins: Array) -> Array:
         """Return ``condition / stop - 1`` at margins."""
@@ -292,10 +288,8 @@ class Conditioning(Quantity):
 
     def excesses_at(self, moved: Moved) -> Array:
         """Return ``condition / stop - 1`` at points; infinite past a singularity."""
-        lines, levers = moved.lines.center, moved.turned(moved.starts.levers).center
-        directions = lines / length(lines)
-        rooms = self._rooms(moved, np.concatenate([directions, np.cross(levers, directions)], 2))
-        return np.asarray(np.where(rooms > 0.0, 1.0 / rooms - 1.0, math.inf))[:, None]
+        room = self.values(moved) + 1.0
+        return np.asarray(np.where(room > 0.0, 1.0 / room - 1.0, math.inf))
 
     def margins(self, moved: Moved) -> Enclosure:
         """Return margins (N, 1)."""
