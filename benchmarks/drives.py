@@ -20,7 +20,7 @@ import numpy as np
 
 from stewart_dynamics import Motion, Parameters
 from stewart_dynamics.setpoints.output_messages import OutputMessages
-from stewart_dynamics.setpoints.step import Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, Step
 
 BEGIN, END = '<!-- drives: begin -->', '<!-- drives: end -->'
 CALLS, ROUNDS = 100, 3000
@@ -48,20 +48,20 @@ def measure() -> list[str]:
     """Return the lines for the page."""
     motion = Motion([0.0, 0.0, 1.1], np.eye(3), [0.05, 0.02, 0.03], [0.1, 0.1, 0.1],
                     [1.0, 1.0, 1.0])
-    setpoint = Setpoint(STAMP, tuple(motion.rows.tolist()))
+    setpoint = Batch.of(STAMP, motion.rows)
     cells: list[tuple[str, ...]] = [
         ('', 'step [us]', 'messages [us]', 'step, more [us]', 'messages, more [us]')]
     first = 0.0, 0.0
     for name, changes in CASES.items():
         parameters = Parameters.from_yaml(PARAMETERS).replaced(changes)
         step, messages = Step(parameters), OutputMessages(parameters)
-        before = step(setpoint, None)
-        assert before is not None and not before.exceedances
-        later = setpoint._replace(stamp=STAMP + 10 ** 6)
-        output = step(later, before.state)
-        assert output is not None
+        before = step(setpoint)
+        assert before.answered[0] and not before.exceeding[0]
+        later = setpoint._replace(stamps=setpoint.stamps + 10 ** 6)
+        outputs = step(later, before.state)
+        assert outputs.answered[0]
         times = (least(lambda: step(later, before.state)),  # noqa: B023
-                 least(lambda: list(messages.of_output(output))))  # noqa: B023
+                 least(lambda: list(messages.of(outputs))))  # noqa: B023
         first = first if changes else times
         cells.append((name, *(f'{time:.2f}' for time in times), *(
             f'{time - of_legs:.2f}' if changes else '' for time, of_legs in zip(

@@ -42,7 +42,7 @@ from stewart_dynamics.reference_motion.motion_functions import motion_at
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.security import PROFILES
 from stewart_dynamics.setpoints.output_messages import OutputMessages
-from stewart_dynamics.setpoints.step import Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, Step
 
 BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'
 BEGIN_MARKERS, END_MARKERS = '<!-- markers: begin -->', '<!-- markers: end -->'
@@ -428,11 +428,11 @@ def picture_words() -> str:
     """Return how long a picture takes and how large it is."""
     parameters = Parameters.from_yaml(PARAMETERS)
     motion = motion_at(ReferenceMotionParameters(MOTION), np.array([0.3])).rows[0].tolist()
-    output = Step(parameters)(Setpoint(FIRST_STAMP, motion), None)
-    assert output is not None
+    outputs = Step(parameters)(Batch.of(FIRST_STAMP, motion))
+    assert outputs.answered[0]
     markers = Markers(parameters)
-    size = len(markers.write(motion, output))
-    times = repeat(lambda: markers.write(motion, output), timer=time.process_time, repeat=21,
+    size = len(markers.write(motion, outputs))
+    times = repeat(lambda: markers.write(motion, outputs), timer=time.process_time, repeat=21,
                    number=200)
     words = (f'A picture has {size:,} bytes and is written in {median(times) / 200 * 1e6:.0f} us '
              'of processor time, median of 21.')

@@ -106,23 +106,21 @@ double condition_of_pair(double a[6][6], double inverse[6][6]) {
 
 /* See solve_many in library.h. */
 void NAMED(solve_lanes_, SUFFIX)(
-  const stewart_platform * platform, int64_t count, const double * motion_rows,
-  int64_t n_wrenches, const double * wrench_rows, int64_t n_bases, const double * base_rows,
-  int conditioned, double * result_rows);
+  const stewart_platform * platform, int64_t count, lane_rows of_motions, lane_rows of_wrenches,
+  lane_rows of_bases, int conditioned, double * result_rows, int64_t result_stride);
 
 /* Write rows, from the first one on, to lanes; lanes behind the last row have its numbers. */
-static void spread(
-  real * to, int width, const double * rows, int64_t n_rows, int64_t first, int64_t count) {
+static void spread(real * to, int width, lane_rows rows, int64_t first, int64_t count) {
   for (int k = 0; k < LANES; k++) {
-    int64_t row = n_rows == 1 ? 0 : first + k < count ? first + k : count - 1;
-    for (int n = 0; n < width; n++) {to[n][k] = rows[row * width + n];}
+    const double * row =
+      rows.first + rows.stride * (first + k < count ? first + k : count - 1);
+    for (int n = 0; n < width; n++) {to[n][k] = row[n];}
   }
 }
 
 void NAMED(solve_lanes_, SUFFIX)(
-  const stewart_platform * platform, int64_t count, const double * motion_rows,
-  int64_t n_wrenches, const double * wrench_rows, int64_t n_bases, const double * base_rows,
-  int conditioned, double * result_rows) {
+  const stewart_platform * platform, int64_t count, lane_rows of_motions, lane_rows of_wrenches,
+  lane_rows of_bases, int conditioned, double * result_rows, int64_t result_stride) {
   enum {MOTION = sizeof(motions) / sizeof(real), BASE = sizeof(bases) / sizeof(real),
     RESULT = sizeof(results) / sizeof(real)};
   for (int64_t first = 0; first < count; first += LANES) {
@@ -130,9 +128,9 @@ void NAMED(solve_lanes_, SUFFIX)(
     bases base;
     results result;
     real wrench[6];
-    spread((real *)&motion, MOTION, motion_rows, count, first, count);
-    spread(wrench, 6, wrench_rows, n_wrenches, first, count);
-    spread((real *)&base, BASE, base_rows, n_bases, first, count);
+    spread((real *)&motion, MOTION, of_motions, first, count);
+    spread(wrench, 6, of_wrenches, first, count);
+    spread((real *)&base, BASE, of_bases, first, count);
     load external = {read3(wrench), read3(wrench + 3)};
     choice moving = base.gravity[0] == base.gravity[0];  /* else nan: the base is still */
     if (any(moving)) {
@@ -145,7 +143,8 @@ void NAMED(solve_lanes_, SUFFIX)(
     solve(platform, &motion, external, conditioned, &result);
     const real * numbers = (const real *)&result;
     for (int k = 0; k < LANES && first + k < count; k++) {
-      for (int n = 0; n < RESULT; n++) {result_rows[(first + k) * RESULT + n] = numbers[n][k];}
+      double * row = result_rows + result_stride * (first + k);
+      for (int n = 0; n < RESULT; n++) {row[n] = numbers[n][k];}
     }
   }
 }

@@ -13,13 +13,16 @@ double condition_of_pair(double a[6][6], double inverse[6][6]);
 
 #include "library.h"
 
+#include <string.h>
+
+#define NUMBERS(structure) ((int64_t)(sizeof(structure) / sizeof(double)))
+
 /* A function into which all that it calls is inlined: twice as fast. */
 #define FLAT __attribute__((flatten))
 
 typedef void lanes_function(
-  const stewart_platform * platform, int64_t count, const double * motions, int64_t n_wrenches,
-  const double * wrenches, int64_t n_bases, const double * bases, int conditioned,
-  double * results);
+  const stewart_platform * platform, int64_t count, lane_rows motions, lane_rows wrenches,
+  lane_rows bases, int conditioned, double * results, int64_t result_stride);
 
 lanes_function solve_lanes_baseline;
 #if defined(__x86_64__) || defined(_M_X64)
@@ -47,9 +50,21 @@ void solve_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
   int64_t n_wrenches, const double * wrenches, int64_t n_bases, const stewart_base * bases,
   int64_t conditioned, stewart_result * results) {
-  solve_lanes()(
-    platform, count, (const double *)motions, n_wrenches, wrenches, n_bases,
-    (const double *)bases, conditioned != 0, (double *)results);
+  lane_rows of_motions = {(const double *)motions, NUMBERS(stewart_motion)};
+  lane_rows of_wrenches = {wrenches, n_wrenches == 1 ? 0 : 6};
+  lane_rows of_bases = {(const double *)bases, n_bases == 1 ? 0 : NUMBERS(stewart_base)};
+  solve_lanes()(platform, count, of_motions, of_wrenches, of_bases, conditioned != 0,
+                (double *)results, NUMBERS(stewart_result));
+}
+
+void solve_setpoints(
+  const stewart_platform * platform, int64_t count, const setpoint * setpoints,
+  setpoint_output * outputs) {
+  lane_rows motions = {(const double *)&setpoints->motion, NUMBERS(setpoint)};
+  lane_rows wrenches = {setpoints->wrench, NUMBERS(setpoint)};
+  lane_rows bases = {(const double *)&setpoints->base, NUMBERS(setpoint)};
+  solve_lanes()(platform, count, motions, wrenches, bases, 1, (double *)&outputs->result,
+                NUMBERS(setpoint_output));
 }
 
 /* Whether a base adds a load: one of nan adds none. */
@@ -83,6 +98,7 @@ int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
 #include "dynamics.c"
 #include "motors.c"
 #include "setpoints.c"
+#include "messages.c"
 #include "plant.c"
 #include "governor.c"
 #include "cueing.c"

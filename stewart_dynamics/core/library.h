@@ -14,6 +14,9 @@
 
 #include "stewart_dynamics.h"
 
+/* The first row of numbers for many samples, and the distance to the next; 0: one row for all. */
+typedef struct { const double * first; int64_t stride; } lane_rows;
+
 /* The singularity warning after a sample: stewart_state as numbers. */
 typedef struct {
   double cause, stopped, determinant, time_to_crossing, crossings;
@@ -51,26 +54,38 @@ typedef struct {
    nan where not needed. */
 typedef struct { double angles, clearance, motors, joint_axes[36]; } limit_checks;
 
-/* A setpoint of the node with the state before it, and what it gives. Flags are 0 or 1; windings:
-   temperature rises [K] and copper heat [W]. */
+/* The state of the step after a setpoint: of the warning; stamp [s, ns] and lengths [m] of the last
+   setpoint that was not a jump, nan before the first; temperature rises [K] and copper heat [W] of
+   the windings; whether time has jumped back before a setpoint that could not be answered. */
+typedef struct {
+  warning_state warning;
+  double seconds, nanoseconds, lengths[6];
+  double windings[12];
+  double restarting;
+} step_state;
+
+/* A setpoint. Flags are 0 or 1. */
 typedef struct {
   stewart_motion motion;
-  double wrench[6];
-  stewart_base base;
-  warning_state before;
-  double followed[6]; /* lengths of the last setpoint that was not a jump, or nan [m] */
-  double since;       /* time since that setpoint, 0 where there is none [s] */
-  double elapsed;     /* the same with the tolerance of stamps, infinite where there is none [s] */
-  double windings_before[12];
-  double restart, stamp_valid, base_known;
-  double answered, exceeding, jumped; /* answered: all numbers are finite */
-  stewart_result result; /* forces nan where J_inv cannot be solved or the base is not known */
-  double forces[6];      /* to publish [N]; nan where suppressed, as the motors' commands */
-  warning_state after;
-  double joint_angles[12], clearances[6], nearest[6];
-  double windings[12];
-  checked_motors motors;
-} one_setpoint;
+  double wrench[6];   /* load on the platform [N, N m] */
+  stewart_base base;  /* nan: still, or not known */
+  double base_known;  /* so is that of a fixed base */
+  double restart;     /* time has jumped back before it */
+  double stamped;     /* its stamp comes from messages, otherwise it is the time of arrival */
+} setpoint;
+
+/* What the step gives of a setpoint, beside its motors. */
+typedef struct {
+  stewart_result result;  /* forces nan where J_inv cannot be solved or the base is not known */
+  double positions[6];    /* of the joints: lengths of the legs less those at zero [m] */
+  double forces[6];       /* to publish [N]; nan where suppressed, as the motors' commands */
+  warning_state warning;
+  double mean_rates[6]; /* from the last setpoint that was not a jump [m/s] */
+  double answered; /* all numbers are finite */
+  double restart;  /* time has jumped back before it, or before one that was not answered */
+  double changed;  /* the warning has changed, or is the first */
+  double exceeding, jumped; /* a limit is exceeded; the legs cannot follow */
+} setpoint_output;
 
 /* A motion under loads, and what a call of one sample gives. */
 typedef struct {
@@ -218,20 +233,28 @@ int64_t forward_kinematics_one(const stewart_platform * platform, one_pose * sam
 /* The kind of processor for which solve_many computes: 0 baseline, 1 AVX2, 2 AVX-512. */
 int64_t processor_kind(void);
 
-/* Checks of a setpoint and its published forces; and of setpoints in order. */
-void step_one(
+/* Results of setpoints. Then their checks, in order, and what is published of them; returns how many
+   are answered. Unless results, joint angles and clearances are `solved`, they are computed first.
+   A leg may move at its largest rate for an additional time [s], `slack` after a stamp,
+   `slack_of_arrival` after a time of arrival. */
+void solve_setpoints(
+  const stewart_platform * platform, int64_t count, const setpoint * setpoints,
+  setpoint_output * outputs);
+int64_t check_setpoints(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, one_setpoint * setpoint);
-void check_many(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, int64_t count, const int64_t * stamps,
-  const uint8_t * bases_known, const uint8_t * restarts, const double * slack,
-  const stewart_motion * motions, const double * joint_angles, const double * clearances,
-  warning_state * state, int64_t * followed_at, double * followed, double * windings,
-  stewart_result * results, double * forces, warning_state * states, checked_motors * motors,
-  uint8_t * answered, uint8_t * exceeding, uint8_t * jumped);
+  const limit_checks * checks, const double * zero_lengths, double slack, double slack_of_arrival,
+  int64_t solved, int64_t count, const int64_t * stamps, const setpoint * setpoints,
+  double * joint_angles, double * clearances, step_state * state, setpoint_output * outputs,
+  checked_motors * motors);
+
+/* Messages (count, size) of one layout: copies of one, with stamps (count,) [ns] at some places and
+   numbers of rows (count, width) at others. A part has the place in the message, the first column,
+   and how many numbers; with none the byte there says whether the column is above zero. */
+void write_messages(
+  int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
+  int64_t n_parts, const int64_t * parts, int64_t width, int64_t count, const int64_t * stamps,
+  const double * rows, uint8_t * messages);
 
 /* Leg lengths (count, 6) of poses [m]. */
 void lengths_many(

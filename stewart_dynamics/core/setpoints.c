@@ -50,117 +50,100 @@ static unsigned check_clearances(const machine * on, const double clearances[6])
   return exceeded;
 }
 
-/* When a setpoint comes: see one_setpoint. */
-typedef struct {
-  int stamp_valid, base_known, restart;
-  double since, elapsed;
-} arrival;
+/* Time since the last setpoint that was not a jump, 0 where there is none; the same with the
+   tolerance of stamps, infinite where there is none [s]. */
+typedef struct { double since, elapsed; } passed;
 
-/* What is written of a setpoint beside its result. */
-typedef struct {
-  double * forces;
-  checked_motors * motors;
-  int exceeding, jumped;
-} published;
-
-/* Check a result, write what is published; return whether it is answered. */
-static int check_setpoint(
-  const machine * on, const stewart_motion * motion, const arrival * at, const double angles[12],
-  const double clearances[6], const double followed[6], stewart_state * state,
-  double windings[12], stewart_result * result, published * to) {
-  const stewart_platform * platform = on->platform;
-  unsigned exceeded = 0;
-  to->exceeding = to->jumped = 0;
-  if (!at->stamp_valid || !all_finite(result, sizeof *result)) {return 0;}
-  if (at->restart) {  /* this sample is the first, but for the count of crossings */
-    state->warning = STEWART_NO_WARNING, state->stopped = 0, state->determinant = 0.0;
+static passed passed_at(int64_t stamp, double slack, int restart, const step_state * before) {
+  passed time = {0.0, HUGE_VAL};
+  int64_t last = (int64_t)before->seconds * 1000000000 + (int64_t)before->nanoseconds;
+  if (!restart && stamp > last) {
+    time.since = (double)(stamp - last) * 1e-9;
+    time.elapsed = time.since + slack;
   }
-  advance_warning(platform, result, state);
-  int solved = result->condition_number < UNSOLVABLE_CONDITION && at->base_known;
+  return time;
+}
+
+/* Check a setpoint whose result is finite, write what is published, and update the state. */
+static void check_setpoint(
+  const machine * on, const setpoint * of, passed time, const double angles[12],
+  const double clearances[6], step_state * before, setpoint_output * to, checked_motors * motors) {
+  const stewart_platform * platform = on->platform;
+  stewart_result * result = &to->result;
+  unsigned exceeded = 0;
+  int running = 0, first = isnan(before->lengths[0]), warned = before->warning.cause > 0.0;
+  stewart_state state = state_of(&before->warning);
+  if (to->restart > 0.0) {  /* this sample is the first, but for the count of crossings */
+    state.warning = STEWART_NO_WARNING, state.stopped = 0, state.determinant = 0.0;
+  }
+  advance_warning(platform, result, &state);
+  before->warning = to->warning = numbers_of(&state);
+  to->changed = first || warned != (state.warning != STEWART_NO_WARNING);
+  int solved = result->condition_number < UNSOLVABLE_CONDITION && of->base_known > 0.0;
   for (int i = 0; i < 6; i++) {
     const stewart_leg * leg = &platform->legs[i];
+    double way = result->lengths[i] - before->lengths[i];
     if (!solved) {result->forces[i] = result->joint_forces[i] = NAN;}
+    to->mean_rates[i] = way / time.elapsed;
     exceeded |= check_leg(leg, result, i, 1.0) |
-      above(fabs(result->lengths[i] - followed[i]), leg->velocity_max * at->elapsed, STEWART_JUMP);
+      above(fabs(way), leg->velocity_max * time.elapsed, STEWART_JUMP);
     if (on->checks->angles != 0.0) {exceeded |= check_angles(leg, angles[i], angles[i + 6]);}
   }
   if (on->checks->clearance != 0.0) {exceeded |= check_clearances(on, clearances);}
-  to->jumped = (exceeded & STEWART_JUMP) != 0;
-  int running = 0, with_motors = on->checks->motors != 0.0;
+  int jumped = (exceeded & STEWART_JUMP) != 0, with_motors = on->checks->motors != 0.0;
   clip_forces(platform, result, to->forces);
   if (with_motors) {
-    put_motors(platform, on->drives, on->n_curve, on->curve, motion, result->forces, to->forces,
-               &to->motors->drives);
-    check_motors(on->drives, at->since, to->jumped, windings, to->motors);
-    running = to->motors->running > 0.0;
+    put_motors(platform, on->drives, on->n_curve, on->curve, &of->motion, result->forces,
+               to->forces, &motors->drives);
+    check_motors(on->drives, time.since, jumped, before->windings, motors);
+    running = motors->running > 0.0;
   }
-  int suppressed = !solved || suppresses(platform, state->stopped, exceeded, running);
-  to->exceeding = exceeded != 0 || (with_motors && to->motors->exceeding > 0.0);
+  int suppressed = !solved || suppresses(platform, state.stopped, exceeded, running);
+  to->jumped = jumped;
+  to->exceeding = exceeded != 0 || (with_motors && motors->exceeding > 0.0);
   for (int i = 0; suppressed && i < 6; i++) {
     to->forces[i] = NAN;
-    if (with_motors) {to->motors->drives.commands[i] = NAN;}
+    if (with_motors) {motors->drives.commands[i] = NAN;}
   }
-  return 1;
 }
 
-void step_one(
+int64_t check_setpoints(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, one_setpoint * setpoint) {
+  const limit_checks * checks, const double * zero_lengths, double slack, double slack_of_arrival,
+  int64_t solved, int64_t count, const int64_t * stamps, const setpoint * setpoints,
+  double * joint_angles, double * clearances, step_state * state, setpoint_output * outputs,
+  checked_motors * motors) {
   machine on = {platform, drives, n, curve, n_base, base, n_moving, moving, checks};
-  stewart_state state = state_of(&setpoint->before);
-  arrival at = {
-    setpoint->stamp_valid > 0.0, setpoint->base_known > 0.0, setpoint->restart > 0.0,
-    setpoint->since, setpoint->elapsed};
-  published to = {setpoint->forces, &setpoint->motors, 0, 0};
-  int64_t nearest[6] = {0};
-  solve_sample(
-    platform, &setpoint->motion, setpoint->wrench, &setpoint->base, &setpoint->result);
-  if (checks->angles != 0.0) {put_angles(&on, &setpoint->motion, setpoint->joint_angles);}
-  if (checks->clearance != 0.0) {
-    put_clearances(&on, &setpoint->motion, setpoint->clearances, nearest);
-  }
-  for (int i = 0; i < 12; i++) {setpoint->windings[i] = setpoint->windings_before[i];}
-  setpoint->answered = check_setpoint(
-    &on, &setpoint->motion, &at, setpoint->joint_angles, setpoint->clearances,
-    setpoint->followed, &state, setpoint->windings, &setpoint->result, &to);
-  setpoint->after = numbers_of(&state);
-  setpoint->exceeding = to.exceeding, setpoint->jumped = to.jumped;
-  for (int i = 0; i < 6; i++) {setpoint->nearest[i] = (double)nearest[i];}
-}
-
-void check_many(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, int64_t count, const int64_t * stamps,
-  const uint8_t * bases_known, const uint8_t * restarts, const double * slack,
-  const stewart_motion * motions, const double * joint_angles, const double * clearances,
-  warning_state * state, int64_t * followed_at, double * followed, double * windings,
-  stewart_result * results, double * forces, warning_state * states, checked_motors * motors,
-  uint8_t * answered, uint8_t * exceeding, uint8_t * jumped) {
-  machine on = {platform, drives, n, curve, n_base, base, n_moving, moving, checks};
-  stewart_state now = state_of(state);
-  int restart = 0;
+  int64_t answered = 0;
   for (int64_t k = 0; k < count; k++) {
-    restart = restart || restarts[k];  /* if this one is not answered, the next is the restart */
-    arrival at = {
-      -STAMPS_END <= stamps[k] && stamps[k] < STAMPS_END, bases_known[k], restart, 0.0, HUGE_VAL};
-    if (at.stamp_valid && !restart && stamps[k] > *followed_at) {
-      at.since = (double)(stamps[k] - *followed_at) * 1e-9;
-      at.elapsed = at.since + slack[k];
+    const setpoint * of = &setpoints[k];
+    setpoint_output * to = &outputs[k];
+    double * angles = checks->angles != 0.0 ? &joint_angles[12 * k] : NULL;
+    double * clearance = checks->clearance != 0.0 ? &clearances[6 * k] : NULL;
+    if (!solved) {
+      int64_t nearest[6];
+      solve_sample(platform, &of->motion, of->wrench, &of->base, &to->result);
+      if (angles) {put_angles(&on, &of->motion, angles);}
+      if (clearance) {put_clearances(&on, &of->motion, clearance, nearest);}
     }
-    published to = {&forces[6 * k], checks->motors != 0.0 ? &motors[k] : NULL, 0, 0};
-    answered[k] = (uint8_t)check_setpoint(
-      &on, &motions[k], &at, checks->angles != 0.0 ? &joint_angles[12 * k] : NULL,
-      checks->clearance != 0.0 ? &clearances[6 * k] : NULL, followed, &now, windings,
-      &results[k], &to);
-    exceeding[k] = (uint8_t)to.exceeding, jumped[k] = (uint8_t)to.jumped;
-    restart = restart && !answered[k];
-    if (answered[k] && !to.jumped) {
-      *followed_at = stamps[k];
-      for (int i = 0; i < 6; i++) {followed[i] = results[k].lengths[i];}
+    for (int i = 0; i < 6; i++) {to->positions[i] = to->result.lengths[i] - zero_lengths[i];}
+    int restart = state->restarting > 0.0 || of->restart > 0.0;
+    int sound = -STAMPS_END <= stamps[k] && stamps[k] < STAMPS_END &&
+      all_finite(&to->result, sizeof to->result);
+    to->answered = sound, to->restart = restart;
+    state->restarting = restart && !sound;  /* then the next setpoint is the restart */
+    if (!sound) {continue;}
+    passed time = passed_at(
+      stamps[k], of->stamped > 0.0 ? slack : slack_of_arrival, restart, state);
+    check_setpoint(&on, of, time, angles, clearance, state, to,
+                   checks->motors != 0.0 ? &motors[k] : NULL);
+    if (to->jumped == 0.0) {
+      state->seconds = (double)(stamps[k] / 1000000000);
+      state->nanoseconds = (double)(stamps[k] % 1000000000);
+      for (int i = 0; i < 6; i++) {state->lengths[i] = to->result.lengths[i];}
     }
-    states[k] = numbers_of(&now);
+    answered++;
   }
-  *state = numbers_of(&now);
+  return answered;
 }

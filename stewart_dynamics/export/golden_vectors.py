@@ -11,6 +11,7 @@ The results are those of the library.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 
 import numpy as np
@@ -22,10 +23,11 @@ from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
-from stewart_dynamics.mechanics.limits import LIMITS, OF_MOTORS
+from stewart_dynamics.mechanics.limits import Exceedance, LIMITS, OF_MOTORS
 from stewart_dynamics.mechanics.rows import BASE, FORCES, MOTION, POSE, RESULT, WRENCH
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.step import Output, Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
 
 # Return codes of the C source.
 OK, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = (CODES[f'STEWART_{name}'] for name in (
@@ -84,22 +86,21 @@ def golden_vectors(parameters: Parameters) -> Array:
     bases[:, :3] += parameters.gravity
     guess = np.zeros((1, MOTION))
     guess[0, :POSE.stop] = motions[0, :POSE.stop]
-    rows, state = [], None
+    rows, state = [], FIRST
     for n in range(_COUNT):
         stamp, moving = n * _PERIOD, n % 3 == 2
-        a, b, c, d, e, f = wrenches[n].tolist()
-        output = step(Setpoint(
-            stamp, tuple(motions[n].tolist()), (a, b, c, d, e, f),
-            base=tuple(bases[n].tolist()) if moving else None), state)
-        if output is None:
+        outputs = step(Batch.of(
+            stamp, motions[n], wrenches[n], bases=bases[n] if moving else None), state)
+        state = outputs.state
+        if not outputs.answered[0]:
             continue
-        state = output.state
         code, steps, residual = np.empty(1, dtype=int), np.empty(1, dtype=int), np.empty(1)
         forward_kinematics.poses(
-            hexapod, np.array([output.lengths]), guess, code, steps, residual)
+            hexapod, outputs.lengths.copy(), guess, code, steps, residual)
         rows.append([
-            stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(output),
-            *_motors(drives, motions[n], output), int(code[0]), *guess[0, :POSE.stop]])
+            stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(
+                outputs, step.exceedances(motions[n:n + 1], outputs)),
+            *_motors(drives, motions[n:n + 1], outputs), int(code[0]), *guess[0, :POSE.stop]])
     return np.array(rows, dtype=float).reshape(-1, len(COLUMNS))
 
 
@@ -122,23 +123,29 @@ def _motions(parameters: Parameters) -> Array:
                   turning.linear_acceleration, turning.angular_acceleration).rows
 
 
-def _results(output: Output) -> list[float]:
-    """Return the columns from CODE to WARNING."""
-    code = SINGULAR if not output.solvable else OK if output.forces else SUPPRESSED
-    exceeded = [sum(LIMITS[each.limit].bit for each in output.exceedances
+def _results(outputs: Outputs, exceedances: Sequence[Exceedance]) -> list[float]:
+    """Return the columns from CODE to WARNING of one setpoint's outputs."""
+    forces = outputs.forces[0]
+    code = SINGULAR if outputs.conditions[0] >= UNSOLVABLE_CONDITION else (
+        SUPPRESSED if math.isnan(forces[0]) else OK)
+    exceeded = [sum(LIMITS[each.limit].bit for each in exceedances
                     if each.leg == leg) for leg in range(6)]
-    state = output.singularity
-    return [code, *output.lengths, *output.rates, *(output.demanded_forces or (0.0,) * 6),
-            output.determinant, output.determinant_rate, output.condition,
-            *output.unit_load_forces, *(output.joint_forces or (0.0,) * 6),
-            *(output.forces or (0.0,) * 6), *exceeded, state.cause, state.stopped,
-            state.crossings]
+    state = outputs.singularity()
+    return [code, *outputs.lengths[0], *outputs.rates[0], *_or_zero(outputs.demanded_forces[0]),
+            outputs.determinants[0], outputs.determinant_rates[0], outputs.conditions[0],
+            *outputs.unit_load_forces[0], *_or_zero(outputs.joint_forces[0]), *_or_zero(forces),
+            *exceeded, state.cause, state.stopped, state.crossings]
 
 
-def _motors(drives: Drives | None, motion: Array, output: Output) -> list[float]:
+def _or_zero(forces: Array) -> Array:
+    """Return zeros for forces that are not known."""
+    return np.where(np.isnan(forces), 0.0, forces)
+
+
+def _motors(drives: Drives | None, motions: Array, outputs: Outputs) -> list[float]:
     """Return the columns MOTOR_CODE and MOTORS, for the demanded forces."""
     if drives is None:
         return [NO_MOTORS, *np.zeros(len(PARTS['MOTORS']))]
     results = np.zeros((1, RESULT))
-    results[0, FORCES] = output.demanded_forces or 0.0
-    return [OK, *drives(motion[None], results)[0, MECHANICAL]]
+    results[:, FORCES] = _or_zero(outputs.demanded_forces)
+    return [OK, *drives(motions, results)[0, MECHANICAL]]

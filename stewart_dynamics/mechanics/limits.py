@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Six
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.core.binding import CODES
 from stewart_dynamics.mechanics.rows import (
     BASE_JOINT_ANGLES, FORCES, JOINT_FORCES, LENGTHS, PLATFORM_JOINT_ANGLES, RATES)
@@ -172,6 +172,8 @@ class Limits:
         self.force_max: Array = self.bounds.get(FORCE_MAX, np.full(6, math.inf))
         self._of_samples = {name: (bound.tolist(), self.thresholds[name].tolist())
                             for name, bound in self.bounds.items()}
+        if VELOCITY_MAX in self.bounds:
+            self._of_samples[JUMP] = self._of_samples[VELOCITY_MAX]
 
     def exceeds(self, limit: str, values: Array) -> Flags:
         """Return where values (..., 6) of its quantity exceed a limit; nan never does."""
@@ -196,14 +198,6 @@ class Limits:
                     other = nearest[leg] if limit == CLEARANCE_MIN else -1
                     found.append(Exceedance(limit, leg, float(value), bounds[leg], other))
         return tuple(found)
-
-    def jumps(self, lengths: Six, followed: Six, elapsed: float) -> tuple[Exceedance, ...]:
-        """Return the legs that cannot move from one length to another within a time [s]."""
-        bounds, _ = self._of_samples[VELOCITY_MAX]
-        return tuple(
-            Exceedance(JUMP, leg, (new - old) / elapsed, bounds[leg])
-            for leg, (new, old) in enumerate(zip(lengths, followed, strict=True))
-            if abs(new - old) > bounds[leg] * elapsed * (1.0 + TOLERANCE))
 
 
 def _threshold(limit: Limit, bound: Array | None) -> Array:

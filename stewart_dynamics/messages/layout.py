@@ -10,7 +10,7 @@ others by comparing their bytes with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from operator import itemgetter
 from struct import Struct
 from typing import Any
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, SECOND, Stamps
+from stewart_dynamics.core.binding import function, Single
 from stewart_dynamics.messages.cdr import ORDERS
 
 
@@ -37,7 +38,8 @@ class Layout:
             gaps: Sequence[slice] = (),
     ) -> None:
         self.size = len(message)
-        self._message = message
+        self.message, self.numbers, self.stamps = message, numbers, stamps
+        self._row = np.frombuffer(message, f'V{self.size}')
         order = ORDERS[message[1]]
         numbers = [(at, count) for at, count in numbers if count]
         free = np.zeros(self.size, dtype=bool)
@@ -72,7 +74,7 @@ class Layout:
             begin, end = end, len(Struct(layout).unpack(bytes(Struct(layout).size)))
             places[field[-1]].append(slice(begin, end))
         self._struct = Struct(f'{layout}{self.size - Struct(layout).size}x')
-        self._template = [*self._struct.unpack(self._message)]
+        self._template = [*self._struct.unpack(self.message)]
         self._stamp_places, self._number_places = places['I'], places['d']
         values = [n for place in places['d'] for n in range(place.start, place.stop)]
         self._values: Callable[[tuple[Any, ...]], tuple[float, ...]] = (
@@ -120,15 +122,52 @@ class Layout:
 
     def write(self, stamps: Integers | None, *numbers: Array) -> NDArray[np.void]:
         """Return messages (N,), each an entry of ``size`` bytes; each part's numbers (N, ...)."""
-        rows = np.empty(len(numbers[0]), dtype=self._dtype)
-        rows.view(np.uint8).reshape(-1, self.size)[:] = np.frombuffer(self._message, np.uint8)
+        messages = self._row.repeat(len(numbers[0]))
+        rows = messages.view(self._dtype)
         if stamps is not None:
             seconds, nanoseconds = np.divmod(stamps, SECOND)
             for name in self._stamps:
                 rows[name]['sec'], rows[name]['nanosec'] = seconds, nanoseconds
         for name, values in zip(self._parts, numbers, strict=True):
             rows[name] = values
-        return rows.view(f'V{self.size}')
+        return messages
+
+
+class SideBySide:
+    """
+    Messages of several layouts, side by side, with a stamp and the numbers of one row.
+
+    layouts: the layouts, each with the columns of the row for each of its parts.
+    width: numbers in a row.
+    """
+
+    def __init__(self, layouts: Sequence[tuple[Layout, Sequence[slice]]], width: int) -> None:
+        stamps, parts, message = [], [], b''
+        for layout, columns in layouts:
+            stamps += [len(message) + at for at in layout.stamps]
+            parts += [(len(message) + at, column.start, count) for (at, count), column in zip(
+                layout.numbers, columns, strict=True)]
+            message += layout.message
+        self._entries = np.dtype([
+            (str(n), f'V{layout.size}') for n, (layout, _) in enumerate(layouts)])
+        constants = (len(message), np.frombuffer(message, np.uint8), len(stamps), np.array(
+            stamps, np.int64), len(parts), np.array(parts, np.int64), width)
+        self._write = function('write_messages').bound(*constants)
+        stamp, row = np.zeros(1, np.int64), np.zeros((1, width))
+        one = np.empty((1, len(message)), np.uint8)
+        self._write_one = Single(
+            'write_messages', (*constants, 1, stamp, row, one), (stamp, row), (one,))
+
+    def write(self, stamps: Stamps, rows: Array) -> Iterator[NDArray[np.void]]:
+        """Yield the messages (N,) of each layout, of stamps (N,) [ns] and rows (N, width)."""
+        if len(stamps) == 1:
+            written, = self._write_one(stamps, rows)
+        else:
+            written = np.empty((len(stamps), self._entries.itemsize), np.uint8)
+            self._write(len(stamps), stamps, np.ascontiguousarray(rows), written)
+        entries = written.view(self._entries)[:, 0]
+        for name in self._entries.names or ():
+            yield entries[name]
 
 
 def at_any_byte(data: Bytes, size: int) -> NDArray[np.void]:

@@ -70,6 +70,7 @@ def float64_values(data: bytes) -> tuple[float, ...]:
 # To write many of them at once.
 FLOAT64_ARRAY = Layout(float64_array((0.0,) * 6), [(20, 6)], stamps=())
 FLOAT64 = Layout(float64(0.0), [(4, 1)], stamps=())
+BOOLEAN = Layout(boolean(False), [(4, 0)], stamps=())  # whether a number is above zero
 
 
 def transforms(frames: Sequence[tuple[str, str]]) -> Layout:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 import math
 import time
@@ -39,10 +39,10 @@ from stewart_dynamics.ros.signal_flag import SIGNALS
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH, BaseWrench
 from stewart_dynamics.setpoints.input_messages import WRENCH
 from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.output_messages import OutputMessages
+from stewart_dynamics.setpoints.output_messages import OutputMessages, Written
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_EXCLUSIVE, OUT_OF_RANGE, Rejection, stamp_words)
-from stewart_dynamics.setpoints.step import Output, Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
 
 
 # If more setpoints wait, the node has fallen behind, and only the newest is answered.
@@ -100,11 +100,10 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._diagnostics = DynamicsDiagnostics(
             parameters, self._setpoints.topics, self._setpoints.base.topics, time.monotonic())
         self._heard = self._diagnostics.setpoints.heard
-        self._waiting: list[tuple[Setpoint, float]] = []  # joined setpoints, and times of arrival
+        self._waiting: list[tuple[Batch, float]] = []  # single setpoints, and times of arrival
         self._gathering = False  # a task answers them after the messages received
-        self._last: Output | None = None
+        self._state = FIRST  # of the step
         self._target: Target | None = None  # the last answered setpoint
-        self._restarting = False  # the last setpoint was a restart that could not be answered
         publishers, rate = self._topics.publishers, parameters.visualization_rate
         self._markers = PublisherAtRate(publishers.get(MARKERS), rate, Markers(parameters).write)
         self._joint_states = PublisherAtRate(
@@ -139,8 +138,8 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._heard[topic] = came
         self._rested = self._rested or came - self._handled > _REST
         if not self._exclusive or self._is_only_writer(topic):
-            setpoint = self._setpoints.take(topic, data, self._ros_time)
-            if setpoint is not None:
+            setpoint = self._setpoints.take([(topic, data, self._ros_time)])
+            if len(setpoint.stamps):
                 self._waiting.append((setpoint, came))
                 if not self._gathering:
                     self._answer_waiting()
@@ -167,47 +166,47 @@ class DynamicsNode(ManagedNode[Parameters]):
             executor: Any = self.executor
             executor.create_task(self._answer_waiting)
 
-    def _newest(self, waiting: list[tuple[Setpoint, float]]) -> tuple[Setpoint, float]:
+    def _newest(self, waiting: list[tuple[Batch, float]]) -> tuple[Batch, float]:
         """Drop and count all setpoints but the newest, which is a restart if one of them is."""
         *dropped, (newest, came) = waiting
         for setpoint, _ in dropped:
-            self._setpoints.reject('setpoint', DROPPED, stamp_words(setpoint.stamp))
-        restart = any(setpoint.restart for setpoint, _ in waiting)
-        return newest._replace(restart=restart), came
+            self._setpoints.reject('setpoint', DROPPED, stamp_words(int(setpoint.stamps[0])))
+        restart = any(setpoint.restarts[0] for setpoint, _ in waiting)
+        return newest.changed(restarts=restart), came
 
-    def _answer(self, setpoint: Setpoint, came: float) -> None:
-        """Compute the answer to a setpoint, publish it, and note it."""
-        setpoint = self._setpoints.on_base(setpoint)
-        if self._restarting:
-            setpoint = setpoint._replace(restart=True)
-        output = self._models.step(setpoint, None if self._last is None else self._last.state)
-        self._restarting = output is None and setpoint.restart
-        if output is None:
-            self._setpoints.reject('setpoint', OUT_OF_RANGE, stamp_words(setpoint.stamp))
+    def _answer(self, setpoint: Batch, came: float) -> None:
+        """Compute the answer to a single setpoint, publish it, and note it."""
+        outputs = self._models.step(setpoint, self._state)
+        self._state = outputs.state
+        if not len(outputs.stamps):
+            self._setpoints.reject('setpoint', OUT_OF_RANGE, stamp_words(int(setpoint.stamps[0])))
             return
-        publishers = self._topics.publishers
-        for topic, message in self._messages.of_output(output):
-            publishers[topic].publish(message)
-        self._last, self._target = output, Target(setpoint.motion, output.determinant)
-        self._note(setpoint, output, came)
-
-    def _note(self, setpoint: Setpoint, output: Output, came: float) -> None:
-        """Publish the base wrench; pass the answer to other publishers and diagnostics."""
+        self._publish(self._messages.of(outputs))
         if self._base_wrench_read:
-            wrench = self._models.base_wrench(setpoint)
-            if wrench is not None:
-                self._topics.publishers[BASE_WRENCH].publish(
-                    self._messages.of_wrench(setpoint.stamp, wrench))
-        self._markers.note(setpoint.motion, output)
-        self._travel.note(setpoint.motion)
+            self._publish([self._messages.of_base_wrenches(
+                outputs.stamps, self._models.base_wrench(setpoint))])
+        self._note(setpoint, outputs, came)
+
+    def _publish(self, written: Iterable[Written]) -> None:
+        for topic, having, messages in written:
+            if having[0]:
+                self._topics.publishers[topic].publish(messages.tobytes())
+
+    def _note(self, setpoint: Batch, outputs: Outputs, came: float) -> None:
+        """Pass the answer to other publishers and diagnostics."""
+        motion = setpoint.motions[0].tolist()
+        self._target = Target(motion, float(outputs.determinants[0]))
+        exceedances = self._models.step.exceedances(setpoint.motions, outputs)
+        self._markers.note(motion, outputs, exceedances)
+        self._travel.note(motion)
         if not self._model_measured:
-            self._moved(setpoint.stamp, setpoint.motion)
+            self._moved(int(outputs.stamps[0]), motion)
         now = time.monotonic()
-        if setpoint.base is not None:
-            self._diagnostics.base.answered(setpoint, now)
+        if not setpoint.base_known[0]:
+            self._diagnostics.base.unknown(now)
         if not self._diagnostics.answers.number:
-            self._diagnostics.begins(setpoint.motion, output.determinant)
-        if self._diagnostics.answered(output, setpoint.motion, came, now):
+            self._diagnostics.begins(motion, self._target.determinant)
+        if self._diagnostics.answered(outputs, exceedances, motion, came, now):
             self._report()
         self._setpoints.judge()
 
@@ -247,7 +246,7 @@ class DynamicsNode(ManagedNode[Parameters]):
 
     def _on_wrench(self, data: bytes) -> None:
         if self._active:
-            self._setpoints.take_wrench(data)
+            self._setpoints.take([(WRENCH, data, self._ros_time)])
 
     def _on_measured_legs(self, data: bytes) -> None:
         if not self._active:

@@ -11,20 +11,22 @@ an answer only stamp, poses, lengths, colours and the text are written into it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 from struct import pack, Struct
 
 import numpy as np
-from stewart_dynamics.arrays import Array, SECOND, Six
+from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.description.hexapod import (
     BALL, BARREL, BARREL_LENGTH, Color, COLORS, PLATE, ROD)
 from stewart_dynamics.mechanics.frames.rotation import quaternion_of
 from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
+from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
 from stewart_dynamics.node.diagnostics.answers import singularity_state
 from stewart_dynamics.node.diagnostics.levels import ERROR, OK, WARN
 from stewart_dynamics.parameters.table import (
     mean_radius, Parameters)
-from stewart_dynamics.setpoints.step import Output
+from stewart_dynamics.setpoints.step import Outputs
 from visualization_msgs.msg import Marker
 
 
@@ -130,38 +132,40 @@ class Markers:
         self._end = bytes(self._body[-_BEHIND_TEXT:])
         del self._body[-_BEHIND_TEXT - 8:]
 
-    def write(self, motion: Sequence[float], output: Output) -> bytes:
+    def write(self, motion: Sequence[float], outputs: Outputs,
+              exceedances: Sequence[Exceedance] = ()) -> bytes:
         """
         Return the message.
 
         motion: motion of the setpoint, laid out as for ``inverse_dynamics``.
+        outputs, exceedances: those of this one setpoint.
         """
         body = self._body
-        stamp = divmod(output.stamp, SECOND)
+        stamp = divmod(int(outputs.stamps[0]), SECOND)
         for at in self._stamps:
             _STAMP.pack_into(body, at, *stamp)
         rotation = np.reshape(motion[3:12], (3, 3))
         pose = (*motion[:3], *quaternion_of(motion[3:12]))
         for at in self._with_platform:
             _POSE.pack_into(body, at, *pose)
-        level, message = singularity_state(output, self._parameters)
+        level, message = singularity_state(outputs.rows[0].tolist(), self._parameters)
         _put_color(body, self._plate, PLATFORM[level])
 
         vectors = motion[:3] + self._platform @ rotation.T - self._base
-        colors = 2 * self._colors(output.forces)
+        forces = outputs.forces[0].tolist()
+        colors = 2 * self._colors(forces)
         for at, numbers, color in zip(
-                self._bodies, self._cylinders(vectors, output.lengths), colors, strict=True):
+                self._bodies, self._cylinders(vectors, outputs.lengths[0]), colors, strict=True):
             _POSE_AND_SCALE.pack_into(body, at, *numbers)
             _put_color(body, at, color)
 
         x, y, z = motion[:3]
         _POSE.pack_into(body, self._text, x, y, z + self._text_above, 0.0, 0.0, 0.0, 1.0)
-        text = self._words(output, message).encode() + b'\x00'
+        text = self._words(outputs, exceedances, forces, message).encode() + b'\x00'
         return b''.join((body, _COUNT.pack(len(text)), text, bytes(-len(text) % 4), self._end))
 
-    def _cylinders(self, vectors: Array, of_legs: Six) -> list[list[float]]:
+    def _cylinders(self, vectors: Array, lengths: Array) -> list[list[float]]:
         """Return pose and scale of six cylinders and of six pistons, ten numbers each."""
-        lengths = np.array(of_legs)
         along = vectors / lengths[:, None]
         barrels = _OF_LENGTH * lengths
         if self._shortest is not None:
@@ -181,28 +185,30 @@ class Markers:
         rows: list[list[float]] = numbers.tolist()
         return rows
 
-    def _full(self, forces: Six) -> Sequence[float]:
+    def _full(self, forces: Sequence[float]) -> Sequence[float]:
         """Return the force of each leg at which its colour is saturated."""
         if self._bounds is not None:
             bounds: list[float] = self._bounds.tolist()
             return bounds
         return [max(map(abs, forces)) or 1.0] * 6
 
-    def _colors(self, forces: Six | None) -> list[Color]:
-        if forces is None:
+    def _colors(self, forces: Sequence[float]) -> list[Color]:
+        if math.isnan(forces[0]):
             return [NO_FORCE] * 6
         return [_between(NO_LOAD, PUSH if force > 0.0 else PULL, abs(force) / full)
                 for force, full in zip(forces, self._full(forces), strict=True)]
 
-    def _words(self, output: Output, message: str) -> str:
-        lines = [f'det(J) {output.determinant:.4g} m^3, condition number {output.condition:.4g}']
+    def _words(self, outputs: Outputs, exceedances: Sequence[Exceedance], forces: Sequence[float],
+               message: str) -> str:
+        lines = [f'det(J) {outputs.determinants[0]:.4g} m^3, '
+                 f'condition number {outputs.conditions[0]:.4g}']
         if message:
             lines.insert(0, message)
-        legs = sorted({exceedance.leg for exceedance in output.exceedances})
+        legs = sorted({exceedance.leg for exceedance in exceedances})
         if legs:
             lines.append('limits exceeded: ' + ', '.join(self._names[leg] for leg in legs))
-        if output.forces is not None:
-            full = self._full(output.forces)
+        if not math.isnan(forces[0]):
+            full = self._full(forces)
             force = 'limits.force_max' if len(set(full)) > 1 else f'{full[0]:.4g} N'
             lines.append(f'vermillion: push, blue: pull, saturated at {force}')
         return '\n'.join(lines)

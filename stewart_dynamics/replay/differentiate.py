@@ -21,7 +21,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
 from stewart_dynamics.setpoints.input_messages import LARGEST
-from stewart_dynamics.setpoints.step import Batch, restarts_of
+from stewart_dynamics.setpoints.step import Batch
 
 # Poses in a window.
 WINDOW = 4096
@@ -121,14 +121,12 @@ class Differentiator:
         batch: stamps increase, except at jumps back in time. Positions beyond LARGEST are left
             out: they would disturb the splines of all poses around them.
         """
-        batch = batch._replace(
-            wrenches=np.broadcast_to(batch.wrenches, (len(batch.stamps), WRENCH)))
         near = np.all(np.abs(batch.motions[:, POSITION]) <= LARGEST, axis=1)
         if self._restart_before or not near.all():
-            restarts, self._restart_before = restarts_of(
+            restarts, self._restart_before = _restarts_of(
                 batch.restarts, near, self._restart_before)
             self.left_out[TOO_FAR] += int(np.count_nonzero(~near))
-            batch = batch.chosen(near)._replace(restarts=restarts)
+            batch = batch.chosen(near).changed(restarts=restarts)
         self._pending.append(batch)
         self._held += len(batch.stamps)
         # not at every batch: joining the pending ones takes time
@@ -288,10 +286,22 @@ class Differentiator:
     def _followed(self, given: Batch, motions: Array, followed: Flags) -> Batch:
         """Leave out setpoints that the spline could not follow; keep a restart among them."""
         self.left_out.update({TOO_FAST: n} if (n := int(np.count_nonzero(~followed))) else {})
-        restarts, self._restart = restarts_of(given.restarts, followed, self._restart)
+        restarts, self._restart = _restarts_of(given.restarts, followed, self._restart)
         if n:
             given, motions = given.chosen(followed), motions[followed]
-        return given._replace(motions=motions, restarts=restarts)
+        return given.changed(motions, restarts)
+
+
+def _restarts_of(restarts: Flags, kept: Flags, waiting: bool = False) -> tuple[Flags, bool]:
+    """
+    Return the restarts of those setpoints (N,) that are kept, and whether one waits for the next.
+
+    A restart that is left out passes to the next setpoint that is kept; one was already waiting
+    or not. The step does so for those that it cannot answer.
+    """
+    of_kept = np.cumsum(restarts)[kept] + waiting
+    still = np.count_nonzero(restarts) + waiting > of_kept.max(initial=0)
+    return np.diff(of_kept, prepend=0) > 0, bool(still)
 
 
 def _rounded_down(value: float) -> float:
@@ -309,7 +319,6 @@ def _joined(batches: list[Batch]) -> Batch:
     if len(batches) == 1:
         return batches[0]
     if not batches:
-        none = np.empty(0, dtype=np.int64)
-        return Batch(none, np.empty((0, MOTION)), np.empty((0, WRENCH)), none.astype(bool), none)
-    return Batch._make(None if parts[0] is None else np.concatenate(parts)
-                       for parts in zip(*batches, strict=True))
+        return Batch.of([], np.empty((0, MOTION)))
+    stamps, rows, times, moving = zip(*batches, strict=True)
+    return Batch(np.concatenate(stamps), np.concatenate(rows), np.concatenate(times), moving[0])

@@ -46,7 +46,7 @@ from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection, stamp_of
-from stewart_dynamics.setpoints.step import Batch, restarts_of, State, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Step
 from stewart_dynamics.whole_file import write_json
 
 VERSION = 1  # version of summary.json; increased when the meaning of a key changes
@@ -155,8 +155,7 @@ class _Run:
         self._step = Step(parameters)
         self._platform = StewartPlatform(parameters)
         self._base_wrench = BaseWrench(parameters)
-        self._state: State | None = None
-        self._restarting = False
+        self._state = FIRST
         self._stamp: int | None = None
         self._elapsed = 0, 0  # [s], [ns]
         self._summary = Summary(parameters, self._quasi_static)
@@ -189,7 +188,7 @@ class _Run:
                     self._take_measured(messages.chosen(measured))
                     messages = messages.chosen(~measured)
         self._files.write_inputs(messages)
-        setpoints = self._setpoints.take_many(messages)
+        setpoints = self._setpoints.take(messages)
         if self._differentiator is not None:
             setpoints = self._differentiator.add(setpoints)
         return self._answer(setpoints)
@@ -286,21 +285,18 @@ class _Run:
         """Take the step for setpoints; write its outputs and add them to summary and report."""
         if not len(setpoints.stamps):
             return 0
-        if self._restarting:
-            setpoints.restarts[0] = True
-        outputs = self._step.many(setpoints, self._state)
-        restarts, self._restarting = restarts_of(setpoints.restarts, outputs.answered)
+        outputs = self._step(setpoints, self._state)
+        self._state = outputs.state
         rejected = len(setpoints.stamps) - len(outputs.stamps)
         if rejected:
             self._setpoints.reject('setpoint', OUT_OF_RANGE, '', rejected)
-            setpoints = setpoints.chosen(outputs.answered)._replace(restarts=restarts)
+            setpoints = setpoints.chosen(outputs.answered)
         if not len(setpoints.stamps):
             return 0
-        self._state = outputs.state
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
         block = Answered(self._seconds(setpoints.stamps), setpoints, outputs,
-                         self._base_wrench.many(setpoints),
+                         self._base_wrench(setpoints),
                          powers_of(self._platform, setpoints, outputs))
         self._files.write(block)
         if self.report is not None:

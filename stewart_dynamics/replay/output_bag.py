@@ -45,7 +45,7 @@ from stewart_dynamics.messages.standard import string, transforms
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.setpoints.input_messages import INPUT_TYPES
-from stewart_dynamics.setpoints.output_messages import OutputMessages, WARNING, Written
+from stewart_dynamics.setpoints.output_messages import OutputMessages, WARNING
 from stewart_dynamics.setpoints.step import Outputs
 import yaml  # type: ignore[import-untyped]
 
@@ -56,6 +56,7 @@ RECORDED_TYPES = MODEL_TYPES | {
     TF_STATIC: type_names.TF_MESSAGE, ROBOT_DESCRIPTION: type_names.STRING}
 
 _LIBRARY = 'stewart_dynamics'
+_Group = tuple[str, Stamps, NDArray[np.void]]  # a topic, and messages at indices (K,) of times
 # Late subscribers get their last message, in `ros2 bag play`, too.
 _LATCHED = WARNING, TF_STATIC, ROBOT_DESCRIPTION
 # Bytes of a message record before the message: opcode, length, channel, sequence, two times.
@@ -146,17 +147,20 @@ class OutputBag:
         times, outputs = block.setpoints.times, block.outputs
         if not len(times):
             return
-        groups = [group for group in (
-            *self._messages.of_outputs(outputs),
-            self._messages.of_base_wrenches(outputs.stamps, block.base_wrenches),
-            *self._of_model(times, block.setpoints.motions, outputs)) if len(group[1])]
-        self._write_messages(times, groups)
+        groups: list[_Group] = []
+        for topic, having, messages in (
+                *self._messages.of(outputs),
+                self._messages.of_base_wrenches(outputs.stamps, block.base_wrenches)):
+            which = np.flatnonzero(having)
+            groups.append((topic, which, messages[which]))
+        groups += self._of_model(times, block.setpoints.motions, outputs)
+        self._write_messages(times, [group for group in groups if len(group[1])])
 
     def write_inputs(self, recorded: Messages) -> None:
         """Write a chunk: recorded messages of the inputs."""
         if not len(recorded.times):
             return
-        groups = []
+        groups: list[_Group] = []
         for topic, places in recorded.places().items():
             sizes = recorded.sizes[places]
             for size in np.unique(sizes).tolist():
@@ -165,7 +169,7 @@ class OutputBag:
                                at_any_byte(recorded.data, size)[recorded.starts[which]]))
         self._write_messages(recorded.times, groups)
 
-    def _write_messages(self, times: Stamps, groups: Sequence[Written]) -> None:
+    def _write_messages(self, times: Stamps, groups: Sequence[_Group]) -> None:
         """Write a chunk of messages: by time, and of one time in the order of the groups."""
         sizes = np.zeros((len(times), len(groups)), dtype=np.int64)
         for n, (_, which, messages) in enumerate(groups):
@@ -190,7 +194,7 @@ class OutputBag:
             self._counts[channel] += len(which)
         self._write_chunk(content, int(times.min()), int(times.max()), indexes)
 
-    def _of_model(self, times: Stamps, motions: Array, outputs: Outputs) -> Iterator[Written]:
+    def _of_model(self, times: Stamps, motions: Array, outputs: Outputs) -> Iterator[_Group]:
         """Yield the messages that show the model, as often as they are due."""
         if self._period and self._due is None:
             for topic, messages in self._model.of_beginning(int(outputs.stamps[0])):

@@ -59,7 +59,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         topics = find_topics(recording, parameters, options)
         setpoints = Setpoints(parameters, lambda rejection, details: None, lambda text: None)
         for messages, size in recording.messages({name: key for key, name in topics.items()}):
-            batch = setpoints.take_many(messages)
+            batch = setpoints.take(messages)
             batches.append(batch if splines is None else splines.add(batch))
             progress(size)
         setpoints.end('the bag ends')
@@ -73,8 +73,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         raise BagError(f'{bag}: has no valid setpoint{why}')
     stamps = np.concatenate([each.stamps for each in batches])
     rows = np.concatenate([each.motions for each in batches])
-    wrenches = np.concatenate([np.broadcast_to(each.wrenches, (len(each.stamps), 6))
-                               for each in batches])
+    wrenches = np.concatenate([each.wrenches for each in batches])
     bases = None if batches[0].bases is None else np.concatenate(
         [np.asarray(each.bases) for each in batches])
     if bases is not None:

@@ -19,8 +19,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, OF_LEGS,
-    OF_LOADS, OF_RATES, POSE, Quantity, result_values, USUAL, VELOCITY_MAX)
+    Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, OF_LEGS, OF_LOADS, OF_RATES,
+    POSE, Quantity, USUAL, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -161,11 +161,7 @@ class Summary:
                 (demanded ** 2, np.maximum(power, 0.0), np.maximum(-power, 0.0)), axis=1))
         self._published.add(seconds, outputs.forces)
         self._power.add(seconds, power)
-        values = result_values(outputs.results)
-        for name in self._limits.of_joints:
-            values[name] = outputs.joint_angles[:, ANGLES[name]]
-        if CLEARANCE_MIN in self._limits.bounds:
-            values[CLEARANCE_MIN] = outputs.clearances
+        values = outputs.values()
         for name, each in values.items():
             self._peaks[name].add(seconds, each)
         for name, exceeded in self._exceeded.items():
@@ -177,7 +173,7 @@ class Summary:
         self._condition.add(seconds, outputs.conditions[:, None])
         self._time_to_crossing.add(seconds, outputs.times_to_crossing[:, None])
         self._unit_load_force.add(seconds, outputs.unit_load_forces)
-        self._crossings.add(seconds, outputs.determinants, setpoints.restarts)
+        self._crossings.add(seconds, outputs.determinants, outputs.restarts)
         self._warnings.add(seconds, steps, outputs.warnings)
         if breakdown is not None:
             self._has_breakdown = True

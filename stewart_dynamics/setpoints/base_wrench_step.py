@@ -4,20 +4,17 @@
 """
 The base wrench of setpoints: force and moment that the hexapod exerts on its base.
 
-It is not part of the step: the node computes it only while there is a subscriber. The result is
-bit-identical for single setpoints and for batches.
+It is not part of the step: the node computes it only while there is a subscriber.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, NO_WRENCH, Six
-from stewart_dynamics.core.binding import function, Sample
-from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.step import Batch, Setpoint
+from stewart_dynamics.setpoints.step import Batch
 
 # Topic, relative to the node's name.
 BASE_WRENCH = 'base_wrench'
@@ -30,29 +27,14 @@ class BaseWrench:
     Force [N] and moment [N m] on the base at its origin, base axes; see
     ``mechanics.dynamics.base_wrench``.
 
-    parameters: constant for all calls; create another object for other parameters. Not
-        thread-safe: calls for one setpoint share a buffer.
+    parameters: constant for all calls; create another object for other parameters.
     """
 
     def __init__(self, parameters: Parameters) -> None:
         self._platform = StewartPlatform(parameters)
-        self._still = tuple(BaseMotion(parameters.gravity).rows.tolist())
-        self._sample = Sample('one_motion', 'base', 'base_wrench')
-        self._solve = function('base_wrench_one').bound(
-            self._platform.structure, self._sample.numbers)
 
-    def __call__(self, setpoint: Setpoint) -> Six | None:
-        """Return the base wrench; None if the base's motion is unknown or numbers overflow."""
-        base = setpoint.base
-        self._sample.write(*setpoint.motion, *NO_WRENCH, *setpoint.wrench,
-                           *(self._still if base is None else base))
-        if not self._solve():
-            return None
-        wrench: Six = self._sample.read()
-        return wrench
-
-    def many(self, setpoints: Batch) -> Array:
-        """Return base wrenches (N, 6); rows of nan where a call for one setpoint gives None."""
+    def __call__(self, setpoints: Batch) -> Array:
+        """Return base wrenches (N, 6); rows of nan: base's motion unknown, or numbers overflow."""
         wrenches = self._platform.base_wrenches(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
         finite = np.isfinite(wrenches)

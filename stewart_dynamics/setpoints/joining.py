@@ -5,22 +5,22 @@
 Joins messages on the setpoint topics to setpoints, and counts rejected messages.
 
 Node and replay pass the same bytes in the same order, so both reject and join alike: the node
-one message at a time, the replay in batches. ``take`` handles one message; ``take_many`` handles a
-batch, and calls ``take`` for each message if one of them is irregular. The wrench and the base's
-motion have topics of their own: a setpoint gets the values that are valid when it is complete.
+one message at a time, the replay in blocks. Regular blocks are joined at once, all others message
+by message. The wrench and the base's motion have topics of their own: a setpoint gets the values
+that are valid when it is complete.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
 
 from stewart_dynamics.arrays import Six
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
-from stewart_dynamics.mechanics.rows import BASE, MOTION
+from stewart_dynamics.mechanics.rows import MOTION, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.setpoints.base_input import BaseInput
@@ -30,9 +30,12 @@ from stewart_dynamics.setpoints.input_messages import (
     ACCEL, COMBINED, SOURCES, TopicSamples, TWIST, WRENCH, WrenchInput)
 from stewart_dynamics.setpoints.rejections import Rejection, Rejections
 from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining
-from stewart_dynamics.setpoints.step import Batch, Setpoint
+from stewart_dynamics.setpoints.step import Batch, SETPOINT
 
-_STANDSTILL = (0.0,) * 6
+_STANDSTILL = (0.0,) * 12
+
+Message = tuple[str, bytes, Callable[[], int]]
+"""Topic, data and clock [ns]; the clock is read if the stamps of a setpoint are zero."""
 
 
 class Setpoints:
@@ -59,13 +62,15 @@ class Setpoints:
             (parameters.base_frame, parameters.platform_frame))
         self._checks = [each for each in (self._consistency, self.base.consistency) if each]
         self._parameters = parameters
+        self._none = Batch(np.empty(0, dtype=np.int64), np.empty((0, SETPOINT)),
+                           np.empty(0, dtype=np.int64), bool(self.base.topics))
         # Rows of motion; empty before the first.
         self._first: Sequence[float] = ()
         self._last: Sequence[float] = ()
         self._topic_of = dict.fromkeys(QUANTITIES, COMBINED) if COMBINED in self.topics else (
             dict.fromkeys(QUANTITIES, TWIST) | dict.fromkeys(RATES, ACCEL))
         self.recorded: int | None = None
-        """Time of recording [ns] of the message being processed by ``take_many``."""
+        """Time of recording [ns] of the message of a block that is being processed."""
 
     @property
     def counts(self) -> Counter[Rejection]:
@@ -100,73 +105,55 @@ class Setpoints:
         return [Mistake(self.topics[0], f'{which} setpoint: {text}')] if text else []
 
     def judge(self) -> None:
-        """Check the samples noted by ``take``, if there are enough; called when there is time."""
+        """Check samples noted so far, if there are enough; called when there is time."""
         for consistency in self._checks:
             consistency.judge()
 
-    def take_wrench(self, data: bytes) -> None:
-        """Use this geometry_msgs/WrenchStamped for all later setpoints, if it is valid."""
-        self._wrench_input.take(data)
-
-    def take(self, topic: str, data: bytes, now: Callable[[], int]) -> Setpoint | None:
-        """
-        Return the setpoint that this message completes, if any; without the base's motion.
-
-        now: the clock [ns]; read if the stamps of a setpoint are zero.
-        """
-        sample = self._joining.take(topic, data, now)
-        if sample is None:
-            return None
-        stamp, values, restart, stamped = sample
-        # Twist and acceleration are zero if only the pose is given.
-        motion = values + _STANDSTILL + _STANDSTILL if len(values) == 12 else values
-        self._first = self._first or motion
-        self._last = motion
-        if restart:
-            self.base.restarted(stamp)
-        if self._consistency is not None:
-            self._consistency.noted.append((stamp, motion, restart))
-        return Setpoint(stamp, motion, self.wrench, restart, stamped=stamped)
-
-    def on_base(self, setpoint: Setpoint) -> Setpoint:
-        """Return the setpoint with the base's motion at its stamp."""
-        if not self.base.topics:
-            return setpoint
-        return setpoint._replace(base=self.base.at(setpoint.stamp))
-
-    def take_many(self, messages: Messages) -> Batch:
+    def take(self, messages: Messages | Iterable[Message]) -> Batch:
         """Return the setpoints that these messages complete."""
-        joined = self._take_ordinary(messages)
-        if joined is not None:
-            return joined
-        self._wrench_input.reader.forget_layout()
-        self._joining.forget_layouts()
-        self.base.joining.forget_layouts()
-        setpoints = []
-        times = []
+        if not isinstance(messages, Messages):
+            return self._take_each(messages)
+        joined = self._take_regular(messages)
+        if joined is None:
+            self._wrench_input.reader.forget_layout()
+            self._joining.forget_layouts()
+            self.base.joining.forget_layouts()
+            joined = self._take_each(self._recorded(messages))
+        return joined
+
+    def _recorded(self, messages: Messages) -> Iterator[Message]:
         for topic, time, data in messages.each():
             self.recorded = time
-            if topic == WRENCH:
-                self.take_wrench(data)
-                continue
-            clock = partial(int, time)
-            if topic in self.base.topics:
-                self.base.take(topic, data, clock)
-                continue
-            setpoint = self.take(topic, data, clock)
-            if setpoint is not None:
-                setpoints.append(self.on_base(setpoint))
-                times.append(time)
+            yield topic, data, partial(int, time)
             self.judge()
-        return Batch(
-            np.array([each.stamp for each in setpoints], dtype=np.int64),
-            np.array([each.motion for each in setpoints], dtype=float).reshape(-1, MOTION),
-            np.array([each.wrench for each in setpoints], dtype=float).reshape(-1, 6),
-            np.array([each.restart for each in setpoints], dtype=bool),
-            np.array(times, dtype=np.int64),
-            np.array([each.base for each in setpoints], dtype=float).reshape(-1, BASE)
-            if self.base.topics else None,
-            np.array([each.stamped for each in setpoints], dtype=bool))
+
+    def _take_each(self, messages: Iterable[Message]) -> Batch:
+        """Join messages one by one."""
+        stamps, rows, times = [], [], []
+        for topic, data, now in messages:
+            if topic == WRENCH:
+                self._wrench_input.take(data)
+            elif topic in self.base.topics:
+                self.base.take(topic, data, now)
+            elif (sample := self._joining.take(topic, data, now)) is not None:
+                stamp, values, restart, stamped = sample
+                # Twist and acceleration are zero if only the pose is given.
+                motion = values if len(values) == MOTION else (*values, *_STANDSTILL)
+                self._first = self._first or motion
+                self._last = motion
+                if restart:
+                    self.base.restarted(stamp)
+                if self._consistency is not None:
+                    self._consistency.noted.append((stamp, motion, restart))
+                base = self.base.at(stamp)
+                stamps.append(stamp)
+                rows.append((*motion, *self._wrench_input.wrench, *(base or NO_BASE),
+                             base is None or base[0] == base[0], restart, stamped))
+                times.append(self.recorded or 0)
+        if not stamps:
+            return self._none
+        return Batch(np.array(stamps), np.array(rows, dtype=float), np.array(times),
+                     self._none.moving)
 
     def end(self, why: str) -> None:
         """Drop and count waiting samples: no more messages arrive."""
@@ -179,8 +166,8 @@ class Setpoints:
         """Count and report messages that are not used."""
         self._rejections.reject(topic, reason, details, number)
 
-    def _take_ordinary(self, messages: Messages) -> Batch | None:
-        """Join a batch as ``take_many``; None, without effect, if a message is irregular."""
+    def _take_regular(self, messages: Messages) -> Batch | None:
+        """Join a block at once; None, without effect, if a message is irregular."""
         places = messages.places()
         wrenches = NO_SAMPLES
         if WRENCH in places:
@@ -201,7 +188,7 @@ class Setpoints:
         if self._consistency is not None and len(joined.stamps):
             self._consistency.add(
                 joined.stamps, joined.motions, np.zeros(len(joined.stamps), dtype=bool))
-        return Batch(
+        return Batch.of(
             joined.stamps, joined.motions, self._wrench_input.at(wrenches, joined.places),
-            np.zeros(len(joined.stamps), dtype=bool), messages.times[joined.places],
-            self.base.accept(base, places, joined.stamps, joined.places))
+            times=messages.times[joined.places],
+            bases=self.base.accept(base, places, joined.stamps, joined.places))

@@ -4,166 +4,128 @@
 """
 The step from a setpoint to leg lengths, forces and the singularity warning, in node and replay.
 
-It uses neither messages nor bags and keeps no state. Results are bit-identical for single
-setpoints and for batches.
+It uses neither messages nor bags and keeps no state: the state after some setpoints is an argument
+for the next. A single setpoint is a batch of one; results are bit-identical, whatever the batches.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, cast, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Flags, NANOSECOND, NO_WRENCH, Six, Stamps, STAMPS_END
-from stewart_dynamics.core.binding import function, Sample
+from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Stamps
+from stewart_dynamics.core.binding import function, places, Single
+from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
-from stewart_dynamics.mechanics.limits import ANGLES, CLEARANCE_MIN, Exceedance, result_values
+from stewart_dynamics.mechanics.limits import (
+    ANGLES, CLEARANCE_MIN, Exceedance, JUMP, result_values)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES,
-    UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity_warning import (
-    CAUSE, Singularity, STATE, TIME, UNSOLVABLE_CONDITION)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_ANGLES, JOINT_FORCES, LENGTHS, NO_BASE,
+    RATES, RESULT, UNIT_LOAD_FORCES)
+from stewart_dynamics.mechanics.singularity_warning import CAUSE, Singularity, TIME
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.motor_row import (
-    EXCEEDING, MOTOR_ROW, OF_DRIVES, RISES, SOUND, WINDINGS)
-
+from stewart_dynamics.setpoints.motor_row import EXCEEDING, MOTOR_ROW, OF_DRIVES, RISES
 
 # Tolerance of the stamps of setpoints [s]: a leg may move at its rate limit for this additional
 # time before a setpoint counts as a jump.
 JITTER = 1e-3
 
+# Parts of the rows of setpoints, of their outputs, and of the state of the step.
+_SETPOINT, _OUTPUT, _STATE = (
+    places(name) for name in ('setpoint', 'setpoint_output', 'step_state'))
+_MOTION, _LOAD, _BASE, _BASE_KNOWN, _RESTART, _STAMPED = (_SETPOINT[name] for name in (
+    'motion', 'wrench', 'base', 'base_known', 'restart', 'stamped'))
+SETPOINT = 1 + _STAMPED
+POSITIONS, PUBLISHED_FORCES, WARNING_STATE, _MEAN_RATES, _ANSWERED, _RESTARTED, _CHANGED, _EXCEEDING, _JUMPED = (
+    _OUTPUT[name] for name in ('positions', 'forces', 'warning', 'mean_rates', 'answered',
+                               'restart', 'changed', 'exceeding', 'jumped'))
+OUTPUT = 1 + _JUMPED
 
-class Setpoint(NamedTuple):
-    """Pose, twist and acceleration at one time."""
-
-    stamp: int  # [ns]
-    motion: tuple[float, ...]  # a row of motion, laid out as for ``inverse_dynamics``
-    wrench: Six = NO_WRENCH  # load on the platform at its origin, base axes [N, N m]
-    restart: bool = False  # time has jumped back: earlier setpoints no longer apply
-    base: tuple[float, ...] | None = None
-    """Row of the base's motion, nan if unknown; None if the base is fixed."""
-    stamped: bool = True
-    """Whether the stamp comes from the messages; otherwise it is the time of arrival."""
-
-    @property
-    def base_known(self) -> bool:
-        """Return whether the base is fixed or its motion is known."""
-        return self.base is None or self.base[0] == self.base[0]
-
-
-class State(NamedTuple):
-    """State after earlier setpoints; before the first setpoint it is State()."""
-
-    singularity: Singularity | None = None
-    stamp: int = 0  # stamp of the last setpoint that was not a jump [ns]
-    lengths: Six | None = None  # leg lengths of that setpoint [m]; None before the first one
-    windings: tuple[float, ...] | None = None
-    """Of the motors after that setpoint, see ``motor_row``; None without thermal data."""
-
-
-class Output(NamedTuple):
-    """Result of the step for one setpoint."""
-
-    stamp: int
-    result: tuple[float, ...]
-    """Row of results (RESULT,); forces are nan where they cannot be computed."""
-    forces: Six | None
-    """As published [N], clipped to limits.force_max; None if suppressed or not computed."""
-    singularity: Singularity
-    warning_changed: bool
-    exceedances: tuple[Exceedance, ...]
-    joint_angles: tuple[float, ...] = ()
-    """Row of joint angles [rad], nan for those without a limit; empty without any limit."""
-    clearances: tuple[float, ...] = ()
-    """Distance of the surface of each leg to the nearest other leg [m]; empty without limit."""
-    motors: tuple[float, ...] = ()
-    """Begin of a row of motors, see ``motor_row``; empty without ``drive.*``."""
-    state: State = State()  # for the next setpoint
-
-    @property
-    def lengths(self) -> Six:
-        """Lengths of the legs [m]."""
-        return cast(Six, self.result[LENGTHS])
-
-    @property
-    def rates(self) -> Six:
-        """Rates of the legs [m/s]."""
-        return cast(Six, self.result[RATES])
-
-    @property
-    def demanded_forces(self) -> Six | None:
-        """Unclipped [N]; None if J_inv cannot be solved or the base's motion is unknown."""
-        return _known(self.result[FORCES])
-
-    @property
-    def joint_forces(self) -> Six | None:
-        """Forces of rods and joints [N], under the demanded forces; None without these."""
-        return _known(self.result[JOINT_FORCES])
-
-    @property
-    def unit_load_forces(self) -> Six:
-        """Largest force of each leg under a unit load on the platform."""
-        return cast(Six, self.result[UNIT_LOAD_FORCES])
-
-    @property
-    def determinant(self) -> float:
-        """det(J_inv) [m^3]."""
-        return self.result[DETERMINANT]
-
-    @property
-    def determinant_rate(self) -> float:
-        """Its time derivative [m^3/s]."""
-        return self.result[DETERMINANT_RATE]
-
-    @property
-    def condition(self) -> float:
-        """Condition number of J_inv."""
-        return self.result[CONDITION]
-
-    @property
-    def solvable(self) -> bool:
-        """Whether J_inv can be solved."""
-        return self.condition < UNSOLVABLE_CONDITION
+FIRST: Array = np.zeros(1 + _STATE['restarting'])
+"""The state before the first setpoint."""
+FIRST[_STATE['warning.time_to_crossing']] = math.inf
+FIRST[_STATE['lengths']] = math.nan
+FIRST.flags.writeable = False
 
 
 class Batch(NamedTuple):
-    """Sequence of N setpoints."""
+    """Sequence of N setpoints, or a single one."""
 
     stamps: Stamps  # (N,) [ns]
-    motions: Array  # rows of motion (N, 24), laid out as for ``inverse_dynamics``
-    wrenches: Array  # (N, 6) [N, N m], or one row for all
-    restarts: Flags  # (N,): time has jumped back before the setpoint
-    times: Stamps  # time of arrival of the message that completed each (N,) [ns]
-    bases: Array | None = None
-    """Rows of the base's motion (N, 12), nan where unknown; None if the base is fixed."""
-    stamped: Flags | None = None
-    """(N,): the stamp comes from the messages, not from the time of arrival. None: all do."""
+    rows: Array  # (N, SETPOINT), the structure ``setpoint`` in C; its parts are properties
+    times: Stamps  # when the message that completed each was recorded (N,) [ns]
+    moving: bool  # whether the base moves; False: it is fixed
+
+    @classmethod
+    def of(cls, stamps: ArrayLike, motions: ArrayLike, wrenches: ArrayLike = NO_WRENCH,
+           restarts: ArrayLike = False, times: ArrayLike | None = None,
+           bases: ArrayLike | None = None, stamped: ArrayLike = True) -> Batch:
+        """
+        Return N setpoints, or a single one; what is one for all may be given once.
+
+        stamps (N,), times (N,), by default the stamps: see the fields.
+        motions (N, MOTION), wrenches (N, 6) [N, N m], bases (N, BASE): rows as for
+            ``inverse_dynamics``; bases are nan where unknown, None if the base is fixed.
+        restarts (N,): time has jumped back before the setpoint.
+        stamped (N,): the stamp comes from the messages, not from the time of arrival.
+        """
+        at = np.atleast_1d(np.asarray(stamps, dtype=np.int64))
+        rows = np.empty((len(at), SETPOINT))
+        rows[:, _MOTION], rows[:, _LOAD] = motions, wrenches
+        rows[:, _RESTART], rows[:, _STAMPED] = restarts, stamped
+        rows[:, _BASE] = NO_BASE if bases is None else bases
+        rows[:, _BASE_KNOWN] = bases is None or ~np.isnan(rows[:, _BASE.start])
+        return cls(at, rows, at if times is None else np.atleast_1d(np.asarray(times)),
+                   bases is not None)
+
+    @property
+    def motions(self) -> Array:
+        """Rows of motion (N, MOTION), laid out as for ``inverse_dynamics``."""
+        return self.rows[:, _MOTION]
+
+    @property
+    def wrenches(self) -> Array:
+        """Load on the platform at its origin (N, 6), base axes [N, N m]."""
+        return self.rows[:, _LOAD]
+
+    @property
+    def bases(self) -> Array | None:
+        """Rows of the base's motion (N, BASE), nan where unknown; None if the base is fixed."""
+        return self.rows[:, _BASE] if self.moving else None
 
     @property
     def base_known(self) -> Flags:
         """(N,): the base is fixed or its motion is known."""
-        if self.bases is None:
-            return np.ones(len(self.stamps), dtype=bool)
-        return ~np.isnan(self.bases[:, 0])
+        return self.rows[:, _BASE_KNOWN] > 0.0
+
+    @property
+    def restarts(self) -> Flags:
+        """(N,): time has jumped back before the setpoint."""
+        return self.rows[:, _RESTART] > 0.0
+
+    @property
+    def stamped(self) -> Flags:
+        """(N,): the stamp comes from the messages, not from the time of arrival."""
+        return self.rows[:, _STAMPED] > 0.0
 
     def chosen(self, which: Any) -> Batch:
         """Return selected setpoints: by a slice, an index or a mask (N,)."""
-        return Batch._make(None if part is None else part[which] for part in self)
+        return self._replace(stamps=self.stamps[which], rows=self.rows[which],
+                             times=self.times[which])
 
-
-def restarts_of(restarts: Flags, kept: Flags, waiting: bool = False) -> tuple[Flags, bool]:
-    """
-    Return the restarts of those setpoints (N,) that are kept, and whether one waits for the next.
-
-    A restart that is left out passes to the next setpoint that is kept; one was already waiting
-    or not. ``check_many`` in C does so setpoint by setpoint.
-    """
-    of_kept = np.cumsum(restarts)[kept] + waiting
-    still = np.count_nonzero(restarts) + waiting > of_kept.max(initial=0)
-    return np.diff(of_kept, prepend=0) > 0, bool(still)
+    def changed(self, motions: ArrayLike | None = None, restarts: ArrayLike | None = None) -> Batch:
+        """Return the same setpoints with other motions (N, MOTION), or restarts (N,)."""
+        rows = self.rows.copy()
+        if motions is not None:
+            rows[:, _MOTION] = motions
+        if restarts is not None:
+            rows[:, _RESTART] = restarts
+        return self._replace(rows=rows)
 
 
 class Outputs(NamedTuple):
@@ -171,58 +133,98 @@ class Outputs(NamedTuple):
 
     answered: Flags  # mask of the batch: setpoints that could be answered; the others overflow
     stamps: Stamps  # (N,) [ns]
-    results: Array
-    """Rows of results (N, 27), laid out as for ``inverse_dynamics``; missing forces are nan."""
-    forces: Array
-    """As published (N, 6): clipped to limits.force_max; nan where suppressed or not solved."""
-    states: Array  # rows of Singularity (N, STATE)
-    changed: Flags  # (N,): the singularity warning has changed
-    exceeding: Flags  # (N,): a limit is exceeded
-    jumped: Flags  # (N,): the legs cannot follow from the last setpoint that was not a jump
-    joint_angles: Array  # rows of joint angles (N, 12) [rad], or (N, 0), as in Output
-    clearances: Array  # (N, 6) [m], or (N, 0), as in Output
+    rows: Array
+    """
+    (N, OUTPUT), the structure ``setpoint_output`` in C; its parts are properties. It begins with
+    the row of results of ``inverse_dynamics``.
+    """
+    joint_angles: Array  # (N, 12) [rad], nan without a limit of theirs; (N, 0) without any
+    clearances: Array
+    """Distance of the surface of each leg to the nearest other (N, 6) [m]; (N, 0): no limit."""
     motors: Array  # rows of motors (N, MOTOR_ROW), or (N, 0); see ``motor_row``
-    state: State = State()  # for the next setpoint
+    state: Array  # for the next setpoint, see ``FIRST``
+
+    @property
+    def results(self) -> Array:
+        """Rows of results (N, RESULT); forces that are not known are nan."""
+        return self.rows[:, :RESULT]
 
     @property
     def lengths(self) -> Array:
         """(N, 6) [m]."""
-        return self.results[:, LENGTHS]
+        return self.rows[:, LENGTHS]
 
     @property
     def rates(self) -> Array:
         """(N, 6) [m/s]."""
-        return self.results[:, RATES]
+        return self.rows[:, RATES]
 
     @property
     def demanded_forces(self) -> Array:
-        """Unclipped forces (N, 6) [N]; nan where they cannot be computed, as in Output."""
-        return self.results[:, FORCES]
+        """Unclipped forces (N, 6) [N]; nan where J_inv cannot be solved or the base is unknown."""
+        return self.rows[:, FORCES]
 
     @property
     def joint_forces(self) -> Array:
         """(N, 6) [N]; nan where forces cannot be computed."""
-        return self.results[:, JOINT_FORCES]
+        return self.rows[:, JOINT_FORCES]
 
     @property
     def unit_load_forces(self) -> Array:
         """(N, 6)."""
-        return self.results[:, UNIT_LOAD_FORCES]
+        return self.rows[:, UNIT_LOAD_FORCES]
 
     @property
     def determinants(self) -> Array:
         """(N,) [m^3]."""
-        return self.results[:, DETERMINANT]
+        return self.rows[:, DETERMINANT]
 
     @property
     def determinant_rates(self) -> Array:
         """(N,) [m^3/s]."""
-        return self.results[:, DETERMINANT_RATE]
+        return self.rows[:, DETERMINANT_RATE]
 
     @property
     def conditions(self) -> Array:
         """(N,)."""
-        return self.results[:, CONDITION]
+        return self.rows[:, CONDITION]
+
+    @property
+    def forces(self) -> Array:
+        """As published (N, 6): clipped to limits.force_max; nan where suppressed or unknown."""
+        return self.rows[:, PUBLISHED_FORCES]
+
+    @property
+    def with_forces(self) -> Flags:
+        """(N,): forces are published."""
+        forces = self.rows[:, PUBLISHED_FORCES.start]
+        known: Flags = forces == forces
+        return known
+
+    @property
+    def states(self) -> Array:
+        """States of the singularity warning (N, STATE), rows of Singularity."""
+        return self.rows[:, WARNING_STATE]
+
+    @property
+    def changed(self) -> Flags:
+        """(N,): the singularity warning has changed, or is the first."""
+        return self.rows[:, _CHANGED] > 0.0
+
+    @property
+    def restarts(self) -> Flags:
+        """(N,): time has jumped back before it, or before one that could not be answered."""
+        return self.rows[:, _RESTARTED] > 0.0
+
+    @property
+    def exceeding(self) -> Flags:
+        """(N,): a limit is exceeded."""
+        return self.rows[:, _EXCEEDING] > 0.0
+
+    @property
+    def jumped(self) -> Flags:
+        """(N,): the legs cannot follow from the last setpoint that was not a jump."""
+        return self.rows[:, _JUMPED] > 0.0
 
     @property
     def times_to_crossing(self) -> Array:
@@ -234,23 +236,25 @@ class Outputs(NamedTuple):
         """(N,): the singularity warning is on."""
         return self.states[:, CAUSE] > 0.0
 
+    def singularity(self, n: int = 0) -> Singularity:
+        """Return the state of the warning after a setpoint."""
+        return Singularity.of(self.states[n].tolist())
 
-def _known(forces: tuple[float, ...]) -> Six | None:
-    return None if math.isnan(forces[0]) else cast(Six, forces)
-
-
-_FIRST = Singularity()
-_NO_LENGTHS = (math.nan,) * 6  # no setpoint is a jump from these
-_COLD = (0.0,) * WINDINGS
-_UNCHECKED: tuple[tuple[float, ...], ...] = ((), (), ())  # joints, clearance, nearest
+    def values(self) -> dict[str, Array]:
+        """Return the values (N, 6) of the limits of the legs, those that are computed."""
+        found = result_values(self.rows)
+        if self.joint_angles.shape[1]:
+            found |= {name: self.joint_angles[:, where] for name, where in ANGLES.items()}
+        if self.clearances.shape[1]:
+            found[CLEARANCE_MIN] = self.clearances
+        return found
 
 
 class Step:
     """
     The step for a hexapod with given parameters.
 
-    parameters: constant for all calls; create another step for other parameters. Not thread-safe:
-        calls for one setpoint share a buffer.
+    parameters: constant for all calls; create another step for other parameters.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -258,107 +262,64 @@ class Step:
         self._platform = StewartPlatform(parameters)
         self._of_poses = of_poses = PoseLimits(parameters)
         self._limits, self._motors = of_poses.limits, MotorLimits(parameters)
-        self._with_motors = bool(parameters.drives)
-        self._warms = parameters.drive.thermal_resistance is not None
-        # Margin by which the time between two setpoints may exceed that between their stamps [s].
-        self._slack = JITTER + parameters.setpoint.sync_tolerance
-        self._slack_of_arrival = JITTER + parameters.setpoint.timeout
-        self._sample = sample = Sample(
-            'one_setpoint', 'base_known', 'answered', 'exceeding', 'jumped', 'result', 'forces',
-            'after', *(('joint_angles', 'clearances', 'nearest')
-                       if of_poses.angles or of_poses.clearance or self._with_motors else ()),
-            *(('windings', 'motors') if self._with_motors else ()))
-        self._arguments = self._platform.structure, *of_poses.arguments
-        self._solve = function('step_one').bound(*self._arguments, sample.numbers)
+        of_angles, of_clearance = of_poses.angles, of_poses.clearance
+        self._widths = (0 if of_angles is None else JOINT_ANGLES, 0 if of_clearance is None else 6,
+                        MOTOR_ROW if parameters.drives else 0)
+        # The last two: by how much the time between two setpoints may exceed that between their
+        # stamps, or between their times of arrival [s].
+        constants = (
+            self._platform.structure, *of_poses.arguments, parameters.geometry.zero_length,
+            JITTER + parameters.setpoint.sync_tolerance, JITTER + parameters.setpoint.timeout)
+        self._check = function('check_setpoints').bound(*constants)
+        stamps, given, state = np.zeros(1, dtype=np.int64), np.zeros((1, SETPOINT)), FIRST.copy()
+        angles, clearances, motors = (np.empty((1, width)) for width in self._widths)
+        rows = np.empty((1, OUTPUT))
+        self._check_one = Single(
+            'check_setpoints',
+            (*constants, 0, 1, stamps, given, angles, clearances, state, rows, motors),
+            (stamps, given, state), (rows, angles, clearances, motors, state))
 
-    def __call__(self, setpoint: Setpoint, before: State | None) -> Output | None:
+    def __call__(self, setpoints: Batch, before: Array = FIRST) -> Outputs:
         """
-        Return the output, or None if the stamp or other numbers overflow.
+        Return the outputs of setpoints in order.
 
-        setpoint: finite, with a valid rotation matrix.
-        before: state of the previous output; None for the first setpoint.
+        setpoints: finite, with valid rotation matrices.
+        before: state of the previous outputs.
         """
-        before = before or State()
-        stamp, since, elapsed = setpoint.stamp, 0.0, math.inf
-        if stamp > before.stamp and not setpoint.restart:
-            since = (stamp - before.stamp) * NANOSECOND
-            elapsed = since + (self._slack if setpoint.stamped else self._slack_of_arrival)
-        self._sample.write(
-            *setpoint.motion, *setpoint.wrench, *(setpoint.base or NO_BASE),
-            *(before.singularity or _FIRST), *(before.lengths or _NO_LENGTHS), since, elapsed,
-            *(before.windings or _COLD), setpoint.restart, -STAMPS_END <= stamp < STAMPS_END,
-            setpoint.base_known)
-        self._solve()
-        answered, exceeding, jumped, result, commanded, after, *checked = self._sample.read()
-        if not answered:
-            return None
-        angles, clearances, nearest, *of_motors = checked or _UNCHECKED
-        windings, motors = of_motors or (None, ())
-        if motors and not motors[SOUND]:
-            motors = ()
-        lengths = result[LENGTHS]
-        angles = angles if self._of_poses.angles else ()
-        clearances = clearances if self._of_poses.clearance else ()
-        exceedances: tuple[Exceedance, ...] = ()
-        if exceeding:
-            exceedances = self._limits.exceeded(result_values(self._sample['result']))
-            if jumped and before.lengths:
-                exceedances += self._limits.jumps(lengths, before.lengths, elapsed)
-            exceedances += self._limits.exceeded(
-                {name: angles[where] for name, where in ANGLES.items()}
-                | {CLEARANCE_MIN: clearances}, tuple(map(int, nearest)))
-            if motors and motors[EXCEEDING]:
-                row = np.array(motors)
-                exceedances += self._motors.exceeded(row[OF_DRIVES], row[RISES])
-        singularity = Singularity.of(after)
-        if not self._warms:
-            windings = None
-        return Output(
-            stamp, result, _known(commanded), singularity,
-            before.singularity is None or singularity.warning != before.singularity.warning,
-            exceedances, angles, clearances, motors,
-            before._replace(singularity=singularity) if jumped
-            else State(singularity, stamp, lengths, windings))
+        stamps, given, number = setpoints.stamps, setpoints.rows, len(setpoints.stamps)
+        if number == 1:
+            rows, angles, clearances, motors, state = self._check_one(stamps, given, before)
+        else:
+            rows, state = np.empty((number, OUTPUT)), before.copy()
+            angles, clearances, motors = (np.empty((number, width)) for width in self._widths)
+            in_parts(self._solve, (), given, rows)
+            if self._of_poses.angles is not None:
+                angles = self._of_poses.angles(setpoints.motions)
+            if self._of_poses.clearance is not None:
+                clearances = self._of_poses.clearance(setpoints.motions)
+            self._check(1, number, stamps, given, angles, clearances, state, rows, motors)
+        answered = rows[:, _ANSWERED] > 0.0
+        if np.count_nonzero(answered) < number:
+            stamps = stamps[answered]
+            rows, angles, clearances, motors = (
+                each[answered] for each in (rows, angles, clearances, motors))
+        return Outputs(answered, stamps, rows, angles, clearances, motors, state)
 
-    def many(self, setpoints: Batch, before: State | None) -> Outputs:
-        """Return the outputs of a sequence of setpoints, as calls for one setpoint would."""
-        before, motions = before or State(), setpoints.motions
-        results = self._platform.solve(motions, setpoints.wrenches, setpoints.bases)
-        number = len(results)
-        none: Array = np.empty((number, 0))
-        angles = none if self._of_poses.angles is None else self._of_poses.angles(motions)
-        clearances = none if self._of_poses.clearance is None else (
-            self._of_poses.clearance(motions))
-        motors = np.empty((number, MOTOR_ROW if self._with_motors else 0))
-        state = np.array(before.singularity or _FIRST)
-        windings = np.array(before.windings or _COLD)
-        followed_at = np.array([before.stamp])
-        followed = np.array(before.lengths or _NO_LENGTHS)
-        forces, states = np.empty((number, 6)), np.empty((number, STATE))
-        answered, exceeding, jumped = (np.empty(number, dtype=bool) for _ in range(3))
-        slack = np.full(number, self._slack)
-        if setpoints.stamped is not None:
-            slack[~setpoints.stamped] = self._slack_of_arrival
-        function('check_many')(
-            *self._arguments, number, setpoints.stamps, setpoints.base_known, setpoints.restarts,
-            slack, np.ascontiguousarray(motions), angles, clearances, state, followed_at, followed,
-            windings, results, forces, states, motors, answered, exceeding, jumped)
-        stamps = setpoints.stamps
-        if not answered.all():
-            stamps, results, forces, states, exceeding, jumped, angles, clearances, motors = (
-                each[answered] for each in (stamps, results, forces, states, exceeding, jumped,
-                                            angles, clearances, motors))
-        singularity = before.singularity
-        warnings = states[:, CAUSE] > 0.0
-        changed = np.empty(len(states), dtype=bool)
-        changed[:1] = singularity is None or warnings[:1] != singularity.warning
-        changed[1:] = warnings[1:] != warnings[:-1]
-        if len(states):
-            singularity = Singularity.of(states[-1].tolist())
-        a, b, c, d, e, f = followed.tolist()
-        warm = tuple(windings.tolist()) if self._warms and len(states) else before.windings
-        return Outputs(
-            answered, stamps, results, forces, states, changed, exceeding, jumped, angles,
-            clearances, motors, State(
-                singularity, int(followed_at[0]),
-                None if math.isnan(a) else (a, b, c, d, e, f), warm))
+    def _solve(self, setpoints: Array, outputs: Array) -> None:
+        function('solve_setpoints')(self._platform.structure, len(setpoints), setpoints, outputs)
+
+    def exceedances(self, motions: Array, outputs: Outputs, n: int = 0) -> tuple[Exceedance, ...]:
+        """Return the limits that a setpoint exceeds; motions (N, MOTION): those of the outputs."""
+        if not outputs.exceeding[n]:
+            return ()
+        values = {name: each[n].tolist() for name, each in outputs.values().items()}
+        if outputs.jumped[n]:
+            values[JUMP] = outputs.rows[n, _MEAN_RATES].tolist()
+        nearest: list[int] = []
+        if self._of_poses.clearance is not None:
+            nearest = self._of_poses.clearance.nearest(motions[n:n + 1])[1][0].tolist()
+        found = self._limits.exceeded(values, nearest)
+        motors = outputs.motors[n]
+        if len(motors) and motors[EXCEEDING]:
+            found += self._motors.exceeded(motors[OF_DRIVES], motors[RISES])
+        return found

@@ -4,7 +4,7 @@
 """
 The statuses of answers: ``timing``, ``singularity`` and ``limits``.
 
-Processing times and setpoints dropped for lack of time; distance from a singularity, cause of the
+Outputs are those of one setpoint. Processing times and setpoints dropped for lack of time; distance from a singularity, cause of the
 warning and crossings; for each kind of limit a state, a line and a peak of its own.
 """
 
@@ -16,18 +16,21 @@ from dataclasses import dataclass, field
 import math
 from statistics import median
 
-from stewart_dynamics.arrays import NANOSECOND, SECOND
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS, OF_LOADS, OF_RESULTS,
-    SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX)
-from stewart_dynamics.mechanics.singularity_warning import Cause, HYSTERESIS
+    Exceedance, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS, OF_LOADS, SPEED_MAX, TEMPERATURE_RISE_MAX,
+    TORQUE_MAX)
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, UNIT_LOAD_FORCES)
+from stewart_dynamics.mechanics.singularity_warning import (
+    Cause, HYSTERESIS, Singularity, UNSOLVABLE_CONDITION)
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
-from stewart_dynamics.setpoints.motor_row import DEMANDED_TORQUES, RISES, SPEEDS
+from stewart_dynamics.setpoints.motor_row import DEMANDED_TORQUES, RISES, SOUND, SPEEDS
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
-from stewart_dynamics.setpoints.step import Output
+from stewart_dynamics.setpoints.step import Outputs, PUBLISHED_FORCES, WARNING_STATE
 
 _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singularity
 # Where the values of limits are in a row of motors.
@@ -52,19 +55,21 @@ class Answers:
         self.parameters = parameters  # may be replaced at any time
         self.number = 0
         self.at = now  # time of the last one
-        self.output: Output | None = None
-        self.output_before: Output | None = None
+        self.outputs: Outputs | None = None
+        self.row: list[float] = []  # that of the last outputs, as numbers: far faster to look at
+        self.before: tuple[int, float] | None = None  # stamp [ns] and det(J) before the last one
         self.second, self.second_before = Second(now), Second(now)
         self._timeout = parameters.setpoint.timeout
 
-    def add(self, output: Output, seconds: float, now: float) -> None:
+    def add(self, outputs: Outputs, seconds: float, now: float) -> None:
         """Note an answer, and its processing time."""
         self.number += 1
         self.at = now
-        self.output_before, self.output = self.output, output
+        if self.outputs is not None:
+            self.before = int(self.outputs.stamps[0]), self.row[DETERMINANT]
+        self.outputs, self.row = outputs, outputs.rows[0].tolist()
         self.second.times.append(seconds)
-        if output.condition > self.second.condition:
-            self.second.condition = output.condition
+        self.second.condition = max(self.second.condition, self.row[CONDITION])
 
     def end_second(self, now: float) -> None:
         """End the present second after a report: reports may be much less than one apart."""
@@ -105,32 +110,31 @@ class TimingDiagnostics(StatusPart):
         return Status(self.name, *self._answers.state(self.held.at(now), 'on time', now), values)
 
 
-def singularity_state(output: Output, parameters: Parameters) -> Level:
-    """Return the level of one output, and its cause with the numbers of the output."""
-    if not output.solvable:
+def singularity_state(row: Sequence[float], parameters: Parameters) -> Level:
+    """Return the level of a row of outputs, and its cause with the numbers of the row."""
+    state, condition = Singularity.of(row[WARNING_STATE]), row[CONDITION]
+    if condition >= UNSOLVABLE_CONDITION:
         return Level(ERROR, 'J_inv cannot be solved: no forces')
-    state = output.singularity
     if state.stopped:
-        is_suppressed = output.demanded_forces is not None and (
+        is_suppressed = not math.isnan(row[FORCES.start]) and (
             parameters.singularity.action == SUPPRESS_FORCES)
         suppressed = ': forces suppressed' if is_suppressed else ''
         return Level(ERROR, f'inside stop_condition{suppressed}: '
-                     + _condition(output, 'stop_condition', parameters.singularity.stop_condition))
+                     + _condition(condition, 'stop_condition', parameters.singularity.stop_condition))
     if not state.warning:
         return OK_LEVEL
     if state.cause is Cause.CROSSED:
         return Level(ERROR, 'det(J) crossed zero since the last setpoint')
     if state.cause is Cause.CONDITION:
         return Level(WARN, _condition(
-            output, 'warn_condition', parameters.singularity.warn_condition))
+            condition, 'warn_condition', parameters.singularity.warn_condition))
     time, bound = state.time_to_crossing, parameters.singularity.warn_time
     ends = '' if time < bound else f' (the warning ends above {bound / HYSTERESIS:g} s)'
     return Level(WARN, f'crossing of det(J) = 0 predicted in {time:.3g} s, singularity.warn_time '
                  f'is {bound:g} s{ends}')
 
 
-def _condition(output: Output, threshold: str, bound: float) -> str:
-    condition = output.condition
+def _condition(condition: float, threshold: str, bound: float) -> str:
     if condition >= bound:
         return f'condition number {condition:.4g} exceeds singularity.{threshold}, {bound:g}'
     return (f'condition number {condition:.4g} has exceeded singularity.{threshold}, {bound:g}, '
@@ -155,43 +159,44 @@ class SingularityDiagnostics(StatusPart):
         """Note the likely mistake in the first pose, and whether it is beyond a singularity."""
         self._other_side = mistake if other_side else ''
 
-    def answered(self, output: Output, now: float) -> bool:
-        """Note an output; return whether it must be reported at once, at any level."""
-        before = self._answers.output_before
-        if output.condition > self._largest:
-            self._largest = output.condition
-        state = singularity_state(output, self._answers.parameters)
+    def answered(self, now: float) -> bool:
+        """Note the last outputs; return whether they must be reported at once, at any level."""
+        row = self._answers.row
+        self._largest = max(self._largest, row[CONDITION])
+        state = singularity_state(row, self._answers.parameters)
         if state.level == OK and self._other_side:
             state = Level(WARN, self._other_side)
-        if output.singularity.cause is not Cause.CROSSED:
+        singularity = Singularity.of(row[WARNING_STATE])
+        if singularity.cause is not Cause.CROSSED:
             self.held.see(state, now, _NEARNESS)
             if self._crossed:
                 self.held.see(OK_LEVEL, now, _CROSSING)
                 self._crossed = False
             return False
         self._crossed, self._other_side = True, ''
-        crossing = Level(ERROR, _crossing(before, output))
+        crossing = Level(ERROR, self._crossing())
         self._crossings.append(crossing.message)
         self.held.see(crossing, now, _CROSSING)
-        stopped = output.singularity.stopped or not output.solvable
+        stopped = singularity.stopped or row[CONDITION] >= UNSOLVABLE_CONDITION
         self.held.see(state if stopped else OK_LEVEL, now, _NEARNESS)
         return now - self._crossing_logged_at >= PERIOD
 
     def status(self, now: float) -> Status:
         """Return the status."""
-        answers, output, values = self._answers, self._answers.output, []
-        if output is not None:
-            forces = output.unit_load_forces
+        answers, row, values = self._answers, self._answers.row, []
+        if row:
+            forces, condition = row[UNIT_LOAD_FORCES], row[CONDITION]
             worst = max(range(6), key=forces.__getitem__)
-            crossing = output.singularity.time_to_crossing
+            state = Singularity.of(row[WARNING_STATE])
+            crossing = state.time_to_crossing
             of_the_last_second = max(
-                output.condition, answers.second.condition, answers.second_before.condition)
+                condition, answers.second.condition, answers.second_before.condition)
             values = [
-                ('det(J) (m^3)', f'{output.determinant:.9g}'),
-                ('d(det(J))/dt (m^3/s)', f'{output.determinant_rate:.9g}'),
+                ('det(J) (m^3)', f'{row[DETERMINANT]:.9g}'),
+                ('d(det(J))/dt (m^3/s)', f'{row[DETERMINANT_RATE]:.9g}'),
                 ('time to crossing (s)', f'{crossing:.3f}' if crossing < 1e6 else 'none'),
-                ('crossings', str(output.singularity.crossings)),
-                ('condition number', f'{output.condition:.6g}'),
+                ('crossings', str(state.crossings)),
+                ('condition number', f'{condition:.6g}'),
                 ('worst condition number of the last second', f'{of_the_last_second:.6g}'),
                 ('worst condition number since activation', f'{self._largest:.6g}'),
                 ('largest leg force under a unit load', f'{forces[worst]:.6g}'),
@@ -210,16 +215,19 @@ class SingularityDiagnostics(StatusPart):
         level, message = self.held.of(_NEARNESS, now)
         return lines + self._changed(level, message or 'clear')
 
-
-def _crossing(before: Output | None, output: Output) -> str:
-    """Return when det(J) crossed zero, on a straight line between two outputs."""
-    seconds, nanoseconds = divmod(output.stamp, SECOND)
-    stamp = f'stamp {seconds}.{nanoseconds:09d} s'
-    passed = 0 if before is None else output.stamp - before.stamp
-    if before is None or passed <= 0:
-        return f'det(J) crossed zero before {stamp}'
-    now, then = abs(output.determinant), abs(before.determinant)
-    return f'det(J) crossed zero {passed * NANOSECOND * now / (now + then):.3g} s before {stamp}'
+    def _crossing(self) -> str:
+        """Return when det(J) crossed zero, on a straight line between two setpoints."""
+        answers = self._answers
+        assert answers.outputs is not None
+        at = int(answers.outputs.stamps[0])
+        seconds, nanoseconds = divmod(at, SECOND)
+        stamp = f'stamp {seconds}.{nanoseconds:09d} s'
+        if answers.before is None or at <= answers.before[0]:
+            return f'det(J) crossed zero before {stamp}'
+        passed = at - answers.before[0]
+        now, then = abs(answers.row[DETERMINANT]), abs(answers.before[1])
+        return (f'det(J) crossed zero {passed * NANOSECOND * now / (now + then):.3g} s before '
+                f'{stamp}')
 
 
 class LimitsDiagnostics(StatusPart):
@@ -238,30 +246,33 @@ class LimitsDiagnostics(StatusPart):
         self._mistake = ''  # in the pose with which legs became too long or too short
         self._largest_force, self._its_leg = 0.0, 0
 
-    def answered(self, output: Output, motion: Sequence[float], now: float) -> None:
-        """Note an output, and its setpoint's row of motion."""
-        forces = output.demanded_forces
-        if forces is not None:
-            largest = abs(self._largest_force)
-            # These two take less time than abs of each.
-            if max(forces) > largest or min(forces) < -largest:
-                self._largest_force = max(forces, key=abs)
-                self._its_leg = forces.index(self._largest_force)
-        if output.exceedances or self._exceeding:
-            self._exceeding = bool(output.exceedances)
-            self._note_exceedances(output, motion, now)
+    def answered(self, exceedances: Sequence[Exceedance], motion: Sequence[float], now: float,
+                 ) -> None:
+        """Note the last outputs, the limits they exceed, and the setpoint's row of motion."""
+        forces = self._answers.row[FORCES]
+        largest = abs(self._largest_force)
+        # These two take less time than abs of each; nan is never larger.
+        if max(forces) > largest or min(forces) < -largest:
+            self._its_leg = max(range(6), key=lambda leg: abs(forces[leg]))
+            self._largest_force = forces[self._its_leg]
+        if exceedances or self._exceeding:
+            self._exceeding = bool(exceedances)
+            self._note_exceedances(exceedances, motion, now)
 
-    def _note_exceedances(self, output: Output, motion: Sequence[float], now: float) -> None:
-        suppressed = output.forces is None and output.demanded_forces is not None and (
+    def _note_exceedances(self, exceedances: Sequence[Exceedance], motion: Sequence[float],
+                          now: float) -> None:
+        row = self._answers.row
+        published, demanded = row[PUBLISHED_FORCES.start], row[FORCES.start]
+        suppressed = math.isnan(published) and not math.isnan(demanded) and (
             self._answers.parameters.limits.action == SUPPRESS_FORCES) and any(
-                not LIMITS[each.limit].clips for each in output.exceedances)
+                not LIMITS[each.limit].clips for each in exceedances)
         self._suppressed += suppressed
         if not any(self.held.of(name, now).level for name in _OF_POSE):
             # At most once in a second: it may take a millisecond.
             self._mistake = pose_mistake(
                 self._answers.parameters, motion, first=self._answers.number == 1)
         for name in LIMITS:
-            exceeded = [each for each in output.exceedances if each.limit == name]
+            exceeded = [each for each in exceedances if each.limit == name]
             if not exceeded:
                 self.held.see(OK_LEVEL, now, name)
                 continue
@@ -278,9 +289,9 @@ class LimitsDiagnostics(StatusPart):
     def status(self, now: float) -> Status:
         """Return the status, with all causes of its level."""
         values = []
-        if self._answers.output is not None:
+        if self._answers.outputs is not None:
             values = [(f'{leg}: {quantity}', f'{number:.6g}')
-                      for quantity, numbers in self._of_legs(self._answers.output)
+                      for quantity, numbers in self._of_legs(self._answers.outputs)
                       for leg, number in zip(self._joints, numbers, strict=False)
                       if not math.isnan(number)]
         if self._largest_force:
@@ -295,14 +306,13 @@ class LimitsDiagnostics(StatusPart):
             values.append(('setpoints without forces, by limits.action', str(self._suppressed)))
         return Status(self.name, *self._answers.state(self.held.at(now), 'all held', now), values)
 
-    def _of_legs(self, output: Output) -> list[tuple[str, Sequence[float]]]:
-        """Return each quantity with its unit, and six numbers, where they are computed or not."""
-        numbers: dict[str, Sequence[float]] = {
-            **{limit: output.result[LIMITS[limit].columns] for limit in OF_RESULTS
-               if limit != LENGTH_MIN},
-            **{limit: output.joint_angles[where] for limit, where in ANGLES.items()},
-            CLEARANCE_MIN: output.clearances,
-            **{limit: output.motors[where] for limit, where in _OF_MOTORS.items()}}
+    def _of_legs(self, outputs: Outputs) -> list[tuple[str, Array]]:
+        """Return each quantity that is computed, with its unit, and six numbers."""
+        numbers = {limit: values[0] for limit, values in outputs.values().items()
+                   if limit != LENGTH_MIN}
+        motors = outputs.motors[0]
+        if len(motors) and motors[SOUND]:
+            numbers |= {limit: motors[where] for limit, where in _OF_MOTORS.items()}
         return [(f'{LIMITS[limit].quantity.name}{" demanded" * (limit in _DEMANDED)} '
                  f'({LIMITS[limit].quantity.unit})', each) for limit, each in numbers.items()]
 

@@ -22,7 +22,6 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import SECONDS
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejection, STAMP_ZERO
-from stewart_dynamics.setpoints.step import Setpoint
 
 INCOMPLETE, _UNKNOWN = 'incomplete', 'unknown'  # causes of a level besides rejections
 # Time after which arriving messages that complete no setpoint are logged [s].
@@ -168,11 +167,10 @@ class BaseDiagnostics(StatusPart):
         if base.last:
             self._row = base.last[1]
 
-    def answered(self, setpoint: Setpoint, now: float) -> None:
-        """Note a setpoint that was answered."""
-        if not setpoint.base_known:
-            self._unknown += 1
-            self.held.happened(Level(ERROR, self._why(now)), now, _UNKNOWN)
+    def unknown(self, now: float) -> None:
+        """Note a setpoint for which the motion was not known."""
+        self._unknown += 1
+        self.held.happened(Level(ERROR, self._why(now)), now, _UNKNOWN)
 
     def stale(self, now: float) -> bool:
         """Return whether no recent sample is available."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.node.diagnostics.answers import (
     Answers, LimitsDiagnostics, SingularityDiagnostics, TimingDiagnostics)
 from stewart_dynamics.node.diagnostics.input_statuses import (
@@ -20,7 +21,7 @@ from stewart_dynamics.node.diagnostics.outcomes import (
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.consistency import Mistake
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
-from stewart_dynamics.setpoints.step import Output
+from stewart_dynamics.setpoints.step import Outputs
 
 # Period at which the node calls ``due_at_tick`` [s].
 TICK = 0.05
@@ -54,15 +55,16 @@ class DynamicsDiagnostics:
             pose_mistake(parameters, motion),
             determinant * determinant_at_home(parameters) < 0.0)
 
-    def answered(self, output: Output, motion: Sequence[float], came: float, now: float) -> bool:
+    def answered(self, outputs: Outputs, exceedances: Sequence[Exceedance],
+                 motion: Sequence[float], came: float, now: float) -> bool:
         """
-        Note an output, its setpoint's row of motion and time of arrival.
+        Note the outputs of one setpoint, the limits it exceeds, its motion and time of arrival.
 
         Returns whether a report is due.
         """
-        self.answers.add(output, now - came, now)
-        self.limits.answered(output, motion, now)
-        crossed = self.singularity.answered(output, now)
+        self.answers.add(outputs, now - came, now)
+        self.limits.answered(exceedances, motion, now)
+        crossed = self.singularity.answered(now)
         return crossed or self._due(now)
 
     def rejected(self, rejection: Rejection, details: str, now: float) -> None:
