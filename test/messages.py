@@ -16,10 +16,9 @@ from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.setpoints.input_messages import WRENCH as WRENCH_TOPIC
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import Rejection
-from stewart_dynamics.setpoints.step import Setpoint
+from stewart_dynamics.setpoints.step import Batch
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
@@ -49,15 +48,10 @@ class Feed:
             parameters, lambda rejection, details: self.said.append((rejection, details)),
             self.notices.append)
 
-    def __call__(self, topic: str, data: bytes, now: int = NOW) -> Setpoint | None:
-        """Take one message as the node does, at a time [ns]."""
-        if topic in self.setpoints.base.topics:
-            self.setpoints.base.take(topic, data, lambda: now)
-        elif topic == WRENCH_TOPIC:
-            self.setpoints.take_wrench(data)
-        elif (setpoint := self.setpoints.take(topic, data, lambda: now)) is not None:
-            return self.setpoints.on_base(setpoint)
-        return None
+    def __call__(self, topic: str, data: bytes, now: int = NOW) -> Batch | None:
+        """Take one message as the node does, at a time [ns]; return the setpoint it completes."""
+        setpoint = self.setpoints.take([(topic, data, lambda: now)])
+        return setpoint if len(setpoint.stamps) else None
 
     @property
     def counts(self) -> dict[tuple[str, str], int]:
@@ -82,25 +76,20 @@ def check_many(one: Feed, many: Feed, given: Sequence[tuple[str, bytes]], topics
     times = range(NOW, NOW + 1000 * len(given), 1000)
     expected = [(setpoint, time) for (topic, data), time in zip(given, times, strict=True)
                 if (setpoint := one(topic, data, time)) is not None]
-    found: list[tuple[Setpoint, int]] = []
-    whole = together(given, topics)
+    whole, number = together(given, topics), 0
     for first, end in pairwise([0, *sorted(cut for cut in cuts if cut < len(given)), len(given)]):
-        batch = many.setpoints.take_many(whole.chosen(slice(first, end)))
-        number = len(batch.stamps)
-        assert batch.motions.shape == (number, 24)
-        assert batch.wrenches.shape == (number, 6)
-        assert (batch.bases is None) == (not many.setpoints.base.topics)
-        bases = [None] * number if batch.bases is None else map(tuple, batch.bases.tolist())
-        stamped = [True] * number if batch.stamped is None else batch.stamped.tolist()
-        found += [(Setpoint(stamp, tuple(motion), tuple(wrench), restart, base, known), time)
-                  for stamp, motion, wrench, restart, time, base, known in zip(
-                      *(part.tolist() for part in batch[:5]), bases, stamped, strict=True)]
-    assert list(map(repr, found)) == list(map(repr, expected))
+        found = many.setpoints.take(whole.chosen(slice(first, end)))
+        assert found.moving == bool(many.setpoints.base.topics)
+        for n, (setpoint, time) in enumerate(expected[number:number + len(found.stamps)]):
+            assert (found.stamps[n], found.times[n]) == (setpoint.stamps[0], time)
+            assert found.rows[n].tobytes() == setpoint.rows[0].tobytes()
+        number += len(found.stamps)
+    assert number == len(expected)
     assert many.notices == one.notices
     for feed in (one, many):
         feed.setpoints.end('the bag ends')
     assert many.counts == one.counts
-    return len(found)
+    return number
 
 
 def _new(kind: str, *fields: Any) -> Any:

@@ -26,10 +26,10 @@ from stewart_dynamics.messages.setpoint import imu, layout_of
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.input_messages import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, LARGEST, POSE, WRENCH)
-from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (
     MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE, TOO_OLD, TWICE,
     WRONG_FRAME)
+from stewart_dynamics.setpoints.sample_joining import SampleJoining
 
 MS = 1_000_000
 SECOND = 1000 * MS
@@ -54,10 +54,10 @@ class Feed(messages.Feed):
             self(topic, data)
 
     def row(self, stamp: int) -> Any:
-        """Return the row of the base at a setpoint."""
+        """Return the row of the base at a setpoint; None if the base is fixed."""
         setpoint = self(POSE, messages.pose(stamp))
         assert setpoint is not None
-        return setpoint.base
+        return None if setpoint.bases is None else setpoint.bases[0].tolist()
 
 
 def sample(topics: Sequence[str], stamp: int, mark: float = 0.0) -> list[tuple[str, bytes]]:
@@ -91,7 +91,7 @@ def test_a_pose_and_a_motion_give_the_bits_of_the_library() -> None:
                           ('motion', BaseMotion.from_motion(motion, gravity))):
         feed = Feed(source)
         feed.sample(SECOND, 0.5)
-        assert feed.row(SECOND) == tuple(truth.rows.tolist())
+        assert feed.row(SECOND) == truth.rows.tolist()
 
 
 def test_an_imu_gives_the_bits_of_the_library() -> None:
@@ -101,7 +101,7 @@ def test_an_imu_gives_the_bits_of_the_library() -> None:
     feed.sample(SECOND, 0.5)
     truth = BaseMotion.from_imu([0.5, 1.0, 9.0], [0.5, 0.2, 0.3], np.zeros(3),
                                 mounting.position, mounting.rotation)
-    assert feed.row(SECOND) == tuple(truth.rows.tolist())
+    assert feed.row(SECOND) == truth.rows.tolist()
     feed.sample(SECOND + 5 * MS, 0.7)
     gain = -math.expm1(-2.0 * math.pi * PARAMETERS['base.imu.cutoff'] * 0.005)
     truth = BaseMotion.from_imu([0.7, 1.0, 9.0], [0.7, 0.2, 0.3],
@@ -364,8 +364,8 @@ def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPa
         feed = Feed(source)
         with monkeypatch.context() as patch:
             patch.delattr(BaseInput, 'take')
-            patch.delattr(Setpoints, 'take')
-            bases = [feed.setpoints.take_many(messages.together(part, TOPICS)).bases
+            patch.delattr(SampleJoining, 'take')
+            bases = [feed.setpoints.take(messages.together(part, TOPICS)).bases
                      for part in (given[:103], given[103:])]
         assert all(map(np.any, map(np.isfinite, bases)))
         assert not feed.said

@@ -25,36 +25,34 @@ from stewart_dynamics.setpoints.consistency import Mistake
 from stewart_dynamics.setpoints.input_messages import ACCEL, BASE_IMU, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_FINITE, NOT_JOINED, Rejection, STAMP_ZERO, TWICE)
-from stewart_dynamics.setpoints.step import Output, Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
 PROGRAM = 'stewart_dynamics'
-RESULTS = places('stewart_result')
+OUTPUT = places('setpoint_output')
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)
 BEGIN = 100.0
 
 
-def output_of(setpoint: Setpoint = HOME, before: Singularity | None = None,
-              **limits: object) -> Output:
+def outputs_of(setpoint: Batch = HOME) -> Outputs:
     """Return what a setpoint gives."""
-    step = Step(PARAMETERS.replaced({
-        name.replace('__', '.'): value for name, value in limits.items()}))
-    output = step(setpoint, before)
-    assert output is not None
-    return output
+    outputs = Step(PARAMETERS)(setpoint)
+    assert outputs.answered[0]
+    return outputs
 
 
-CLEAR = output_of()
+CLEAR = outputs_of()
 
 
-def with_result(output: Output, **numbers: Any) -> Output:
-    """Return an output with other numbers in its row of results."""
-    row = np.array(output.result)
+def changed(outputs: Outputs = CLEAR, stamp: int | None = None, **numbers: Any) -> Outputs:
+    """Return outputs with another stamp, and other numbers in their row."""
+    rows = outputs.rows.copy()
     for name, number in numbers.items():
-        row[RESULTS[name]] = number
-    return output._replace(result=tuple(row.tolist()))
+        rows[:, OUTPUT[name.replace('__', '.')]] = number
+    return outputs._replace(
+        rows=rows, stamps=outputs.stamps if stamp is None else np.array([stamp]))
 
 
 def begun(**changes: Any) -> DynamicsDiagnostics:
@@ -63,13 +61,14 @@ def begun(**changes: Any) -> DynamicsDiagnostics:
     return DynamicsDiagnostics(parameters, TOPICS, (), BEGIN)
 
 
-def answered(diagnostics: DynamicsDiagnostics, now: float, output: Output = CLEAR,
-             topics: tuple[str, ...] = TOPICS, took: float = 1e-4,
-             motion: Sequence[float] = HOME.motion) -> bool:
+def answered(diagnostics: DynamicsDiagnostics, now: float, outputs: Outputs = CLEAR,
+             topics: tuple[str, ...] = TOPICS, took: float = 1e-4, setpoint: Batch = HOME,
+             exceedances: Sequence[Exceedance] = ()) -> bool:
     """Let messages of some topics come, and a setpoint be answered."""
     for topic in topics:
         diagnostics.setpoints.heard[topic] = now
-    return diagnostics.answered(output, motion, now - took, now)
+    return diagnostics.answered(
+        outputs, exceedances, setpoint.motions[0].tolist(), now - took, now)
 
 
 def status(diagnostics: DynamicsDiagnostics, name: str, now: float) -> Status:
@@ -319,7 +318,7 @@ def test_a_backlog_is_a_warning_for_a_second_and_its_losses_stay_counted(
 
 def test_the_age_of_the_last_setpoint_is_stated(snapshot: Snapshot) -> None:
     diagnostics = begun()
-    answered(diagnostics, BEGIN, output_of(QUARTER))
+    answered(diagnostics, BEGIN, outputs_of(QUARTER))
     for name in ('singularity', 'limits', 'timing'):
         assert 'ago' not in status(diagnostics, name, BEGIN + 0.1).message
         of = status(diagnostics, name, BEGIN + 7.0)
@@ -362,8 +361,8 @@ def test_a_clear_motion_is_ok() -> None:
     of = status(diagnostics, 'singularity', BEGIN)
     assert (of.level, of.message) == (OK, 'clear')
     values = dict(of.values)
-    assert values['det(J) (m^3)'] == f'{CLEAR.determinant:.9g}'
-    assert values['condition number'] == f'{CLEAR.condition:.6g}'
+    assert values['det(J) (m^3)'] == f'{CLEAR.determinants[0]:.9g}'
+    assert values['condition number'] == f'{CLEAR.conditions[0]:.6g}'
     assert values['time to crossing (s)'] == 'none'
     assert values['crossings'] == '0'
     assert values['its leg'] in PARAMETERS['joints']
@@ -372,20 +371,21 @@ def test_a_clear_motion_is_ok() -> None:
 def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None:
     """With z down a platform stands where it would hang: the lengths are the same."""
     around = {'limits__length_min': [1.0], 'limits__length_max': [1.4]}
-    x, y, z, *others = HOME.motion
-    below = output_of(HOME._replace(motion=(x, y, -z, *others)))
+    motions = HOME.motions.copy()
+    motions[:, 2] *= -1.0
+    below = outputs_of(HOME.changed(motions))
     assert below.lengths == pytest.approx(CLEAR.lengths, rel=1e-12)
     diagnostics = begun(**around)
-    diagnostics.begins((x, y, -z, *others), below.determinant)
+    diagnostics.begins(motions[0].tolist(), float(below.determinants[0]))
     for n in range(2):
         answered(diagnostics, BEGIN + n, below)
         of = status(diagnostics, 'singularity', BEGIN + n)
         assert of.level == WARN
         assert re.fullmatch(
-            rf'det\(J\) is -{CLEAR.determinant:.3g} m\^3, at home \+[\d.]+ m\^3: the motion '
+            rf'det\(J\) is -{CLEAR.determinants[0]:.3g} m\^3, at home \+[\d.]+ m\^3: the motion '
             'begins beyond a .*likely mistake: an axis of the other sign, or .*', of.message)
     above = begun(**around)
-    above.begins(HOME.motion, CLEAR.determinant)
+    above.begins(HOME.motions[0].tolist(), float(CLEAR.determinants[0]))
     answered(above, BEGIN)
     assert status(above, 'singularity', BEGIN).message == 'clear'
 
@@ -400,9 +400,9 @@ def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None
 def test_a_warning_states_its_reason_with_its_own_numbers(
         cause: Cause, condition: float, time: float, snapshot: Snapshot) -> None:
     diagnostics = begun()
-    answered(diagnostics, BEGIN, with_result(
-        CLEAR, condition_number=condition)._replace(singularity=Singularity(
-            cause=cause, time_to_crossing=time, crossings=4)))
+    answered(diagnostics, BEGIN, changed(
+        result__condition_number=condition,
+        warning=Singularity(cause=cause, time_to_crossing=time, crossings=4)))
     of = status(diagnostics, 'singularity', BEGIN)
     assert of.level == WARN
     snapshot(of.message)
@@ -414,16 +414,16 @@ def test_a_warning_states_its_reason_with_its_own_numbers(
     snapshot(text)
 
 
-def near(condition: float, stamp: int = 0) -> Output:
-    """Return an output inside warn_condition."""
-    return with_result(CLEAR, condition_number=condition)._replace(
-        stamp=stamp, singularity=Singularity(cause=Cause.CONDITION))
+def near(condition: float, stamp: int = 0) -> Outputs:
+    """Return outputs inside warn_condition."""
+    return changed(CLEAR, stamp, result__condition_number=condition,
+                   warning=Singularity(cause=Cause.CONDITION))
 
 
 def test_a_past_state_is_reported_with_its_own_number_and_since_when(snapshot: Snapshot) -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, near(23.5))
-    answered(diagnostics, BEGIN + 0.4, with_result(CLEAR, condition_number=7.42))
+    answered(diagnostics, BEGIN + 0.4, changed(result__condition_number=7.42))
     of = status(diagnostics, 'singularity', BEGIN + 0.4)
     assert of.level == WARN
     snapshot(of.message)
@@ -433,12 +433,12 @@ def test_a_past_state_is_reported_with_its_own_number_and_since_when(snapshot: S
 
 def test_a_crossing_is_one_line_in_the_log_with_stamp_and_time() -> None:
     diagnostics = begun()
-    answered(diagnostics, BEGIN, with_result(
-        near(23.5, 1_700_000_000_120_000_000), determinant=0.3))
+    answered(diagnostics, BEGIN, changed(
+        near(23.5, 1_700_000_000_120_000_000), result__determinant=0.3))
     assert [level for level, _ in logged(diagnostics, BEGIN)] == [WARN]
-    crossing = with_result(CLEAR, condition_number=30.0, determinant=-0.1)._replace(
-        stamp=1_700_000_000_130_000_001,
-        singularity=Singularity(cause=Cause.CROSSED, crossings=1))
+    crossing = changed(
+        CLEAR, 1_700_000_000_130_000_001, result__condition_number=30.0,
+        result__determinant=-0.1, warning=Singularity(cause=Cause.CROSSED, crossings=1))
     assert answered(diagnostics, BEGIN + 0.01, crossing), 'it is reported at once'
     line = 'det(J) crossed zero 0.0025 s before stamp 1700000000.130000001 s'
     assert (ERROR, f'singularity: {line}') in logged(diagnostics, BEGIN + 0.01)
@@ -455,12 +455,12 @@ def test_a_crossing_is_one_line_in_the_log_with_stamp_and_time() -> None:
 def test_a_crossing_inside_stop_condition_hides_nothing_and_is_not_hidden(
         snapshot: Snapshot) -> None:
     diagnostics = begun(singularity__action='suppress_forces')
-    inside = with_result(CLEAR, condition_number=1e4)._replace(
-        forces=None, singularity=Singularity(cause=Cause.CONDITION, stopped=True))
+    inside = changed(result__condition_number=1e4, forces=np.nan,
+                     warning=Singularity(cause=Cause.CONDITION, stopped=True))
     answered(diagnostics, BEGIN, inside)
     logged(diagnostics, BEGIN)
-    assert answered(diagnostics, BEGIN + 0.01, inside._replace(
-        stamp=1, singularity=Singularity(cause=Cause.CROSSED, stopped=True)))
+    assert answered(diagnostics, BEGIN + 0.01, changed(
+        inside, 1, warning=Singularity(cause=Cause.CROSSED, stopped=True)))
     of = status(diagnostics, 'singularity', BEGIN + 0.01)
     assert of.level == ERROR
     snapshot(of.message)
@@ -469,11 +469,11 @@ def test_a_crossing_inside_stop_condition_hides_nothing_and_is_not_hidden(
 def test_hundreds_of_crossings_are_one_line_in_a_second_with_their_number(
         snapshot: Snapshot) -> None:
     diagnostics = begun()
-    crossing = CLEAR._replace(singularity=Singularity(cause=Cause.CROSSED))
+    crossing = changed(warning=Singularity(cause=Cause.CROSSED))
     lines = []
     for n in range(100):
         now = BEGIN + 0.02 * n
-        if answered(diagnostics, now, crossing._replace(stamp=n)):
+        if answered(diagnostics, now, changed(crossing, n)):
             lines += logged(diagnostics, now)
     first, second = [text for _, text in lines]
     snapshot(first)
@@ -481,9 +481,9 @@ def test_hundreds_of_crossings_are_one_line_in_a_second_with_their_number(
 
 
 @pytest.mark.parametrize('setpoint', [QUARTER, FLAT])
-def test_a_pose_that_cannot_be_solved_is_an_error(setpoint: Setpoint, snapshot: Snapshot) -> None:
+def test_a_pose_that_cannot_be_solved_is_an_error(setpoint: Batch, snapshot: Snapshot) -> None:
     diagnostics = begun()
-    answered(diagnostics, BEGIN, output_of(setpoint))
+    answered(diagnostics, BEGIN, outputs_of(setpoint))
     of = status(diagnostics, 'singularity', BEGIN)
     assert of.level == ERROR
     snapshot(of.message)
@@ -495,10 +495,10 @@ def test_the_worst_condition_is_kept_for_a_second_or_two() -> None:
     diagnostics = begun()
     key = 'worst condition number of the last second'
     for condition in (3.0, 40.0, 5.0):
-        answered(diagnostics, BEGIN, with_result(CLEAR, condition_number=condition))
+        answered(diagnostics, BEGIN, changed(result__condition_number=condition))
     assert dict(status(diagnostics, 'singularity', BEGIN).values)[key] == '40'
     for second, worst in ((1.0, '40'), (2.0, '40'), (3.0, '4')):
-        answered(diagnostics, BEGIN + second, with_result(CLEAR, condition_number=4.0))
+        answered(diagnostics, BEGIN + second, changed(result__condition_number=4.0))
         values = dict(status(diagnostics, 'singularity', BEGIN + second).values)
         assert values[key] == worst
         assert values['worst condition number since activation'] == '40'
@@ -514,9 +514,9 @@ def test_held_limits_are_ok(snapshot: Snapshot) -> None:
     snapshot(of.message)
     values = dict(of.values)
     for leg, name in enumerate(PARAMETERS['joints']):
-        assert values[f'{name}: length (m)'] == f'{CLEAR.lengths[leg]:.6g}'
-        assert values[f'{name}: rate (m/s)'] == f'{CLEAR.rates[leg]:.6g}'
-        assert values[f'{name}: force demanded (N)'] == f'{CLEAR.demanded_forces[leg]:.6g}'
+        assert values[f'{name}: length (m)'] == f'{CLEAR.lengths[0, leg]:.6g}'
+        assert values[f'{name}: rate (m/s)'] == f'{CLEAR.rates[0, leg]:.6g}'
+        assert values[f'{name}: force demanded (N)'] == f'{CLEAR.demanded_forces[0, leg]:.6g}'
 
 
 @pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
@@ -524,16 +524,14 @@ def test_held_limits_are_ok(snapshot: Snapshot) -> None:
 def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
         action: str, limited: bool, snapshot: Snapshot) -> None:
     limits = {'limits__length_max': 1.4} if limited else {'limits__velocity_max': 0.5}
-    high = HOME._replace(stamp=HOME.stamp + 1_000_000,
-                         motion=(0.0, 0.0, 1e3, *HOME.motion[3:]))
+    high = Batch.of(HOME.stamps + 1_000_000, (0.0, 0.0, 1e3, *HOME.motions[0, 3:]))
     step = Step(PARAMETERS.replaced({
         'limits.action': action, **{k.replace('__', '.'): v for k, v in limits.items()}}))
-    first = step(HOME, None)
-    assert first is not None
-    output = step(high, first.state)
-    assert output is not None
+    outputs = step(high, step(HOME).state)
+    assert outputs.answered[0]
     diagnostics = begun(limits__action=action, **limits)
-    answered(diagnostics, BEGIN, output, motion=high.motion)
+    answered(diagnostics, BEGIN, outputs, setpoint=high,
+             exceedances=step.exceedances(high.motions, outputs))
     lines = [line.text for line in diagnostics.report(BEGIN)[1]]
     of = status(diagnostics, 'limits', BEGIN)
     assert of.level == ERROR
@@ -551,8 +549,8 @@ def test_a_limit_hides_no_other(snapshot: Snapshot) -> None:
     diagnostics = begun()
     rate = Exceedance('limits.velocity_max', 2, 0.5001, 0.5)
     force = Exceedance('limits.force_max', 0, 2.4e6, 6000.0)
-    answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(rate, force)))
-    answered(diagnostics, BEGIN + 0.5, CLEAR._replace(exceedances=(rate,)))
+    answered(diagnostics, BEGIN, exceedances=(rate, force))
+    answered(diagnostics, BEGIN + 0.5, exceedances=(rate,))
     words = [excess.words(PARAMETERS['joints']) for excess in (rate, force)]
     of = status(diagnostics, 'limits', BEGIN + 0.5)
     snapshot(of.message)
@@ -572,7 +570,7 @@ def test_each_kind_of_limit_is_logged_when_it_is_exceeded_and_when_no_longer(
     for n in range(600):
         now = BEGIN + 0.01 * n
         excesses = (rate, less if n % 2 else force) if 100 <= n < 341 else (rate,)
-        answered(diagnostics, now, CLEAR._replace(exceedances=excesses))
+        answered(diagnostics, now, exceedances=excesses)
         lines += logged(diagnostics, now)
     levels, texts = zip(*lines, strict=True)
     assert levels == (ERROR, ERROR, OK)
@@ -581,18 +579,17 @@ def test_each_kind_of_limit_is_logged_when_it_is_exceeded_and_when_no_longer(
 
 def test_the_largest_force_is_kept_until_the_next_activation() -> None:
     diagnostics = begun()
-    forces = CLEAR.demanded_forces
-    assert forces is not None
+    forces, = CLEAR.demanded_forces
     key, leg = 'largest force demanded since activation (N)', 'leg of the largest force demanded'
     for largest, at in ((1e4, 3), (-2.5e4, 5), (2e4, 0)):
         peak = (*forces[:at], largest, *forces[at + 1:])
-        answered(diagnostics, BEGIN, with_result(CLEAR, forces=peak))
+        answered(diagnostics, BEGIN, changed(result__forces=peak))
     for after in (0.0, 100.0):
         answered(diagnostics, BEGIN + after)
         values = dict(status(diagnostics, 'limits', BEGIN + after).values)
         assert (values[key], values[leg]) == ('-25000', 'leg_6')
     diagnostics = begun()
-    answered(diagnostics, BEGIN, with_result(CLEAR, forces=np.nan))
+    answered(diagnostics, BEGIN, changed(result__forces=np.nan))
     assert key not in dict(status(diagnostics, 'limits', BEGIN).values)
 
 
@@ -601,13 +598,13 @@ def test_the_largest_force_is_kept_until_the_next_activation() -> None:
 def test_a_level_holds_for_a_second_after_its_cause() -> None:
     diagnostics = begun()
     excess = Exceedance('limits.force_max', 0, 2.0, 1.0)
-    answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(excess,)))
+    answered(diagnostics, BEGIN, exceedances=(excess,))
     for after in (0.1, 0.5, 0.99):
         answered(diagnostics, BEGIN + after)
         assert status(diagnostics, 'limits', BEGIN + after).level == ERROR
     assert status(diagnostics, 'limits', BEGIN + 1.0).level == OK
-    answered(diagnostics, BEGIN + 3.0, CLEAR._replace(exceedances=(excess,)))
-    answered(diagnostics, BEGIN + 3.9, CLEAR._replace(exceedances=(excess,)))
+    answered(diagnostics, BEGIN + 3.0, exceedances=(excess,))
+    answered(diagnostics, BEGIN + 3.9, exceedances=(excess,))
     assert status(diagnostics, 'limits', BEGIN + 4.8).level == ERROR
 
 
@@ -623,7 +620,7 @@ def test_a_change_of_level_is_pending_until_it_is_reported() -> None:
     assert diagnostics.level_changed(BEGIN + 0.01)
     diagnostics.report(BEGIN + 0.01)
     assert not answered(diagnostics, BEGIN + 0.02)
-    assert answered(diagnostics, BEGIN + 0.03, output_of(QUARTER))
+    assert answered(diagnostics, BEGIN + 0.03, outputs_of(QUARTER))
     diagnostics.report(BEGIN + 0.03)
     assert not diagnostics.level_changed(BEGIN + 0.04)
     assert diagnostics.level_changed(BEGIN + 0.14)  # stale
@@ -676,24 +673,26 @@ def test_every_value_is_finite_and_every_key_has_its_unit(
     step = Step(PARAMETERS.replaced({
         'limits.force_max': 10.0, 'limits.length_max': 1.0, 'limits.velocity_max': 0.1}))
     diagnostics = begun()
-    now, state = BEGIN, None
+    now, state = BEGIN, FIRST
     _check_values(diagnostics, now)
     for stamp, (position, rotation, rates, pause) in enumerate(motions):
         now += pause
-        output = step(Setpoint(stamp, (*position, *rotation, *rates)), state)
-        if output is None:
-            diagnostics.rejected(Rejection('setpoint', 'out of range'), '', now)
+        setpoint = Batch.of(stamp, (*position, *rotation, *rates))
+        outputs = step(setpoint, state)
+        state = outputs.state
+        if outputs.answered[0]:
+            answered(diagnostics, now, outputs,
+                     exceedances=step.exceedances(setpoint.motions, outputs))
         else:
-            answered(diagnostics, now, output)
-            state = output.state
+            diagnostics.rejected(Rejection('setpoint', 'out of range'), '', now)
         diagnostics.setpoints.found({POSE: 2}, {'leg_states': 1}, '')
         _check_values(diagnostics, now)
 
 
 def test_a_level_lasts_as_long_as_the_output_that_caused_it() -> None:
     diagnostics = begun()
-    warned = CLEAR._replace(singularity=Singularity(cause=Cause.CONDITION))
-    stopped = CLEAR._replace(singularity=Singularity(Cause.CONDITION, stopped=True))
+    warned = changed(warning=Singularity(cause=Cause.CONDITION))
+    stopped = changed(warning=Singularity(Cause.CONDITION, stopped=True))
     answered(diagnostics, BEGIN, stopped)
     levels = []
     for n in range(1, 40):

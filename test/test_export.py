@@ -23,7 +23,7 @@ from referees import (
     symmetric_parameters)
 from snapshot import Snapshot
 from stewart_dynamics import Motion, Parameters
-from stewart_dynamics.core.binding import record
+from stewart_dynamics.core.binding import places, record
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.export import main
 from stewart_dynamics.export.c_project import (
@@ -43,7 +43,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.singularity_warning import HYSTERESIS, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import OUTLINES
 from stewart_dynamics.parameters.tolerances import QUATERNION_TOLERANCE
-from stewart_dynamics.setpoints.step import JITTER, Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, JITTER, Step
 from test_drives import driven
 
 PROGRAM = 'stewart_export'
@@ -68,6 +68,7 @@ needs_compiler = pytest.mark.skipif(not COMPILERS, reason='needs a C compiler')
 
 SAMPLES, MOTIONS = 20_000, 5  # of each hexapod
 HAS_WRENCH, HAS_BASE = 1, 2
+STEP_STATE = places('step_state')
 OK, OUT_OF_RANGE, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = 0, 5, 6, 7, 8, 9
 
 # The structures of the C source.
@@ -270,33 +271,37 @@ def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
         call(library.steps, count, structure(p), motions, wrenches, bases, given, stamps, states,
              outputs, codes[0], motors, codes[1])
 
-        step, state, drives = Step(p), None, Drives(p)
+        step, state, drives = Step(p), FIRST, Drives(p)
         results = np.zeros((count, RESULT))
         for n in range(count):
-            a, b, c, d, e, f = wrenches[n].tolist() if given[n] & HAS_WRENCH else (0.0,) * 6
-            output = step(Setpoint(
-                int(stamps[n]), tuple(motions[n].tolist()), (a, b, c, d, e, f),
-                base=tuple(bases[n].tolist()) if given[n] & HAS_BASE else None), state)
-            assert output is not None
+            setpoint = Batch.of(
+                stamps[n], motions[n], wrenches[n] if given[n] & HAS_WRENCH else 0.0,
+                bases=bases[n] if given[n] & HAS_BASE else None)
+            output = step(setpoint, state)
+            assert output.answered[0]
             state = output.state
-            results[n] = [*output.lengths, *output.rates, *(output.demanded_forces or [0.0] * 6),
-                          output.determinant, output.determinant_rate, output.condition,
-                          *output.unit_load_forces, *(output.joint_forces or [0.0] * 6)]
-            code = SINGULAR if not output.solvable else OK if output.forces else SUPPRESSED
-            warned = output.singularity
+            results[n] = output.results[0]
+            if np.isnan(results[n, FORCES]).all():
+                results[n, FORCES] = results[n, JOINT_FORCES] = 0.0
+            code = (SINGULAR if output.conditions[0] >= UNSOLVABLE_CONDITION
+                    else OK if output.with_forces[0] else SUPPRESSED)
+            warned, exceedances = output.singularity(), step.exceedances(setpoint.motions, output)
             exceeded = [0] * 6
-            for each in output.exceedances:
+            for each in exceedances:
                 exceeded[each.leg] |= LIMITS[each.limit].bit
             found = states[n]
             assert codes[0, n] == code
-            assert outputs['forces'][n].tolist() == list(output.forces or [0.0] * 6)
+            assert outputs['forces'][n].tolist() == (
+                output.forces[0].tolist() if output.with_forces[0] else [0.0] * 6)
             assert outputs['exceeded'][n].tolist() == exceeded
+            seconds, nanoseconds = (int(state[STEP_STATE[name]])
+                                    for name in ('seconds', 'nanoseconds'))
             assert (found['warning'], found['stopped'], found['crossings'], found['determinant'],
                     found['time_to_crossing'], found['stamp'], *found['lengths']) == (
                 *warned[:2], warned.crossings, warned.determinant, warned.time_to_crossing,
-                state.stamp, *(state.lengths or ()))
+                seconds * 10 ** 9 + nanoseconds, *state[STEP_STATE['lengths']])
             seen |= {('code', code), ('warning', int(warned.cause)), *(
-                ('limit', each.limit) for each in output.exceedances)}
+                ('limit', each.limit) for each in exceedances)}
         check_results(outputs['result'], results, codes[0])
         if p['actuator.screw_lead'] is None:
             assert (codes[1] == NO_MOTORS).all()
@@ -480,17 +485,15 @@ def test_golden_csv_is_read_as_it_was_computed(exported: Path) -> None:
         rows = [{name: float(text) for name, text in row.items()}
                 for row in csv.DictReader(file)]
     names = list(rows[0])
-    step, state = Step(Parameters.from_yaml(PLATFORM_FILE)), None
+    step, state = Step(Parameters.from_yaml(PLATFORM_FILE)), FIRST
     for row in rows:
         numbers = [row[name] for name in names]
-        motion, wrench, base = numbers[2:26], numbers[26:32], numbers[32:44]
-        a, b, c, d, e, f = wrench
-        output = step(Setpoint(int(row['stamp']), tuple(motion), (a, b, c, d, e, f),
-                               base=tuple(base) if row['has_base'] else None), state)
-        assert output is not None and output.forces is not None
+        output = step(Batch.of(int(row['stamp']), numbers[2:26], numbers[26:32],
+                               bases=numbers[32:44] if row['has_base'] else None), state)
+        assert output.with_forces.tolist() == [True]
         state = output.state
-        assert [row[f'force_{leg}'] for leg in range(1, 7)] == list(output.forces)
-        assert row['determinant'] == output.determinant
+        assert [row[f'force_{leg}'] for leg in range(1, 7)] == output.forces[0].tolist()
+        assert row['determinant'] == output.determinants[0]
     assert {row['has_base'] for row in rows} == {0.0, 1.0}
     assert any(row['exceeded_1'] for row in rows) and not rows[0]['exceeded_1']
 

@@ -14,7 +14,6 @@ from stewart_dynamics import Motion
 from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
-from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, NEVER, OK, STALE, Status, StatusPart, WARN)
@@ -23,7 +22,6 @@ from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostic
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.input_messages import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import NOT_MEASURED, Rejection, Rejections
-from stewart_dynamics.setpoints.step import Setpoint
 from test_external_wrench import (
     BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, UNFILTERED)
 
@@ -239,11 +237,6 @@ def base_with_a_sample() -> BaseInput:
     return base
 
 
-def setpoint(known: bool) -> Setpoint:
-    """Return a setpoint on a base that is known or not."""
-    return Setpoint(STAMP, (0.0,) * 24, base=(0.0,) * 12 if known else NO_BASE)
-
-
 def state(of: DynamicsDiagnostics, now: float) -> tuple[int, str]:
     """Return level and words of the status."""
     return status(of.base, now)[1:3]
@@ -279,7 +272,7 @@ def test_base_stamps_that_differ_from_those_of_setpoints_are_reported(snapshot: 
     of = diagnostics(BASE_IMU)
     of.base.heard[BASE_IMU] = START
     of.base.sampled(base_with_a_sample(), START)
-    of.base.answered(setpoint(known=False), START + 0.01)
+    of.base.unknown(START + 0.01)
     why = 'no forces: the stamps of the base and of setpoints differ by more than base.timeout, ' \
         '0.1 s'
     assert state(of, START + 0.02) == (ERROR, why)
@@ -287,7 +280,6 @@ def test_base_stamps_that_differ_from_those_of_setpoints_are_reported(snapshot: 
     assert level == ERROR
     snapshot(text)
     assert logged(of.base, START + 0.03) == []
-    of.base.answered(setpoint(known=True), START + 0.05)
     assert state(of, START + 0.06)[0] == ERROR  # for a second
     of.base.heard[BASE_IMU] = START + 1.05
     of.base.sampled(base_with_a_sample(), START + 1.05)
@@ -304,7 +296,7 @@ def test_base_stamps_that_differ_from_those_of_setpoints_are_reported(snapshot: 
 def test_a_base_that_comes_after_the_last_setpoint_is_known_within_a_second(
         snapshot: Snapshot) -> None:
     of = diagnostics(BASE_IMU)
-    of.base.answered(setpoint(known=False), START)
+    of.base.unknown(START)
     level, text = state(of, START + 0.01)
     assert level == ERROR
     snapshot(text)
@@ -319,7 +311,7 @@ def test_a_base_that_comes_after_the_last_setpoint_is_known_within_a_second(
 def test_before_anything_has_come_nothing_is_logged() -> None:
     of = diagnostics(BASE_IMU)
     assert logged(of.base, START + 10.0) == []
-    of.base.answered(setpoint(known=False), START + 10.0)
+    of.base.unknown(START + 10.0)
     assert [level for level, _ in logged(of.base, START + 10.0)] == [ERROR]
 
 

@@ -146,11 +146,9 @@ def test_figure_18(unit: Unit) -> None:
     bag = ROOT / 'bags' / 'singular'
     setpoints = Setpoints(PARAMETERS, lambda rejection, details: None, print)
     with closing(Recording(bag)) as recording:
-        parts = [setpoints.take_many(messages) for messages, _ in recording.messages(
+        parts = [setpoints.take(messages) for messages, _ in recording.messages(
             {f'/stewart_dynamics/{topic}': topic for topic in setpoints.topics})]
-    expected = Step(PARAMETERS).many(Batch._make(
-        None if part[0] is None else np.concatenate(part)
-        for part in zip(*parts, strict=True)), None)
+    expected = Step(PARAMETERS)(Batch.joined(parts))
     unit.fmu.exitInitializationMode()
     rows = _recorded_inputs(bag)
     for n, row in enumerate(rows):

@@ -23,7 +23,8 @@ from stewart_dynamics.mechanics.limits import BASE_ANGLE_MAX, OF_JOINTS, PLATFOR
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.planned.checks import LIMIT
 from stewart_dynamics.planned.planned_trajectory import check_planned_trajectory
-from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, Step
+from test_step import singles
 
 SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1})
 
@@ -168,22 +169,21 @@ def test_the_step_reports_angles_above_their_limit_for_one_and_for_many() -> Non
     motion, angles = moved()
     base, platform = 0.9 * angles[:, :6].max(), 0.8 * angles[:, 6:].max()
     step = Step(SYMMETRIC.replaced({BASE_ANGLE_MAX: base, PLATFORM_ANGLE_MAX: platform}))
-    many = step.many(Batch(np.arange(101), motion.rows, np.zeros((1, 6)),
-                           np.zeros(101, dtype=bool), np.arange(101)), None)
+    setpoints = Batch.of(np.arange(101), motion.rows)
+    many = step(setpoints)
     assert np.array_equal(many.joint_angles, angles)
-    found = 0
-    for n, row in enumerate(motion.rows.tolist()):
-        output = step(Setpoint(n, tuple(row)), None)
-        assert output is not None
-        assert output.joint_angles == tuple(angles[n].tolist())
-        assert [(each.limit, each.leg, each.value, each.bound) for each in output.exceedances] == [
+    for n, setpoint in enumerate(singles(setpoints)):
+        output = step(setpoint)
+        assert output.joint_angles.tobytes() == angles[n].tobytes()
+        found = step.exceedances(setpoint.motions, output)
+        assert found == step.exceedances(motion.rows, many, n)
+        assert [(each.limit, each.leg, each.value, each.bound) for each in found] == [
             *((BASE_ANGLE_MAX, leg, angles[n, leg], base) for leg in range(6)
               if angles[n, leg] > base),
             *((PLATFORM_ANGLE_MAX, leg, angles[n, 6 + leg], platform) for leg in range(6)
               if angles[n, 6 + leg] > platform)]
-        assert many.exceeding[n] == bool(output.exceedances)
-        found += bool(output.exceedances)
-    assert 5 < found < 60
+        assert many.exceeding[n] == bool(found)
+    assert 5 < many.exceeding.sum() < 60
 
 
 def swing(points: int, turn: float = 0.4) -> tuple[Array, Motion, Any]:

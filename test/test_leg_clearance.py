@@ -22,10 +22,11 @@ from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
 from stewart_dynamics.parameters.table import LEG_SHAPE, OUTLINES
 from stewart_dynamics.planned.checks import LIMIT
 from stewart_dynamics.planned.planned_trajectory import check_planned_trajectory
-from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, Step
 from test_capability import limited, moved, random_travel
 from test_capability_boxes import poses_in, some_ranges
 from test_capability_workspace import inside
+from test_step import singles
 
 SHAPE = dict(zip(LEG_SHAPE, (0.04, 0.7, 0.02), strict=True))
 SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1, **SHAPE})
@@ -181,9 +182,9 @@ def test_a_message_names_what_a_leg_is_near_to() -> None:
     row = Motion.from_pose(home).rows
     for changes, other in (({}, 'leg_2'), ({OUTLINES[1]: square}, OUTLINES[1])):
         p = SYMMETRIC.replaced({CLEARANCE_MIN: 1.0, **changes})
-        output = Step(p)(Setpoint(0, tuple(row.tolist())), None)
-        assert output is not None
-        assert f'leg_1: clearance to {other}, ' in output.exceedances[0].words(p['joints'])
+        step, setpoint = Step(p), Batch.of(0, row)
+        found = step.exceedances(setpoint.motions, step(setpoint))
+        assert f'leg_1: clearance to {other}, ' in found[0].words(p['joints'])
         result = check_planned_trajectory(
             StewartPlatform(p), [0.0, 1.0], Motion.of_rows(np.stack([row, row])))
         assert f'leg_1: clearance to {other}, ' in result.message
@@ -215,21 +216,21 @@ def test_the_step_reports_a_clearance_below_its_limit_for_one_and_for_many() -> 
     motion = lowered(np.linspace(0.0, 0.2, 51))
     clearances = LegClearance(LOWERING)(motion.rows)
     bound = 0.1
-    setpoints = Batch(np.arange(51), motion.rows, np.zeros((1, 6)), np.zeros(51, dtype=bool),
-                      np.arange(51))
+    setpoints = Batch.of(np.arange(51), motion.rows)
     step = Step(LOWERING.replaced({CLEARANCE_MIN: bound}))
-    many = step.many(setpoints, None)
+    many = step(setpoints)
     assert np.array_equal(many.clearances, clearances)
     assert np.array_equal(many.exceeding, (clearances < bound).any(axis=1))
     assert 5 < many.exceeding.sum() < 46
-    for n, row in enumerate(motion.rows.tolist()):
-        output = step(Setpoint(n, tuple(row)), None)
-        assert output is not None
-        assert output.clearances == tuple(clearances[n].tolist())
-        assert [(each.limit, each.leg, each.value, each.bound) for each in output.exceedances] == [
+    for n, setpoint in enumerate(singles(setpoints)):
+        output = step(setpoint)
+        assert output.clearances.tobytes() == clearances[n].tobytes()
+        found = step.exceedances(setpoint.motions, output)
+        assert found == step.exceedances(motion.rows, many, n)
+        assert [(each.limit, each.leg, each.value, each.bound) for each in found] == [
             (CLEARANCE_MIN, leg, clearances[n, leg], bound) for leg in range(6)
             if clearances[n, leg] < bound]
-    without = Step(LOWERING).many(setpoints, None)
+    without = Step(LOWERING)(setpoints)
     assert np.array_equal(without.forces, many.forces)
     assert without.clearances.shape == (51, 0)
     assert not without.exceeding.any()

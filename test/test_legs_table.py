@@ -20,9 +20,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
+from stewart_dynamics.mechanics.singularity_warning import CAUSE
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
-from stewart_dynamics.setpoints.step import Outputs
+from stewart_dynamics.setpoints.step import (
+    FIRST, OUTPUT, Outputs, PUBLISHED_FORCES, WARNING_STATE)
 from test_output_bag import answered, base_wrenches_of, LEGS, turning
 
 RESULTS = 27
@@ -39,11 +40,10 @@ def motions_of(number: int) -> NDArray[np.float64]:
 
 def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
                stamps: NDArray[np.int64], warnings: NDArray[np.bool_]) -> Outputs:
-    states = np.zeros((len(stamps), STATE))
-    states[:, CAUSE] = warnings
-    flags = np.zeros(len(stamps), dtype=bool)
-    return Outputs(~flags, stamps, results, forces, states, flags, flags,
-                   flags, *(np.empty((len(stamps), 0)) for _ in range(3)))
+    rows, none = np.zeros((len(stamps), OUTPUT)), np.empty((len(stamps), 0))
+    rows[:, :RESULTS], rows[:, PUBLISHED_FORCES] = results, forces
+    rows[:, WARNING_STATE][:, CAUSE] = warnings
+    return Outputs(np.ones(len(stamps), dtype=bool), stamps, rows, none, none, none, FIRST)
 
 
 def bits(values: Any) -> list[int]:

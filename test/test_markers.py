@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: 
 from stewart_dynamics.node import markers as module  # noqa: E402
 from stewart_dynamics.node.diagnostics.levels import ERROR, OK, WARN  # noqa: E402
 from stewart_dynamics.node.markers import Markers  # noqa: E402
-from stewart_dynamics.setpoints.step import Output, Setpoint, Step  # noqa: E402
+from stewart_dynamics.setpoints.step import Batch, PUBLISHED_FORCES, Step  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 Array = NDArray[np.float64]
@@ -37,9 +37,9 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 STAMP = 1_700_000_000_123_456_789
 
 
-def setpoint(position: tuple[float, ...], rotation: Any = UPRIGHT) -> Setpoint:
+def setpoint(position: tuple[float, ...], rotation: Any = UPRIGHT) -> Batch:
     """Return a setpoint at rest."""
-    return Setpoint(STAMP, (*position, *np.ravel(rotation).tolist(), *(0.0,) * 12))
+    return Batch.of(STAMP, (*position, *np.ravel(rotation), *(0.0,) * 12))
 
 
 HOME = setpoint((0.0, 0.0, 1.1))
@@ -49,17 +49,19 @@ NEAR = setpoint((0.0, 0.0, 1.1), np.reshape(
 SINGULAR = setpoint((0.0, 0.0, 1.1), QUARTER_TURN)
 
 
-def answer(parameters: Parameters, to: Setpoint) -> Output:
-    """Return the output of a setpoint."""
-    output = Step(parameters)(to, None)
-    assert output is not None
-    return output
+def written(writer: Markers, step: Step, to: Batch, forces: Any = None) -> bytes:
+    """Return the message of the answer to a setpoint, or of one with other published forces."""
+    outputs = step(to)
+    assert outputs.answered[0]
+    if forces is not None:
+        outputs.rows[:, PUBLISHED_FORCES] = forces
+    return writer.write(
+        to.motions[0].tolist(), outputs, step.exceedances(to.motions, outputs))
 
 
-def picture(parameters: Parameters, to: Setpoint, output: Output | None = None,
-            ) -> dict[tuple[str, int], Any]:
+def picture(parameters: Parameters, to: Batch, forces: Any = None) -> dict[tuple[str, int], Any]:
     """Return the markers of an answer, as rclpy reads them, by namespace and number."""
-    data = Markers(parameters).write(to.motion, output or answer(parameters, to))
+    data = written(Markers(parameters), Step(parameters), to, forces)
     return by_name(deserialize_message(data, MarkerArray))
 
 
@@ -100,22 +102,26 @@ def shade(expected: tuple[float, ...]) -> Any:
     return pytest.approx(expected, abs=1e-6)
 
 
-def joints_of(parameters: Parameters, to: Setpoint) -> tuple[Array, Array]:
+def pose_of(to: Batch) -> Pose:
+    """Return the pose of a setpoint."""
+    return Pose(to.motions[0, :3], to.motions[0, 3:12].reshape(3, 3))
+
+
+def joints_of(parameters: Parameters, to: Batch) -> tuple[Array, Array]:
     """Return base and platform joints (6, 3) in the base frame."""
-    rotation = np.reshape(to.motion[3:12], (3, 3))
-    return (parameters['geometry.base_joints'], np.array(to.motion[:3])
-            + parameters['geometry.platform_joints'] @ rotation.T)
+    pose = pose_of(to)
+    return (parameters['geometry.base_joints'],
+            pose.position + parameters['geometry.platform_joints'] @ pose.rotation.T)
 
 
-def hexapods() -> list[tuple[Parameters, Setpoint]]:
+def hexapods() -> list[tuple[Parameters, Batch]]:
     """Return hexapods and poses: random ones, one that hangs, one with its legs in a plane."""
     random = rng()
     cases = [(HEXAPOD, HOME), (HEXAPOD, setpoint((0.0, 0.0, -1.1))),
              (HEXAPOD, setpoint((0.0, 0.0, 0.0))), (HEXAPOD, SINGULAR)]
     for _ in range(8):
         parameters = random_parameters(random)
-        cases += [(parameters, Setpoint(STAMP, tuple(row)))
-                  for row in random_motion(parameters, random, 1).rows.tolist()]
+        cases.append((parameters, Batch.of(STAMP, random_motion(parameters, random, 1).rows)))
     return cases
 
 
@@ -128,9 +134,9 @@ CASES = hexapods()
     ('', tuple('abcdef'), HOME), ('b', tuple(f'leg_{n}' * 20 for n in range(6)), NEAR), *(
         (frame, ('ab', 'abc', 'abcd', 'abcde', 'abcdef', 'ä\u4e2d'), SINGULAR)
         for frame in ('ba', 'bas', 'base', 'base\u00e4'))], ids=range(6))
-def test_bytes_are_those_of_a_typed_message(joints: Any, frame: str, to: Setpoint) -> None:
+def test_bytes_are_those_of_a_typed_message(joints: Any, frame: str, to: Batch) -> None:
     parameters = HEXAPOD.replaced({'joints': joints, 'base_frame': frame})
-    data = Markers(parameters).write(to.motion, answer(parameters, to))
+    data = written(Markers(parameters), Step(parameters), to)
     message = deserialize_message(data, MarkerArray)
     again = bytes(serialize_message(message))
     assert len(again) == len(data)
@@ -165,10 +171,9 @@ def test_bytes_are_those_of_a_typed_message(joints: Any, frame: str, to: Setpoin
 
 
 def test_a_message_does_not_depend_on_the_one_before() -> None:
-    writer = Markers(HEXAPOD)
-    first = [writer.write(to.motion, answer(HEXAPOD, to)) for to in (HOME, NEAR, SINGULAR)]
-    assert [writer.write(to.motion, answer(HEXAPOD, to))
-            for to in (SINGULAR, NEAR, HOME)] == first[::-1]
+    writer, step = Markers(HEXAPOD), Step(HEXAPOD)
+    first = [written(writer, step, to) for to in (HOME, NEAR, SINGULAR)]
+    assert [written(writer, step, to) for to in (SINGULAR, NEAR, HOME)] == first[::-1]
 
 
 @pytest.mark.parametrize('rate, seconds', [
@@ -182,11 +187,10 @@ def test_markers_of_a_silent_node_vanish_but_not_before_the_next_are_due(
 # The geometry
 
 @pytest.mark.parametrize('parameters, to', CASES)
-def test_legs_are_drawn_from_joint_to_joint(parameters: Parameters, to: Setpoint) -> None:
-    drawn = picture(parameters, to)
-    tolerance = 1e-13 * (size_of(parameters) + float(np.abs(to.motion[:3]).max()))
-    lengths = StewartPlatform(parameters).inverse_kinematics(
-        Pose(to.motion[:3], np.reshape(to.motion[3:12], (3, 3))))
+def test_legs_are_drawn_from_joint_to_joint(parameters: Parameters, to: Batch) -> None:
+    drawn, pose = picture(parameters, to), pose_of(to)
+    tolerance = 1e-13 * (size_of(parameters) + float(np.abs(pose.position).max()))
+    lengths = StewartPlatform(parameters).inverse_kinematics(pose)
     shortest = parameters['limits.length_min']
     for n, (base, platform) in enumerate(zip(*joints_of(parameters, to), strict=True)):
         piston, cylinder = drawn['pistons', n], drawn['cylinders', n]
@@ -211,7 +215,7 @@ def test_legs_are_drawn_from_joint_to_joint(parameters: Parameters, to: Setpoint
 
 
 @pytest.mark.parametrize('parameters, to', CASES)
-def test_plates_and_balls_are_at_the_joints(parameters: Parameters, to: Setpoint) -> None:
+def test_plates_and_balls_are_at_the_joints(parameters: Parameters, to: Batch) -> None:
     drawn = picture(parameters, to)
     for name, joints in zip(('base', 'platform'), joints_of(parameters, to), strict=True):
         assert np.allclose(points(drawn[name, 1]), joints, rtol=0.0,
@@ -236,7 +240,7 @@ def test_plates_have_their_outlines() -> None:
     outline = np.array([[1.0, 1.0, 0.1], [-1.0, 1.0, 0.1], [-2.0, -1.0, 0.1], [1.0, -1.0, 0.1]])
     drawn = picture(HEXAPOD.replaced({
         'geometry.base_outline': outline, 'geometry.platform_outline': 0.5 * outline}), HOME)
-    for name, corners in (('base', outline), ('platform', 0.5 * outline + HOME.motion[:3])):
+    for name, corners in (('base', outline), ('platform', 0.5 * outline + HOME.motions[0, :3])):
         at = points(drawn[name, 0])
         assert len(at) == 12 * len(corners)
         distances = np.linalg.norm((at[:, None] - corners)[..., :2], axis=-1)
@@ -246,7 +250,7 @@ def test_plates_have_their_outlines() -> None:
 
 def test_the_platforms_axes_are_those_of_its_frame() -> None:
     axes = points(picture(HEXAPOD, SINGULAR)['platform', 2]).reshape(3, 2, 3)
-    assert np.allclose(axes[:, 0], SINGULAR.motion[:3])
+    assert np.allclose(axes[:, 0], SINGULAR.motions[0, :3])
     directions = axes[:, 1] - axes[:, 0]
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     assert np.allclose(directions, QUARTER_TURN.T, atol=1e-15)
@@ -255,9 +259,8 @@ def test_the_platforms_axes_are_those_of_its_frame() -> None:
 def test_the_centre_of_mass_is_drawn_in_the_platform() -> None:
     parameters = HEXAPOD.replaced({'platform.center_of_mass': [0.1, -0.2, 0.3]})
     for to in (HOME, NEAR, SINGULAR):
-        rotation = np.reshape(to.motion[3:12], (3, 3))
-        ball = picture(parameters, to)['platform', 3]
-        assert np.allclose(points(ball), [to.motion[:3] + rotation @ [0.1, -0.2, 0.3]],
+        pose, ball = pose_of(to), picture(parameters, to)['platform', 3]
+        assert np.allclose(points(ball), [pose.position + pose.rotation @ [0.1, -0.2, 0.3]],
                            rtol=0.0, atol=1e-13)
         assert color(ball) not in map(color, (
             picture(parameters, to)['platform', n] for n in range(3)))
@@ -266,7 +269,7 @@ def test_the_centre_of_mass_is_drawn_in_the_platform() -> None:
 def test_the_text_stands_above_the_platform() -> None:
     drawn = picture(HEXAPOD, NEAR)
     where = drawn['singularity', 0].pose.position
-    assert (where.x, where.y) == NEAR.motion[:2]
+    assert [where.x, where.y] == NEAR.motions[0, :2].tolist()
     assert where.z > max(points(drawn['platform', 0])[:, 2].max(),
                          points(drawn['platform', 2])[:, 2].max())
 
@@ -274,8 +277,7 @@ def test_the_text_stands_above_the_platform() -> None:
 # The colours
 
 def _leg_colors(parameters: Parameters, forces: Any) -> list[tuple[float, ...]]:
-    output = answer(parameters, HOME)._replace(forces=forces)
-    drawn = picture(parameters, HOME, output)
+    drawn = picture(parameters, HOME, forces)
     for n in range(6):
         assert color(drawn['cylinders', n]) == color(drawn['pistons', n])
     return [color(drawn['pistons', n]) for n in range(6)]
@@ -301,14 +303,14 @@ def test_without_a_limit_the_largest_force_has_the_full_colour() -> None:
     assert colors[0] == colors[3] == shade(tuple(
         np.mean([module.NO_LOAD, module.PUSH], axis=0)))
     assert _leg_colors(parameters, (0.0,) * 6) == [shade(module.NO_LOAD)] * 6
-    forces = answer(parameters, HOME).forces
-    assert forces is not None
+    outputs = Step(parameters)(HOME)
+    assert outputs.with_forces[0]
     text = picture(parameters, HOME)['singularity', 0].text
-    assert f'saturated at {max(map(abs, forces)):.4g} N' in text
+    assert f'saturated at {np.abs(outputs.forces).max():.4g} N' in text
 
 
 def test_legs_without_forces_are_grey() -> None:
-    assert _leg_colors(HEXAPOD, None) == [shade(module.NO_FORCE)] * 6
+    assert _leg_colors(HEXAPOD, math.nan) == [shade(module.NO_FORCE)] * 6
     assert 'colour' not in picture(HEXAPOD, SINGULAR)['singularity', 0].text
 
 
@@ -344,12 +346,12 @@ def test_the_platform_and_the_text_show_the_singularity() -> None:
             (HEXAPOD, HOME, OK, ''), (HEXAPOD, NEAR, WARN, 'condition number '),
             (suppressing, NEAR, ERROR, 'inside stop_condition: forces suppressed'),
             (HEXAPOD, SINGULAR, ERROR, 'J_inv cannot be solved: no forces')):
-        drawn, output = picture(parameters, to), answer(parameters, to)
+        drawn, outputs = picture(parameters, to), Step(parameters)(to)
         assert color(drawn['platform', 0]) == shade(module.PLATFORM[level])
         lines = drawn['singularity', 0].text.split('\n')
         assert lines[0].startswith(words or 'det(J)')
-        assert (f'det(J) {output.determinant:.4g} m^3, condition number {output.condition:.4g}'
-                in lines)
+        assert (f'det(J) {outputs.determinants[0]:.4g} m^3, '
+                f'condition number {outputs.conditions[0]:.4g}') in lines
 
 
 def test_the_text_names_legs_that_exceed_their_limits() -> None:
@@ -367,11 +369,11 @@ def test_for_any_answer_markers_have_only_finite_numbers() -> None:
     drawn = 0
     for exponent in np.linspace(-300.0, 300.0, 61):
         position = tuple((10.0 ** exponent * random.uniform(-1.0, 1.0, 3)).tolist())
-        output = step(setpoint(position), None)
-        if output is None:
+        to = setpoint(position)
+        if not step(to).answered[0]:
             continue
         drawn += 1
-        message = deserialize_message(writer.write(setpoint(position).motion, output), MarkerArray)
+        message = deserialize_message(written(writer, step, to), MarkerArray)
         for marker in message.markers:
             pose, scale = marker.pose, marker.scale
             assert np.all(np.isfinite([
@@ -427,9 +429,8 @@ def test_markers_show_the_answer(node: DynamicsNode) -> None:
     stamp = node.stamp() + 10 * SECOND  # time for the legs to move there
     node.answer(sample, stamp=stamp)
     node.until(lambda: stamp in _stamps(seen), 'it is drawn')
-    motion = tuple(sample.motion().rows.ravel().tolist())
-    expected = Markers(HEXAPOD).write(
-        motion, answer(HEXAPOD, Setpoint(stamp, motion)))
+    expected = written(
+        Markers(HEXAPOD), Step(HEXAPOD), Batch.of(stamp, sample.motion().rows))
     assert seen[_stamps(seen).index(stamp)] == deserialize_message(expected, MarkerArray)
 
 

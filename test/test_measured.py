@@ -61,7 +61,7 @@ class Case(NamedTuple):
             self.motion.angular_acceleration)))
         batch = self.setpoints.chosen(which)
         return Case(self.parameters, motion, self.seconds[which], batch,
-                    Step(self.parameters).many(batch, None))
+                    Step(self.parameters)(batch))
 
 
 def case_of(seed: int = 0, many: int = 500, step: float = 0.01,
@@ -82,10 +82,9 @@ def case_of(seed: int = 0, many: int = 500, step: float = 0.01,
         size * (wave(0, 0) + [0.0, 0.0, 1.0]), wave(1, 0), size * wave(0, 1), wave(1, 1),
         size * wave(0, 2), wave(1, 2))
     stamp = np.array(stamps) if stamps is not None else START + np.arange(many) * round(step * 1e9)
-    batch = Batch(stamp, motion.rows, np.zeros((many, 6)), np.diff(stamp, prepend=stamp[0]) < 0,
-                  stamp)
+    batch = Batch.of(stamp, motion.rows, restarts=np.diff(stamp, prepend=stamp[0]) < 0)
     seconds = np.cumsum(np.diff(stamp, prepend=stamp[0]).clip(0)) * 1e-9
-    return Case(parameters, motion, seconds, batch, Step(parameters).many(batch, None))
+    return Case(parameters, motion, seconds, batch, Step(parameters)(batch))
 
 
 def compared(comparison: Comparison, *given: Any) -> list[Array]:
@@ -160,8 +159,8 @@ def test_a_load_in_the_model_leaves_no_residual() -> None:
     case = case_of()
     load = rng().uniform(-300.0, 300.0, (500, 6))
     batch = case.setpoints
-    with_load = batch._replace(wrenches=load)
-    outputs = Step(case.parameters).many(with_load, None)
+    with_load = Batch.of(batch.stamps, batch.motions, load)
+    outputs = Step(case.parameters)(with_load)
     comparison = Comparison(case.parameters)
     _, _, _, wrench = compared(
         comparison, case._replace(setpoints=with_load, outputs=outputs),
@@ -210,7 +209,7 @@ def test_torques_of_motors_are_compared_without_the_losses_of_the_drives(
     comparison = Comparison(p, of_motors=True)
     per_effort = force_per_effort(p, torques=True, currents=False)
     _, measured, computed, _ = compared(
-        comparison, case._replace(parameters=p, outputs=Step(p).many(case.setpoints, None)),
+        comparison, case._replace(parameters=p, outputs=Step(p)(case.setpoints)),
         (case.setpoints.stamps, torques * per_effort))
     np.testing.assert_allclose(measured, computed, rtol=1e-9, atol=1e-9 * np.abs(computed).max())
     assert np.abs(torques * per_effort - computed).max() > 0.05 * np.abs(computed).max()
@@ -222,7 +221,7 @@ def test_forces_given_as_torques_of_motors_are_named(efficiency: float) -> None:
     p = case.parameters.replaced({
         'actuator.reflected_mass': None, 'actuator.screw_lead': 0.02,
         'drive.torque_constant': 0.5, 'drive.efficiency': efficiency})
-    case = case._replace(parameters=p, outputs=Step(p).many(case.setpoints, None))
+    case = case._replace(parameters=p, outputs=Step(p)(case.setpoints))
     for currents in (False, True):
         per_effort = force_per_effort(p, torques=not currents, currents=currents)
         comparison = Comparison(p, of_motors=True)
@@ -310,11 +309,11 @@ def test_friction_may_hold_a_resting_platform_with_any_force() -> None:
     forces = still.forces()
     strong = {'actuator.coulomb_friction': 2.5 * float(np.abs(forces).max())}
     p = case.parameters.replaced(strong)
-    batch = case.setpoints._replace(motions=still.motion.rows)
-    stuck = Case(p, still.motion, case.seconds, batch, Step(p).many(batch, None))
+    batch = case.setpoints.changed(motions=still.motion.rows)
+    stuck = Case(p, still.motion, case.seconds, batch, Step(p)(batch))
     assert values_of(stuck, -forces)['likely_mistake'] is None
-    assert values_of(still._replace(setpoints=batch, outputs=Step(case.parameters).many(
-        batch, None)), -forces)['likely_mistake']['what'] == 'sign'
+    without = still._replace(setpoints=batch, outputs=Step(case.parameters)(batch))
+    assert values_of(without, -forces)['likely_mistake']['what'] == 'sign'
 
 
 def test_a_contact_is_found_with_its_time_and_load() -> None:
@@ -443,10 +442,9 @@ def test_nothing_compared_gives_null() -> None:
 def test_standing_still_gives_no_correlation() -> None:
     case = case_of(many=1)
     still = Motion(case.motion.position, case.motion.rotation)
-    rows = np.repeat(still.rows, 50, axis=0)
     stamps = START + np.arange(50) * 10_000_000
-    batch = Batch(stamps, rows, np.zeros((50, 6)), np.zeros(50, dtype=bool), stamps)
-    outputs = Step(case.parameters).many(batch, None)
+    batch = Batch.of(stamps, still.rows)
+    outputs = Step(case.parameters)(batch)
     comparison = Comparison(case.parameters)
     comparison.add_setpoints(np.arange(50) * 0.01, batch, outputs)
     comparison.add_measured(stamps, np.full((50, 6), 100.0))

@@ -26,7 +26,7 @@ from stewart_dynamics.replay.statements import Card, cards, motion_statements
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
 from stewart_dynamics.setpoints.motor_row import DEMANDED_TORQUES, MOTOR_ROW, SPEEDS
-from stewart_dynamics.setpoints.step import Batch, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Step
 from stewart_dynamics.whole_file import to_json
 
 DRIVES = {
@@ -43,21 +43,19 @@ TIMES: Array = np.arange(0.0, 8.0, 0.005)
 
 def setpoints(motion: Motion, times: Array) -> Batch:
     """Return the setpoints of a motion."""
-    stamps = np.round((1.0 + times) * SECOND).astype(np.int64)
-    return Batch(stamps, motion.rows, np.zeros((len(times), 6)), np.zeros(len(times), dtype=bool),
-                 stamps)
+    return Batch.of(np.round((1.0 + times) * SECOND), motion.rows)
 
 
 def summary_of(p: Parameters, motion: Motion, times: Array, edges: list[int],
                quasi_static: bool = False) -> dict[str, Any]:
     """Return the summary of a motion that is given in blocks."""
     summary, step, base = Summary(p, quasi_static), Step(p), BaseWrench(p)
-    state = None
+    state = FIRST
     for first, end in zip([0, *edges], [*edges, len(times)], strict=True):
         block = setpoints(motion, times).chosen(slice(first, end))
-        outputs = step.many(block, state)
+        outputs = step(block, state)
         state = outputs.state
-        summary.add(Answered(times[first:end], block, outputs, base.many(block),
+        summary.add(Answered(times[first:end], block, outputs, base(block),
                              powers_of(StewartPlatform(p), block, outputs)))
     values = summary.values()
     to_json(values)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -13,48 +13,56 @@ from referees import random_motion, rng
 from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.limits import (
-    SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
-from stewart_dynamics.setpoints.motor_row import ANGLES, DEMANDED_TORQUES, RISES, TORQUES
+    Exceedance, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
+from stewart_dynamics.setpoints.motor_row import ANGLES, DEMANDED_TORQUES, RISES, SOUND, TORQUES
 from stewart_dynamics.setpoints.output_messages import OutputMessages
-from stewart_dynamics.setpoints.step import Batch, Output, Setpoint, State, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
 from test_drives import driven, HEXAPOD, PUBLISHED
+from test_output_messages import written
+from test_step import answered, bits, singles, STATE
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 STAMP = 1_700_000_000 * 10 ** 9
 THERMAL = {'drive.thermal_resistance': 1.5, 'drive.thermal_time_constant': 2.0}
 
 
-def answers(p: Parameters, motion: Motion, step: float = 0.1, restarts: Any = ()) -> list[Output]:
-    """Return the outputs of setpoints one by one, after a check that many are the same."""
-    one, state, found = Step(p), None, []
-    n_setpoints = len(motion.rows)
-    stamps = STAMP + np.rint(np.arange(n_setpoints) * step * 1e9).astype(np.int64)
-    again = np.isin(np.arange(n_setpoints), restarts)
-    for n, row in enumerate(motion.rows.tolist()):
-        output = one(Setpoint(int(stamps[n]), tuple(row), restart=bool(again[n])), state)
-        assert output is not None
+class Answers(NamedTuple):
+    """Outputs of setpoints a tenth of a second apart; of each the state after it and excesses."""
+
+    outputs: Outputs
+    states: list[Array]
+    exceedances: list[tuple[Exceedance, ...]]
+
+
+def answers(p: Parameters, motion: Motion, restarts: Any = ()) -> Answers:
+    """Return the outputs of setpoints, after a check that they are the same one by one."""
+    numbers = np.arange(len(motion.rows))
+    setpoints = Batch.of(STAMP + numbers * 10 ** 8, motion.rows,
+                         restarts=np.isin(numbers, restarts))
+    step, by, state = Step(p), OutputMessages(p), FIRST
+    found = Answers(outputs := answered(step, setpoints), [], [])
+    for n, setpoint in enumerate(singles(setpoints)):
+        output = answered(step, setpoint, state)
         state = output.state
-        found.append(output)
-    middle = n_setpoints // 2
-    state, written, messages = None, OutputMessages(p), {}
-    for part in (slice(0, middle), slice(middle, None)):
-        outputs = Step(p).many(Batch(
-            stamps[part], motion.rows[part], np.zeros((1, 6)), again[part], stamps[part]), state)
-        state = outputs.state
-        for topic, which, many in written.of_outputs(outputs):
-            for n, each in zip(which.tolist(), many, strict=True):
-                messages[topic, n + (part.start or 0)] = each.tobytes()
-        for n, row in enumerate(outputs.motors, part.start or 0):
-            motors = np.array(found[n].motors)
-            if found[n].forces is None:
-                motors[TORQUES] = np.nan
-            np.testing.assert_array_equal(row[:len(motors)], motors)
-            assert bool(found[n].exceedances) == outputs.exceeding[n - (part.start or 0)]
-    assert state == found[-1].state
-    assert messages == {(topic, n): data for n, output in enumerate(found)
-                        for topic, data in written.of_output(output)}
+        assert bits(output) == bits(outputs, n)
+        assert written(by, output) == written(by, outputs, n)
+        exceedances = step.exceedances(setpoint.motions, output)
+        assert exceedances == step.exceedances(motion.rows, outputs, n)
+        assert bool(exceedances) == outputs.exceeding[n]
+        found.states.append(state)
+        found.exceedances.append(exceedances)
+    assert state.tobytes() == outputs.state.tobytes()
+    middle = len(numbers) // 2
+    parts, state = [], FIRST
+    for which in (slice(0, middle), slice(middle, None)):
+        part = answered(step, setpoints.chosen(which), state)
+        state = part.state
+        parts += [(bits(part, n), written(by, part, n)) for n in range(len(part.stamps))]
+    assert parts == [(bits(outputs, n), written(by, outputs, n)) for n in numbers.tolist()]
+    assert state.tobytes() == outputs.state.tobytes()
     return found
 
 
@@ -64,10 +72,10 @@ def test_motors_are_those_of_the_library() -> None:
     motion = random_motion(p, random, 20)
     motors = StewartPlatform(p).motors(motion)
     rises = temperature_rises(p, 0.1 * np.arange(20), motors.copper_heat)
-    for n, output in enumerate(answers(p, motion)):
-        assert output.motors[TORQUES] == tuple(motors.torques[n])
-        assert output.motors[ANGLES] == tuple(motors.angles[n])
-        assert output.motors[RISES] == pytest.approx(rises[n], rel=1e-9)
+    found = answers(p, motion).outputs.motors
+    assert np.array_equal(found[:, TORQUES], motors.torques)
+    assert np.array_equal(found[:, ANGLES], motors.angles)
+    assert found[:, RISES] == pytest.approx(rises, rel=1e-9)
 
 
 def test_torques_are_clipped_to_the_curve_and_limits_name_each_motor() -> None:
@@ -78,16 +86,17 @@ def test_torques_are_clipped_to_the_curve_and_limits_name_each_motor() -> None:
     motion = random_motion(p, random, 30)
     motors = StewartPlatform(p).motors(motion)
     seen = set()
-    for n, output in enumerate(answers(p, motion)):
+    outputs, _, exceedances = answers(p, motion)
+    for n, found in enumerate(exceedances):
         most = motors.available_torques[n]
-        assert output.motors[TORQUES] == tuple(np.clip(motors.torques[n], -most, most))
+        assert np.array_equal(outputs.motors[n, TORQUES], np.clip(motors.torques[n], -most, most))
         wanted = {(TORQUE_MAX, leg) for leg in range(6)
                   if abs(motors.breakaway_torques[n, leg]) > 2.0}
         wanted |= {(TORQUE_SPEED, leg) for leg in range(6)
                    if abs(motors.breakaway_torques[n, leg]) > most[leg] and most[leg] < 2.0}
         wanted |= {(SPEED_MAX, leg) for leg in range(6) if abs(motors.speeds[n, leg]) > 500.0}
-        assert {(each.limit, each.leg) for each in output.exceedances} == wanted
-        seen |= {each.limit for each in output.exceedances}
+        assert {(each.limit, each.leg) for each in found} == wanted
+        seen |= {each.limit for each in found}
     assert seen == {TORQUE_MAX, TORQUE_SPEED, SPEED_MAX}
 
 
@@ -98,32 +107,34 @@ def test_speed_and_temperature_follow_the_action_of_limits(action: str) -> None:
         **THERMAL, 'drive.speed_max': 900.0, 'limits.action': action,
         'drive.temperature_rise_max': 2.0})
     seen = set()
-    for output in answers(p, random_motion(p, random, 40)):
-        limits = {each.limit for each in output.exceedances}
+    outputs, _, exceedances = answers(p, random_motion(p, random, 40))
+    for n, found in enumerate(exceedances):
+        limits = {each.limit for each in found}
         seen |= limits
         suppressed = action == 'suppress_forces' and bool(limits)
-        assert (output.forces is None) == suppressed
-        assert ('motor_torques' in dict(OutputMessages(p).of_output(output))) != suppressed
+        assert np.isnan(outputs.forces[n]).tolist() == [suppressed] * 6
+        assert ('motor_torques' in written(OutputMessages(p), outputs, n)) != suppressed
     assert seen == {SPEED_MAX, TEMPERATURE_RISE_MAX}
 
 
 def test_the_torque_follows_a_clipped_force_but_limits_see_the_demanded_one() -> None:
     p = HEXAPOD.replaced({**PUBLISHED, 'actuator.reflected_mass': None, 'limits.force_max': 100.0,
                           'drive.torque_max': 0.06})
-    output, = answers(p, Motion(np.array([[0.0, 0.0, 1.0]]), np.eye(3)[None]))
-    assert output.forces == (100.0,) * 6
-    assert output.motors[TORQUES] == pytest.approx([100.0 / 3769.911184] * 6)
-    assert {each.limit for each in output.exceedances} == {'limits.force_max', TORQUE_MAX}
-    assert output.exceedances[6].words(p['joints']).startswith('leg_1: motor torque 0.06')
+    output, _, (exceedances,) = answers(p, Motion(np.array([[0.0, 0.0, 1.0]]), np.eye(3)[None]))
+    assert output.forces.tolist() == [[100.0] * 6]
+    assert output.motors[0, TORQUES] == pytest.approx([100.0 / 3769.911184] * 6)
+    assert {each.limit for each in exceedances} == {'limits.force_max', TORQUE_MAX}
+    assert exceedances[6].words(p['joints']).startswith('leg_1: motor torque 0.06')
 
 
 def test_windings_keep_their_temperature_where_time_jumps_back() -> None:
     random = rng(3)
     p = driven(HEXAPOD, random, **THERMAL)
     motion = random_motion(p, random, 10)
-    straight, jumped = answers(p, motion), answers(p, motion, restarts=[6])
-    assert jumped[5].motors == straight[5].motors
-    assert jumped[6].motors[RISES] == jumped[5].motors[RISES] != straight[6].motors[RISES]
+    straight, jumped = (answers(p, motion, restarts).outputs.motors for restarts in ([], [6]))
+    assert np.array_equal(jumped[5], straight[5])
+    assert np.array_equal(jumped[6, RISES], jumped[5, RISES])
+    assert not np.array_equal(jumped[6, RISES], straight[6, RISES])
 
 
 def test_a_setpoint_that_the_legs_cannot_reach_warms_no_winding() -> None:
@@ -134,39 +145,41 @@ def test_a_setpoint_that_the_legs_cannot_reach_warms_no_winding() -> None:
     poses[:] = [0.0, 0.0, 1.0]
     poses[4:6, 2] = 1.2  # in a tenth of a second
     motion = Motion(poses, motion.rotation * 0.0 + np.eye(3), linear_acceleration=poses)
-    outputs = answers(p, motion)
-    assert [any(each.limit == 'jump' for each in output.exceedances)
-            for output in outputs] == [False] * 4 + [True] * 2 + [False] * 6
-    assert outputs[3].state.windings is not None
-    assert outputs[3].state.windings == outputs[5].state.windings
-    heat = np.tile(outputs[3].state.windings[6:], (2, 1))
-    assert outputs[6].motors[RISES] == pytest.approx(temperature_rises(
-        p, np.array([0.0, 0.3]), heat, np.array(outputs[3].motors[RISES]))[1], rel=1e-9)
+    outputs, states, exceedances = answers(p, motion)
+    assert [any(each.limit == 'jump' for each in found) for found in exceedances] == [
+        False] * 4 + [True] * 2 + [False] * 6
+    windings = [state[STATE['windings']] for state in states]
+    assert windings[3].all()
+    assert np.array_equal(windings[3], windings[5])
+    heat = np.tile(windings[3][6:], (2, 1))
+    assert outputs.motors[6, RISES] == pytest.approx(temperature_rises(
+        p, np.array([0.0, 0.3]), heat, outputs.motors[3, RISES])[1], rel=1e-9)
 
 
 def test_without_forces_there_are_angles_and_speeds_alone() -> None:
     p = HEXAPOD.replaced({**PUBLISHED, 'actuator.reflected_mass': None})
     quarter = Motion.from_euler([[0.0, 0.0, 1.0]], [[0.0, 0.0, np.pi / 2]])
-    output = Step(p)(Setpoint(STAMP, tuple(quarter.rows[0].tolist())), State())
-    assert output is not None and output.forces is None
-    assert np.isnan(output.motors[DEMANDED_TORQUES]).all()
-    messages = dict(OutputMessages(p).of_output(output))
+    output = answered(Step(p), Batch.of(STAMP, quarter.rows))
+    assert np.isnan(output.forces).all()
+    assert np.isnan(output.motors[:, DEMANDED_TORQUES]).all()
+    messages = written(OutputMessages(p), output)
     assert 'motor_torques' not in messages
     state: Any = STORE.deserialize_cdr(messages['motor_states'], 'sensor_msgs/msg/JointState')
     assert state.name == [f'leg_{n}_motor' for n in range(1, 7)]
-    assert tuple(state.position) == output.motors[ANGLES] and not len(state.effort)
+    assert np.array_equal(state.position, output.motors[0, ANGLES]) and not len(state.effort)
 
 
 def test_a_motor_whose_numbers_overflow_is_not_published() -> None:
     p = HEXAPOD.replaced({'actuator.screw_lead': 1e-306, 'drive.gear_ratio': 1.0})
     fast = Motion([0.0, 0.0, 1.0], np.eye(3), [0.0, 0.0, 1e3])
-    output = Step(p)(Setpoint(STAMP, tuple(fast.rows.tolist())), None)
-    assert output is not None and output.motors == ()
-    assert 'motor_states' not in dict(OutputMessages(p).of_output(output))
+    step, setpoint = Step(p), Batch.of(STAMP, fast.rows)
+    output = answered(step, setpoint)
+    assert not output.motors[0, SOUND] and not step.exceedances(setpoint.motions, output)
+    assert 'motor_states' not in written(OutputMessages(p), output)
 
 
 def test_nothing_is_computed_without_drives() -> None:
-    output = Step(HEXAPOD.replaced({'actuator.screw_lead': 0.01}))(
-        Setpoint(STAMP, tuple(Motion([0.0, 0.0, 1.0], np.eye(3)).rows.tolist())), None)
-    assert output is not None and output.motors == () and output.state.windings is None
+    output = answered(Step(HEXAPOD.replaced({'actuator.screw_lead': 0.01})), Batch.of(
+        STAMP, Motion([0.0, 0.0, 1.0], np.eye(3)).rows))
+    assert output.motors.shape == (1, 0) and not output.state[STATE['windings']].any()
     assert 'motor_states' not in OutputMessages(HEXAPOD).types

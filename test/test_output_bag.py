@@ -48,8 +48,11 @@ def turning(number: int, first: int = 0) -> Outputs:
     motions[:, 2] = 1.1
     motions[:, 3:12] = from_euler(0.01 * n[:, None] * [0.0, 0.0, 1.0]).reshape(-1, 9)
     motions[:, 17] = 1.0
-    return STEP.many(Batch(1_000_000 * (n + 1), motions, np.zeros((number, 6)),
-                           np.zeros(number, dtype=bool), times_of(number, first)), None)
+    return STEP(Batch.of(1_000_000 * (n + 1), motions))
+
+
+def part_of(outputs: Outputs, which: slice) -> Outputs:
+    return Outputs._make((*(part[which] for part in outputs[:-1]), outputs.state))
 
 
 def times_of(number: int, first: int = 0) -> NDArray[np.int64]:
@@ -66,9 +69,8 @@ def base_wrenches_of(outputs: Outputs) -> Array:
 def answered(outputs: Outputs, times: NDArray[np.int64], motions: Array) -> Answered:
     """Return outputs as a block."""
     n = len(outputs.stamps)
-    return Answered(np.arange(n) / 7.0, Batch(
-        outputs.stamps, motions, np.zeros((n, 6)), np.zeros(n, dtype=bool), times), outputs,
-        base_wrenches_of(outputs), np.zeros((n, 6)))
+    return Answered(np.arange(n) / 7.0, Batch.of(outputs.stamps, motions, times=times), outputs,
+                    base_wrenches_of(outputs), np.zeros((n, 6)))
 
 
 def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]]) -> Path:
@@ -85,7 +87,7 @@ def turned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outputs]:
     """Return a bag of three chunks, and the outputs in it."""
     outputs = turning(300)
     assert 5 < np.isnan(outputs.forces[:, 0]).sum() < 50
-    parts = [Outputs(*(part[at:at + 100] for part in outputs)) for at in (0, 100, 200)]
+    parts = [part_of(outputs, slice(at, at + 100)) for at in (0, 100, 200)]
     return write_bag(tmp_path_factory.mktemp('turned') / 'a bag', [
         (times_of(100, 100 * n), part) for n, part in enumerate(parts)]), outputs
 
@@ -275,7 +277,7 @@ def test_a_bag_in_many_blocks_has_the_messages_of_one(tmp_path: Path) -> None:
     outputs = turning(60)
     one = write_bag(tmp_path / 'one', [(times_of(60), outputs)])
     many = write_bag(tmp_path / 'many', [
-        (times_of(1, n), Outputs(*(part[n:n + 1] for part in outputs))) for n in range(60)])
+        (times_of(1, n), part_of(outputs, slice(n, n + 1))) for n in range(60)])
     found = []
     for bag in (one, many):
         by_topic = defaultdict(list)

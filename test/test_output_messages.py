@@ -17,17 +17,29 @@ from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES, OutputMessages
-from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
 from test_step import (
-    answered, FLAT, PARAMETERS, QUARTER, REST, rotations, rows, sizes, STAMP, STEP, UPRIGHT)
+    answered, FLAT, PARAMETERS, QUARTER, random_setpoints, REST, rotations, singles, sizes, STAMP,
+    STEP, UPRIGHT)
 
 MESSAGES = OutputMessages(PARAMETERS)
 
 
-def decoded(messages: list[tuple[str, bytes]]) -> dict[str, Any]:
-    """Return the messages as rosbags reads them, by topic; each topic once."""
-    assert len({topic for topic, _ in messages}) == len(messages)
-    return {topic: STORE.deserialize_cdr(data, OUTPUT_TYPES[topic]) for topic, data in messages}
+def written(by: OutputMessages, outputs: Outputs, n: int = 0) -> dict[str, bytes]:
+    """Return the messages of an output by topic; each topic once."""
+    found: dict[str, bytes] = {}
+    for topic, having, messages in by.of(outputs):
+        assert len(having) == len(messages) == len(outputs.stamps)
+        if having[n]:
+            assert topic not in found
+            found[topic] = messages[n].tobytes()
+    return found
+
+
+def decoded(messages: dict[str, bytes]) -> dict[str, Any]:
+    """Return the messages as rosbags reads them, by topic."""
+    return {topic: STORE.deserialize_cdr(data, OUTPUT_TYPES[topic])
+            for topic, data in messages.items()}
 
 
 def numbers_of(messages: dict[str, Any]) -> list[float]:
@@ -47,47 +59,45 @@ def test_messages_carry_the_output() -> None:
     zero = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
     parameters = PARAMETERS.replaced({
         'geometry.zero_length': zero, 'joints': ['a', 'bc', 'def', 'ghij', 'élan', '六']})
-    step, written = Step(parameters), OutputMessages(parameters)
-    for setpoint, wrench in rows(parameters, 10):
-        output = answered(step, setpoint, wrench)
-        messages = list(written.of_output(output))
-        assert [topic for topic, _ in messages] == [
+    step, by = Step(parameters), OutputMessages(parameters)
+    for setpoint in singles(random_setpoints(parameters, 10)):
+        output = answered(step, setpoint)
+        messages = written(by, output)
+        assert list(messages) == [
             topic for topic in OUTPUT_TYPES if topic != BASE_WRENCH]
         of = decoded(messages)
         state = of['leg_states']
-        assert state.header.stamp.sec * 10 ** 9 + state.header.stamp.nanosec == setpoint.stamp
+        assert state.header.stamp.sec * 10 ** 9 + state.header.stamp.nanosec == setpoint.stamps[0]
         assert state.header.frame_id == ''
         assert tuple(state.name) == parameters['joints']
-        assert tuple(state.position) == tuple(
-            a - b for a, b in zip(output.lengths, zero, strict=True))
-        assert tuple(state.velocity) == output.rates
-        assert tuple(state.effort) == output.forces
-        assert tuple(of['leg_lengths'].data) == output.lengths
-        assert tuple(of['leg_forces'].data) == output.forces
-        assert of['jacobian_determinant'].data == output.determinant
-        assert of['singularity_warning'].data == output.singularity.warning
+        assert np.array_equal(state.position, output.lengths[0] - zero)
+        assert np.array_equal(state.velocity, output.rates[0])
+        assert np.array_equal(state.effort, output.forces[0])
+        assert np.array_equal(of['leg_lengths'].data, output.lengths[0])
+        assert np.array_equal(of['leg_forces'].data, output.forces[0])
+        assert of['jacobian_determinant'].data == output.determinants[0]
+        assert of['singularity_warning'].data == output.warnings[0]
 
 
 def test_the_warning_is_sent_first_and_then_at_every_change() -> None:
-    state, sent = None, []
+    state, warned, sent = FIRST, None, []
     # to the singularity and back again, slowly: nothing is predicted
     for angle in [*range(0, 89, 4), *range(88, -1, -4)]:
         half = math.radians(angle) / 2
         rotation = from_quaternion(0.0, 0.0, math.sin(half), math.cos(half))
-        output = answered(STEP, Setpoint(STAMP, (0.0, 0.0, 1.0, *rotation, *REST)), NO_WRENCH,
-                          state)
-        message = decoded(list(MESSAGES.of_output(output))).get('singularity_warning')
+        output = answered(STEP, Batch.of(STAMP, (0.0, 0.0, 1.0, *rotation, *REST)), state)
+        message = decoded(written(MESSAGES, output)).get('singularity_warning')
         if message is not None:
             sent.append(message.data)
-        changed = state is None or state.singularity.warning != output.singularity.warning
-        assert (message is not None) == changed == output.warning_changed
-        state = output.state
+        changed = warned != output.warnings[0]
+        assert (message is not None) == changed == output.changed[0]
+        state, warned = output.state, output.warnings[0]
     assert sent == [False, True, False]
 
 
 @pytest.mark.parametrize('setpoint', [QUARTER, FLAT], ids=['a quarter turn', 'flat'])
-def test_without_forces_there_are_none_in_the_messages(setpoint: Setpoint) -> None:
-    of = decoded(list(MESSAGES.of_output(answered(STEP, setpoint))))
+def test_without_forces_there_are_none_in_the_messages(setpoint: Batch) -> None:
+    of = decoded(written(MESSAGES, answered(STEP, setpoint)))
     assert list(of) == ['leg_states', 'leg_lengths', 'jacobian_determinant',
                         'singularity_warning']
     assert len(of['leg_states'].effort) == 0
@@ -101,27 +111,17 @@ def test_many_messages_are_those_of_one_after_the_other(action: str) -> None:
         'singularity.action': action, 'limits.force_max': 1000.0,
         'geometry.zero_length': [0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
         'joints': ['a', 'bc', 'def', 'ghij', 'élan', '六']})
-    step, written = Step(parameters), OutputMessages(parameters)
+    step, by = Step(parameters), OutputMessages(parameters)
     angles = np.radians([*range(60, 90, 3), 90, *range(89, 60, -3)])
-    rotations_of = [from_quaternion(0.0, 0.0, math.sin(half), math.cos(half))
-                    for half in angles / 2]
-    motions = np.array([(0.0, 0.0, 1.0, *rotation, *REST) for rotation in rotations_of])
-    stamps = STAMP + np.arange(len(motions))
-    outputs = step.many(Batch(stamps, motions, np.zeros((len(motions), 6)),
-                              np.zeros(len(motions), dtype=bool), stamps), None)
-    found: dict[int, dict[str, bytes]] = {n: {} for n in range(len(motions))}
-    for topic, which, many in written.of_outputs(outputs):
-        for n, each in zip(which.tolist(), many, strict=True):
-            assert topic not in found[n]
-            found[n][topic] = each.tobytes()
-    state = None
-    lacking = 0
-    for n, motion in enumerate(motions.tolist()):
-        output = answered(step, Setpoint(STAMP + n, tuple(motion)), NO_WRENCH, state)
+    setpoints = Batch.of(STAMP + np.arange(len(angles)), [
+        (0.0, 0.0, 1.0, *from_quaternion(0.0, 0.0, math.sin(half), math.cos(half)), *REST)
+        for half in angles / 2])
+    outputs, state = answered(step, setpoints), FIRST
+    for n, setpoint in enumerate(singles(setpoints)):
+        output = answered(step, setpoint, state)
         state = output.state
-        lacking += output.forces is None
-        assert found[n] == dict(written.of_output(output))
-    assert 0 < lacking < len(motions)
+        assert written(by, outputs, n) == written(by, output)
+    assert 0 < np.count_nonzero(outputs.with_forces) < len(angles)
 
 
 def test_an_external_wrench_is_written_in_the_base_frame() -> None:
@@ -137,15 +137,15 @@ def test_an_external_wrench_is_written_in_the_base_frame() -> None:
 
 @pytest.mark.parametrize('frame', ['base', 'sol', 'é', ''])
 def test_base_wrenches_are_written_alike_one_by_one_and_together(frame: str) -> None:
-    written = OutputMessages(PARAMETERS.replaced({'base_frame': frame} if frame else {}))
+    by = OutputMessages(PARAMETERS.replaced({'base_frame': frame} if frame else {}))
     stamps = STAMP + 10 ** 9 * np.arange(4)
     wrenches = np.arange(24.0).reshape(4, 6) - 11.5
     wrenches[2] = np.nan
-    topic, which, many = written.of_base_wrenches(stamps, wrenches)
+    topic, having, many = by.of_base_wrenches(stamps, wrenches)
     assert OUTPUT_TYPES[topic] == 'geometry_msgs/msg/WrenchStamped'
-    assert which.tolist() == [0, 1, 3]
-    one = [written.of_wrench(int(stamps[n]), tuple(wrenches[n].tolist())) for n in which]
-    assert [each.tobytes() for each in many] == one
+    assert having.tolist() == [True, True, False, True]
+    one = [by.of_wrench(int(stamps[n]), wrenches[n].tolist()) for n in (0, 1, 3)]
+    assert [each.tobytes() for each in many[having]] == one
     read = STORE.deserialize_cdr(one[1], OUTPUT_TYPES[topic])
     assert read.header.frame_id == frame or not frame
     assert read.header.stamp.sec * 10 ** 9 + read.header.stamp.nanosec == stamps[1]
@@ -153,18 +153,17 @@ def test_base_wrenches_are_written_alike_one_by_one_and_together(frame: str) -> 
     assert [force.x, force.y, force.z, torque.x, torque.y, torque.z] == wrenches[1].tolist()
 
 
-def _check_finite(step: Step, setpoint: Setpoint, wrench: Six) -> None:
-    output = step(setpoint._replace(wrench=wrench), None)
-    if output is None:
+def _check_finite(step: Step, setpoint: Batch) -> None:
+    output = step(setpoint)
+    if not output.answered[0]:
         return
-    after = step(setpoint._replace(wrench=wrench), output.state)
-    assert after is not None
-    for of in (output, after):
-        read = decoded(list(OutputMessages(step.parameters).of_output(of)))
+    by = OutputMessages(step.parameters)
+    for of in (output, answered(step, setpoint, output.state)):
+        read = decoded(written(by, of))
         assert np.all(np.isfinite(numbers_of(read)))
         assert read['leg_states'].position.shape == (6,)
         assert ('leg_forces' in read) == bool(len(read['leg_states'].effort))
-        assert of.condition >= 1.0
+        assert of.conditions[0] >= 1.0
 
 
 @given(st.tuples(sizes, sizes, sizes), rotations, st.tuples(*[sizes] * 12),
@@ -175,9 +174,9 @@ def _check_finite(step: Step, setpoint: Setpoint, wrench: Six) -> None:
 def test_only_finite_numbers_are_published(
         position: tuple[float, ...], rotation: tuple[float, ...], rates: tuple[float, ...],
         wrench: Six) -> None:
-    setpoint = Setpoint(STAMP, (*position, *rotation, *rates))
-    _check_finite(STEP, setpoint, wrench)
-    _check_finite(_LIMITED, setpoint, wrench)
+    setpoint = Batch.of(STAMP, (*position, *rotation, *rates), wrench)
+    _check_finite(STEP, setpoint)
+    _check_finite(_LIMITED, setpoint)
 
 
 _LIMITED = Step(PARAMETERS.replaced({
@@ -193,4 +192,4 @@ def test_only_finite_numbers_are_published_for_any_hexapod(
     step = Step(PARAMETERS.replaced({
         'platform.mass': mass, 'legs.piston.mass': leg_mass,
         'geometry.zero_length': zero_length}))
-    _check_finite(step, Setpoint(STAMP, (*position, *rotation, *rates)), NO_WRENCH)
+    _check_finite(step, Batch.of(STAMP, (*position, *rotation, *rates)))

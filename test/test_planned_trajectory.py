@@ -24,7 +24,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.planned.checks import LIMIT, SINGULAR
 from stewart_dynamics.planned.interpolation import Interpolation
 from stewart_dynamics.planned.planned_trajectory import check_planned_trajectory, PlannedTrajectory
-from stewart_dynamics.setpoints.step import Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, Step
 from stewart_dynamics.simulator.plant import Plant
 from trajectories import (
     Array, counted, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
@@ -373,9 +373,8 @@ def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded(
             changes = {limit: bounds.tolist()}
             parameters = FREE.replaced(changes)
             assert check(([0], rows), parameters).accepted != exceeded
-            output = Step(parameters)(Setpoint(0, tuple(motion_of(rows).rows[0].tolist())), None)
-            assert output is not None
-            assert bool(output.exceedances) == exceeded
+            step, setpoint = Step(parameters), Batch.of(0, motion_of(rows).rows)
+            assert bool(step.exceedances(setpoint.motions, step(setpoint))) == exceeded
             simulated_parameters = simulated(**{**UNLIMITED, **changes})
             if exceeded:
                 with snapshot.raises(ParameterError):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import messages
-from messages import motion, MS, RECORDED, Recorded
+from messages import Feed, motion, MS, RECORDED, Recorded
 import numpy as np
 import pytest
 from referees import rotation_about
@@ -29,9 +29,8 @@ from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
 from stewart_dynamics.setpoints.input_messages import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
     TWIST, WRENCH)
-from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
-from stewart_dynamics.setpoints.step import Output, Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs as Answer, Step
 from test_replay import (
     JOINT_STATE, nanoseconds, Outputs, outputs_of, PARAMETERS, six_of, write_bag)
 
@@ -76,21 +75,16 @@ def at_sea(source: str, number: int = 300) -> list[Recorded]:
     return sorted(of, key=lambda each: each[1])
 
 
-def answers(parameters: Parameters, of: Iterable[Recorded],
-            ) -> list[tuple[Setpoint, Output]]:
-    """Return what the step gives message by message, as in the node."""
-    setpoints, step = Setpoints(parameters, print, print), Step(parameters)
-    found: list[tuple[Setpoint, Output]] = []
+def answers(parameters: Parameters, of: Iterable[Recorded]) -> list[tuple[Batch, Answer]]:
+    """Return setpoints and what the step gives, message by message, as in the node."""
+    feed, step, state = Feed(parameters), Step(parameters), FIRST
+    found: list[tuple[Batch, Answer]] = []
     for topic, when, data in of:
-        if topic in setpoints.base.topics:
-            setpoints.base.take(topic, data, lambda: when)  # noqa: B023
-            continue
-        setpoint = setpoints.take(topic, data, lambda: when)  # noqa: B023
-        if setpoint is not None:
-            setpoint = setpoints.on_base(setpoint)
-            output = step(setpoint, found[-1][1].state if found else None)
-            assert output is not None
-            found.append((setpoint, output))
+        if (setpoint := feed(topic, data, when)) is not None:
+            answer = step(setpoint, state)
+            assert answer.answered.tolist() == [True]
+            state = answer.state
+            found.append((setpoint, answer))
     return found
 
 
@@ -126,7 +120,8 @@ def test_a_replay_gives_the_bits_of_the_step_and_states_where_the_base_is_not_kn
     parameters, of = parameters_of(source), at_sea(source)
     outputs = replayed(of, parameters, tmp_path)
     expected = answers(parameters, of)
-    unknown = [n for n, (_, output) in enumerate(expected) if output.demanded_forces is None]
+    unknown = [n for n, (_, answer) in enumerate(expected)
+               if np.isnan(answer.demanded_forces).all()]
     assert len(expected) == 300
     assert unknown[:5] == [0, 1, 2, 3, 4]
     assert 30 < len(unknown) < 60
@@ -135,37 +130,35 @@ def test_a_replay_gives_the_bits_of_the_step_and_states_where_the_base_is_not_kn
     loads = {nanoseconds(each): each for _, each in outputs.messages[f'{NODE}/base_wrench']}
     forces = {nanoseconds(state): list(state.effort)
               for _, state in outputs.messages[f'{NODE}/leg_states']}
-    for n, (setpoint, output) in enumerate(expected):
-        row, base_wrench = outputs.rows[n], load(setpoint)
+    for n, (setpoint, answer) in enumerate(expected):
+        row, stamp = outputs.rows[n], int(setpoint.stamps[0])
+        base_wrench, demanded = load(setpoint)[0].tolist(), answer.demanded_forces[0].tolist()
         cells = [row[f'{leg}_demanded_force_n'] for leg in parameters['joints']]
         of_base = [row[f'base_{part}'] for part in (
             'force_x_n', 'force_y_n', 'force_z_n', 'moment_x_n_m', 'moment_y_n_m',
             'moment_z_n_m')]
-        assert float(row['determinant_m3']) == output.determinant
+        assert float(row['determinant_m3']) == answer.determinants[0]
         if n in unknown:
-            assert base_wrench is None
+            assert np.isnan(base_wrench).all()
             assert set(cells) == set(of_base) == {''}
-            assert forces[setpoint.stamp] == []
-            assert setpoint.stamp not in loads
+            assert forces[stamp] == []
+            assert stamp not in loads
             continue
-        assert base_wrench is not None
-        assert output.demanded_forces == tuple(map(float, cells))
-        assert list(output.forces or ()) == forces[setpoint.stamp]
-        assert list(base_wrench) == six_of(loads[setpoint.stamp]) == list(map(float, of_base))
+        assert demanded == list(map(float, cells))
+        assert answer.forces[0].tolist() == forces[stamp]
+        assert base_wrench == six_of(loads[stamp]) == list(map(float, of_base))
         # and the library's
-        m = setpoint.motion
-        given = Motion(m[0:3], np.reshape(m[3:12], (3, 3)), m[12:15], m[15:18], m[18:21], m[21:24])
-        base = BaseMotion.of_rows(np.array(setpoint.base))
-        result = platform.inverse_dynamics(given, base=base)
-        assert tuple(result.forces.tolist()) == output.demanded_forces
-        assert tuple(platform.base_wrench(given, base=base).tolist()) == base_wrench
+        assert setpoint.bases is not None
+        given, base = Motion.of_rows(setpoint.motions[0]), BaseMotion.of_rows(setpoint.bases[0])
+        assert platform.inverse_dynamics(given, base=base).forces.tolist() == demanded
+        assert platform.base_wrench(given, base=base).tolist() == base_wrench
     # the very bytes of the node
     with (tmp_path / 'out' / 'bag' / 'bag' / 'bag.mcap').open('rb') as file:
         content = file.read()
     for setpoint, _ in expected[5:20]:
-        base_wrench = load(setpoint)
-        assert base_wrench is not None
-        assert written.of_wrench(setpoint.stamp, base_wrench) in content
+        _, having, message = written.of_base_wrenches(setpoint.stamps, load(setpoint))
+        assert having[0]
+        assert message[0].tobytes() in content
 
     found, text = summary_of(tmp_path), ' '.join(capsys.readouterr().out.split())
     lacking = [row['time_s'] for row in outputs.rows if not row['base_force_z_n']]
@@ -354,11 +347,12 @@ def test_measured_forces_on_a_base_that_moves_differ_by_a_missing_mass_and_nothi
         true = StewartPlatform(parameters.replaced(
             {'platform.mass': parameters['platform.mass'] + mass}))
         legs, added = [], []
-        for setpoint, output in answers(parameters, of):
-            forces = true.solve(np.array([setpoint.motion]), None, np.array([setpoint.base]))
-            added.append(forces[0, 12:18] - output.forces)
-            legs.append(('/hexapod/state', RECORDED + setpoint.stamp + 3, messages.joint_state(
-                setpoint.stamp, parameters['joints'], [], [], forces[0, 12:18])))
+        for setpoint, answer in answers(parameters, of):
+            stamp = int(setpoint.stamps[0])
+            forces = true.solve(setpoint.motions, None, setpoint.bases)[0, 12:18]
+            added.append(forces - answer.forces[0])
+            legs.append(('/hexapod/state', RECORDED + stamp + 3, messages.joint_state(
+                stamp, parameters['joints'], [], [], forces)))
         replayed(sorted([*of, *legs], key=lambda each: each[1]), parameters, tmp_path / name,
                  '--measured', '/hexapod/state')
         found = summary_of(tmp_path / name)['measured']

@@ -57,12 +57,10 @@ class Given:
     def __init__(self, seconds: Array, motions: Array, parameters: Parameters = PARAMETERS,
                  bases: Array | None = None) -> None:
         self.seconds, self.motions, self.parameters = seconds, motions, parameters
-        many = len(seconds)
         stamps = 1_700_000_000_000_000_000 + np.rint(seconds * 1e9).astype(np.int64)
-        self.setpoints = Batch(
-            stamps, motions, np.zeros((many, 6)), np.zeros(many, dtype=bool), stamps, bases)
-        self.outputs: Outputs = Step(parameters).many(self.setpoints, None)
-        self.base_wrenches = BaseWrench(parameters).many(self.setpoints)
+        self.setpoints = Batch.of(stamps, motions, bases=bases)
+        self.outputs = Step(parameters)(self.setpoints)
+        self.base_wrenches = BaseWrench(parameters)(self.setpoints)
         self.powers = powers_of(StewartPlatform(parameters), self.setpoints, self.outputs)
         self.breakdown = ForceBreakdownRows(parameters)(motions, self.setpoints.wrenches, bases)
         if bases is not None:
@@ -72,8 +70,8 @@ class Given:
         """Return some of the setpoints as the replay gives them, or the same again later [s]."""
         return Answered(
             self.seconds[part] + later, self.setpoints.chosen(part),
-            Outputs(*(each[part] for each in self.outputs)), self.base_wrenches[part],
-            self.powers[part], self.breakdown[part])
+            Outputs._make((*(each[part] for each in self.outputs[:-1]), self.outputs.state)),
+            self.base_wrenches[part], self.powers[part], self.breakdown[part])
 
     def summary(self, **changes: Any) -> dict[str, Any]:
         """Return what summary.json would hold."""

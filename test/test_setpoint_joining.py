@@ -21,15 +21,13 @@ import pytest
 from referees import rng, symmetric_parameters
 from scipy.spatial.transform import Rotation
 
-from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.setpoints.input_messages import (
     ACCEL, COMBINED, POSE, SampleReader, TWIST, WRENCH)
-from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, TOO_OLD, TWICE,
     WRONG_FRAME)
-from stewart_dynamics.setpoints.sample_joining import WAITING
-from stewart_dynamics.setpoints.step import Setpoint
+from stewart_dynamics.setpoints.sample_joining import SampleJoining, WAITING
+from stewart_dynamics.setpoints.step import Batch
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)
@@ -58,16 +56,16 @@ class Feed(messages.Feed):
             PARAMETERS.replaced({f'setpoint.{name}': value for name, value in given.items()}))
         self.given: Counter[str] = Counter()
 
-    def __call__(self, topic: str, data: bytes, now: int = NOW) -> Setpoint | None:
+    def __call__(self, topic: str, data: bytes, now: int = NOW) -> Batch | None:
         """Take one message."""
         self.given[topic] += 1
         return super().__call__(topic, data, now)
 
-    def sample(self, topic: str, stamp: int, mark: float = 0.0) -> Setpoint | None:
+    def sample(self, topic: str, stamp: int, mark: float = 0.0) -> Batch | None:
         """Take a good message of a topic, the mark in its first number."""
         return self(topic, good(topic, stamp, mark))
 
-    def whole(self, stamp: int, mark: float = 0.0) -> Setpoint | None:
+    def whole(self, stamp: int, mark: float = 0.0) -> Batch | None:
         """Take good messages of all topics; the last one must be what completes it."""
         answers = [self.sample(topic, stamp, mark) for topic in self.setpoints.topics]
         assert answers[:-1] == [None] * (len(answers) - 1)
@@ -78,10 +76,19 @@ class Feed(messages.Feed):
         found = []
         for topic, mark in samples:
             if (setpoint := self.sample(topic, 0, mark)) is not None:
-                assert setpoint.stamp == NOW
-                assert setpoint.motion[0] == setpoint.motion[12] == setpoint.motion[18]
-                found.append(setpoint.motion[0])
+                motion = setpoint.motions[0].tolist()
+                assert setpoint.stamps[0] == NOW
+                assert motion[0] == motion[12] == motion[18]
+                found.append(motion[0])
         return found
+
+
+def check_same(setpoint: Batch | None, expected: Batch) -> None:
+    """Check that two setpoints are equal, except for their times of recording."""
+    assert setpoint is not None
+    assert np.array_equal(setpoint.stamps, expected.stamps)
+    assert np.array_equal(setpoint.rows, expected.rows, equal_nan=True)
+    assert setpoint.moving == expected.moving
 
 
 # Joining
@@ -99,10 +106,11 @@ def test_topics_are_joined_in_any_order_within_the_tolerance(
     assert feed(order[1], data[order[1]]) is None
     setpoint = feed(order[2], data[order[2]])
     assert setpoint is not None
-    assert setpoint.stamp == SECOND
-    assert setpoint.motion[:3] == (0.1, 0.2, 1.3)
-    assert np.allclose(setpoint.motion[3:12], [0, -1, 0, 1, 0, 0, 0, 0, 1], rtol=0, atol=1e-15)
-    assert setpoint.motion[12:] == tuple(range(1, 13))
+    assert setpoint.stamps[0] == SECOND
+    motion, = setpoint.motions
+    assert motion[:3].tolist() == [0.1, 0.2, 1.3]
+    assert np.allclose(motion[3:12], [0, -1, 0, 1, 0, 0, 0, 0, 1], rtol=0, atol=1e-15)
+    assert motion[12:].tolist() == list(range(1, 13))
     assert not feed.counts
     assert not feed.notices
 
@@ -136,7 +144,7 @@ def test_the_nearest_sample_within_the_tolerance_is_joined() -> None:
         feed.sample(ACCEL, stamp, mark)
     setpoint = feed.sample(POSE, SECOND)
     assert setpoint is not None
-    assert (setpoint.motion[12], setpoint.motion[18]) == (2.0, 2.0)
+    assert setpoint.motions[0, [12, 18]].tolist() == [2.0, 2.0]
 
 
 def test_a_combined_message_is_a_setpoint() -> None:
@@ -144,16 +152,15 @@ def test_a_combined_message_is_a_setpoint() -> None:
     assert feed.setpoints.topics == (COMBINED,)
     setpoint = feed(COMBINED, messages.combined(
         SECOND, (0.1, 0.2, 1.3), UPRIGHT, (1, 2, 3, 4, 5, 6), (7, 8, 9, 10, 11, 12)))
-    assert setpoint == Setpoint(
-        SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13)), NO_WRENCH)
+    check_same(setpoint, Batch.of(
+        SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13))))
 
 
 def test_a_pose_alone_stands_still() -> None:
     feed = Feed(source='pose')
     assert feed.setpoints.topics == (POSE,)
-    setpoint = feed.sample(POSE, SECOND, 0.25)
-    assert setpoint == Setpoint(
-        SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12, NO_WRENCH)
+    check_same(feed.sample(POSE, SECOND, 0.25), Batch.of(
+        SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12))
 
 
 @pytest.mark.parametrize('source', ['combined', 'pose'])
@@ -163,7 +170,7 @@ def test_a_single_topic_needs_no_stamp_and_each_stamp_is_used_once(source: str) 
     for _ in range(3):
         setpoint = feed.sample(topic, 0)
         assert setpoint is not None
-        assert setpoint.stamp == NOW
+        assert setpoint.stamps[0] == NOW
     assert len(feed.notices) == 1
     assert feed.sample(topic, SECOND)
     assert feed.sample(topic, SECOND) is None
@@ -224,12 +231,11 @@ def test_the_base_frame_and_an_empty_one_are_accepted(topic: str, frame: str) ->
 
 
 def test_another_base_frame_is_the_only_one() -> None:
-    setpoints = Setpoints(
-        PARAMETERS.replaced({'base_frame': 'sol élevé', 'setpoint.source': 'pose'}),
-        lambda rejection, details: None, lambda text: None)
-    assert setpoints.take(POSE, messages.pose(SECOND, frame='base'), lambda: NOW) is None
-    assert setpoints.counts == {Rejection(POSE, WRONG_FRAME): 1}
-    assert setpoints.take(POSE, messages.pose(SECOND, frame='sol élevé'), lambda: NOW)
+    feed = messages.Feed(
+        PARAMETERS.replaced({'base_frame': 'sol élevé', 'setpoint.source': 'pose'}))
+    assert feed(POSE, messages.pose(SECOND, frame='base')) is None
+    assert feed.counts == {(POSE, WRONG_FRAME): 1}
+    assert feed(POSE, messages.pose(SECOND, frame='sol élevé'))
 
 
 @pytest.mark.parametrize(('reason', 'said'), [
@@ -260,7 +266,7 @@ def test_the_first_sample_of_a_repeated_stamp_is_used() -> None:
     feed.sample(TWIST, SECOND)
     setpoint = feed.sample(ACCEL, SECOND)
     assert setpoint is not None
-    assert setpoint.motion[0] == 1.0
+    assert setpoint.motions[0, 0] == 1.0
     for topic in TOPICS:
         assert feed.sample(topic, SECOND, 3.0) is None
     assert feed.counts == {(POSE, TWICE): 2, (TWIST, TWICE): 1, (ACCEL, TWICE): 1}
@@ -293,7 +299,7 @@ def test_a_setpoint_after_a_jump_back_is_a_restart() -> None:
     feed = Feed()
     stamps = (SECOND, SECOND - 100 * MS - 1, 2 * SECOND, SECOND, SECOND + MS)
     setpoints = [feed.whole(stamp) for stamp in stamps]
-    assert [setpoint.restart for setpoint in setpoints if setpoint] == [
+    assert [setpoint.restarts[0] for setpoint in setpoints if setpoint] == [
         False, True, False, True, False]
     assert len(feed.notices) == 2
     assert not feed.counts
@@ -410,7 +416,7 @@ def test_the_number_of_waiting_samples_is_bounded(silent: str) -> None:
     assert feed.counts == {(topic, NOT_JOINED): 50 for topic in TOPICS if topic != silent}
     # the oldest are dropped, the newest are still there
     answers = [feed.sample(silent, n * MS) for n in range(1, many + 1)]
-    used = [answer.motion[0 if silent != POSE else 12] for answer in answers if answer]
+    used = [answer.motions[0, 0 if silent != POSE else 12] for answer in answers if answer]
     assert used == [float(n) for n in range(51, many + 1)]
 
 
@@ -426,13 +432,13 @@ def test_a_quaternion_is_brought_to_unit_length(
     quaternion = [factor * number for number in direction]
     setpoint = Feed(source='pose')(POSE, messages.pose(SECOND, HOME, quaternion))
     assert setpoint is not None
-    rotation = np.array(setpoint.motion[3:12]).reshape(3, 3)
+    rotation = setpoint.motions[0, 3:12].reshape(3, 3)
     # some roundings of the numbers in it, none of the length
     assert np.max(np.abs(rotation @ rotation.T - np.eye(3))) < 2e-15
     assert np.linalg.det(rotation) == pytest.approx(1.0, abs=3e-15)
     assert np.allclose(rotation, Rotation.from_quat(direction).as_matrix(), rtol=0, atol=3e-15)
-    other = Feed(source='pose')(POSE, messages.pose(SECOND, HOME, [-x for x in quaternion]))
-    assert other == setpoint
+    check_same(Feed(source='pose')(POSE, messages.pose(SECOND, HOME, [-x for x in quaternion])),
+               setpoint)
 
 
 # Any input at all
@@ -466,7 +472,7 @@ samples = st.lists(st.tuples(
     st.sampled_from(['none'] * 12 + list(FAULTS))), max_size=80)
 
 
-def _drained(feed: Feed, answers: list[Setpoint]) -> None:
+def _drained(feed: Feed, answers: list[Batch]) -> None:
     """Use or drop what waits."""
     far = 2 ** 31 * SECOND - 1
     final = [answer for topic in TOPICS if (answer := feed.sample(topic, far))]
@@ -478,7 +484,7 @@ def _drained(feed: Feed, answers: list[Setpoint]) -> None:
 def test_every_message_is_answered_or_counted(
         sequence: list[tuple[str, int, str]], tolerance: float) -> None:
     feed = Feed(sync_tolerance=tolerance)
-    answers: list[Setpoint] = []
+    answers: list[Batch] = []
     for topic, stamp, fault in sequence:
         if (answer := feed(topic, FAULTS[fault](good(topic, stamp)))) is not None:
             answers.append(answer)
@@ -486,9 +492,9 @@ def test_every_message_is_answered_or_counted(
             n for (of, _), n in feed.counts.items() if of == t) for t in TOPICS}
         assert min(waiting.values()) >= 0
     for answer in answers:
-        assert len(answer.motion) == 24
-        assert np.all(np.isfinite(answer.motion))
-    stamps = [answer.stamp for answer in answers if answer.stamp != NOW]
+        assert answer.motions.shape == (1, 24)
+        assert np.all(np.isfinite(answer.motions))
+    stamps = [stamp for answer in answers if (stamp := int(answer.stamps[0])) != NOW]
     back = [(a, b) for a, b in zip(stamps, stamps[1:], strict=False) if b <= a]
     assert all(a - b > 100 * MS for a, b in back)
     assert sum('restart' in notice for notice in feed.notices) == len(back)
@@ -506,10 +512,10 @@ def test_only_stamps_within_the_tolerance_are_joined(
     for topic, stamp, _ in sequence:
         answer = feed.sample(topic, stamp, float(stamp))
         if answer is not None:
-            marks = [answer.motion[0], answer.motion[12], answer.motion[18]]
-            assert answer.stamp in (NOW, *marks)
+            stamp, marks = int(answer.stamps[0]), answer.motions[0, [0, 12, 18]].tolist()
+            assert stamp in (NOW, *marks)
             assert max(marks) - min(marks) <= 2 * tolerance * MS
-            assert answer.stamp != NOW or marks == [0.0, 0.0, 0.0]
+            assert stamp != NOW or marks == [0.0, 0.0, 0.0]
 
 
 # Many at once
@@ -545,11 +551,11 @@ def test_many_in_order_are_what_they_are_one_by_one(cuts: Sequence[int]) -> None
 
 def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     feed = Feed()
-    monkeypatch.delattr(Setpoints, 'take')
+    monkeypatch.delattr(SampleJoining, 'take')
     monkeypatch.delattr(SampleReader, 'read')
     given = stream(50)
     for part in (given[:61], given[61:]):
-        feed.setpoints.take_many(messages.together(part, INPUTS))
+        feed.setpoints.take(messages.together(part, INPUTS))
     assert not feed.counts
 
 

@@ -24,12 +24,14 @@ from referees import ROOT  # noqa: E402
 from running import HOME, nanoseconds, Peer, PLATFORM, QOS, raw, Sample, SEPARATE  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 import stewart_dynamics  # noqa: E402
+from stewart_dynamics.core.binding import places  # noqa: E402
 from stewart_dynamics.node.dynamics_node import BACKLOG, DynamicsNode  # noqa: E402
 from stewart_dynamics.setpoints.rejections import DROPPED, OUT_OF_RANGE, Rejection  # noqa: E402
 
 PACKAGE = Path(stewart_dynamics.__file__).parent
 BEGIN = 1_700_000_000_000_000_000  # a stamp [ns]
 MOST_FILES = 12
+RESTARTING = places('step_state')['restarting']
 
 
 class Fed:
@@ -104,17 +106,18 @@ def test_a_restart_that_is_dropped_or_cannot_be_answered_holds_for_the_next(fed:
     fed.gather(2 * day, *range(2 * day + 1, 2 * day + 1 + BACKLOG))
     fed.node._answer_waiting()
     fed.answered(2)
-    assert fed.node._last is not None
-    assert fed.node._last.stamp == BEGIN + 2 * day + BACKLOG
-    assert fed.node._last.singularity.crossings == 0
+    outputs = fed.node._diagnostics.answers.outputs
+    assert outputs is not None
+    assert outputs.stamps[0] == BEGIN + 2 * day + BACKLOG
+    assert outputs.singularity().crossings == 0
     fed.gather(day, sample=too_large)
     fed.node._answer_waiting()
     assert fed.counts[Rejection('setpoint', OUT_OF_RANGE)] == 1
-    assert fed.node._restarting
+    assert fed.node._state[RESTARTING]
     fed.gather(day + 1)
     fed.node._answer_waiting()
     assert fed.answered(3)[2] == day + 1
-    assert not fed.node._restarting
+    assert not fed.node._state[RESTARTING]
 
 
 def test_the_page_names_the_files_that_a_setpoint_runs_through(domain: int) -> None:
@@ -128,7 +131,8 @@ def test_the_page_names_the_files_that_a_setpoint_runs_through(domain: int) -> N
         each.close()
     # These call functions in C, which no profile sees.
     for caller, called in (('core/binding.py', 'core/stewart_dynamics.c'),
-                           ('setpoints/step.py', 'core/setpoints.c')):
+                           ('setpoints/step.py', 'core/setpoints.c'),
+                           ('setpoints/output_messages.py', 'core/messages.c')):
         found.insert(found.index(caller) + 1, called)
     assert on_page == found
     assert len(found) <= MOST_FILES

@@ -18,7 +18,8 @@ from referees import (
     QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, relative,
     rng, symmetric_parameters)
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
-from stewart_dynamics.arrays import Array, NO_WRENCH, Six
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import places
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JOINT_FORCE_MAX, JUMP, LENGTH_MAX,
@@ -29,7 +30,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import LEG_SHAPE
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
-from stewart_dynamics.setpoints.step import Batch, JITTER, Output, Setpoint, State, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, JITTER, Outputs, Step
 
 PARAMETERS = symmetric_parameters()
 STEP = Step(PARAMETERS)
@@ -37,26 +38,44 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 REST = (0.0,) * 12
 STAMP = 12_000_000_034
 
+STATE = places('step_state')
+
 # The hexapod turned as far as it is singular, and its legs and platform in one plane.
-QUARTER = Setpoint(STAMP, (0.0, 0.0, 1.0, *QUARTER_TURN.ravel().tolist(), *REST))
-FLAT = Setpoint(STAMP, (0.0, 0.0, 0.0, *UPRIGHT, *REST))
-HOME = Setpoint(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *REST))
+QUARTER = Batch.of(STAMP, (0.0, 0.0, 1.0, *QUARTER_TURN.ravel(), *REST))
+FLAT = Batch.of(STAMP, (0.0, 0.0, 0.0, *UPRIGHT, *REST))
+HOME = Batch.of(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *REST))
 
 
-def rows(parameters: Parameters, many: int) -> list[tuple[Setpoint, Six]]:
-    """Return random setpoints and wrenches that suit a hexapod."""
+def random_setpoints(parameters: Parameters, many: int) -> Batch:
+    """Return random setpoints that suit a hexapod."""
     random = rng()
-    motion = random_motion(parameters, random, many)
-    wrenches = random_wrench(parameters, random, many).tolist()
-    return [(Setpoint(STAMP + n, tuple(row)), tuple(load))
-            for n, (row, load) in enumerate(zip(motion.rows.tolist(), wrenches, strict=True))]
+    return Batch.of(STAMP + np.arange(many), random_motion(parameters, random, many).rows,
+                    random_wrench(parameters, random, many))
 
 
-def answered(step: Step, setpoint: Setpoint, wrench: Six = NO_WRENCH,
-             before: State | None = None) -> Output:
-    output = step(setpoint._replace(wrench=wrench), before)
-    assert output is not None
-    return output
+def singles(setpoints: Batch) -> list[Batch]:
+    """Return the setpoints of a batch, each a batch of one."""
+    return [setpoints.chosen(slice(n, n + 1)) for n in range(len(setpoints.stamps))]
+
+
+def answered(step: Step, setpoints: Batch, before: Array = FIRST) -> Outputs:
+    outputs = step(setpoints, before)
+    assert outputs.answered.all()
+    assert outputs.stamps.tolist() == setpoints.stamps.tolist()
+    return outputs
+
+
+def state_of(**parts: Any) -> Array:
+    """Return a state of the step: the first but for some parts."""
+    state = FIRST.copy()
+    for name, part in parts.items():
+        state[STATE[name]] = part
+    return state
+
+
+def bits(outputs: Outputs, n: int = 0) -> list[bytes]:
+    """Return the bits of all that is answered to a setpoint."""
+    return [part[n].tobytes() for part in outputs[1:-1]]
 
 
 # Results
@@ -66,48 +85,49 @@ def test_the_step_gives_the_librarys_bits() -> None:
     for _ in range(5):
         parameters = random_parameters(random)
         step, platform = Step(parameters), StewartPlatform(parameters)
-        for setpoint, wrench in rows(parameters, 20):
-            result = platform.inverse_dynamics(Motion.of_rows(np.array(setpoint.motion)), wrench)
-            output = answered(step, setpoint, wrench)
-            assert output.stamp == setpoint.stamp
-            assert output.lengths == tuple(result.lengths.tolist())
-            assert output.rates == tuple(result.rates.tolist())
-            assert output.demanded_forces == output.forces == tuple(result.forces.tolist())
-            assert output.unit_load_forces == tuple(result.unit_load_forces.tolist())
-            assert output.determinant == result.determinant
-            assert output.determinant_rate == result.determinant_rate
-            assert output.condition == result.condition_number
+        for setpoint in singles(random_setpoints(parameters, 20)):
+            result = platform.inverse_dynamics(
+                Motion.of_rows(setpoint.motions[0]), setpoint.wrenches[0])
+            output = answered(step, setpoint)
+            assert np.array_equal(output.lengths[0], result.lengths)
+            assert np.array_equal(output.rates[0], result.rates)
+            assert np.array_equal(output.demanded_forces[0], result.forces)
+            assert np.array_equal(output.forces[0], result.forces)
+            assert np.array_equal(output.unit_load_forces[0], result.unit_load_forces)
+            assert output.determinants[0] == result.determinant
+            assert output.determinant_rates[0] == result.determinant_rate
+            assert output.conditions[0] == result.condition_number
 
 
 def test_the_step_keeps_no_state() -> None:
-    given = [setpoint._replace(wrench=wrench) for setpoint, wrench in rows(PARAMETERS, 30)]
-    states = [None, State(), State(Singularity(Cause.CONDITION, True, -1.0)),
-              State(stamp=STAMP - 1, lengths=(1.0,) * 6)]
-    first = [STEP(setpoint, state) for setpoint in given for state in states]
-    again = [STEP(setpoint, state) for setpoint in given for state in states]
-    other = Step(PARAMETERS)
-    backward = [other(setpoint, state)
-                for setpoint in reversed(given) for state in reversed(states)]
-    assert first == again == backward[::-1]
+    given = singles(random_setpoints(PARAMETERS, 30))
+    seconds, nanoseconds = divmod(STAMP - 1, 10 ** 9)
+    calls = list(product(given, (
+        FIRST, state_of(warning=Singularity(Cause.CONDITION, True, -1.0)),
+        state_of(seconds=seconds, nanoseconds=nanoseconds, lengths=1.0))))
+
+    def found(step: Step, calls: Sequence[tuple[Batch, Array]]) -> list[list[bytes]]:
+        return [[part.tobytes() for part in step(*each)] for each in calls]
+
+    first = found(STEP, calls)
+    assert first == found(STEP, calls) == found(Step(PARAMETERS), calls[::-1])[::-1]
 
 
 # Limits
 
 def test_forces_are_clipped_and_reported() -> None:
-    for setpoint, wrench in rows(PARAMETERS, 20):
-        free = answered(STEP, setpoint, wrench)
-        assert free.demanded_forces is not None
-        assert not free.exceedances
-        bounds = [abs(force) * (0.5 if leg % 2 else 1.0)
-                  for leg, force in enumerate(free.demanded_forces)]
-        output = answered(Step(PARAMETERS.replaced({'limits.force_max': bounds})), setpoint,
-                          wrench)
-        assert output.demanded_forces == free.demanded_forces
-        assert output.forces == tuple(
-            force / 2 if leg % 2 else force for leg, force in enumerate(free.demanded_forces))
-        assert output.exceedances == tuple(
-            Exceedance('limits.force_max', leg, free.demanded_forces[leg], bounds[leg])
-            for leg in (1, 3, 5))
+    for setpoint in singles(random_setpoints(PARAMETERS, 20)):
+        free = answered(STEP, setpoint)
+        forces = free.demanded_forces[0].tolist()
+        assert not STEP.exceedances(setpoint.motions, free)
+        bounds = [abs(force) * (0.5 if leg % 2 else 1.0) for leg, force in enumerate(forces)]
+        step = Step(PARAMETERS.replaced({'limits.force_max': bounds}))
+        output = answered(step, setpoint)
+        assert output.demanded_forces[0].tolist() == forces
+        assert output.forces[0].tolist() == [
+            force / 2 if leg % 2 else force for leg, force in enumerate(forces)]
+        assert step.exceedances(setpoint.motions, output) == tuple(
+            Exceedance('limits.force_max', leg, forces[leg], bounds[leg]) for leg in (1, 3, 5))
 
 
 # Actions on limits, and jumps
@@ -115,40 +135,32 @@ def test_forces_are_clipped_and_reported() -> None:
 RATE = 0.5  # a leg's limit [m/s]
 
 
-def at(height: float, milliseconds: float, **changes: Any) -> Setpoint:
+def at(height: float, milliseconds: float, **changes: bool) -> Batch:
     """Return a setpoint at rest at a height and a time."""
-    return HOME._replace(stamp=STAMP + round(milliseconds * 1e6),
-                         motion=(0.0, 0.0, height, *HOME.motion[3:]), **changes)
+    return Batch.of(STAMP + round(milliseconds * 1e6), (0.0, 0.0, height, *UPRIGHT, *REST),
+                    **changes)
 
 
-def both_ways(step: Step, setpoints: Sequence[Setpoint]) -> list[Output]:
-    """Return the outputs one by one; many at once give the same forces, jumps and state."""
-    state, outputs = None, []
-    for setpoint in setpoints:
-        outputs.append(answered(step, setpoint, before=state))
-        state = outputs[-1].state
+def both_ways(step: Step, setpoints: Sequence[Batch]) -> Outputs:
+    """Return the outputs of setpoints; one by one and in two parts they are the same bits."""
+    whole, state = Batch.joined(setpoints), FIRST
+    outputs = answered(step, whole)
+    for n, setpoint in enumerate(setpoints):
+        output = answered(step, setpoint, state)
+        state = output.state
+        assert bits(output) == bits(outputs, n)
+        exceedances = step.exceedances(setpoint.motions, output)
+        assert exceedances == step.exceedances(whole.motions, outputs, n)
+        assert outputs.exceeding[n] == bool(exceedances)
+        assert outputs.jumped[n] == any(each.limit == JUMP for each in exceedances)
+    assert state.tobytes() == outputs.state.tobytes()
     for cut in range(len(setpoints) + 1):
-        before = None
-        for which in (slice(0, cut), slice(cut, None)):
-            part, singles = setpoints[which], outputs[which]
-            if not part:
-                continue
-            many = step.many(Batch(
-                np.array([each.stamp for each in part]),
-                np.array([each.motion for each in part]), np.zeros((len(part), 6)),
-                np.array([each.restart for each in part]), np.zeros(len(part), dtype=np.int64),
-                stamped=np.array([each.stamped for each in part])), before)
-            before = many.state
-            assert before == singles[-1].state
-            assert many.jumped.tolist() == [jumped(each) for each in singles]
-            assert many.exceeding.tolist() == [bool(each.exceedances) for each in singles]
-            for row, each in zip(many.forces.tolist(), singles, strict=True):
-                assert each.forces == (None if math.isnan(row[0]) else tuple(row))
+        first = answered(step, whole.chosen(slice(0, cut)))
+        second = answered(step, whole.chosen(slice(cut, None)), first.state)
+        for parts in zip(first[1:-1], second[1:-1], outputs[1:-1], strict=True):
+            assert np.concatenate(parts[:2]).tobytes() == parts[2].tobytes()
+        assert second.state.tobytes() == outputs.state.tobytes()
     return outputs
-
-
-def jumped(output: Output) -> bool:
-    return any(each.limit == JUMP for each in output.exceedances)
 
 
 @pytest.mark.parametrize(('limit', 'values'), [
@@ -157,38 +169,40 @@ def jumped(output: Output) -> bool:
     ('limits.platform_joint_angle_max', (1e-3, 1.0)), ('limits.leg_clearance_min', (0.9, 0.1))])
 def test_forces_are_suppressed_while_a_limit_of_motion_is_exceeded(
         limit: str, values: tuple[float, float]) -> None:
-    moving = HOME._replace(motion=(*HOME.motion[:12], 0.0, 0.0, 0.1, *REST[3:]))
-    leg = max(answered(STEP, moving).lengths)
+    moving = HOME.changed(motions=(*HOME.motions[0, :14], 0.1, *REST[3:]))
+    leg = answered(STEP, moving).lengths.max()
     exceeded, held = (value * leg if 'length' in limit else value for value in values)
-    tilted = moving._replace(motion=(0.05, *moving.motion[1:]))
+    tilted = moving.changed(motions=(0.05, *moving.motions[0, 1:]))
     for bound, suppressed in ((exceeded, True), (held, False)):
         for action in ('warn', 'suppress_forces'):
             step = Step(PARAMETERS.replaced({
                 'geometry.zero_length': leg, limit: bound, 'limits.action': action,
                 **dict.fromkeys(LEG_SHAPE, 0.01)}))
-            output, = both_ways(step, [tilted])
-            assert bool(output.exceedances) is suppressed
-            assert (output.forces is None) is (suppressed and action == 'suppress_forces')
-            assert output.demanded_forces is not None
+            output = both_ways(step, [tilted])
+            assert output.exceeding[0] == suppressed
+            assert np.isnan(output.forces[0]).tolist() == [
+                suppressed and action == 'suppress_forces'] * 6
+            assert np.isfinite(output.demanded_forces).all()
 
 
 def test_a_force_that_is_clipped_suppresses_nothing() -> None:
     step = Step(PARAMETERS.replaced({'limits.force_max': 1.0, 'limits.action': 'suppress_forces'}))
-    output, = both_ways(step, [HOME])
-    assert output.exceedances
-    assert output.forces == pytest.approx([1.0] * 6)
+    output = both_ways(step, [HOME])
+    assert output.exceeding[0]
+    assert output.forces[0] == pytest.approx([1.0] * 6)
 
 
 @pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
 def test_a_setpoint_that_the_legs_cannot_reach_in_time_is_a_jump(action: str) -> None:
     step = Step(PARAMETERS.replaced({'limits.velocity_max': RATE, 'limits.action': action}))
     # Legs are steep: 1 mm of height is 0.7 to 1 mm of a leg. One outlier, then on as before.
-    outputs = both_ways(step, [at(1.0, 0), at(1.0005, 1), at(1.1, 2), at(1.001, 3), at(1.0, 4)])
-    assert [jumped(each) for each in outputs] == [False, False, True, False, False]
-    assert [each.forces is None for each in outputs] == [
-        False, False, action == 'suppress_forces', False, False]
-    worst = outputs[2].exceedances[0]
-    lengths = [each.lengths[worst.leg] for each in outputs]
+    setpoints = [at(1.0, 0), at(1.0005, 1), at(1.1, 2), at(1.001, 3), at(1.0, 4)]
+    outputs = both_ways(step, setpoints)
+    assert outputs.jumped.tolist() == [False, False, True, False, False]
+    assert outputs.with_forces.tolist() == [True, True, action == 'warn', True, True]
+    assert (np.isnan(outputs.forces).T == ~outputs.with_forces).all()
+    worst = step.exceedances(Batch.joined(setpoints).motions, outputs, 2)[0]
+    lengths = outputs.lengths[:, worst.leg]
     assert worst.value == pytest.approx((lengths[2] - lengths[1]) / (1e-3 + JITTER))
     assert worst.bound == RATE
     assert 'limits.velocity_max' in worst.words(PARAMETERS['joints'])
@@ -196,11 +210,11 @@ def test_a_setpoint_that_the_legs_cannot_reach_in_time_is_a_jump(action: str) ->
 
 def test_after_a_jump_setpoints_are_followed_once_the_legs_can_be_there() -> None:
     step = Step(PARAMETERS.replaced({'limits.velocity_max': RATE}))
-    start, end = (answered(STEP, at(height, 0)).lengths for height in (1.0, 1.1))
-    needed = 1e3 * (max(end) - max(start)) / RATE
-    outputs = both_ways(step, [at(1.0, 0), *(at(1.1, time) for time in range(1, 300, 10))])
-    followed = [time for time, each in zip(range(1, 300, 10), outputs[1:], strict=True)
-                if not jumped(each)]
+    start, end = (answered(STEP, at(height, 0)).lengths.max() for height in (1.0, 1.1))
+    needed = 1e3 * (end - start) / RATE
+    times = np.arange(1, 300, 10)
+    outputs = both_ways(step, [at(1.0, 0), *(at(1.1, time) for time in times.tolist())])
+    followed = times[~outputs.jumped[1:]].tolist()
     assert needed - 2.0 < followed[0] < needed + 10.0
     assert followed == list(range(followed[0], 300, 10))
 
@@ -208,27 +222,27 @@ def test_after_a_jump_setpoints_are_followed_once_the_legs_can_be_there() -> Non
 def test_a_restart_and_a_stamp_of_arrival_are_no_jumps() -> None:
     step = Step(PARAMETERS.replaced({'limits.velocity_max': RATE, 'setpoint.timeout': 0.1}))
     outputs = both_ways(step, [
-        at(1.0, 0), at(1.1, -500, restart=True), at(1.12, -499.9, stamped=False),
+        at(1.0, 0), at(1.1, -500, restarts=True), at(1.12, -499.9, stamped=False),
         at(2.0, -499.8, stamped=False), at(1.1201, -499.8)])
-    assert [jumped(each) for each in outputs] == [False, False, False, True, False]
-    assert not jumped(answered(STEP, at(1e3, 1), before=answered(STEP, at(1.0, 0)).state))
+    assert outputs.jumped.tolist() == [False, False, False, True, False]
+    assert not answered(STEP, at(1e3, 1), answered(STEP, at(1.0, 0)).state).jumped[0]
 
 
 def test_a_motion_at_the_rate_limit_is_no_jump() -> None:
     times = np.arange(0.0, 1000.0, 7.0)
     heights = 1.0 + 0.1 * np.sin(2e-3 * math.pi * times)
-    free = [answered(STEP, at(height, time)) for height, time in zip(heights, times, strict=True)]
-    fastest = np.abs(np.diff([each.lengths for each in free], axis=0)).max() / 7e-3
+    setpoints = [at(*each) for each in zip(heights.tolist(), times.tolist(), strict=True)]
+    free = answered(STEP, Batch.joined(setpoints))
+    fastest = np.abs(np.diff(free.lengths, axis=0)).max() / 7e-3
     step = Step(PARAMETERS.replaced({'limits.velocity_max': fastest}))
-    outputs = both_ways(step, [at(h, t) for h, t in zip(heights, times, strict=True)][:20])
-    assert not any(map(jumped, outputs))
+    assert not both_ways(step, setpoints[:20]).jumped.any()
 
 
 # Near a singularity
 
-def _turned(degrees: float) -> Setpoint:
+def _turned(degrees: float) -> Batch:
     half = math.radians(degrees) / 2
-    return Setpoint(STAMP, (
+    return Batch.of(STAMP, (
         0.0, 0.0, 1.0, *from_quaternion(0.0, 0.0, math.sin(half), math.cos(half)), *REST))
 
 
@@ -238,54 +252,61 @@ def test_forces_are_suppressed_inside_the_stop_condition(action: str) -> None:
         'singularity.action': action, 'singularity.stop_condition': 100.0})
     step = Step(parameters)
     clear = answered(step, _turned(45.0))
-    assert clear.forces == clear.demanded_forces is not None
+    assert np.array_equal(clear.forces, clear.demanded_forces)
     near = answered(step, _turned(89.9))
-    assert 100.0 < near.condition < UNSOLVABLE_CONDITION
-    assert near.demanded_forces is not None
-    assert near.singularity.stopped
-    assert near.forces == (near.demanded_forces if action == 'warn' else None)
-    assert near.singularity.warning
+    assert 100.0 < near.conditions[0] < UNSOLVABLE_CONDITION
+    assert np.isfinite(near.demanded_forces).all()
+    assert near.singularity().stopped
+    if action == 'warn':
+        assert np.array_equal(near.forces, near.demanded_forces)
+    else:
+        assert np.isnan(near.forces).all() and not near.with_forces[0]
+    assert near.warnings[0]
 
 
 def test_a_suppressed_force_above_its_limit_is_still_reported() -> None:
     step = Step(PARAMETERS.replaced({
         'singularity.action': 'suppress_forces', 'limits.force_max': 1.0}))
-    output = answered(step, _turned(89.99))
-    assert output.forces is None
-    assert {exceedance.limit for exceedance in output.exceedances} == {'limits.force_max'}
+    setpoint = _turned(89.99)
+    output = answered(step, setpoint)
+    assert np.isnan(output.forces).all()
+    assert {each.limit for each in step.exceedances(setpoint.motions, output)} == {
+        'limits.force_max'}
 
 
 @pytest.mark.parametrize('setpoint', [
-    QUARTER, FLAT, Setpoint(STAMP, (*(
+    QUARTER, FLAT, Batch.of(STAMP, (*(
         PARAMETERS['geometry.base_joints'][2] - PARAMETERS['geometry.platform_joints'][2]
-    ).tolist(), *UPRIGHT, *REST))], ids=['a quarter turn', 'flat', 'a leg without length'])
-def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Setpoint) -> None:
+    ), *UPRIGHT, *REST))], ids=['a quarter turn', 'flat', 'a leg without length'])
+def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Batch) -> None:
     step = Step(PARAMETERS.replaced({'limits.force_max': 1.0}))
     output = answered(step, setpoint)
-    assert output.condition >= UNSOLVABLE_CONDITION
-    assert output.demanded_forces is None
-    assert output.forces is None
-    assert not output.exceedances
-    assert output.singularity.warning
-    rotation = np.reshape(setpoint.motion[3:12], (3, 3))
-    legs = (setpoint.motion[:3] + PARAMETERS['geometry.platform_joints'] @ rotation.T
+    assert output.conditions[0] >= UNSOLVABLE_CONDITION
+    assert np.isnan(output.demanded_forces).all()
+    assert np.isnan(output.forces).all()
+    assert not step.exceedances(setpoint.motions, output)
+    assert output.warnings[0]
+    rotation = np.reshape(setpoint.motions[0, 3:12], (3, 3))
+    legs = (setpoint.motions[0, :3] + PARAMETERS['geometry.platform_joints'] @ rotation.T
             - PARAMETERS['geometry.base_joints'])
-    assert np.allclose(output.lengths, np.linalg.norm(legs, axis=1), rtol=1e-14)
+    assert np.allclose(output.lengths[0], np.linalg.norm(legs, axis=1), rtol=1e-14)
 
 
 # Numbers that overflow
 
 @pytest.mark.parametrize('setpoint', [
-    Setpoint(STAMP, (1e200, 0.0, 1.0, *UPRIGHT, *REST)),
-    Setpoint(STAMP, (0.0, 0.0, 1e308, *UPRIGHT, *REST)),
-    Setpoint(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 3, *(1e200,) * 3, *(0.0,) * 6)),
-    Setpoint(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 6, *(1e308,) * 6)),
-    HOME._replace(wrench=(1e308,) * 6),
-    HOME._replace(stamp=2 ** 31 * 10 ** 9), HOME._replace(stamp=-2 ** 63)],
+    Batch.of(STAMP, (1e200, 0.0, 1.0, *UPRIGHT, *REST)),
+    Batch.of(STAMP, (0.0, 0.0, 1e308, *UPRIGHT, *REST)),
+    Batch.of(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 3, *(1e200,) * 3, *(0.0,) * 6)),
+    Batch.of(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 6, *(1e308,) * 6)),
+    Batch.of(STAMP, HOME.motions, (1e308,) * 6),
+    Batch.of(2 ** 31 * 10 ** 9, HOME.motions), Batch.of(-2 ** 63, HOME.motions)],
     ids=['far', 'farther', 'turning', 'accelerated', 'loaded', 'after 2038', 'before 1901'])
-def test_a_setpoint_that_overflows_gives_nothing(setpoint: Setpoint) -> None:
-    assert STEP(setpoint, None) is None
-    assert STEP(HOME, None) is not None
+def test_a_setpoint_that_overflows_gives_nothing(setpoint: Batch) -> None:
+    output = STEP(setpoint)
+    assert not output.answered[0]
+    assert [len(part) for part in output[1:-1]] == [0] * 5
+    assert STEP(HOME, output.state).answered[0]
 
 
 sizes = st.floats(allow_nan=False, allow_infinity=False) | st.floats(-3.0, 3.0) | st.sampled_from(
@@ -298,35 +319,24 @@ rotations = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(
 
 def test_a_restart_is_no_crossing() -> None:
     before = Singularity(Cause.CONDITION, True, -0.2, crossings=1)
-    output = STEP(HOME._replace(restart=True), State(before))
-    assert output is not None
-    assert output.singularity.crossings == 1
-    assert not output.singularity.warning
-    assert output.warning_changed
+    output = answered(STEP, HOME.changed(restarts=True), state_of(warning=before, lengths=1.0))
+    assert output.singularity().crossings == 1
+    assert not output.warnings[0]
+    assert output.changed[0]
 
 
 # The base wrench of setpoints: the library's, for one and for many, and finite numbers only
 
 MANY = 50
+STAMPS = np.full(MANY, STAMP)
 
 
-def setpoints_of(batch: Batch) -> list[Setpoint]:
-    bases = [None] * len(batch.stamps) if batch.bases is None else [
-        tuple(row) for row in batch.bases.tolist()]
-    return [Setpoint(STAMP, tuple(motion), tuple(wrench), False, base)
-            for motion, wrench, base in zip(
-                batch.motions.tolist(), batch.wrenches.tolist(), bases, strict=True)]
-
-
-def batch_of(motions: Array, wrenches: Array, bases: Array | None) -> Batch:
-    stamps = np.full(len(motions), STAMP)
-    return Batch(stamps, motions, wrenches, np.zeros(len(motions), dtype=bool), stamps, bases)
-
-
-def assert_alike(found: Array, of_one: BaseWrench, batch: Batch) -> None:
-    """Check that the call for one gives the rows of the call for many, bit for bit."""
-    for row, setpoint in zip(found.tolist(), setpoints_of(batch), strict=True):
-        assert of_one(setpoint) == (None if row[0] != row[0] else tuple(row))
+def base_wrenches(parameters: Parameters, setpoints: Batch) -> Array:
+    """Return base wrenches (N, 6), after a check that those of one are the same bits."""
+    of = BaseWrench(parameters)
+    found = of(setpoints)
+    assert found.tobytes() == b''.join(of(each).tobytes() for each in singles(setpoints))
+    return found
 
 
 @pytest.mark.parametrize('moving', [False, True], ids=['still', 'moving'])
@@ -337,11 +347,10 @@ def test_the_base_wrench_is_the_librarys_bit_for_bit(moving: bool) -> None:
         motion = random_motion(parameters, random, MANY)
         wrenches = random_wrench(parameters, random, MANY)
         base = random_base_motion(parameters, random, MANY) if moving else None
-        batch = batch_of(motion.rows, wrenches, None if base is None else base.rows)
-        found = BaseWrench(parameters).many(batch)
+        found = base_wrenches(parameters, Batch.of(
+            STAMPS, motion.rows, wrenches, bases=None if base is None else base.rows))
         assert np.array_equal(
             found, StewartPlatform(parameters).base_wrench(motion, wrenches, base))
-        assert_alike(found, BaseWrench(parameters), batch)
 
 
 def test_an_unknown_base_and_overflowing_numbers_have_no_base_wrench() -> None:
@@ -350,11 +359,10 @@ def test_an_unknown_base_and_overflowing_numbers_have_no_base_wrench() -> None:
     bases = random_base_motion(PARAMETERS, random, MANY).rows.copy()
     bases[10:20] = NO_BASE
     motions[20:25, 18:21] = 1e308
-    batch = batch_of(motions, random_wrench(PARAMETERS, random, MANY), bases)
-    found = BaseWrench(PARAMETERS).many(batch)
+    found = base_wrenches(PARAMETERS, Batch.of(
+        STAMPS, motions, random_wrench(PARAMETERS, random, MANY), bases=bases))
     assert np.flatnonzero(np.isnan(found).all(axis=1)).tolist() == list(range(10, 25))
     assert np.isnan(found).sum() == 15 * 6
-    assert_alike(found, BaseWrench(PARAMETERS), batch)
 
 
 def weight_of(parameters: Parameters) -> float:
@@ -364,13 +372,11 @@ def weight_of(parameters: Parameters) -> float:
 
 @pytest.mark.parametrize('setpoint', [HOME, QUARTER, FLAT], ids=['home', 'a quarter turn', 'flat'])
 def test_at_rest_it_is_the_weight_also_where_the_forces_cannot_be_solved(
-        setpoint: Setpoint) -> None:
-    found = BaseWrench(PARAMETERS)(setpoint)
-    assert found is not None
+        setpoint: Batch) -> None:
+    found = BaseWrench(PARAMETERS)(setpoint)[0]
     assert relative(found[:3], weight_of(PARAMETERS) * PARAMETERS['gravity']) < 1e-12
     tilted = BaseMotion([0.0, 6.0, -8.0])
-    found = BaseWrench(PARAMETERS)(setpoint._replace(base=tuple(tilted.rows.tolist())))
-    assert found is not None
+    found = BaseWrench(PARAMETERS)(Batch.of(STAMP, setpoint.motions, bases=tilted.rows))[0]
     assert relative(found[:3], weight_of(PARAMETERS) * tilted.gravity) < 1e-12
 
 

@@ -22,21 +22,24 @@ import pytest
 from referees import rng, ROOT, symmetric_parameters
 
 from stewart_dynamics import Parameters
+from stewart_dynamics.core.binding import places
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
-from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT, WRENCH
-from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE, TIME, UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT
+from stewart_dynamics.mechanics.singularity_warning import CAUSE, TIME, UNSOLVABLE_CONDITION
 from stewart_dynamics.replay.residuals import AXES
 from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.replay.summary import Answered, Summary
 from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.reporting.block_statistics import LISTED
 from stewart_dynamics.setpoints.rejections import NOT_JOINED
-from stewart_dynamics.setpoints.step import Batch, Outputs
+from stewart_dynamics.setpoints.step import (
+    Batch, FIRST, OUTPUT, Outputs, PUBLISHED_FORCES, WARNING_STATE)
 from stewart_dynamics.whole_file import to_json
 
 Array = NDArray[np.float64]
 
 SECOND = 1_000_000_000
+RESTART = places('setpoint_output')['restart']
 LIMITS = {
     'limits.length_min': [0.5, 0.6, 0.7, 0.5, 0.6, 0.0],
     'limits.length_max': [1.5, 1.4, 1.3, 1.5, 1.4, 9.0],
@@ -86,19 +89,21 @@ class Samples:
         self.base_unknown = numbers('base_unknown', default=0.0) > 0.0
         assert not given
 
-    def outputs(self) -> Outputs:
-        """Return them as the step gives them."""
+    def outputs(self, parameters: Parameters) -> Outputs:
+        """Return them as the step gives them: angles and clearances only if they have limits."""
         many = len(self.seconds)
-        results = np.concatenate([
+        with_limits = slice(None if parameters['limits.leg_clearance_min'] is not None else 0)
+        rows = np.zeros((many, OUTPUT))
+        rows[:, :RESULT] = np.concatenate([
             self.lengths, self.rates, self.demanded, self.det[:, None],
             np.zeros((many, 1)), self.condition[:, None], self.unit_load, self.joint_forces,
             ], axis=1)
-        assert results.shape == (many, RESULT)
-        states = np.zeros((many, STATE))
+        rows[:, PUBLISHED_FORCES], rows[:, RESTART] = self.forces, self.restarts
+        states = rows[:, WARNING_STATE]
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
-        flags = np.zeros(many, dtype=bool)
-        outputs = Outputs(~flags, self.stamps, results, self.forces, states, flags, flags,
-                          flags, self.joint_angles, self.clearances, np.empty((many, 0)))
+        outputs = Outputs(np.ones(many, dtype=bool), self.stamps, rows,
+                          self.joint_angles[:, with_limits], self.clearances[:, with_limits],
+                          np.empty((many, 0)), FIRST)
         np.testing.assert_array_equal(outputs.warnings, self.warnings)
         np.testing.assert_array_equal(outputs.times_to_crossing, self.time_to_crossing)
         return outputs
@@ -108,27 +113,27 @@ class Samples:
         many = len(self.seconds)
         bases = np.zeros((many, BASE))
         bases[self.base_unknown] = NO_BASE
-        return Batch(self.stamps, np.zeros((many, MOTION)), np.zeros((many, WRENCH)),
-                     self.restarts, self.stamps, bases if self.base_unknown.any() else None)
+        return Batch.of(self.stamps, np.zeros((many, MOTION)), restarts=self.restarts,
+                        bases=bases if self.base_unknown.any() else None)
 
-    def parts(self, edges: Sequence[int] = ()) -> Iterator[Answered]:
+    def parts(self, parameters: Parameters, edges: Sequence[int] = ()) -> Iterator[Answered]:
         """Return them as the replay gives them, in blocks with these edges."""
-        outputs, setpoints = self.outputs(), self.setpoints()
+        outputs, setpoints = self.outputs(parameters), self.setpoints()
         with np.errstate(over='ignore'):
             powers = self.demanded * self.rates
         for first, end in zip([0, *edges], [*edges, len(self.seconds)], strict=True):
             part = slice(first, end)
             yield Answered(
                 self.seconds[part], setpoints.chosen(part),
-                Outputs(*(each[part] for each in outputs)), self.base_wrenches[part],
-                powers[part],
+                Outputs._make((*(each[part] for each in outputs[:-1]), outputs.state)),
+                self.base_wrenches[part], powers[part],
                 None if self.breakdown is None else self.breakdown[part])
 
     def summary(self, parameters: Parameters, edges: Sequence[int] = (),
                 quasi_static: bool = False) -> Summary:
         """Return the summary of them, given to it in parts."""
         summary = Summary(parameters, quasi_static)
-        for part in self.parts(edges):
+        for part in self.parts(parameters, edges):
             summary.add(part)
         return summary
 
@@ -386,7 +391,7 @@ def test_any_split_gives_the_same_and_can_be_read_before_the_end(
     for _ in range(2):
         assert_same(split.values(), whole.values())
     early = Summary(parameters)
-    for part, end in zip(samples.parts(edges), [*edges, many], strict=True):
+    for part, end in zip(samples.parts(parameters, edges), [*edges, many], strict=True):
         early.add(part)
         assert early.values()['setpoints']['answered'] == end
 
@@ -407,7 +412,7 @@ def test_a_long_motion_is_the_same_in_blocks_of_any_size() -> None:
 
 def test_it_keeps_no_samples() -> None:
     samples, parameters = random_samples(1, 2000), hexapod(**LIMITS)
-    outputs, setpoints = samples.outputs(), samples.setpoints()
+    outputs, setpoints = samples.outputs(parameters), samples.setpoints()
     summary = Summary(parameters)
 
     def held_after(blocks: int) -> int:

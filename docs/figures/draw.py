@@ -55,11 +55,10 @@ class Recorded(NamedTuple):
         parameters = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
         setpoints = Setpoints(parameters, lambda rejection, details: None, print)
         with closing(Recording(bag)) as recording:
-            parts = [setpoints.take_many(messages) for messages, _ in recording.messages(
+            parts = [setpoints.take(messages) for messages, _ in recording.messages(
                 {f'{NODE}/{topic}': topic for topic in setpoints.topics})]
-        batch = Batch._make(None if part[0] is None else np.concatenate(part)
-                            for part in zip(*parts, strict=True))
-        outputs = Step(parameters).many(batch, None)
+        batch = Batch.joined(parts)
+        outputs = Step(parameters)(batch)
         return cls(parameters, (batch.stamps - batch.stamps[0]) * 1e-9, batch.motions, outputs)
 
     @property

@@ -194,9 +194,9 @@ class Function:
 
     def bound(self, *first: Any) -> Callable[..., Any]:
         """
-        Return a function that calls it with these arguments, which stay where they are, and others.
+        Return a function that calls it with these arguments, which stay where they are, and more.
 
-        Without others, for single samples, a call takes a tenth of the time, and other threads
+        Without more, for single samples, a call takes a tenth of the time, and other threads
         wait for it.
         """
         passed = [each(value) for each, value in zip(self._passed, first, strict=False)]
@@ -209,7 +209,7 @@ class Function:
         return cast('Callable[..., Any]', call)
 
 
-class Single:
+class BatchOfOne:
     """
     A function for a batch of one: arguments are copied to and from memory that it knows.
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, SECOND, Stamps
-from stewart_dynamics.core.binding import function, Single
+from stewart_dynamics.core.binding import BatchOfOne, function
 from stewart_dynamics.messages.cdr import ORDERS
 
 
@@ -155,7 +155,7 @@ class SideBySide:
         self._write = function('write_messages').bound(*constants)
         stamp, row = np.zeros(1, np.int64), np.zeros((1, width))
         one = np.empty((1, len(message)), np.uint8)
-        self._write_one = Single(
+        self._write_one = BatchOfOne(
             'write_messages', (*constants, 1, stamp, row, one), (stamp, row), (one,))
 
     def write(self, stamps: Stamps, rows: Array) -> Iterator[NDArray[np.void]]:

@@ -15,8 +15,8 @@ from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
-    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
-    POSITION, ROTATION, WRENCH)
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE, POSITION,
+    ROTATION)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
@@ -130,7 +130,7 @@ class Differentiator:
         self._pending.append(batch)
         self._held += len(batch.stamps)
         # not at every batch: joining the pending ones takes time
-        return self._done() if self._held >= self._due else _joined([])
+        return self._done() if self._held >= self._due else Batch.joined([])
 
     def finish(self) -> Batch:
         """Return the remaining setpoints, with their motion, after the last batch."""
@@ -167,7 +167,7 @@ class Differentiator:
 
     def _done(self, ended: bool = False) -> Batch:
         """Process every window for which all poses are there."""
-        held = _joined(self._pending)
+        held = Batch.joined(self._pending)
         stamps = held.stamps
         steps = np.diff(stamps)
         if not self._step and len(steps):
@@ -184,7 +184,7 @@ class Differentiator:
                 self._given = 0
             else:
                 self._keep(segment)
-        return _joined(done)
+        return Batch.joined(done)
 
     def _windows(self, segment: Batch, closed: bool) -> list[Batch]:
         """Process a segment as far as possible; a closed one to its end."""
@@ -313,12 +313,3 @@ def _rounded_down(value: float) -> float:
 def _vector_of_quotient(a: Array, b: Array) -> Array:
     """Return the vector part of a times the conjugate of b, of quaternions x y z w (N, 4)."""
     return (b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3]))
-
-
-def _joined(batches: list[Batch]) -> Batch:
-    if len(batches) == 1:
-        return batches[0]
-    if not batches:
-        return Batch.of([], np.empty((0, MOTION)))
-    stamps, rows, times, moving = zip(*batches, strict=True)
-    return Batch(np.concatenate(stamps), np.concatenate(rows), np.concatenate(times), moving[0])

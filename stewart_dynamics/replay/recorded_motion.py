@@ -66,24 +66,21 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         if splines is not None:
             batches.append(splines.finish())
         missing = list(recording.missing)
-    batches = [each for each in batches if len(each.stamps)]
-    if not batches:
+    recorded = Batch.joined([each for each in batches if len(each.stamps)])
+    if not len(recorded.stamps):
         why = ''.join(f'; {each.topic}: {each.reason}' for each in setpoints.counts)
         why += '' if splines is None else ''.join(f'; {reason}' for reason in splines.left_out)
         raise BagError(f'{bag}: has no valid setpoint{why}')
-    stamps = np.concatenate([each.stamps for each in batches])
-    rows = np.concatenate([each.motions for each in batches])
-    wrenches = np.concatenate([each.wrenches for each in batches])
-    bases = None if batches[0].bases is None else np.concatenate(
-        [np.asarray(each.bases) for each in batches])
-    if bases is not None:
-        known = np.isfinite(bases).all(axis=1)
+    if recorded.bases is not None:
+        known = np.isfinite(recorded.bases).all(axis=1)
         if not known.any():
             raise BagError(f"{bag}: the base's motion is not known at any setpoint")
-        stamps, rows, wrenches, bases = (each[known] for each in (stamps, rows, wrenches, bases))
+        recorded = recorded.chosen(known)
+    stamps, bases = recorded.stamps, recorded.bases
     steps = np.maximum(np.diff(stamps, prepend=stamps[0]), 0)  # a bag that loops
-    return RecordedMotion(np.cumsum(steps) * NANOSECOND, Motion.of_rows(rows), wrenches,
-                          None if bases is None else BaseMotion.of_rows(bases), missing,
+    return RecordedMotion(np.cumsum(steps) * NANOSECOND, Motion.of_rows(recorded.motions.copy()),
+                          recorded.wrenches.copy(),
+                          None if bases is None else BaseMotion.of_rows(bases.copy()), missing,
                           sum(setpoints.counts.values())
                           + (0 if splines is None else splines.left_out.total()),
                           tuple(each.words for each in setpoints.mistakes(ever=True)), stamps)

@@ -126,6 +126,7 @@ class Setpoints:
             self.recorded = time
             yield topic, data, partial(int, time)
             self.judge()
+        self.recorded = None
 
     def _take_each(self, messages: Iterable[Message]) -> Batch:
         """Join messages one by one."""
@@ -145,7 +146,7 @@ class Setpoints:
                     self.base.restarted(stamp)
                 if self._consistency is not None:
                     self._consistency.noted.append((stamp, motion, restart))
-                base = self.base.at(stamp)
+                base = self.base.at(stamp) if self.base.topics else None
                 stamps.append(stamp)
                 rows.append((*motion, *self._wrench_input.wrench, *(base or NO_BASE),
                              base is None or base[0] == base[0], restart, stamped))

@@ -10,6 +10,7 @@ for the next. A single setpoint is a batch of one; results are bit-identical, wh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from typing import Any, NamedTuple
 
@@ -17,15 +18,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Stamps
-from stewart_dynamics.core.binding import function, places, Single
+from stewart_dynamics.core.binding import BatchOfOne, function, places
 from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, Exceedance, JUMP, result_values)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_ANGLES, JOINT_FORCES, LENGTHS, NO_BASE,
-    RATES, RESULT, UNIT_LOAD_FORCES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_ANGLES, JOINT_FORCES, LENGTHS, MOTION,
+    NO_BASE, RATES, RESULT, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, Singularity, TIME
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
@@ -41,9 +42,10 @@ _SETPOINT, _OUTPUT, _STATE = (
 _MOTION, _LOAD, _BASE, _BASE_KNOWN, _RESTART, _STAMPED = (_SETPOINT[name] for name in (
     'motion', 'wrench', 'base', 'base_known', 'restart', 'stamped'))
 SETPOINT = 1 + _STAMPED
-POSITIONS, PUBLISHED_FORCES, WARNING_STATE, _MEAN_RATES, _ANSWERED, _RESTARTED, _CHANGED, _EXCEEDING, _JUMPED = (
-    _OUTPUT[name] for name in ('positions', 'forces', 'warning', 'mean_rates', 'answered',
-                               'restart', 'changed', 'exceeding', 'jumped'))
+POSITIONS, PUBLISHED_FORCES, WARNING_STATE, _MEAN_RATES = (
+    _OUTPUT[name] for name in ('positions', 'forces', 'warning', 'mean_rates'))
+_ANSWERED, _RESTARTED, _CHANGED, _EXCEEDING, _JUMPED = (
+    _OUTPUT[name] for name in ('answered', 'restart', 'changed', 'exceeding', 'jumped'))
 OUTPUT = 1 + _JUMPED
 
 FIRST: Array = np.zeros(1 + _STATE['restarting'])
@@ -83,6 +85,16 @@ class Batch(NamedTuple):
         return cls(at, rows, at if times is None else np.atleast_1d(np.asarray(times)),
                    bases is not None)
 
+    @classmethod
+    def joined(cls, batches: Sequence[Batch]) -> Batch:
+        """Return batches as one."""
+        if len(batches) == 1:
+            return batches[0]
+        if not batches:
+            return cls.of([], np.empty((0, MOTION)))
+        stamps, rows, times, moving = zip(*batches, strict=True)
+        return cls(np.concatenate(stamps), np.concatenate(rows), np.concatenate(times), moving[0])
+
     @property
     def motions(self) -> Array:
         """Rows of motion (N, MOTION), laid out as for ``inverse_dynamics``."""
@@ -114,11 +126,12 @@ class Batch(NamedTuple):
         return self.rows[:, _STAMPED] > 0.0
 
     def chosen(self, which: Any) -> Batch:
-        """Return selected setpoints: by a slice, an index or a mask (N,)."""
+        """Return selected setpoints: by a slice, indices or a mask (N,)."""
         return self._replace(stamps=self.stamps[which], rows=self.rows[which],
                              times=self.times[which])
 
-    def changed(self, motions: ArrayLike | None = None, restarts: ArrayLike | None = None) -> Batch:
+    def changed(
+            self, motions: ArrayLike | None = None, restarts: ArrayLike | None = None) -> Batch:
         """Return the same setpoints with other motions (N, MOTION), or restarts (N,)."""
         rows = self.rows.copy()
         if motions is not None:
@@ -274,7 +287,7 @@ class Step:
         stamps, given, state = np.zeros(1, dtype=np.int64), np.zeros((1, SETPOINT)), FIRST.copy()
         angles, clearances, motors = (np.empty((1, width)) for width in self._widths)
         rows = np.empty((1, OUTPUT))
-        self._check_one = Single(
+        self._check_one = BatchOfOne(
             'check_setpoints',
             (*constants, 0, 1, stamps, given, angles, clearances, state, rows, motors),
             (stamps, given, state), (rows, angles, clearances, motors, state))

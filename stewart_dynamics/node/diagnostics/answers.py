@@ -4,8 +4,9 @@
 """
 The statuses of answers: ``timing``, ``singularity`` and ``limits``.
 
-Outputs are those of one setpoint. Processing times and setpoints dropped for lack of time; distance from a singularity, cause of the
-warning and crossings; for each kind of limit a state, a line and a peak of its own.
+Processing times and setpoints dropped for lack of time; distance from a singularity, cause of the
+warning and crossings; for each kind of limit a state, a line and a peak of its own. Outputs are
+those of a single setpoint.
 """
 
 from __future__ import annotations
@@ -119,8 +120,8 @@ def singularity_state(row: Sequence[float], parameters: Parameters) -> Level:
         is_suppressed = not math.isnan(row[FORCES.start]) and (
             parameters.singularity.action == SUPPRESS_FORCES)
         suppressed = ': forces suppressed' if is_suppressed else ''
-        return Level(ERROR, f'inside stop_condition{suppressed}: '
-                     + _condition(condition, 'stop_condition', parameters.singularity.stop_condition))
+        return Level(ERROR, f'inside stop_condition{suppressed}: ' + _condition(
+            condition, 'stop_condition', parameters.singularity.stop_condition))
     if not state.warning:
         return OK_LEVEL
     if state.cause is Cause.CROSSED:
