@@ -503,6 +503,18 @@ def test_a_bag_that_loops_is_followed_with_a_notice(
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 100
 
 
+def test_a_restart_that_cannot_be_answered_is_that_of_the_next_setpoint(tmp_path: Path) -> None:
+    day, of = 86400 * SECOND, []
+    for n, (stamp, x) in enumerate([(day, 0.0), (MS, 1e200), (2 * MS, 0.0)]):
+        when = RECORDED + n * MS
+        of += [('setpoint/pose', when, messages.pose(stamp, (x, 0.0, 1.1))),
+               ('setpoint/twist', when, messages.twist(stamp)),
+               ('setpoint/accel', when, messages.accel(stamp))]
+    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
+    found = summary_of(tmp_path / 'out' / 'bag')['setpoints']
+    assert (found['answered'], found['restarts']) == (2, 1)
+
+
 def test_another_name_of_the_node(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/hexapod')
     assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE

@@ -173,6 +173,7 @@ class Summary:
         self._condition.add(seconds, outputs.conditions[:, None])
         self._time_to_crossing.add(seconds, outputs.times_to_crossing[:, None])
         self._unit_load_force.add(seconds, outputs.unit_load_forces)
+        self._restarts += int(outputs.restarts.sum())
         self._crossings.add(seconds, outputs.determinants, outputs.restarts)
         self._warnings.add(seconds, steps, outputs.warnings)
         if breakdown is not None:
@@ -193,7 +194,6 @@ class Summary:
         steps[gaps] = 0.0
         self._seconds = float(seconds[-1])
         self._answered += len(seconds)
-        self._restarts += int(setpoints.restarts.sum())
         first = self._stamps[0] if self._stamps else int(setpoints.stamps[0])
         self._stamps = first, int(setpoints.stamps[-1])
         return steps

@@ -46,7 +46,7 @@ Written = tuple[str, Flags, NDArray[np.void]]
 
 class OutputMessages:
     """
-    Writes the output messages.
+    Writes the output messages; not thread-safe, as the step.
 
     types: topics that the hexapod has, and their types.
     """

@@ -267,7 +267,8 @@ class Step:
     """
     The step for a hexapod with given parameters.
 
-    parameters: constant for all calls; create another step for other parameters.
+    parameters: constant for all calls; create another step for other parameters. Not thread-safe:
+        calls for a batch of one share memory.
     """
 
     def __init__(self, parameters: Parameters) -> None:
