@@ -22,7 +22,7 @@ from referees import (
     symmetric_parameters)
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.core import binding
-from stewart_dynamics.core.binding import CODES, function, places, record
+from stewart_dynamics.core.binding import CODES, Function, function, places, record
 from stewart_dynamics.mechanics.rows import BASE, MOTION, POSE, RESULT, TWIST
 
 CORE = ROOT / 'stewart_dynamics' / 'core'
@@ -37,6 +37,12 @@ def hexapods() -> list[Parameters]:
     return [random, random.replaced({
         'actuator.screw_lead': 0.02, 'drive.gear_ratio': 1.5,
         'drive.screw_rotation': 'universal'}), symmetric_parameters()]
+
+
+class LaneRows(ctypes.Structure):
+    """``lane_rows`` of lanes.h."""
+
+    _fields_ = [('first', ctypes.c_void_p), ('stride', ctypes.c_int64)]
 
 
 def samples(parameters: Parameters, count: int) -> tuple[Any, Any, Any]:
@@ -68,10 +74,10 @@ def test_samples_side_by_side_have_the_bits_of_each_alone(kind: str, hexapod: in
                 row[of['motion']], row[of['base']] = motions[n], moving[n % len(moving)]
                 function('solve_one')(structure, sample)
                 alone[n] = row[of['result']]
-            pointers = [ctypes.c_void_p(each.ctypes.data) for each in (
-                structure, motions, loads, moving, found)]
-            many(pointers[0], ctypes.c_int64(count), pointers[1], ctypes.c_int64(len(loads)),
-                 pointers[2], ctypes.c_int64(len(moving)), pointers[3], 1, pointers[4])
+            many(ctypes.c_void_p(structure.ctypes.data), ctypes.c_int64(count),
+                 *(LaneRows(each.ctypes.data, 0 if len(each) == 1 else each.shape[1])
+                   for each in (motions, loads, moving)),
+                 1, ctypes.c_void_p(found.ctypes.data), ctypes.c_int64(RESULT))
             assert np.array_equal(found, alone, equal_nan=True)
 
 
@@ -92,7 +98,7 @@ def test_structures_are_laid_out_as_the_compiler_lays_them_out(tmp_path: Path) -
     text = (CORE / 'stewart_dynamics.h').read_text() + (CORE / 'library.h').read_text()
     names = re.findall(r'^\}? ?.*\} (\w+);$|^  (\w+);$', text, re.MULTILINE)
     listed = [a or b for a, b in names if re.search(rf'\b{a or b};', text)]
-    assert {'stewart_platform', 'one_setpoint', 'one_plant', 'leg_drives'} <= set(listed)
+    assert {'stewart_platform', 'setpoint_output', 'one_plant', 'leg_drives'} <= set(listed)
     lines, expected = [], []
     for name in listed:
         fields: Any = record(name).fields
@@ -137,7 +143,7 @@ def test_a_library_that_is_not_built_is_one_line(
     binding._library.cache_clear()
     try:
         with pytest.raises(ImportError, match=r'library\.so: .*not built for this system: ins'):
-            function('processor_kind')()
+            Function('processor_kind')()
     finally:
         binding._library.cache_clear()
 

@@ -7,7 +7,7 @@
  * processors, with a SUFFIX and the number of LANES of each; library.c selects one.
  */
 
-#include "library.h"
+#include "lanes.h"
 
 #include <math.h>
 
@@ -81,9 +81,6 @@ typedef struct {
 
 #if LANES == 2
 
-double condition_of_pair(double a[6][6], double inverse[6][6]);
-
-/* Return condition_of of one sample: the matrix in one lane, its inverse in the other. */
 double condition_of_pair(double a[6][6], double inverse[6][6]) {
   real both[6][6], trace;
   for (int i = 0; i < 6; i++) {
@@ -103,11 +100,6 @@ double condition_of_pair(double a[6][6], double inverse[6][6]) {
 
 #define JOINED(a, b) a ## b
 #define NAMED(a, b) JOINED(a, b)
-
-/* See solve_many in library.h. */
-void NAMED(solve_lanes_, SUFFIX)(
-  const stewart_platform * platform, int64_t count, lane_rows of_motions, lane_rows of_wrenches,
-  lane_rows of_bases, int conditioned, double * result_rows, int64_t result_stride);
 
 /* Write rows, from the first one on, to lanes; lanes behind the last row have its numbers. */
 static void spread(real * to, int width, lane_rows rows, int64_t first, int64_t count) {

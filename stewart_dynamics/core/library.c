@@ -5,9 +5,9 @@
  * functions for one leg, one platform, one matrix. Each file has a part of them.
  */
 
-/* In lanes.c; a tenth faster. */
-double condition_of_pair(double a[6][6], double inverse[6][6]);
-#define CONDITION_OF condition_of_pair
+#include "lanes.h"
+
+#define CONDITION_OF condition_of_pair  /* a tenth faster */
 
 #include "stewart_dynamics.c"
 
@@ -19,15 +19,6 @@ double condition_of_pair(double a[6][6], double inverse[6][6]);
 
 /* A function into which all that it calls is inlined: twice as fast. */
 #define FLAT __attribute__((flatten))
-
-typedef void lanes_function(
-  const stewart_platform * platform, int64_t count, lane_rows motions, lane_rows wrenches,
-  lane_rows bases, int conditioned, double * results, int64_t result_stride);
-
-lanes_function solve_lanes_baseline;
-#if defined(__x86_64__) || defined(_M_X64)
-lanes_function solve_lanes_avx2, solve_lanes_avx512;
-#endif
 
 int64_t processor_kind(void) {
 #if defined(__x86_64__) || defined(_M_X64)

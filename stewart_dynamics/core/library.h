@@ -14,9 +14,6 @@
 
 #include "stewart_dynamics.h"
 
-/* The first row of numbers for many samples, and the distance to the next; 0: one row for all. */
-typedef struct { const double * first; int64_t stride; } lane_rows;
-
 /* The singularity warning after a sample: stewart_state as numbers. */
 typedef struct {
   double cause, stopped, determinant, time_to_crossing, crossings;
