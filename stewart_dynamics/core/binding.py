@@ -11,7 +11,7 @@ by their addresses, after a check of their types; their sizes are the caller's c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 import ctypes
 from functools import cache, cached_property, partial
 from operator import itemgetter
@@ -207,29 +207,6 @@ class Function:
         call: Any = partial(_call, native, passed, rest) if rest else partial(native, *passed)
         call.arrays = first  # their memory must live as long as the call
         return cast('Callable[..., Any]', call)
-
-
-class BatchOfOne:
-    """
-    A function for a batch of one: arguments are copied to and from memory that it knows.
-
-    That takes a third of the time of a call with other arrays. Not thread-safe.
-
-    arguments: all of the function.
-    given, found: arrays among them that a call takes, and of which it returns copies.
-    """
-
-    def __init__(self, name: str, arguments: Sequence[Any], given: Sequence[Any],
-                 found: Sequence[Any]) -> None:
-        self._call = function(name).bound(*arguments)
-        self._given, self._found = given, found
-
-    def __call__(self, *given: Any) -> list[Any]:
-        """Return copies of the arrays that are found."""
-        for memory, values in zip(self._given, given, strict=True):
-            memory[:] = values
-        self._call()
-        return [each.copy() for each in self._found]
 
 
 def _call(native: Any, passed: list[Any], rest: list[Callable[[Any], Any]], *others: Any) -> Any:

@@ -245,13 +245,21 @@ int64_t check_setpoints(
   double * joint_angles, double * clearances, step_state * state, setpoint_output * outputs,
   checked_motors * motors);
 
-/* Messages (count, size) of one layout: copies of one, with stamps (count,) [ns] at some places and
-   numbers of rows (count, width) at others. A part has the place in the message, the first column,
-   and how many numbers; with none the byte there says whether the column is above zero. */
+/* A part of a message: its place, the first column of a row, and how many numbers; with none the
+   byte there says whether the column is above zero. */
+typedef struct { int64_t at, column, count; } message_part;
+
+/* A message is for rows where a column is not nan, another is nan, another is above zero; -1: any. */
+typedef struct { int64_t known, unknown, positive; } message_condition;
+
+/* Messages (count, size), all kinds side by side: copies of one row of them, with stamps (count,)
+   [ns] at some places and numbers of rows (count, width) at others; which kinds (count, n_kinds) a
+   row has, and the numbers (n_kinds,) of messages. */
 void write_messages(
   int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
-  int64_t n_parts, const int64_t * parts, int64_t width, int64_t count, const int64_t * stamps,
-  const double * rows, uint8_t * messages);
+  int64_t n_parts, const message_part * parts, int64_t n_kinds,
+  const message_condition * conditions, int64_t width, int64_t count, const int64_t * stamps,
+  const double * rows, uint8_t * messages, uint8_t * having, int64_t * numbers);
 
 /* Leg lengths (count, 6) of poses [m]. */
 void lengths_many(

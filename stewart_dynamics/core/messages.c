@@ -12,19 +12,32 @@ static void put_stamp(int64_t stamp, uint8_t * to) {
   memcpy(to + sizeof seconds, &nanoseconds, sizeof nanoseconds);
 }
 
+static int meets(const message_condition * condition, const double * row) {
+  return (condition->known < 0 || !isnan(row[condition->known])) &&
+    (condition->unknown < 0 || isnan(row[condition->unknown])) &&
+    (condition->positive < 0 || row[condition->positive] > 0.0);
+}
+
 void write_messages(
   int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
-  int64_t n_parts, const int64_t * parts, int64_t width, int64_t count, const int64_t * stamps,
-  const double * rows, uint8_t * messages) {
-  for (int64_t k = 0; k < count; k++, messages += size, rows += width) {
+  int64_t n_parts, const message_part * parts, int64_t n_kinds,
+  const message_condition * conditions, int64_t width, int64_t count, const int64_t * stamps,
+  const double * rows, uint8_t * messages, uint8_t * having, int64_t * numbers) {
+  for (int64_t n = 0; n < n_kinds; n++) {numbers[n] = 0;}
+  for (int64_t k = 0; k < count; k++, messages += size, rows += width, having += n_kinds) {
     memcpy(messages, message, (size_t)size);
     for (int64_t n = 0; n < n_stamps; n++) {put_stamp(stamps[k], messages + stamp_places[n]);}
-    for (const int64_t * part = parts; part < parts + 3 * n_parts; part += 3) {
-      if (part[2] == 0) {
-        messages[part[0]] = rows[part[1]] > 0.0;
+    for (const message_part * part = parts; part < parts + n_parts; part++) {
+      const double * from = rows + part->column;
+      if (part->count == 0) {
+        messages[part->at] = *from > 0.0;
       } else {
-        memcpy(messages + part[0], rows + part[1], (size_t)part[2] * sizeof(double));
+        memcpy(messages + part->at, from, (size_t)part->count * sizeof(double));
       }
+    }
+    for (int64_t n = 0; n < n_kinds; n++) {
+      having[n] = (uint8_t)meets(&conditions[n], rows);
+      numbers[n] += having[n];
     }
   }
 }

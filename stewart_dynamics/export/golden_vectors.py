@@ -127,7 +127,7 @@ def _results(outputs: Outputs, exceedances: Sequence[Exceedance]) -> list[float]
     """Return the columns from CODE to WARNING of one setpoint's outputs."""
     forces = outputs.forces[0]
     code = SINGULAR if outputs.conditions[0] >= UNSOLVABLE_CONDITION else (
-        SUPPRESSED if math.isnan(forces[0]) else OK)
+        OK if outputs.with_forces[0] else SUPPRESSED)
     exceeded = [sum(LIMITS[each.limit].bit for each in exceedances
                     if each.leg == leg) for leg in range(6)]
     state = outputs.singularity()

@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from operator import itemgetter
 from struct import Struct
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, SECOND, Stamps
-from stewart_dynamics.core.binding import BatchOfOne, function
+from stewart_dynamics.core.binding import function, record
 from stewart_dynamics.messages.cdr import ORDERS
 
 
@@ -133,41 +133,75 @@ class Layout:
         return messages
 
 
+class Written(NamedTuple):
+    """Messages of a topic that are written from a row of numbers, for rows that have it."""
+
+    topic: str
+    layout: Layout
+    columns: Sequence[slice]  # of the row, for each part of the layout
+    known: int = -1  # the message is for rows where this column is not nan,
+    unknown: int = -1  # this one is nan,
+    positive: int = -1  # this one is above zero; -1: any row
+
+
 class SideBySide:
     """
-    Messages of several layouts, side by side, with a stamp and the numbers of one row.
+    Messages of some topics, side by side, with a stamp and numbers of one row. Not thread-safe.
 
-    layouts: the layouts, each with the columns of the row for each of its parts.
+    kinds: what is written.
     width: numbers in a row.
     """
 
-    def __init__(self, layouts: Sequence[tuple[Layout, Sequence[slice]]], width: int) -> None:
+    def __init__(self, kinds: Sequence[Written], width: int) -> None:
         stamps, parts, message = [], [], b''
-        for layout, columns in layouts:
-            stamps += [len(message) + at for at in layout.stamps]
+        for kind in kinds:
+            stamps += [len(message) + at for at in kind.layout.stamps]
             parts += [(len(message) + at, column.start, count) for (at, count), column in zip(
-                layout.numbers, columns, strict=True)]
-            message += layout.message
+                kind.layout.numbers, kind.columns, strict=True)]
+            message += kind.layout.message
+        self._topics = [kind.topic for kind in kinds]
         self._entries = np.dtype([
-            (str(n), f'V{layout.size}') for n, (layout, _) in enumerate(layouts)])
-        constants = (len(message), np.frombuffer(message, np.uint8), len(stamps), np.array(
-            stamps, np.int64), len(parts), np.array(parts, np.int64), width)
+            (str(n), f'V{kind.layout.size}') for n, kind in enumerate(kinds)])
+        constants = (
+            len(message), np.frombuffer(message, np.uint8),
+            len(stamps), np.array(stamps, np.int64),
+            len(parts), np.array(parts, record('message_part')), len(kinds),
+            np.array([kind[3:] for kind in kinds], record('message_condition')), width)
         self._write = function('write_messages').bound(*constants)
-        stamp, row = np.zeros(1, np.int64), np.zeros((1, width))
-        one = np.empty((1, len(message)), np.uint8)
-        self._write_one = BatchOfOne(
-            'write_messages', (*constants, 1, stamp, row, one), (stamp, row), (one,))
+        # A single row is copied to memory that stays: a third of the time of a call with any.
+        self._stamp, self._row = np.zeros(1, np.int64), np.zeros((1, width))
+        memory, self._numbers, self._of_one = self._memory(1)
+        self._write_one = function('write_messages').bound(
+            *constants, 1, self._stamp, self._row, *memory)
 
-    def write(self, stamps: Stamps, rows: Array) -> Iterator[NDArray[np.void]]:
-        """Yield the messages (N,) of each layout, of stamps (N,) [ns] and rows (N, width)."""
+    def _memory(self, number: int) -> tuple[
+            Sequence[NDArray[Any]], Integers, list[tuple[str, Flags, NDArray[np.void]]]]:
+        """Return what the function in C writes: all, the numbers of messages, each topic."""
+        kinds = len(self._topics)
+        messages, having, numbers = (
+            np.empty((number, self._entries.itemsize), np.uint8),
+            np.empty((number, kinds), bool), np.empty(kinds, np.int64))
+        entries = messages.view(self._entries)[:, 0]
+        return (messages, having, numbers), numbers, [
+            (topic, having[:, n], entries[str(n)]) for n, topic in enumerate(self._topics)]
+
+    def write(self, stamps: Stamps, rows: Array) -> Iterator[
+            tuple[str, Flags, NDArray[np.void]]]:
+        """
+        Yield the topics that have a message, which rows have it (N,), and the messages (N,).
+
+        stamps (N,) [ns], rows (N, width). Those of a single row are valid until the next call.
+        """
         if len(stamps) == 1:
-            written, = self._write_one(stamps, rows)
+            numbers, found = self._numbers, self._of_one
+            self._stamp[:], self._row[:] = stamps, rows
+            self._write_one()
         else:
-            written = np.empty((len(stamps), self._entries.itemsize), np.uint8)
-            self._write(len(stamps), stamps, np.ascontiguousarray(rows), written)
-        entries = written.view(self._entries)[:, 0]
-        for name in self._entries.names or ():
-            yield entries[name]
+            memory, numbers, found = self._memory(len(stamps))
+            self._write(len(stamps), stamps, np.ascontiguousarray(rows), *memory)
+        for number, each in zip(numbers.tolist(), found, strict=True):
+            if number:
+                yield each
 
 
 def at_any_byte(data: Bytes, size: int) -> NDArray[np.void]:

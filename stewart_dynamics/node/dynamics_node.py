@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 import math
 import time
@@ -21,6 +21,7 @@ from stewart_dynamics.external_wrench.estimate import (
     EXTERNAL_WRENCH, ExternalWrench, Target)
 from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs)
+from stewart_dynamics.mechanics.rows import DETERMINANT
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.diagnostics.levels import LogLine, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics, TICK
@@ -39,10 +40,10 @@ from stewart_dynamics.ros.signal_flag import SIGNALS
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH, BaseWrench
 from stewart_dynamics.setpoints.input_messages import WRENCH
 from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.output_messages import OutputMessages, Written
+from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_EXCLUSIVE, OUT_OF_RANGE, Rejection, stamp_words)
-from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, EXCEEDING, FIRST, Outputs, Step
 
 
 # If more setpoints wait, the node has fallen behind, and only the newest is answered.
@@ -181,28 +182,28 @@ class DynamicsNode(ManagedNode[Parameters]):
         if not len(outputs.stamps):
             self._setpoints.reject('setpoint', OUT_OF_RANGE, stamp_words(int(setpoint.stamps[0])))
             return
-        self._publish(self._messages.of(outputs))
+        publishers = self._topics.publishers
+        for topic, _, messages in self._messages.of(outputs):
+            publishers[topic].publish(messages.tobytes())
         if self._base_wrench_read:
-            self._publish([self._messages.of_base_wrenches(
-                outputs.stamps, self._models.base_wrench(setpoint))])
+            topic, known, messages = self._messages.of_base_wrenches(
+                outputs.stamps, self._models.base_wrench(setpoint))
+            if known[0]:
+                publishers[topic].publish(messages.tobytes())
         self._note(setpoint, outputs, came)
-
-    def _publish(self, written: Iterable[Written]) -> None:
-        for topic, having, messages in written:
-            if having[0]:
-                self._topics.publishers[topic].publish(messages.tobytes())
 
     def _note(self, setpoint: Batch, outputs: Outputs, came: float) -> None:
         """Pass the answer to other publishers and diagnostics."""
-        motion = setpoint.motions[0].tolist()
-        self._target = Target(motion, float(outputs.determinants[0]))
-        exceedances = self._models.step.exceedances(setpoint.motions, outputs)
+        motion, row = setpoint.motions[0].tolist(), outputs.rows[0]
+        self._target = Target(motion, float(row[DETERMINANT]))
+        exceedances = self._models.step.exceedances(
+            setpoint.motions, outputs) if row[EXCEEDING] else ()
         self._markers.note(motion, outputs, exceedances)
         self._travel.note(motion)
         if not self._model_measured:
             self._moved(int(outputs.stamps[0]), motion)
         now = time.monotonic()
-        if not setpoint.base_known[0]:
+        if setpoint.moving and not setpoint.base_known[0]:
             self._diagnostics.base.unknown(now)
         if not self._diagnostics.answers.number:
             self._diagnostics.begins(motion, self._target.determinant)

@@ -14,14 +14,14 @@ from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.mechanics import rows
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import JointStateWriter
-from stewart_dynamics.messages.layout import SideBySide
+from stewart_dynamics.messages.layout import SideBySide, Written
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.messages.standard import BOOLEAN, FLOAT64, FLOAT64_ARRAY
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.motor_row import ANGLES, MOTOR_ROW, SOUND, SPEEDS, TORQUES
 from stewart_dynamics.setpoints.step import (
-    OUTPUT, Outputs, POSITIONS, PUBLISHED_FORCES, WARNING_STATE)
+    CHANGED, OUTPUT, Outputs, POSITIONS, PUBLISHED_FORCES, WARNING_STATE)
 
 LEG_STATES, LEG_LENGTHS, LEG_FORCES = 'leg_states', 'leg_lengths', 'leg_forces'
 DETERMINANT, WARNING = 'jacobian_determinant', 'singularity_warning'
@@ -40,8 +40,6 @@ MOTOR_TYPES = {
     MOTOR_STATES: type_names.JOINT_STATE,
     MOTOR_TORQUES: type_names.FLOAT64_MULTI_ARRAY,
 }
-Written = tuple[str, Flags, NDArray[np.void]]
-"""A topic, which of N outputs have a message on it, and the messages (N,), all of one size."""
 
 
 class OutputMessages:
@@ -52,44 +50,44 @@ class OutputMessages:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        leg_states = JointStateWriter(parameters.joints)
-        self._of_rows = SideBySide([
-            (leg_states.layout(True), [POSITIONS, rows.RATES, PUBLISHED_FORCES]),
-            (leg_states.layout(False), [POSITIONS, rows.RATES]),
-            (FLOAT64_ARRAY, [rows.LENGTHS]), (FLOAT64_ARRAY, [PUBLISHED_FORCES]),
-            (FLOAT64, [slice(rows.DETERMINANT, rows.CONDITION)]), (BOOLEAN, [WARNING_STATE]),
-        ], OUTPUT)
-        motor_states = motor_states_writer(parameters)
-        self._of_motors = None if motor_states is None else SideBySide([
-            (motor_states.layout(True), [ANGLES, SPEEDS, TORQUES]),
-            (motor_states.layout(False), [ANGLES, SPEEDS]), (FLOAT64_ARRAY, [TORQUES]),
-        ], MOTOR_ROW)
+        states = JointStateWriter(parameters.joints)
+        force, moving = PUBLISHED_FORCES.start, [POSITIONS, rows.RATES]
+        self._of_legs = SideBySide([
+            Written(LEG_STATES, states.layout(True), [*moving, PUBLISHED_FORCES], known=force),
+            Written(LEG_STATES, states.layout(False), moving, unknown=force),
+            Written(LEG_LENGTHS, FLOAT64_ARRAY, [rows.LENGTHS]),
+            Written(LEG_FORCES, FLOAT64_ARRAY, [PUBLISHED_FORCES], known=force),
+            Written(DETERMINANT, FLOAT64, [slice(rows.DETERMINANT, rows.CONDITION)]),
+            Written(WARNING, BOOLEAN, [WARNING_STATE], positive=CHANGED)], OUTPUT)
+        self._of_motors: SideBySide | None = None
+        if (motors := motor_states_writer(parameters)) is not None:
+            torque, turning = TORQUES.start, [ANGLES, SPEEDS]
+            self._of_motors = SideBySide([
+                Written(MOTOR_STATES, motors.layout(True), [*turning, TORQUES], known=torque,
+                        positive=SOUND),
+                Written(MOTOR_STATES, motors.layout(False), turning, unknown=torque,
+                        positive=SOUND),
+                Written(MOTOR_TORQUES, FLOAT64_ARRAY, [TORQUES], known=torque, positive=SOUND),
+            ], MOTOR_ROW)
         self.types = OUTPUT_TYPES | (MOTOR_TYPES if self._of_motors else {})
         self._wrench = StampedWriter(parameters.base_frame, 6)
 
-    def of(self, outputs: Outputs) -> Iterator[Written]:
-        """Yield the messages for outputs, in the order in which they are published for one."""
-        messages, known = self._of_rows.write(outputs.stamps, outputs.rows), outputs.with_forces
-        yield LEG_STATES, known, next(messages)
-        yield LEG_STATES, ~known, next(messages)
-        every = known | True
-        yield LEG_LENGTHS, every, next(messages)
-        yield LEG_FORCES, known, next(messages)
-        yield DETERMINANT, every, next(messages)
-        yield WARNING, outputs.changed, next(messages)
+    def of(self, outputs: Outputs) -> Iterator[tuple[str, Flags, NDArray[np.void]]]:
+        """
+        Yield the messages for outputs, in the order in which they are published for one.
+
+        Yields topics, which outputs have a message (N,), and the messages (N,), all of one length.
+        """
+        yield from self._of_legs.write(outputs.stamps, outputs.rows)
         if self._of_motors is not None:
-            motors = outputs.motors
-            messages = self._of_motors.write(outputs.stamps, motors)
-            sound, driven = motors[:, SOUND] > 0.0, ~np.isnan(motors[:, TORQUES.start])
-            yield MOTOR_STATES, sound & driven, next(messages)
-            yield MOTOR_STATES, sound & ~driven, next(messages)
-            yield MOTOR_TORQUES, sound & driven, next(messages)
+            yield from self._of_motors.write(outputs.stamps, outputs.motors)
 
     def of_wrench(self, stamp: int, wrench: Sequence[float]) -> bytes:
         """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""
         return self._wrench.write(stamp, wrench)
 
-    def of_base_wrenches(self, stamps: Stamps, base_wrenches: Array) -> Written:
+    def of_base_wrenches(self, stamps: Stamps, base_wrenches: Array) -> tuple[
+            str, Flags, NDArray[np.void]]:
         """Return messages for stamps (N,) [ns] and wrenches (N, 6); none for rows of nan."""
         messages = self._wrench.layout.write(stamps, base_wrenches)
         return BASE_WRENCH, ~np.isnan(base_wrenches[:, 0]), messages

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Stamps
-from stewart_dynamics.core.binding import BatchOfOne, function, places
+from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
 from stewart_dynamics.mechanics.limits import (
@@ -30,7 +30,8 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, Singularity, TIME
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.motor_row import EXCEEDING, MOTOR_ROW, OF_DRIVES, RISES
+from stewart_dynamics.setpoints.motor_row import (
+    EXCEEDING as MOTORS_EXCEEDING, MOTOR_ROW, OF_DRIVES, RISES)
 
 # Tolerance of the stamps of setpoints [s]: a leg may move at its rate limit for this additional
 # time before a setpoint counts as a jump.
@@ -44,7 +45,7 @@ _MOTION, _LOAD, _BASE, _BASE_KNOWN, _RESTART, _STAMPED = (_SETPOINT[name] for na
 SETPOINT = 1 + _STAMPED
 POSITIONS, PUBLISHED_FORCES, WARNING_STATE, _MEAN_RATES = (
     _OUTPUT[name] for name in ('positions', 'forces', 'warning', 'mean_rates'))
-_ANSWERED, _RESTARTED, _CHANGED, _EXCEEDING, _JUMPED = (
+_ANSWERED, _RESTARTED, CHANGED, EXCEEDING, _JUMPED = (
     _OUTPUT[name] for name in ('answered', 'restart', 'changed', 'exceeding', 'jumped'))
 OUTPUT = 1 + _JUMPED
 
@@ -210,9 +211,7 @@ class Outputs(NamedTuple):
     @property
     def with_forces(self) -> Flags:
         """(N,): forces are published."""
-        forces = self.rows[:, PUBLISHED_FORCES.start]
-        known: Flags = forces == forces
-        return known
+        return ~np.isnan(self.rows[:, PUBLISHED_FORCES.start])
 
     @property
     def states(self) -> Array:
@@ -222,7 +221,7 @@ class Outputs(NamedTuple):
     @property
     def changed(self) -> Flags:
         """(N,): the singularity warning has changed, or is the first."""
-        return self.rows[:, _CHANGED] > 0.0
+        return self.rows[:, CHANGED] > 0.0
 
     @property
     def restarts(self) -> Flags:
@@ -232,7 +231,7 @@ class Outputs(NamedTuple):
     @property
     def exceeding(self) -> Flags:
         """(N,): a limit is exceeded."""
-        return self.rows[:, _EXCEEDING] > 0.0
+        return self.rows[:, EXCEEDING] > 0.0
 
     @property
     def jumped(self) -> Flags:
@@ -285,13 +284,12 @@ class Step:
             self._platform.structure, *of_poses.arguments, parameters.geometry.zero_length,
             JITTER + parameters.setpoint.sync_tolerance, JITTER + parameters.setpoint.timeout)
         self._check = function('check_setpoints').bound(*constants)
-        stamps, given, state = np.zeros(1, dtype=np.int64), np.zeros((1, SETPOINT)), FIRST.copy()
-        angles, clearances, motors = (np.empty((1, width)) for width in self._widths)
-        rows = np.empty((1, OUTPUT))
-        self._check_one = BatchOfOne(
-            'check_setpoints',
-            (*constants, 0, 1, stamps, given, angles, clearances, state, rows, motors),
-            (stamps, given, state), (rows, angles, clearances, motors, state))
+        # A single setpoint is copied to memory that stays: half the time of a call with any.
+        self._memory: tuple[Any, ...] = (
+            np.zeros(1, np.int64), np.zeros((1, SETPOINT)),
+            *(np.empty((1, width)) for width in self._widths[:2]), FIRST.copy(),
+            np.empty((1, OUTPUT)), np.empty((1, self._widths[2])))
+        self._check_one = function('check_setpoints').bound(*constants, 0, 1, *self._memory)
 
     def __call__(self, setpoints: Batch, before: Array = FIRST) -> Outputs:
         """
@@ -302,7 +300,10 @@ class Step:
         """
         stamps, given, number = setpoints.stamps, setpoints.rows, len(setpoints.stamps)
         if number == 1:
-            rows, angles, clearances, motors, state = self._check_one(stamps, given, before)
+            at, of_one, *found = self._memory
+            at[:], of_one[:], found[2][:] = stamps, given, before
+            self._check_one()
+            angles, clearances, state, rows, motors = (each.copy() for each in found)
         else:
             rows, state = np.empty((number, OUTPUT)), before.copy()
             angles, clearances, motors = (np.empty((number, width)) for width in self._widths)
@@ -324,8 +325,6 @@ class Step:
 
     def exceedances(self, motions: Array, outputs: Outputs, n: int = 0) -> tuple[Exceedance, ...]:
         """Return the limits that a setpoint exceeds; motions (N, MOTION): those of the outputs."""
-        if not outputs.exceeding[n]:
-            return ()
         values = {name: each[n].tolist() for name, each in outputs.values().items()}
         if outputs.jumped[n]:
             values[JUMP] = outputs.rows[n, _MEAN_RATES].tolist()
@@ -334,6 +333,6 @@ class Step:
             nearest = self._of_poses.clearance.nearest(motions[n:n + 1])[1][0].tolist()
         found = self._limits.exceeded(values, nearest)
         motors = outputs.motors[n]
-        if len(motors) and motors[EXCEEDING]:
+        if len(motors) and motors[MOTORS_EXCEEDING]:
             found += self._motors.exceeded(motors[OF_DRIVES], motors[RISES])
         return found

@@ -58,7 +58,7 @@ class Answers:
         self.at = now  # time of the last one
         self.outputs: Outputs | None = None
         self.row: list[float] = []  # that of the last outputs, as numbers: far faster to look at
-        self.before: tuple[int, float] | None = None  # stamp [ns] and det(J) before the last one
+        self.before: Outputs | None = None  # those before the last ones
         self.second, self.second_before = Second(now), Second(now)
         self._timeout = parameters.setpoint.timeout
 
@@ -66,9 +66,8 @@ class Answers:
         """Note an answer, and its processing time."""
         self.number += 1
         self.at = now
-        if self.outputs is not None:
-            self.before = int(self.outputs.stamps[0]), self.row[DETERMINANT]
-        self.outputs, self.row = outputs, outputs.rows[0].tolist()
+        self.before, self.outputs = self.outputs, outputs
+        self.row = outputs.rows[0].tolist()
         self.second.times.append(seconds)
         self.second.condition = max(self.second.condition, self.row[CONDITION])
 
@@ -113,9 +112,10 @@ class TimingDiagnostics(StatusPart):
 
 def singularity_state(row: Sequence[float], parameters: Parameters) -> Level:
     """Return the level of a row of outputs, and its cause with the numbers of the row."""
-    state, condition = Singularity.of(row[WARNING_STATE]), row[CONDITION]
+    condition = row[CONDITION]
     if condition >= UNSOLVABLE_CONDITION:
         return Level(ERROR, 'J_inv cannot be solved: no forces')
+    state = Singularity.of(row[WARNING_STATE])
     if state.stopped:
         is_suppressed = not math.isnan(row[FORCES.start]) and (
             parameters.singularity.action == SUPPRESS_FORCES)
@@ -167,8 +167,8 @@ class SingularityDiagnostics(StatusPart):
         state = singularity_state(row, self._answers.parameters)
         if state.level == OK and self._other_side:
             state = Level(WARN, self._other_side)
-        singularity = Singularity.of(row[WARNING_STATE])
-        if singularity.cause is not Cause.CROSSED:
+        cause, stopped, *_ = row[WARNING_STATE]
+        if cause != Cause.CROSSED:
             self.held.see(state, now, _NEARNESS)
             if self._crossed:
                 self.held.see(OK_LEVEL, now, _CROSSING)
@@ -178,8 +178,8 @@ class SingularityDiagnostics(StatusPart):
         crossing = Level(ERROR, self._crossing())
         self._crossings.append(crossing.message)
         self.held.see(crossing, now, _CROSSING)
-        stopped = singularity.stopped or row[CONDITION] >= UNSOLVABLE_CONDITION
-        self.held.see(state if stopped else OK_LEVEL, now, _NEARNESS)
+        inside = stopped or row[CONDITION] >= UNSOLVABLE_CONDITION
+        self.held.see(state if inside else OK_LEVEL, now, _NEARNESS)
         return now - self._crossing_logged_at >= PERIOD
 
     def status(self, now: float) -> Status:
@@ -223,10 +223,10 @@ class SingularityDiagnostics(StatusPart):
         at = int(answers.outputs.stamps[0])
         seconds, nanoseconds = divmod(at, SECOND)
         stamp = f'stamp {seconds}.{nanoseconds:09d} s'
-        if answers.before is None or at <= answers.before[0]:
+        passed = 0 if answers.before is None else at - int(answers.before.stamps[0])
+        if answers.before is None or passed <= 0:
             return f'det(J) crossed zero before {stamp}'
-        passed = at - answers.before[0]
-        now, then = abs(answers.row[DETERMINANT]), abs(answers.before[1])
+        now, then = abs(answers.row[DETERMINANT]), abs(answers.before.determinants[0])
         return (f'det(J) crossed zero {passed * NANOSECOND * now / (now + then):.3g} s before '
                 f'{stamp}')
 
