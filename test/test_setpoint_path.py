@@ -130,9 +130,9 @@ def test_the_page_names_the_files_that_a_setpoint_runs_through(domain: int) -> N
     finally:
         each.close()
     # These call functions in C, which no profile sees.
-    for caller, called in (('core/binding.py', 'core/stewart_dynamics.c'),
+    for caller, called in (('setpoints/input_messages.py', 'core/messages.c'),
                            ('setpoints/step.py', 'core/setpoints.c'),
-                           ('setpoints/output_messages.py', 'core/messages.c')):
+                           ('setpoints/step.py', 'core/stewart_dynamics.c')):
         found.insert(found.index(caller) + 1, called)
     assert on_page == found
     assert len(found) <= MOST_FILES

@@ -252,6 +252,17 @@ typedef struct { int64_t at, column, count; } message_part;
 /* A message is for rows where a column is not nan, another is nan, another is above zero; -1: any. */
 typedef struct { int64_t known, unknown, positive; } message_condition;
 
+/* Samples of messages of one layout, each at its place in the data: stamps (count,) [ns] and numbers
+   (count, width), a quaternion as a rotation from column 3 on. Bytes that are `fixed` (255, others
+   0) are as in one message, numbers finite and not above `largest`, quaternions of length 1, and
+   numbers at some places not -1: covariances of what is measured. Returns how many are read, up to
+   the first that is not so. quaternion: its place, or -1. */
+int64_t read_messages(
+  int64_t size, const uint8_t * message, const uint8_t * fixed, int64_t n_parts,
+  const message_part * parts, int64_t quaternion, int64_t n_measured, const int64_t * measured,
+  double largest, int64_t width, int64_t count, const uint8_t * data, const int64_t * starts,
+  const int64_t * sizes, int64_t * stamps, double * values);
+
 /* Messages (count, size), all kinds side by side: copies of one row of them, with stamps (count,)
    [ns] at some places and numbers of rows (count, width) at others; which kinds (count, n_kinds) a
    row has, and the numbers (n_kinds,) of messages. */

@@ -46,7 +46,9 @@ class Layout:
         for part in (*(slice(at, at + 8) for at in stamps),
                      *(slice(at, at + 8 * count) for at, count in numbers), *gaps):
             free[part] = True
-        # Runs of bytes that are the same in all messages.
+        self.fixed: Bytes = np.where(free, 0, 255).astype(np.uint8)
+        """255 for bytes that are the same in all messages, 0 for others."""
+        # Runs of such bytes.
         edges = np.flatnonzero(np.diff(free, prepend=True, append=True)).tolist()
         runs = list(zip(edges[::2], edges[1::2], strict=True))
         self._stamps = [f'stamp at {at}' for at in stamps]
