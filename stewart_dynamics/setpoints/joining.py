@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from struct import Struct
 
 import numpy as np
 
@@ -34,7 +33,6 @@ from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining
 from stewart_dynamics.setpoints.step import Batch, SETPOINT
 
 _STANDSTILL = (0.0,) * 12
-_ROW = Struct(f'{SETPOINT}d')  # far faster than an array of a tuple
 
 Message = tuple[str, bytes, Callable[[], int]]
 """Topic, data and clock [ns]; the clock is read if the stamps of a setpoint are zero."""
@@ -150,15 +148,15 @@ class Setpoints:
                     self._consistency.noted.append((stamp, motion, restart))
                 base = self.base.at(stamp) if self.base.topics else None
                 stamps.append(stamp)
-                rows.append(_ROW.pack(*motion, *self._wrench_input.wrench, *(base or NO_BASE),
-                                      base is None or base[0] == base[0], restart, stamped))
+                rows.append((*motion, *self._wrench_input.wrench, *(base or NO_BASE),
+                             base is None or base[0] == base[0], restart, stamped))
                 if self.recorded is not None:
                     times.append(self.recorded)
         if not stamps:
             return self._none
         at = np.array(stamps)
-        return Batch(at, np.frombuffer(b''.join(rows)).reshape(-1, SETPOINT),
-                     np.array(times) if times else at, self._none.moving)
+        return Batch(at, np.array(rows, dtype=float), np.array(times) if times else at,
+                     self._none.moving)
 
     def end(self, why: str) -> None:
         """Drop and count waiting samples: no more messages arrive."""

@@ -303,7 +303,8 @@ class Step:
             at, of_one, *found = self._memory
             at[:], of_one[:], found[2][:] = stamps, given, before
             self._check_one()
-            angles, clearances, state, rows, motors = (each.copy() for each in found)
+            angles, clearances, state, rows, motors = [
+                each.copy() if each.size else each for each in found]
         else:
             rows, state = np.empty((number, OUTPUT)), before.copy()
             angles, clearances, motors = (np.empty((number, width)) for width in self._widths)

@@ -115,6 +115,9 @@ def singularity_state(row: Sequence[float], parameters: Parameters) -> Level:
     condition = row[CONDITION]
     if condition >= UNSOLVABLE_CONDITION:
         return Level(ERROR, 'J_inv cannot be solved: no forces')
+    cause, stopped, *_ = row[WARNING_STATE]
+    if not cause and not stopped:
+        return OK_LEVEL
     state = Singularity.of(row[WARNING_STATE])
     if state.stopped:
         is_suppressed = not math.isnan(row[FORCES.start]) and (
@@ -122,8 +125,6 @@ def singularity_state(row: Sequence[float], parameters: Parameters) -> Level:
         suppressed = ': forces suppressed' if is_suppressed else ''
         return Level(ERROR, f'inside stop_condition{suppressed}: ' + _condition(
             condition, 'stop_condition', parameters.singularity.stop_condition))
-    if not state.warning:
-        return OK_LEVEL
     if state.cause is Cause.CROSSED:
         return Level(ERROR, 'det(J) crossed zero since the last setpoint')
     if state.cause is Cause.CONDITION:
