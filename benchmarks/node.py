@@ -428,11 +428,12 @@ def picture_words() -> str:
     """Return how long a picture takes and how large it is."""
     parameters = Parameters.from_yaml(PARAMETERS)
     motion = motion_at(ReferenceMotionParameters(MOTION), np.array([0.3])).rows[0].tolist()
-    outputs = Step(parameters)(Batch.of(FIRST_STAMP, motion))
+    setpoint = Batch.of(FIRST_STAMP, motion)
+    outputs = Step(parameters)(setpoint)
     assert outputs.answered[0]
     markers = Markers(parameters)
-    size = len(markers.write(motion, outputs))
-    times = repeat(lambda: markers.write(motion, outputs), timer=time.process_time, repeat=21,
+    size = len(markers.write(setpoint, outputs))
+    times = repeat(lambda: markers.write(setpoint, outputs), timer=time.process_time, repeat=21,
                    number=200)
     words = (f'A picture has {size:,} bytes and is written in {median(times) / 200 * 1e6:.0f} us '
              'of processor time, median of 21.')

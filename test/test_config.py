@@ -105,9 +105,9 @@ def test_rviz_shows_every_namespace_of_the_markers_in_the_base_frame() -> None:
     from stewart_dynamics.node.markers import Markers
     from stewart_dynamics.setpoints.step import Batch, Step
     parameters = Parameters.from_yaml(CONFIG / 'platform.yaml')
-    motion = (0.0, 0.0, 1.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0) + (0.0,) * 12
+    home = Batch.of(1, (0.0, 0.0, 1.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 12))
     message = rclpy.deserialize_message(Markers(parameters).write(
-        motion, Step(parameters)(Batch.of(1, motion))), MarkerArray)
+        home, Step(parameters)(home)), MarkerArray)
     display, = (each for each in rviz()['Displays'] if each['Class'].endswith('/MarkerArray'))
     assert display['Namespaces'] == dict.fromkeys(
         {marker.ns for marker in message.markers}, True)

@@ -67,8 +67,7 @@ def answered(diagnostics: DynamicsDiagnostics, now: float, outputs: Outputs = CL
     """Let messages of some topics come, and a setpoint be answered."""
     for topic in topics:
         diagnostics.setpoints.heard[topic] = now
-    return diagnostics.answered(
-        outputs, exceedances, setpoint.motions[0].tolist(), now - took, now)
+    return diagnostics.answered(setpoint, outputs, exceedances, now - took, now)
 
 
 def status(diagnostics: DynamicsDiagnostics, name: str, now: float) -> Status:

@@ -15,13 +15,13 @@ from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.external_wrench import payload
 from stewart_dynamics.external_wrench.estimate import (
     EXTERNAL_WRENCH, ExternalWrench, Target)
 from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs)
-from stewart_dynamics.mechanics.rows import DETERMINANT
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.diagnostics.levels import LogLine, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics, TICK
@@ -104,7 +104,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._waiting: list[tuple[Batch, float]] = []  # single setpoints, and times of arrival
         self._gathering = False  # a task answers them after the messages received
         self._state = FIRST  # of the step
-        self._target: Target | None = None  # the last answered setpoint
+        self._last: tuple[Batch, Outputs] | None = None  # the last answered setpoint
         publishers, rate = self._topics.publishers, parameters.visualization_rate
         self._markers = PublisherAtRate(publishers.get(MARKERS), rate, Markers(parameters).write)
         self._joint_states = PublisherAtRate(
@@ -194,24 +194,29 @@ class DynamicsNode(ManagedNode[Parameters]):
 
     def _note(self, setpoint: Batch, outputs: Outputs, came: float) -> None:
         """Pass the answer to other publishers and diagnostics."""
-        motion, row = setpoint.motions[0].tolist(), outputs.rows[0]
-        self._target = Target(motion, float(row[DETERMINANT]))
+        self._last = setpoint, outputs
         exceedances = self._models.step.exceedances(
-            setpoint.motions, outputs) if row[EXCEEDING] else ()
-        self._markers.note(motion, outputs, exceedances)
-        self._travel.note(motion)
+            setpoint.motions, outputs) if outputs.rows[0, EXCEEDING] else ()
+        self._markers.note(setpoint, outputs, exceedances)
+        self._travel.note(setpoint.motions[0])
         if not self._model_measured:
-            self._moved(int(outputs.stamps[0]), motion)
+            self._moved(setpoint.stamps[0], setpoint.motions[0])
         now = time.monotonic()
         if setpoint.moving and not setpoint.base_known[0]:
             self._diagnostics.base.unknown(now)
         if not self._diagnostics.answers.number:
-            self._diagnostics.begins(motion, self._target.determinant)
-        if self._diagnostics.answered(outputs, exceedances, motion, came, now):
+            self._diagnostics.begins(setpoint.motions[0].tolist(), outputs.determinants[0])
+        if self._diagnostics.answered(setpoint, outputs, exceedances, came, now):
             self._report()
         self._setpoints.judge()
 
-    def _moved(self, stamp: int, pose: Sequence[float]) -> None:
+    def _target(self) -> Target | None:
+        if self._last is None:
+            return None
+        setpoint, outputs = self._last
+        return Target(setpoint.motions[0].tolist(), float(outputs.determinants[0]))
+
+    def _moved(self, stamp: int, pose: Sequence[float] | Array) -> None:
         """Publish the transform of a pose, a row of motion; note it for the joint states."""
         self._joint_states.note(stamp, pose)
         if self._transforms_read:
@@ -255,8 +260,9 @@ class DynamicsNode(ManagedNode[Parameters]):
         now = time.monotonic()
         diagnostics = self._diagnostics.external_wrench
         diagnostics.heard(now)
+        target = self._target()
         estimate = self._measured_legs.take(
-            data, self._setpoints.wrench, self._target, self._setpoints.base)
+            data, self._setpoints.wrench, target, self._setpoints.base)
         if estimate is None:
             return
         if self._model_measured:
@@ -265,7 +271,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         if estimate.published is not None:
             self._topics.publishers[EXTERNAL_WRENCH].publish(
                 self._messages.of_wrench(estimate.stamp, estimate.published))
-        diagnostics.estimated(estimate, self._target and self._target.motion, now)
+        diagnostics.estimated(estimate, target and target.motion, now)
         if self._diagnostics.level_changed(now):
             self._report()
 

@@ -26,7 +26,7 @@ from stewart_dynamics.node.diagnostics.answers import singularity_state
 from stewart_dynamics.node.diagnostics.levels import ERROR, OK, WARN
 from stewart_dynamics.parameters.table import (
     mean_radius, Parameters)
-from stewart_dynamics.setpoints.step import Outputs
+from stewart_dynamics.setpoints.step import Batch, Outputs
 from visualization_msgs.msg import Marker
 
 
@@ -132,14 +132,10 @@ class Markers:
         self._end = bytes(self._body[-_BEHIND_TEXT:])
         del self._body[-_BEHIND_TEXT - 8:]
 
-    def write(self, motion: Sequence[float], outputs: Outputs,
+    def write(self, setpoint: Batch, outputs: Outputs,
               exceedances: Sequence[Exceedance] = ()) -> bytes:
-        """
-        Return the message.
-
-        motion: motion of the setpoint, laid out as for ``inverse_dynamics``.
-        outputs, exceedances: those of this one setpoint.
-        """
+        """Return the message of a single setpoint, its outputs, and the limits it exceeds."""
+        motion = setpoint.motions[0].tolist()
         body = self._body
         stamp = divmod(int(outputs.stamps[0]), SECOND)
         for at in self._stamps:

@@ -31,7 +31,7 @@ from stewart_dynamics.node.diagnostics.levels import (
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
 from stewart_dynamics.setpoints.motor_row import DEMANDED_TORQUES, RISES, SOUND, SPEEDS
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
-from stewart_dynamics.setpoints.step import Outputs, PUBLISHED_FORCES, WARNING_STATE
+from stewart_dynamics.setpoints.step import Batch, Outputs, PUBLISHED_FORCES, WARNING_STATE
 
 _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singularity
 # Where the values of limits are in a row of motors.
@@ -248,9 +248,8 @@ class LimitsDiagnostics(StatusPart):
         self._mistake = ''  # in the pose with which legs became too long or too short
         self._largest_force, self._its_leg = 0.0, 0
 
-    def answered(self, exceedances: Sequence[Exceedance], motion: Sequence[float], now: float,
-                 ) -> None:
-        """Note the last outputs, the limits they exceed, and the setpoint's row of motion."""
+    def answered(self, setpoint: Batch, exceedances: Sequence[Exceedance], now: float) -> None:
+        """Note the last outputs, the limits they exceed, and their setpoint."""
         forces = self._answers.row[FORCES]
         largest = abs(self._largest_force)
         # These two take less time than abs of each; nan is never larger.
@@ -259,10 +258,10 @@ class LimitsDiagnostics(StatusPart):
             self._largest_force = forces[self._its_leg]
         if exceedances or self._exceeding:
             self._exceeding = bool(exceedances)
-            self._note_exceedances(exceedances, motion, now)
+            self._note_exceedances(setpoint, exceedances, now)
 
-    def _note_exceedances(self, exceedances: Sequence[Exceedance], motion: Sequence[float],
-                          now: float) -> None:
+    def _note_exceedances(
+            self, setpoint: Batch, exceedances: Sequence[Exceedance], now: float) -> None:
         row = self._answers.row
         published, demanded = row[PUBLISHED_FORCES.start], row[FORCES.start]
         suppressed = math.isnan(published) and not math.isnan(demanded) and (
@@ -272,7 +271,8 @@ class LimitsDiagnostics(StatusPart):
         if not any(self.held.of(name, now).level for name in _OF_POSE):
             # At most once in a second: it may take a millisecond.
             self._mistake = pose_mistake(
-                self._answers.parameters, motion, first=self._answers.number == 1)
+                self._answers.parameters, setpoint.motions[0].tolist(),
+                first=self._answers.number == 1)
         for name in LIMITS:
             exceeded = [each for each in exceedances if each.limit == name]
             if not exceeded:

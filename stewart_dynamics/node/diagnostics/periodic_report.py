@@ -21,7 +21,7 @@ from stewart_dynamics.node.diagnostics.outcomes import (
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.consistency import Mistake
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
-from stewart_dynamics.setpoints.step import Outputs
+from stewart_dynamics.setpoints.step import Batch, Outputs
 
 # Period at which the node calls ``due_at_tick`` [s].
 TICK = 0.05
@@ -55,15 +55,15 @@ class DynamicsDiagnostics:
             pose_mistake(parameters, motion),
             determinant * determinant_at_home(parameters) < 0.0)
 
-    def answered(self, outputs: Outputs, exceedances: Sequence[Exceedance],
-                 motion: Sequence[float], came: float, now: float) -> bool:
+    def answered(self, setpoint: Batch, outputs: Outputs, exceedances: Sequence[Exceedance],
+                 came: float, now: float) -> bool:
         """
-        Note the outputs of one setpoint, the limits it exceeds, its motion and time of arrival.
+        Note a single setpoint, its outputs, the limits it exceeds, and its time of arrival.
 
         Returns whether a report is due.
         """
         self.answers.add(outputs, now - came, now)
-        self.limits.answered(exceedances, motion, now)
+        self.limits.answered(setpoint, exceedances, now)
         crossed = self.singularity.answered(now)
         return crossed or self._due(now)
 
