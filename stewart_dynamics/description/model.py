@@ -42,11 +42,11 @@ class ModelMessages:
         self._positions = joint_state_layout(self._joints.names, ['position'])
         self._transform = transforms([(parameters.base_frame, parameters.platform_frame)])
 
-    def joint_states(self, stamp: int, pose: Sequence[float] | Array) -> bytes:
+    def joint_states(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the sensor_msgs/JointState of all joints at a pose, as in a row of motion."""
         return self._positions.write_one(stamp, self._joints.of_sample(pose))
 
-    def transform(self, stamp: int, pose: Sequence[float] | Array) -> bytes:
+    def transform(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the tf2_msgs/TFMessage from ``base_frame`` to ``platform_frame`` at a pose."""
         return self._transform.write_one(
             stamp, (*pose[POSITION], *quaternion_of(pose[ROTATION])))

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 import math
 import time
@@ -15,7 +15,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
-from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.external_wrench import payload
 from stewart_dynamics.external_wrench.estimate import (
@@ -216,7 +215,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         setpoint, outputs = self._last
         return Target(setpoint.motions[0].tolist(), float(outputs.determinants[0]))
 
-    def _moved(self, stamp: int, pose: Sequence[float] | Array) -> None:
+    def _moved(self, stamp: int, pose: Any) -> None:
         """Publish the transform of a pose, a row of motion; note it for the joint states."""
         self._joint_states.note(stamp, pose)
         if self._transforms_read:
