@@ -76,7 +76,7 @@ def at_sea(source: str, number: int = 300) -> list[Recorded]:
 
 
 def answers(parameters: Parameters, of: Iterable[Recorded]) -> list[tuple[Batch, Answer]]:
-    """Return setpoints and what the step gives, message by message, as in the node."""
+    """Return setpoints and the outputs of the step, message by message, as in the node."""
     feed, step, state = Feed(parameters), Step(parameters), FIRST
     found: list[tuple[Batch, Answer]] = []
     for topic, when, data in of:

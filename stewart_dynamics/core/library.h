@@ -71,7 +71,7 @@ typedef struct {
   double stamped;     /* its stamp comes from messages, otherwise it is the time of arrival */
 } setpoint;
 
-/* What the step gives of a setpoint, beside its motors. */
+/* The outputs of the step for a setpoint, beside its motors. */
 typedef struct {
   stewart_result result;  /* forces nan where J_inv cannot be solved or the base is not known */
   double positions[6];    /* of the joints: lengths of the legs less those at zero [m] */

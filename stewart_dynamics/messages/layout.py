@@ -150,7 +150,7 @@ class SideBySide:
     """
     Messages of some topics, side by side, with a stamp and numbers of one row. Not thread-safe.
 
-    kinds: what is written.
+    kinds: the kinds of messages, in the order in which they are published.
     width: numbers in a row.
     """
 

@@ -17,10 +17,10 @@ import numpy as np
 
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Six, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Six, Stamps
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.base_motion import row_of_motion
-from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion, quaternion_length
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, consecutive, LENGTHS, LINEAR_ACCELERATION,
     MOTION, POSE, POSITION, ROTATION)
@@ -29,11 +29,10 @@ from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory_layouts import LegTrajectory, PlatformTrajectory
 from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
-from stewart_dynamics.parameters.tolerances import START_TOLERANCE, unit_rule
+from stewart_dynamics.parameters.tolerances import is_unit, START_TOLERANCE, unit_rule
 from stewart_dynamics.planned.approach import approach_in_pieces, MOST_POINTS
 from stewart_dynamics.planned.planned_trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
-from stewart_dynamics.setpoints.input_messages import unit_quaternions
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
 
@@ -215,7 +214,7 @@ def _rows(first: int, numbers: Array) -> Array:
     if not (finite := np.isfinite(numbers).all(axis=1)).all():
         n = int(np.argmin(finite))
         raise _NotCheckableError(NOT_FINITE, f'points[{first + n}]: {tuple(numbers[n].tolist())}')
-    quaternions, lengths, unit = unit_quaternions(numbers[:, _QUATERNION])
+    quaternions, lengths, unit = _unit_quaternions(numbers[:, _QUATERNION])
     if not unit.all():
         n = int(np.argmin(unit))
         raise _NotCheckableError(
@@ -225,6 +224,23 @@ def _rows(first: int, numbers: Array) -> Array:
     rows[:, ROTATION] = np.column_stack(from_quaternion(*quaternions))
     rows[:, ROTATION.stop:] = numbers[:, _TWIST_AND_ACCELERATION]
     return rows
+
+
+def _unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
+    """
+    Normalize quaternions; return lengths and which quaternions are valid as well.
+
+    quaternions (N, 4): finite numbers x y z w.
+    Returns quaternions (4, N): normalized quaternions, one row for each of x y z w.
+    Returns lengths (N,): lengths before normalization.
+    Returns unit (N,): which lengths are 1 within the tolerance.
+    """
+    # Element by element, as messages of setpoints are read, so that results are bit-identical.
+    x, y, z, w = quaternions.T
+    with np.errstate(over='ignore', divide='ignore', invalid='ignore'):
+        lengths = quaternion_length(x, y, z, w)
+        return (np.stack([x / lengths, y / lengths, z / lengths, w / lengths]), lengths,
+                is_unit(lengths))
 
 
 def _written(parameters: Parameters, stamp: int, times: Stamps, result: PlannedTrajectory,

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, NO_WRENCH, Six, Stamps
+from stewart_dynamics.arrays import Array, Bytes, Integers, NO_WRENCH, Six, Stamps
 from stewart_dynamics.core.binding import CODES, function, record, Sample
 from stewart_dynamics.mechanics.frames.rotation import quaternion_length
 from stewart_dynamics.messages import type_names
@@ -27,7 +27,7 @@ from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist
 from stewart_dynamics.parameters import table
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
+from stewart_dynamics.parameters.tolerances import unit_rule
 from stewart_dynamics.setpoints.rejections import (
     frame_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
     Rejections, WRONG_FRAME)
@@ -244,23 +244,6 @@ class _RegularMessages:
         number = self._read(len(starts), data, np.ascontiguousarray(starts),
                             np.ascontiguousarray(sizes), stamps, values)
         return (stamps, values) if number == len(starts) else None
-
-
-def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
-    """
-    Normalize quaternions; return lengths and which quaternions are valid as well.
-
-    quaternions (N, 4): finite numbers x y z w.
-    Returns quaternions (4, N): normalized quaternions, one row for each of x y z w.
-    Returns lengths (N,): lengths before normalization.
-    Returns unit (N,): which lengths are 1 within the tolerance.
-    """
-    # Element by element, as for one sample, so that results are bit-identical.
-    x, y, z, w = quaternions.T
-    with np.errstate(over='ignore', divide='ignore', invalid='ignore'):
-        lengths = quaternion_length(x, y, z, w)
-        return (np.stack([x / lengths, y / lengths, z / lengths, w / lengths]), lengths,
-                is_unit(lengths))
 
 
 class WrenchInput:

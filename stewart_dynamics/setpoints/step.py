@@ -69,7 +69,7 @@ class Batch(NamedTuple):
            restarts: ArrayLike = False, times: ArrayLike | None = None,
            bases: ArrayLike | None = None, stamped: ArrayLike = True) -> Batch:
         """
-        Return N setpoints, or a single one; what is one for all may be given once.
+        Return N setpoints, or a single one; a value that is the same for all may be given once.
 
         stamps (N,), times (N,), by default the stamps: see the fields.
         motions (N, MOTION), wrenches (N, 6) [N, N m], bases (N, BASE): rows as for
