@@ -372,7 +372,7 @@ def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None
     around = {'limits__length_min': [1.0], 'limits__length_max': [1.4]}
     motions = HOME.motions.copy()
     motions[:, 2] *= -1.0
-    below = outputs_of(HOME.changed(motions))
+    below = outputs_of(HOME.replaced(motions))
     assert below.lengths == pytest.approx(CLEAR.lengths, rel=1e-12)
     diagnostics = begun(**around)
     diagnostics.begins(motions[0].tolist(), float(below.determinants[0]))

@@ -369,7 +369,7 @@ def test_a_pose_far_out_of_range_is_left_out_alone(far: float) -> None:
     restarts = batch.restarts
     restarts[201] = True
     assert same(done, differentiated(Differentiator(10.0, 0.1), [
-        batch.changed(restarts=restarts).chosen(others)]))
+        batch.replaced(restarts=restarts).chosen(others)]))
     assert differentiator.deviation.position_max < 1e-3
 
 

@@ -26,7 +26,7 @@ from stewart_dynamics.setpoints.step import Batch, Step
 from test_capability import limited, moved, random_travel
 from test_capability_boxes import poses_in, some_ranges
 from test_capability_workspace import inside
-from test_step import singles
+from test_step import each_alone
 
 SHAPE = dict(zip(LEG_SHAPE, (0.04, 0.7, 0.02), strict=True))
 SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1, **SHAPE})
@@ -222,11 +222,8 @@ def test_the_step_reports_a_clearance_below_its_limit_for_one_and_for_many() -> 
     assert np.array_equal(many.clearances, clearances)
     assert np.array_equal(many.exceeding, (clearances < bound).any(axis=1))
     assert 5 < many.exceeding.sum() < 46
-    for n, setpoint in enumerate(singles(setpoints)):
-        output = step(setpoint)
+    for n, (output, found) in enumerate(each_alone(step, setpoints)):
         assert output.clearances.tobytes() == clearances[n].tobytes()
-        found = step.exceedances(setpoint.motions, output)
-        assert found == step.exceedances(motion.rows, many, n)
         assert [(each.limit, each.leg, each.value, each.bound) for each in found] == [
             (CLEARANCE_MIN, leg, clearances[n, leg], bound) for leg in range(6)
             if clearances[n, leg] < bound]

@@ -309,7 +309,7 @@ def test_friction_may_hold_a_resting_platform_with_any_force() -> None:
     forces = still.forces()
     strong = {'actuator.coulomb_friction': 2.5 * float(np.abs(forces).max())}
     p = case.parameters.replaced(strong)
-    batch = case.setpoints.changed(motions=still.motion.rows)
+    batch = case.setpoints.replaced(motions=still.motion.rows)
     stuck = Case(p, still.motion, case.seconds, batch, Step(p)(batch))
     assert values_of(stuck, -forces)['likely_mistake'] is None
     without = still._replace(setpoints=batch, outputs=Step(case.parameters)(batch))

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 import math
 from typing import Any
@@ -56,6 +56,17 @@ def random_setpoints(parameters: Parameters, many: int) -> Batch:
 def singles(setpoints: Batch) -> list[Batch]:
     """Return the setpoints of a batch, each a batch of one."""
     return [setpoints.chosen(slice(n, n + 1)) for n in range(len(setpoints.stamps))]
+
+
+def each_alone(
+        step: Step, setpoints: Batch) -> Iterator[tuple[Outputs, tuple[Exceedance, ...]]]:
+    """Yield outputs of each setpoint alone, and the limits it exceeds: those of the batch."""
+    many = step(setpoints)
+    for n, setpoint in enumerate(singles(setpoints)):
+        outputs = step(setpoint)
+        found = step.exceedances(setpoint.motions, outputs)
+        assert found == step.exceedances(setpoints.motions, many, n)
+        yield outputs, found
 
 
 def answered(step: Step, setpoints: Batch, before: Array = FIRST) -> Outputs:
@@ -169,10 +180,10 @@ def both_ways(step: Step, setpoints: Sequence[Batch]) -> Outputs:
     ('limits.platform_joint_angle_max', (1e-3, 1.0)), ('limits.leg_clearance_min', (0.9, 0.1))])
 def test_forces_are_suppressed_while_a_limit_of_motion_is_exceeded(
         limit: str, values: tuple[float, float]) -> None:
-    moving = HOME.changed(motions=(*HOME.motions[0, :14], 0.1, *REST[3:]))
+    moving = HOME.replaced(motions=(*HOME.motions[0, :14], 0.1, *REST[3:]))
     leg = answered(STEP, moving).lengths.max()
     exceeded, held = (value * leg if 'length' in limit else value for value in values)
-    tilted = moving.changed(motions=(0.05, *moving.motions[0, 1:]))
+    tilted = moving.replaced(motions=(0.05, *moving.motions[0, 1:]))
     for bound, suppressed in ((exceeded, True), (held, False)):
         for action in ('warn', 'suppress_forces'):
             step = Step(PARAMETERS.replaced({
@@ -319,7 +330,7 @@ rotations = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(
 
 def test_a_restart_is_no_crossing() -> None:
     before = Singularity(Cause.CONDITION, True, -0.2, crossings=1)
-    output = answered(STEP, HOME.changed(restarts=True), state_of(warning=before, lengths=1.0))
+    output = answered(STEP, HOME.replaced(restarts=True), state_of(warning=before, lengths=1.0))
     assert output.singularity().crossings == 1
     assert not output.warnings[0]
     assert output.changed[0]

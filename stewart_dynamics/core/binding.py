@@ -138,10 +138,6 @@ def _end(place: int | slice) -> int:
     return place + 1 if isinstance(place, int) else place.stop
 
 
-def _number(kind: str) -> Callable[[Any], Any]:
-    return cast('Callable[[Any], Any]', _NUMBERS[kind][1])
-
-
 def _pointer(kind: str) -> Callable[[Any], Any]:
     """Return a function from an array, or None, to what ctypes passes; TypeError: another type."""
     wanted = record(kind)
@@ -181,7 +177,8 @@ class Function:
         self.name = name
         self._returns = None if found[1] == 'void' else _NUMBERS[found[1]][1]
         self._passed = [
-            _pointer(kind) if star or size else _number(kind) for kind, star, size in re.findall(
+            _pointer(kind) if star or size else _NUMBERS[kind][1]
+            for kind, star, size in re.findall(
                 r'(?:const )?(\w+) (\*?) ?\w+(\[\d+\])?', found[2])]
 
     def __call__(self, *arguments: Any) -> Any:

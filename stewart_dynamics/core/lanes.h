@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * What lanes.c has for library.c.
+ * The functions of lanes.c that library.c calls.
  */
 
 #ifndef STEWART_LANES_H

@@ -25,7 +25,6 @@ from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.limits import Exceedance, LIMITS, OF_MOTORS
 from stewart_dynamics.mechanics.rows import BASE, FORCES, MOTION, POSE, RESULT, WRENCH
-from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
 
@@ -126,8 +125,7 @@ def _motions(parameters: Parameters) -> Array:
 def _results(outputs: Outputs, exceedances: Sequence[Exceedance]) -> list[float]:
     """Return the columns from CODE to WARNING of one setpoint's outputs."""
     forces = outputs.forces[0]
-    code = SINGULAR if outputs.conditions[0] >= UNSOLVABLE_CONDITION else (
-        OK if outputs.with_forces[0] else SUPPRESSED)
+    code = SINGULAR if not outputs.solvable[0] else OK if outputs.with_forces[0] else SUPPRESSED
     exceeded = [sum(LIMITS[each.limit].bit for each in exceedances
                     if each.leg == leg) for leg in range(6)]
     state = outputs.singularity()

@@ -172,7 +172,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         for setpoint, _ in dropped:
             self._setpoints.reject('setpoint', DROPPED, stamp_words(int(setpoint.stamps[0])))
         restart = any(setpoint.restarts[0] for setpoint, _ in waiting)
-        return newest.changed(restarts=restart), came
+        return newest.replaced(restarts=restart), came
 
     def _answer(self, setpoint: Batch, came: float) -> None:
         """Compute the answer to a single setpoint, publish it, and note it."""

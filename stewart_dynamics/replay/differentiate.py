@@ -126,7 +126,7 @@ class Differentiator:
             restarts, self._restart_before = _restarts_of(
                 batch.restarts, near, self._restart_before)
             self.left_out[TOO_FAR] += int(np.count_nonzero(~near))
-            batch = batch.chosen(near).changed(restarts=restarts)
+            batch = batch.chosen(near).replaced(restarts=restarts)
         self._pending.append(batch)
         self._held += len(batch.stamps)
         # not at every batch: joining the pending ones takes time
@@ -289,7 +289,7 @@ class Differentiator:
         restarts, self._restart = _restarts_of(given.restarts, followed, self._restart)
         if n:
             given, motions = given.chosen(followed), motions[followed]
-        return given.changed(motions, restarts)
+        return given.replaced(motions, restarts)
 
 
 def _restarts_of(restarts: Flags, kept: Flags, waiting: bool = False) -> tuple[Flags, bool]:

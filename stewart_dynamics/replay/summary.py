@@ -22,7 +22,6 @@ from stewart_dynamics.mechanics.limits import (
     Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, OF_LEGS, OF_LOADS, OF_RATES,
     POSE, Quantity, USUAL, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
-from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.motor_loads import MotorLoads
@@ -143,7 +142,7 @@ class Summary:
         demanded = outputs.demanded_forces
         without = with_nan(demanded)
         unknown = ~setpoints.base_known
-        unsolved = without & ~(unknown & (outputs.conditions < UNSOLVABLE_CONDITION))
+        unsolved = without & ~(unknown & outputs.solvable)
         if unknown.any():
             self._base_unknown += int(unknown.sum())
             if self._base_unknown_at is None:

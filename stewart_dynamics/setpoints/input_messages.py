@@ -203,29 +203,27 @@ class _RegularMessages:
         (at, count), *others = layout.numbers
         quaternion, measured = -1, []
         if topic in _IMUS:
-            parts = [(at + 8 * _OF_IMU[0], 0, 3), (at + 8 * _OF_IMU[3], 3, 3)]
+            width, parts = 6, [(at + 8 * _OF_IMU[0], 0, 3), (at + 8 * _OF_IMU[3], 3, 3)]
             measured = [at + 8 * place for place in _COVARIANCES]
         elif topic in _WITH_POSE:
-            quaternion = at + 24
+            width, quaternion = 12 + 6 * len(others), at + 24
             parts = [(at, 0, 3), *((start, 12 + 6 * n, size)
                                    for n, (start, size) in enumerate(others))]
         else:
-            parts = [(at, 0, count)]
-        self._size, self._width = layout.size, max(column + size for _, column, size in parts)
-        if quaternion >= 0:
-            self._width = max(self._width, 12)
+            width, parts = count, [(at, 0, count)]
+        self._size, self._width = layout.size, width
         constants = (
             layout.size, np.frombuffer(layout.message, np.uint8), layout.fixed, len(parts),
             np.array(parts, record('message_part')), quaternion, len(measured),
             np.array(measured, np.int64), LARGEST if topic in _BOUNDED else sys.float_info.max,
-            self._width)
+            width)
         self._read = function('read_messages').bound(*constants)
-        data, sample = np.zeros(layout.size, np.uint8), np.zeros(1 + self._width, np.int64)
+        data, sample = np.zeros(layout.size, np.uint8), np.zeros(1 + width, np.int64)
         self._read_one = function('read_messages').bound(
             *constants, 1, data, np.zeros(1, np.int64), np.array([layout.size]), sample[:1],
             sample[1:].view(float))
         self._data, self._sample = data.data, sample.data
-        self._numbers = Struct(f'q{self._width}d')
+        self._numbers = Struct(f'q{width}d')
 
     def read(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
         """Return stamp [ns] and numbers of a message; None if it is another or not valid."""

@@ -27,7 +27,8 @@ from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_ANGLES, JOINT_FORCES, LENGTHS, MOTION,
     NO_BASE, RATES, RESULT, UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity_warning import CAUSE, Singularity, TIME
+from stewart_dynamics.mechanics.singularity_warning import (
+    CAUSE, Singularity, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.motor_row import (
@@ -131,7 +132,7 @@ class Batch(NamedTuple):
         return self._replace(stamps=self.stamps[which], rows=self.rows[which],
                              times=self.times[which])
 
-    def changed(
+    def replaced(
             self, motions: ArrayLike | None = None, restarts: ArrayLike | None = None) -> Batch:
         """Return the same setpoints with other motions (N, MOTION), or restarts (N,)."""
         rows = self.rows.copy()
@@ -202,6 +203,11 @@ class Outputs(NamedTuple):
     def conditions(self) -> Array:
         """(N,)."""
         return self.rows[:, CONDITION]
+
+    @property
+    def solvable(self) -> Flags:
+        """(N,): J_inv can be solved."""
+        return self.conditions < UNSOLVABLE_CONDITION
 
     @property
     def forces(self) -> Array:
@@ -302,7 +308,7 @@ class Step:
         if number == 1:
             at, of_one, *found = self._memory
             at[:], of_one[:], found[2][:] = stamps, given, before
-            self._check_one()
+            n_answered = self._check_one()
             angles, clearances, state, rows, motors = [
                 each.copy() if each.size else each for each in found]
         else:
@@ -313,9 +319,10 @@ class Step:
                 angles = self._of_poses.angles(setpoints.motions)
             if self._of_poses.clearance is not None:
                 clearances = self._of_poses.clearance(setpoints.motions)
-            self._check(1, number, stamps, given, angles, clearances, state, rows, motors)
+            n_answered = self._check(
+                1, number, stamps, given, angles, clearances, state, rows, motors)
         answered = rows[:, _ANSWERED] > 0.0
-        if np.count_nonzero(answered) < number:
+        if n_answered < number:
             stamps = stamps[answered]
             rows, angles, clearances, motors = (
                 each[answered] for each in (rows, angles, clearances, motors))
