@@ -410,11 +410,16 @@ class Crowd:
 
     def close(self) -> None:
         """End them all, and check how those of the package end."""
-        for program in self._programs:
-            program.process.send_signal(signal.SIGINT)
-        for program in self._programs:
-            code = program.wait()
-            assert isinstance(program, Partner) or code == 0, (code, program.stderr)
+        nodes = [each for each in self._programs if not isinstance(each, Partner)]
+        for node in nodes:
+            node.process.send_signal(signal.SIGINT)
+        try:
+            for node in nodes:
+                assert node.wait() == 0, node.stderr
+        finally:
+            # Without asking them: Fast DDS with TCP seldom hangs when it is to end.
+            for program in self._programs:
+                program.kill()
 
 
 @pytest.fixture
@@ -531,6 +536,7 @@ def test_one_host(crowd: Crowd, tmp_path: Path) -> None:
 
 # Elements that a profile without a certificate lacks, and so verifies no other.
 NO_CERTIFICATE = 'private_key_file|cert_chain_file|verify_mode|verify_file'
+_ATTEMPTS = 3
 
 
 @pytest.fixture
@@ -655,10 +661,20 @@ def test_intruders_enter_without_each_protection(crowd: Crowd, keys: Callable[..
         'no_certificate', 4, file=read / 'node' / 'environment.sh',
         **using(without(read / 'node' / 'profile.xml', NO_CERTIFICATE)))
     crowd.node('open')
-    crowd.node('fooled', file=fooled / 'node' / 'environment.sh',
-               **using(without(fooled / 'node' / 'profile.xml', 'verify_mode')))
+    unverified = using(without(fooled / 'node' / 'profile.xml', 'verify_mode'))
+    answered = flows(impostor, 2)
+    # A node that dials found no partner once in a thousand starts, in 240 s: Fast DDS's TCP. The
+    # question is whether the intruder is answered, so the node is started again then.
+    for attempt in range(_ATTEMPTS):
+        node = crowd.node(f'fooled_{attempt}', file=fooled / 'node' / 'environment.sh',
+                          **unverified)
+        end = time.monotonic() + DEADLINE / _ATTEMPTS
+        crowd.until(lambda end=end: answered() or time.monotonic() > end, 'time passes')
+        if answered():
+            break
+        crowd.end(node)
+    assert answered(), f'who has signed its own is not answered:\n{printed(impostor)[-1000:]}'
     crowd.until(lambda: reader.heard('setpoint/pose', 1), 'who has no certificate reads')
-    crowd.until(flows(impostor, 2), 'who has signed its own is answered')
     crowd.until(flows(stranger, 3), 'who has neither keys nor profile is answered')
 
 
