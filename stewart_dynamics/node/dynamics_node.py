@@ -194,17 +194,18 @@ class DynamicsNode(ManagedNode[Parameters]):
     def _note(self, setpoint: Batch, outputs: Outputs, came: float) -> None:
         """Pass the answer to other publishers and diagnostics."""
         self._last = setpoint, outputs
+        motion = setpoint.motions[0]
         exceedances = self._models.step.exceedances(
             setpoint.motions, outputs) if outputs.rows[0, EXCEEDING] else ()
         self._markers.note(setpoint, outputs, exceedances)
-        self._travel.note(setpoint.motions[0])
+        self._travel.note(motion)
         if not self._model_measured:
-            self._moved(setpoint.stamps[0], setpoint.motions[0])
+            self._moved(setpoint.stamps[0], motion)
         now = time.monotonic()
         if setpoint.moving and not setpoint.base_known[0]:
             self._diagnostics.base.unknown(now)
         if not self._diagnostics.answers.number:
-            self._diagnostics.begins(setpoint.motions[0].tolist(), outputs.determinants[0])
+            self._diagnostics.begins(motion.tolist(), outputs.determinants[0])
         if self._diagnostics.answered(setpoint, outputs, exceedances, came, now):
             self._report()
         self._setpoints.judge()

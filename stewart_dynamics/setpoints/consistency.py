@@ -106,7 +106,7 @@ class Consistency:
         self._radius = radius
         self._frame = frame
         self._pending: list[tuple[Stamps, Array, Flags]] = []
-        self._steps: Iterator[None] = iter(())  # those that ``judge`` has not yet done
+        self._steps: Iterator[None] | None = None  # those that ``judge`` has not yet done
         self.noted: list[tuple[int, Sequence[float], bool]] = []
         """Single samples for ``judge``: stamp [ns], row of motion, whether time jumped back."""
         self._held = 0
@@ -123,9 +123,11 @@ class Consistency:
 
     def judge(self) -> None:
         """Do one step, a fraction of a millisecond, of the check of the samples noted so far."""
-        with np.errstate(all='ignore'):  # numbers that overflow are not judged
-            for _ in self._steps:
-                return
+        if self._steps is not None:
+            with np.errstate(all='ignore'):  # numbers that overflow are not judged
+                for _ in self._steps:
+                    return
+            self._steps = None
         if len(self.noted) >= _GATHERED:
             self._steps = self._take_noted()
 
@@ -140,8 +142,8 @@ class Consistency:
     def _do(self, steps: Iterator[None]) -> None:
         """Do all steps, after those that are left."""
         with np.errstate(all='ignore'):
-            deque(chain(self._steps, self._take_noted(), steps), maxlen=0)
-        self._steps = iter(())
+            deque(chain(self._steps or (), self._take_noted(), steps), maxlen=0)
+        self._steps = None
 
     def _take_noted(self) -> Iterator[None]:
         if self.noted:
