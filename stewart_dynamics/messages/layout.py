@@ -10,7 +10,7 @@ others by comparing their bytes with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from operator import itemgetter
 from struct import Struct
 from typing import Any, NamedTuple
@@ -187,10 +187,9 @@ class SideBySide:
         return (messages, having, numbers), numbers, [
             (topic, having[:, n], entries[str(n)]) for n, topic in enumerate(self._topics)]
 
-    def write(self, stamps: Stamps, rows: Array) -> Iterator[
-            tuple[str, Flags, NDArray[np.void]]]:
+    def write(self, stamps: Stamps, rows: Array) -> list[tuple[str, Flags, NDArray[np.void]]]:
         """
-        Yield the topics that have a message, which rows have it (N,), and the messages (N,).
+        Return the topics that have a message, which rows have it (N,), and the messages (N,).
 
         stamps (N,) [ns], rows (N, width). Those of a single row are valid until the next call.
         """
@@ -201,9 +200,7 @@ class SideBySide:
         else:
             memory, numbers, found = self._memory(len(stamps))
             self._write(len(stamps), stamps, np.ascontiguousarray(rows), *memory)
-        for number, each in zip(numbers.tolist(), found, strict=True):
-            if number:
-                yield each
+        return [each for number, each in zip(numbers.tolist(), found, strict=True) if number]
 
 
 def at_any_byte(data: Bytes, size: int) -> NDArray[np.void]:

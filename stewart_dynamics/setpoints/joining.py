@@ -15,10 +15,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from struct import Struct
 
 import numpy as np
 
-from stewart_dynamics.arrays import Six
+from stewart_dynamics.arrays import Six, Stamps
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.rows import MOTION, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
@@ -33,6 +34,7 @@ from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining
 from stewart_dynamics.setpoints.step import Batch, SETPOINT
 
 _STANDSTILL = (0.0,) * 12
+_ONE = Struct(f'q{SETPOINT}d')  # stamp and row: numpy needs three times as long for so few
 
 Message = tuple[str, bytes, Callable[[], int]]
 """Topic, data and clock [ns]; the clock is read if the stamps of a setpoint are zero."""
@@ -130,7 +132,7 @@ class Setpoints:
 
     def _take_each(self, messages: Iterable[Message]) -> Batch:
         """Join messages one by one."""
-        stamps, rows, times = [], [], []
+        found: list[Batch] = []
         for topic, data, now in messages:
             if topic == WRENCH:
                 self._wrench_input.take(data)
@@ -147,16 +149,15 @@ class Setpoints:
                 if self._consistency is not None:
                     self._consistency.noted.append((stamp, motion, restart))
                 base = self.base.at(stamp) if self.base.topics else None
-                stamps.append(stamp)
-                rows.append((*motion, *self._wrench_input.wrench, *(base or NO_BASE),
-                             base is None or base[0] == base[0], restart, stamped))
-                if self.recorded is not None:
-                    times.append(self.recorded)
-        if not stamps:
-            return self._none
-        at = np.array(stamps)
-        return Batch(at, np.array(rows, dtype=float), np.array(times) if times else at,
-                     self._none.moving)
+                one = _ONE.pack(
+                    stamp, *motion, *self._wrench_input.wrench, *(base or NO_BASE),
+                    base is None or base[0] == base[0], restart, stamped)
+                at: Stamps = np.ndarray(1, np.int64, one)
+                found.append(Batch(
+                    at, np.ndarray((1, SETPOINT), float, one, at.nbytes),
+                    at if self.recorded is None else np.array([self.recorded]),
+                    self._none.moving))
+        return Batch.joined(found) if found else self._none
 
     def end(self, why: str) -> None:
         """Drop and count waiting samples: no more messages arrive."""

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,15 +72,16 @@ class OutputMessages:
         self.types = OUTPUT_TYPES | (MOTOR_TYPES if self._of_motors else {})
         self._wrench = StampedWriter(parameters.base_frame, 6)
 
-    def of(self, outputs: Outputs) -> Iterator[tuple[str, Flags, NDArray[np.void]]]:
+    def of(self, outputs: Outputs) -> list[tuple[str, Flags, NDArray[np.void]]]:
         """
-        Yield the messages for outputs, in the order in which they are published for one.
+        Return the messages for outputs, in the order in which they are published for one.
 
-        Yields topics, which outputs have a message (N,), and the messages (N,), all of one length.
+        Returns topics, which outputs have a message (N,), and the messages (N,), of one length.
         """
-        yield from self._of_legs.write(outputs.stamps, outputs.rows)
+        found = self._of_legs.write(outputs.stamps, outputs.rows)
         if self._of_motors is not None:
-            yield from self._of_motors.write(outputs.stamps, outputs.motors)
+            found += self._of_motors.write(outputs.stamps, outputs.motors)
+        return found
 
     def of_wrench(self, stamp: int, wrench: Sequence[float]) -> bytes:
         """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""

@@ -241,12 +241,13 @@ class SampleJoining:
         """Return the joined sample that a sample completes, if stamps are within the tolerance."""
         if self._tolerance:
             stamps = self._nearest(stamp)
-        elif all(stamp in waiting for waiting in self._waiting.values()):
-            stamps = dict.fromkeys(self.topics, stamp)
+            if not stamps:
+                return None
         else:
-            return None
-        if not stamps:
-            return None
+            for waiting in self._waiting.values():
+                if stamp not in waiting:
+                    return None
+            stamps = dict.fromkeys(self.topics, stamp)
         restart = self._drop_passed(stamps)
         values = [self._waiting[other].pop(at) for other, at in stamps.items()]
         return JoinedSample(stamps[self.topics[0]], sum(values, ()), restart)

@@ -55,6 +55,8 @@ FIRST: Array = np.zeros(1 + _STATE['restarting'])
 FIRST[_STATE['warning.time_to_crossing']] = math.inf
 FIRST[_STATE['lengths']] = math.nan
 FIRST.flags.writeable = False
+_THE_ONE: Flags = np.ones(1, dtype=bool)
+_THE_ONE.flags.writeable = False
 
 
 class Batch(NamedTuple):
@@ -321,7 +323,10 @@ class Step:
                 clearances = self._of_poses.clearance(setpoints.motions)
             n_answered = self._check(
                 1, number, stamps, given, angles, clearances, state, rows, motors)
-        answered = rows[:, _ANSWERED] > 0.0
+        if n_answered == number == 1:
+            answered = _THE_ONE
+        else:
+            answered = rows[:, _ANSWERED] > 0.0
         if n_answered < number:
             stamps = stamps[answered]
             rows, angles, clearances, motors = (
