@@ -55,6 +55,7 @@ FIRST: Array = np.zeros(1 + _STATE['restarting'])
 FIRST[_STATE['warning.time_to_crossing']] = math.inf
 FIRST[_STATE['lengths']] = math.nan
 FIRST.flags.writeable = False
+# The mask of a single answered setpoint: making it took as long as the computation.
 _THE_ONE: Flags = np.ones(1, dtype=bool)
 _THE_ONE.flags.writeable = False
 
