@@ -196,22 +196,29 @@ def to_json(document: Any, indent: int | None = None) -> str:
     """
     Return a document as JSON, on one line unless lines are indented.
 
-    Numpy scalars and arrays are written as numbers and lists.
-
     Raises ValueError: a number is not finite.
     """
     # Not orjson: it writes null for NaN, and takes no names that are not UTF-8.
-    return json.dumps(document, indent=indent, separators=None if indent else (',', ':'),
-                      allow_nan=False, ensure_ascii=False, default=_plain)
+    return json.dumps(plain(document), indent=indent, separators=None if indent else (',', ':'),
+                      allow_nan=False, ensure_ascii=False)
 
 
-def _plain(value: Any) -> Any:
-    """Return a numpy scalar or array as Python's own numbers."""
+def plain(document: Any) -> Any:
+    """
+    Return a document with Python's own numbers and lists in place of numpy's.
+
+    All that goes into JSON or onto a page passes here: an array has no truth value, and neither
+    a template nor JSON takes all of numpy's scalars.
+    """
     import numpy as np  # late, so that --help is fast
 
-    if not isinstance(value, (np.generic, np.ndarray)):
-        raise TypeError(f'{value!r}: {type(value).__name__} has no form in JSON')
-    return value.tolist()
+    if isinstance(document, (np.generic, np.ndarray)):
+        return document.tolist()
+    if isinstance(document, Mapping):
+        return {plain(key): plain(value) for key, value in document.items()}
+    if isinstance(document, tuple) and hasattr(document, '_fields'):
+        return type(document)(*map(plain, document))
+    return [plain(each) for each in document] if isinstance(document, (list, tuple)) else document
 
 
 @contextmanager

@@ -244,6 +244,28 @@ def test_positions_of_drives_are_an_option(table: Path, tmp_path: Path,
     assert all(each['interval'] is None for each in result['parameters'])
 
 
+def test_frames_of_a_device_are_on_the_page_and_in_the_files(
+        table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = read_poses(table, JOINTS)
+    camera = Pose([1.5, -0.4, 0.7], from_euler([0.3, -0.2, 1.0]))
+    target = Pose([0.05, 0.02, 0.1], from_euler([0.1, 0.2, -0.3]))
+    seen = camera.rotation @ given.poses.rotation
+    file, out = tmp_path / 'camera.csv', tmp_path / 'out'
+    file.write_text(poses_csv(JOINTS, given.lengths, Pose(
+        given.poses.position @ camera.rotation.T + camera.position + seen @ target.position,
+        seen @ target.rotation)))
+    assert main([str(file), '--frames', 'unknown', '--params', str(PLATFORM), '--output',
+                 str(out)]) == 0
+    frames = json.loads((out / 'calibration.json').read_text())['frames']
+    place = -camera.rotation.T @ camera.position
+    for key, expected in (('device_in_base', place), ('target_in_platform', target.position)):
+        # the joints that define both frames are about a millimeter off
+        assert np.linalg.norm(np.array(frames[key]['position_m']) - expected) < 3e-3
+    page, shown = (out / 'report.html').read_text(), capsys.readouterr().out
+    number = f'{frames["device_in_base"]["position_m"][0]:.6g}'
+    assert all('Device in the base frame' in each and number in each for each in (page, shown))
+
+
 def test_degrees_read_as_radians_are_named(
         table: Path, tmp_path: Path, snapshot: Snapshot) -> None:
     rng = np.random.default_rng(2)

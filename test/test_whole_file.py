@@ -16,19 +16,21 @@ from pathlib import Path
 import resource
 import stat
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from referees import ROOT
 from snapshot import Snapshot
 from stewart_dynamics import ParameterError, Parameters, StewartError
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.describe_command_line import main as describe
 from stewart_dynamics.replay.index import write_fleet
 from stewart_dynamics.replay.replay_command_line import main as replay
+from stewart_dynamics.reporting.pages import page
 from stewart_dynamics.reporting.results_folder import RESULT, whole_folder
 from stewart_dynamics.whole_file import (
-    FilesOfFolder, read_text, to_json, write_files, write_json)
+    FilesOfFolder, plain, read_text, to_json, write_files, write_json)
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 FULL = 2000  # [bytes]
@@ -221,11 +223,31 @@ def test_json_takes_numpy_scalars_and_arrays(tmp_path: Path) -> None:
     assert to_json(document['a']) == '[0,1]'
 
 
+def test_pages_take_numpy_scalars_and_arrays(tmp_path: Path) -> None:
+    """A template gets plain numbers, wherever in its values an array stands."""
+    (tmp_path / 'a.css').write_text('')
+    (tmp_path / 'a.html').write_text(
+        "{{ a|map('round', 1)|join(' ') }} {{ 'full' if b.c[0] else 'empty' }} "
+        '{{ d.position|unique|list }} {{ e is true }} {{ f }} {{ g is mapping }}')
+    found = Pair(np.array([2.0, 2.0]), np.float64(0.5))
+    shown = page(tmp_path, 'a', a=np.array([0.11, 0.25]), b={'c': (np.zeros(2),)}, d=found,
+                 e=np.bool_(True), f=[np.int64(3), np.float64(0.1)], g={np.int64(1): None})
+    assert shown == '0.1 0.2 full [2.0] True [3, 0.1] True'
+    assert plain(found) == Pair([2.0, 2.0], 0.5)  # type: ignore[arg-type]
+
+
+class Pair(NamedTuple):
+    """A result with an array."""
+
+    position: Array
+    angle: float
+
+
 @pytest.mark.parametrize('value', [
     math.nan, np.float64(math.inf), np.float32(math.nan), np.array([[0.0, -math.inf]])])
 def test_json_has_no_numbers_that_are_not_finite(tmp_path: Path, value: Any) -> None:
     with pytest.raises(ValueError, match='not JSON compliant'):
         write_json(tmp_path / 'a.json', {'a': [value]})
     assert not any(tmp_path.iterdir())
-    with pytest.raises(TypeError, match='PosixPath has no form in JSON'):
+    with pytest.raises(TypeError, match='PosixPath is not JSON serializable'):
         to_json(tmp_path)

@@ -14,7 +14,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.calibrate import Calibration
-from stewart_dynamics.calibration.calibration_results import outlier_text, validation_text
+from stewart_dynamics.calibration.calibration_results import (
+    frames_text, outlier_text, validation_text)
 from stewart_dynamics.calibration.equations import BASE, PLATFORM, ZERO
 from stewart_dynamics.estimation.confidence_level import INTERVAL, TWO_SIDED
 from stewart_dynamics.reporting.estimates import FIXED, page_values
@@ -37,7 +38,7 @@ def write_report(path: Path, result: Mapping[str, Any], found: Calibration) -> N
     times = _arrow_scale(found)
     text = page(
         _FOLDER, 'calibration', document=True, r=result, name=Path(result['poses']['source']).name,
-        validation=validation_text(result['validation']),
+        validation=validation_text(result['validation']), frames=frames_text(result),
         outliers=[outlier_text(each) for each in result['outliers']],
         changes=_changes(found), views=[
             _view(found, BASE, 'Base joints, from above', times),

@@ -10,12 +10,14 @@ import math
 import textwrap
 from typing import Any
 
+import numpy as np
+
 from stewart_dynamics.calibration.calibrate import Calibration
 from stewart_dynamics.calibration.equations import inverse
 from stewart_dynamics.calibration.frames import PoseErrors
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.estimation.confidence_level import PERCENT, TWO_SIDED
-from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.frames.motion import listed, Pose
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.estimates import (
@@ -96,6 +98,15 @@ def validation_text(held: Mapping[str, Any] | None) -> str:
             f'{after} by a fit to the others')
 
 
+def frames_text(result: Mapping[str, Any]) -> str:
+    """Return the frames of the device in words; empty if they were known."""
+    return '' if result['frames'] is None else '; '.join(
+        f'{name}: {listed(np.array(frame["position_m"]), 6)} m, quaternion '
+        f'{listed(np.array(frame["quaternion"]), 6)}' for name, frame in zip(
+            ('Device in the base frame', 'target in the platform frame'),
+            result['frames'].values(), strict=True))
+
+
 def result_text(result: Mapping[str, Any]) -> str:
     """Return the content of calibration.json as text for the terminal."""
     lack, noise = result['lack_of_fit'], result['noise']
@@ -108,6 +119,7 @@ def result_text(result: Mapping[str, Any]) -> str:
         f'noise {"as given" if noise["given"] else "estimated"}: leg positions '
         f'{1e6 * noise["length_m"]:.2g} um, poses {1e6 * noise["position_m"]:.2g} um and '
         f'{1e6 * noise["rotation_rad"]:.2g} urad',
+        *textwrap.wrap(frames_text(result), 100),
         *map(outlier_text, result['outliers']), '',
         *table_lines(result['parameters'], 'calibrated')]
     if result['not_identified']:

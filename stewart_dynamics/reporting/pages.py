@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from stewart_dynamics.colors import custom_properties
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.whole_file import to_json
+from stewart_dynamics.whole_file import plain, to_json
 
 _SHARED = Path(__file__).with_name('templates')
 
@@ -112,7 +112,7 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
     hashes = ' '.join([*(f"'sha256-{_digest(each)}'" for each in (*scripts, script) if each),
                        *(["'self'"] if shared else [])]) or "'none'"
     return _environment(folder).get_template(f'{template}.html').render(
-        hashes=hashes, script=script, style=style, **values)
+        hashes=hashes, script=script, style=style, **plain(values))
 
 
 def _digest(script: str) -> str:
