@@ -239,6 +239,21 @@ def test_position_velocity_and_acceleration_belong_together() -> None:
             found.velocities ** 2)
 
 
+def test_a_record_with_a_gap_is_not_integrated(tmp_path: Path, snapshot: Snapshot) -> None:
+    t, x, a = quake()
+    for lost, known in (((6.0, 6.001), True), ((6.0, 11.0), False), ((6.0, 6.3), False)):
+        kept = (t < lost[0] - 1e-6) | (t > lost[1] + 1e-6)
+        path = write(tmp_path / 'quake.csv', {
+            't': t[kept], 'ax': a[kept, 0], 'ay': a[kept, 1], 'az': a[kept, 2]})
+        if known:  # a sample that is lost does not move the platform elsewhere
+            motion = read_setpoints(path, PLATFORM).motion
+            np.testing.assert_allclose(
+                motion.position - PLATFORM.home_pose().position, x[kept], atol=5e-4)
+            continue
+        with snapshot.raises(BagError):
+            read_setpoints(path, PLATFORM)
+
+
 # -- bad files ------------------------------------------------------------------------------------
 
 HEAD = 't,x,y,z,qx,qy,qz,qw'

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps, STAMPS_END
-from stewart_dynamics.bags.baseline import integrated
+from stewart_dynamics.bags.baseline import gap_of, integrated
 from stewart_dynamics.bags.csv_table import read_table, Table
 from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.bags.source_axes import axes_matrix, turned
@@ -271,7 +271,14 @@ class CsvMotion:
         if home is None:
             raise BagError(f'{self._path}: has only accelerations: they are integrated from the '
                            'home pose, which needs the parameters of the hexapod')
-        motion = integrated((self.stamps - self.stamps[0]) * NANOSECOND, accelerations[:, :3])
+        times = (self.stamps - self.stamps[0]) * NANOSECOND
+        motion = integrated(times, accelerations[:, :3])
+        gap = gap_of(times, motion.accelerations, motion.velocities)
+        if gap is not None:
+            raise self._at(table, gap, 't', (
+                f'{times[gap] - times[gap - 1]:.4g} s after the row before, usual are '
+                f'{float(np.median(np.diff(times))):.4g} s: accelerations alone are not integrated '
+                'over a gap, all later positions would be wrong: cut the record there'))
         still = np.zeros_like(motion.positions)
         self.notices.append(motion.words())
         level = np.tile([0.0, 0.0, 0.0, 1.0], (len(still), 1))
