@@ -11,8 +11,8 @@ the Seismological Society of America 51, 1961, 175-189). Its coefficients make t
 the velocity least, with velocity and displacement zero at the end, so that the motion begins and
 ends at rest in the same place. Between samples the acceleration is linear.
 
-Nothing bridges a gap: what the velocity changed there is lost, and each later position with it. How
-far it is from linear in windows as long as the gap, elsewhere in the record, says how much that is.
+Nothing bridges a gap: the change of the velocity there is lost, and with it each later position.
+How large it is follows from windows as long as the gap, elsewhere in the record.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def gap_of(times: Array, accelerations: Array, velocities: Array) -> int | None:
 
 
 def _hidden(times: Array, accelerations: Array, velocities: Array, gap: float) -> float:
-    """Return the mean square of what linear accelerations over windows of a gap miss [m^2/s^2]."""
+    """Return the mean squared error of linear accelerations over windows of a gap [m^2/s^2]."""
     last = max(int(np.searchsorted(times, times[-1] - gap, side='right')), 1)
     first = np.linspace(0, last - 1, min(_WINDOWS, last), dtype=np.int64)
     after = np.minimum(np.searchsorted(times, times[first] + _NEARLY * gap), len(times) - 1)

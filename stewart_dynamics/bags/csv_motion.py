@@ -275,10 +275,11 @@ class CsvMotion:
         motion = integrated(times, accelerations[:, :3])
         gap = gap_of(times, motion.accelerations, motion.velocities)
         if gap is not None:
+            usual = float(np.median(np.diff(times)))
             raise self._at(table, gap, 't', (
-                f'{times[gap] - times[gap - 1]:.4g} s after the row before, usual are '
-                f'{float(np.median(np.diff(times))):.4g} s: accelerations alone are not integrated '
-                'over a gap, all later positions would be wrong: cut the record there'))
+                f'{times[gap] - times[gap - 1]:.4g} s after the row before, usual are {usual:.4g} '
+                's: accelerations alone are not integrated over a gap, all later positions would '
+                'be wrong: cut the record there'))
         still = np.zeros_like(motion.positions)
         self.notices.append(motion.words())
         level = np.tile([0.0, 0.0, 0.0, 1.0], (len(still), 1))
