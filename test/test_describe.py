@@ -87,12 +87,20 @@ def test_zero_gravity_of_a_file_is_said_once(tmp_path, capsys, snapshot):
     snapshot(said)
 
 
-def test_the_block_of_ros2_control_is_written_by_option(tmp_path):
-    run('--params', PLATFORM, '--output', tmp_path, '--ros2-control', 'position,effort',
-        '--hardware', 'topic')
-    text = (tmp_path / 'platform.urdf').read_text()
-    assert 'joint_state_topic_hardware_interface/JointStateTopicSystem' in text
-    assert text.count('<command_interface name="effort" />') == 6
+@pytest.mark.parametrize(('hardware', 'plugin'), [
+    ('topic', 'joint_state_topic_hardware_interface/JointStateTopicSystem'),
+    ('joint_command', 'joint_command_topic_hardware_interface/JointCommandTopicSystem')])
+@pytest.mark.parametrize('interfaces', ['effort', 'velocity', 'position,effort', 'position'])
+def test_the_block_of_ros2_control_is_written_by_option(tmp_path, hardware, plugin, interfaces):
+    """Hardware over topics publishes each command, not only those that differ from the state."""
+    run('--params', PLATFORM, '--output', tmp_path, '--ros2-control', interfaces,
+        '--hardware', hardware)
+    block = ET.parse(tmp_path / 'platform.urdf').find('ros2_control')
+    assert block.findtext('hardware/plugin') == plugin
+    assert len(block.findall('joint/command_interface')) == 6 * len(interfaces.split(','))
+    assert {each.get('name'): each.text for each in block.findall('hardware/param')} == {
+        'joint_commands_topic': '/hexapod/joint_commands',
+        'joint_states_topic': '/hexapod/joint_states', 'trigger_joint_command_threshold': '-1'}
 
 
 @pytest.mark.parametrize('arguments', [

@@ -59,7 +59,8 @@ def _arguments() -> argparse.ArgumentParser:
                               'several with commas')
     control.add_argument('--hardware', default='mock', metavar='PLUGIN',
                          help='mock (mock_components), topic (joint_state_topic_hardware_'
-                              'interface) or the name of a plugin (default: mock)')
+                              'interface), joint_command (joint_command_topic_hardware_interface) '
+                              'or the name of a plugin (default: mock)')
     return parser
 
 

@@ -37,10 +37,11 @@ _VIRTUAL = {'yaw': ('z', math.pi), 'pitch': ('y', math.pi / 2), 'roll': ('x', ma
 _COMMENT = ('The loops of a hexapod are open here; its joints close them where they have the '
             'positions of one pose, as the topic joint_states gives them.')
 
-MOCK, TOPIC = 'mock', 'topic'
+MOCK, TOPIC, JOINT_COMMAND = 'mock', 'topic', 'joint_command'
 HARDWARE = {
     MOCK: 'mock_components/GenericSystem',
-    TOPIC: 'joint_state_topic_hardware_interface/JointStateTopicSystem'}
+    TOPIC: 'joint_state_topic_hardware_interface/JointStateTopicSystem',
+    JOINT_COMMAND: 'joint_command_topic_hardware_interface/JointCommandTopicSystem'}
 
 
 class Ros2Control(NamedTuple):
@@ -166,9 +167,11 @@ def _ros2_control(root: ET.Element, hexapod: Hexapod, name: str, control: Ros2Co
     system = add(root, 'ros2_control', name=name, type='system')
     hardware = add(system, 'hardware')
     add(hardware, 'plugin', HARDWARE.get(control.hardware, control.hardware))
-    if control.hardware == TOPIC:
+    if control.hardware in (TOPIC, JOINT_COMMAND):
         add(hardware, 'param', '/hexapod/joint_commands', name='joint_commands_topic')
         add(hardware, 'param', '/hexapod/joint_states', name='joint_states_topic')
+        # Otherwise commands near the state are dropped: all of them at rest, and efforts alone.
+        add(hardware, 'param', '-1', name='trigger_joint_command_threshold')
     if control.hardware == MOCK and {'position', 'velocity'} & set(control.interfaces) == {
             'velocity'}:
         # Otherwise the position would stay where it is.
