@@ -4,14 +4,17 @@
 """
 Files for amplifiers: units, signs and scales, in a mock of a CiA 402 drive.
 
-The mock turns raw objects into what a motor and its screw do; nothing of the package does so.
+The mock turns raw objects into what a motor and its screw do; nothing of the package does so. The
+EtherCAT plugin is a model of ethercat_driver_ros2 1.2.0, written after its source.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import ctypes
 import math
 from pathlib import Path
+import re
 import shutil
 import subprocess
 from typing import Any, NamedTuple
@@ -38,6 +41,9 @@ DRIVEN = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced({
     'drive.gear_ratio': GEAR, 'drive.rated_torque': RATED, 'drive.counts_per_turn': COUNTS,
     'drive.direction': DIRECTIONS, 'drive.torque_max': 8.2})
 PLATFORM = StewartPlatform(DRIVEN)
+# An encoder whose increments are so small that 32 bits are 0.64 m of the leg, or 0.64 m/s.
+FINE = {'drive.gear_ratio': 1.0, 'drive.counts_per_turn': 2.0 ** 24, 'geometry.zero_length': 1.0,
+        'limits.length_min': 1.0, 'limits.length_max': 1.5}
 
 
 class Mock(NamedTuple):
@@ -69,6 +75,83 @@ class Mock(NamedTuple):
         turns = self.direction * position / COUNTS / GEAR
         newton_metres = self.direction * torque / 1000.0 * RATED * GEAR
         return turns * LEAD, newton_metres * 2.0 * math.pi / LEAD
+
+
+class Drive:
+    """A drive of CiA 402 on the bus: its states, the mode that it displays, its position."""
+
+    def __init__(self, position: int, displayed_after: int) -> None:
+        self.objects = {0x6040: 0, 0x607a: 0, 0x60b1: 0, 0x60b2: 0,
+                        0x6041: 0, 0x6064: position, 0x606c: 0, 0x6077: 0, 0x6061: 0}
+        self._displayed_after = displayed_after  # cycles
+        self._cycles = 0
+
+    @property
+    def enabled(self) -> bool:
+        """Return whether it follows 607Ah."""
+        return self.objects[0x6041] == 0x27
+
+    def cycle(self) -> None:
+        """Take the control word, and go on to the next state."""
+        self._cycles += 1
+        control, status = self.objects[0x6040], self.objects[0x6041]
+        following = {(0x00, None): 0x40, (0x40, 0x06): 0x21, (0x21, 0x07): 0x23,
+                     (0x23, 0x0f): 0x27}
+        self.objects[0x6041] = following.get(
+            (status, None), following.get((status, control), status))
+        if self._cycles >= self._displayed_after:
+            self.objects[0x6061] = 8
+
+
+class Plugin:
+    """EcCiA402Drive: it goes through all channels, outputs first, twice in a cycle."""
+
+    STATES: Mapping[int, int] = {0x40: 0x06, 0x21: 0x07, 0x23: 0x0f}  # control word for each
+
+    def __init__(self, text: str) -> None:
+        slave = yaml.safe_load(text)
+        self._outputs, self._inputs = (
+            [channel for pdo in slave[kind] for channel in pdo['channels']]
+            for kind in ('rpdo', 'tpdo'))
+        self._default = {each['index']: float(each.get('default', math.nan))
+                         for each in self._outputs}
+        self._mode, self._status, self._position = 0, 0, math.nan
+        self.states: dict[str, float] = {}
+
+    def go_through(self, commands: Mapping[str, float], bus: dict[int, int]) -> None:
+        """Write commands or defaults into the outputs; read the inputs."""
+        for channel in self._outputs:
+            index, factor = channel['index'], channel.get('factor', 1.0)
+            overridden = False
+            if index == 0x6040:
+                self._default[index] = self.STATES.get(self._status, bus[index])
+            if index == 0x607a:
+                if self._mode != 0:
+                    self._default[index] = factor * self._position
+                overridden = self._mode != 8
+            command = commands.get(channel.get('command_interface', ''), math.nan)
+            value = self._default[index] if overridden or math.isnan(command) else (
+                factor * command)
+            if not math.isnan(value):
+                bus[index] = int(value)  # a cast of C
+        for channel in self._inputs:
+            value = channel.get('factor', 1.0) * bus[channel['index']]
+            if 'state_interface' in channel:
+                self.states[channel['state_interface']] = value
+            if channel['index'] == 0x6061:
+                self._mode = int(value)
+            elif channel['index'] == 0x6064:
+                self._position = value
+            elif channel['index'] == 0x6041:
+                self._status = int(value)
+
+
+def cycle(plugin: Plugin, drive: Drive, position: float) -> None:
+    """Run one period of the controller manager: read, write, and the drive's own."""
+    commands = {'position': position, 'velocity': math.nan, 'effort': math.nan}
+    plugin.go_through(commands, drive.objects)
+    plugin.go_through(commands, drive.objects)
+    drive.cycle()
 
 
 @pytest.fixture(scope='module')
@@ -112,6 +195,57 @@ def test_six_mock_drives_carry_the_weight(files: dict[str, str]) -> None:
     assert fallen.linear_acceleration[2] < -15.0
 
 
+@pytest.mark.parametrize('displayed_after', [0, 1, 2, 3])
+@pytest.mark.parametrize('leg', [0, 1])
+def test_an_enabled_drive_holds_its_position_until_a_command_comes(
+        files: dict[str, str], leg: int, displayed_after: int) -> None:
+    """607Ah is 6064h to the increment, and the command from the first one on."""
+    counts = int(DIRECTIONS[leg] * 0.2 / LEAD * GEAR * COUNTS)
+    plugin, drive = Plugin(files[f'hexapod_ethercat_{leg + 1}.yaml']), Drive(
+        counts, displayed_after)
+    for _ in range(10):
+        cycle(plugin, drive, math.nan)
+        if drive.enabled:
+            assert drive.objects[0x607a] == counts
+    assert drive.enabled
+    assert plugin.states['position'] == pytest.approx(0.2, abs=1e-8)
+    cycle(plugin, drive, plugin.states['position'])  # as controllers begin
+    assert drive.objects[0x607a] == counts
+    for position in (0.201, 0.3, -0.05):
+        cycle(plugin, drive, position)
+        assert drive.objects[0x607a] == pytest.approx(
+            DIRECTIONS[leg] * position / LEAD * GEAR * COUNTS, abs=1.0)
+    cycle(plugin, drive, math.nan)  # a controller that ends
+    assert drive.objects[0x607a] == counts
+
+
+def test_without_the_displayed_mode_the_plugin_never_sends_a_position(
+        files: dict[str, str]) -> None:
+    """The channel of 6061h is why the test above passes."""
+    slave = yaml.safe_load(files['hexapod_ethercat_1.yaml'])
+    channels = slave['tpdo'][0]['channels']
+    channels[:] = [each for each in channels if each['index'] != 0x6061]
+    plugin, drive = Plugin(yaml.safe_dump(slave)), Drive(125829120, 0)
+    for position in [math.nan] * 10 + [0.3] * 10:
+        cycle(plugin, drive, position)
+    assert drive.enabled
+    assert drive.objects[0x607a] == 0
+
+
+def test_a_position_that_is_read_is_written_back_to_the_increment() -> None:
+    """Factors of any lead, gear and encoder: a held position does not creep towards zero."""
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        changed = DRIVEN.replaced({
+            'actuator.screw_lead': random.uniform(0.002, 0.02), 'drive.torque_max': None,
+            'drive.gear_ratio': random.uniform(1.0, 5.0), 'limits.force_max': None,
+            'drive.counts_per_turn': float(random.integers(1000, 2 ** 20))})
+        channels = Mock.of(str(drive_files(changed, 'h')['h_ethercat_2.yaml']), -1.0).channels
+        counts = random.integers(-2 ** 31 + 1, 2 ** 31, 1000)
+        metres = channels[0x6064]['factor'] * counts
+        assert np.all(np.trunc(channels[0x607a]['factor'] * metres) == counts)
+
+
 @pytest.mark.parametrize(('compiler', 'standard', 'suffix'), [
     ('gcc', 'c99', 'c'), ('g++', 'c++17', 'cpp'), ('clang', 'c99', 'c')])
 def test_the_header_has_the_same_units(
@@ -120,7 +254,8 @@ def test_the_header_has_the_same_units(
         pytest.skip(f'needs {compiler}')
     (tmp_path / 'hexapod_drives.h').write_text(files['hexapod_drives.h'])
     names = {'turns': 'double', 'counts': 'int32_t', 'torque': 'double', 'per_mille': 'int16_t',
-             'per_mille_of_force': 'int16_t', 'odrive_torque': 'int16_t'}
+             'per_mille_of_force': 'int16_t', 'odrive_torque': 'int16_t',
+             'odrive_velocity': 'int16_t'}
     calls = '\n'.join(
         f'{kind} call_{name}(int leg, double value); {kind} call_{name}(int leg, double value)'
         f' {{return hexapod_{name}(leg, value);}}' for name, kind in names.items())
@@ -151,6 +286,8 @@ def test_the_header_has_the_same_units(
         assert call('torque', leg, 1.5) == 1.5 * direction
         assert call('per_mille', leg, RATED) == 1000.0 * direction
         assert call('odrive_torque', leg, 1.5) == 1500.0 * direction
+        assert call('odrive_velocity', leg, 0.05) == 30000.0 * direction  # 30 turns/s
+        assert call('odrive_velocity', leg, 0.1) in (direction * 32767.0, -32768.0)
         mock = Mock.of(files[f'hexapod_ethercat_{leg + 1}.yaml'], direction)
         for force in (-3000.0, -0.4, 0.0, 777.0, 6000.0):
             raw = call('per_mille_of_force', leg, force)
@@ -174,11 +311,43 @@ def test_the_header_has_the_same_units(
 @pytest.mark.parametrize('changes', [
     {'drive.rated_torque': None},
     {'drive.screw_rotation': 'universal'},
-    {'drive.rated_torque': 0.01, 'drive.torque_max': None}])
+    {'drive.rated_torque': 0.01},
+    {'drive.rated_torque': 0.01, 'drive.torque_max': None},
+    {**FINE, 'limits.length_max': 1.7}, {**FINE, 'geometry.zero_length': 0.0},
+    {**FINE, 'geometry.zero_length': 1.7},
+    {**FINE, 'drive.counts_per_turn': 2.0 ** 26},
+    {**FINE, 'limits.velocity_max': [0.1, 0.1, 0.1, 0.7, 0.1, 0.1]},
+    {**FINE, 'drive.speed_max': 900.0}])
 def test_units_that_are_not_known_or_do_not_fit_are_rejected(
         changes: dict[str, Any], snapshot: Snapshot) -> None:
     with snapshot.raises(ParameterError):
         drive_files(DRIVEN.replaced(changes), 'hexapod')
+
+
+def test_the_ends_of_32_bits_are_within_them() -> None:
+    """The stroke that just fits is taken; what an error advises is."""
+    fitting = (2.0 ** 31 - 1.0) / 2.0 ** 24 * LEAD
+    taken = {**FINE, 'limits.length_max': 1.0 + fitting, 'limits.velocity_max': fitting}
+    assert drive_files(DRIVEN.replaced(taken), 'h')
+    for more in ({'limits.length_max': 1.0 + 1.0000001 * fitting},
+                 {'limits.velocity_max': 1.0000001 * fitting},
+                 {'drive.speed_max': 900.0}, {'drive.rated_torque': 0.01}):
+        changed = DRIVEN.replaced({**taken, **more})
+        with pytest.raises(ParameterError) as caught:
+            drive_files(changed, 'h')
+        name, value = re.findall(
+            r'(drive\.[a-z_]+)[^:]*? (?:of at most|to at least) ([0-9.]+)', str(caught.value))[0]
+        assert drive_files(changed.replaced({name: float(value)}), 'h')
+    centred = re.findall(r'middle of the stroke, ([0-9.]+) m', _error(
+        DRIVEN.replaced({**FINE, 'limits.length_max': 1.7})))
+    assert drive_files(DRIVEN.replaced({
+        **FINE, 'limits.length_max': 1.7, 'geometry.zero_length': float(centred[0])}), 'h')
+
+
+def _error(parameters: Parameters) -> str:
+    with pytest.raises(ParameterError) as caught:
+        drive_files(parameters, 'h')
+    return str(caught.value)
 
 
 def test_a_direction_is_one_or_minus_one(snapshot: Snapshot) -> None:
@@ -191,7 +360,7 @@ def test_stewart_export_writes_them_on_request(tmp_path: Path) -> None:
     given = ['--params', str(tmp_path / 'hexapod.yaml'), '--output', str(tmp_path / 'c')]
     assert main([*given, '--drives']) == 0
     page = (tmp_path / 'c' / 'hexapod_drives.md').read_text()
-    assert '| leg_2 | -1 | 600 | ' in page
+    assert '| leg_2 | -1 | 600 | -6.291456e+08 | 3.413 |' in page
     assert f'| {1e3 / (2.0 * math.pi * GEAR / LEAD):.6g} |' in page
     assert (tmp_path / 'c' / 'hexapod_ethercat_6.yaml').exists()
     assert main([*given[:-1], str(tmp_path / 'd')]) == 0
