@@ -206,9 +206,18 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         'gravity: [0, 0, 9.81] m/s^2 pulls the platform away from the base: a sign? For a '
         'hexapod that hangs, or whose axes point down, set geometry.platform_side']),
     'platform joints in the base frame': ({'geometry.platform_joints': TOP + HOME}, [
-        'geometry.platform_joints: [0, 0, 1.18] m is their center, where it is at home in the '
-        'base frame, but platform.center_of_mass is 1.06 m away from it: are the joints given in '
-        'the base frame?']),
+        'geometry.platform_joints: [0, 0, 1.18] m is their center, where it is in the base frame, '
+        'legs of 1.3 m and more, but platform.center_of_mass is 1.06 m away from it: are the '
+        'joints given in the base frame?']),
+    'all of the platform in the base frame': ({
+        'geometry.platform_joints': TOP + HOME,
+        'platform.center_of_mass': PLATFORM['platform.center_of_mass'] + HOME}, [
+        'geometry.platform_joints: [0, 0, 1.18] m is their center, where it is in the base frame, '
+        'legs of 1.3 m and more: are the joints given in the base frame?']),
+    'joints in the frame of the floor': ({
+        'geometry.base_joints': BASE + 0.5 * HOME, 'geometry.platform_joints': TOP + 1.3 * HOME}, [
+        'geometry.platform_joints: [0, 0, 1.53] m is their center, where it is in the base frame, '
+        'legs of 1.09 m and more, but platform.center_of_mass is 1.41 m away from it']),
     'a center of mass from the origin of the base': (
         {'platform.center_of_mass': PLATFORM['platform.center_of_mass'] + HOME}, [
             'platform.center_of_mass: [0.02, -0.01, 1.3] m is where the platform is at home in '
@@ -300,6 +309,24 @@ def test_a_mistake_is_reported_once(name: str) -> None:
     assert len(found) == 1 or name in SEVERAL
     # A wrong unit is not also an order of the joints.
     assert name != 'one base joint in mm' or not any('another order' in each for each in found)
+
+
+@pytest.mark.parametrize('height', [0.779, 0.994, 1.18, 1.5])
+@pytest.mark.parametrize('limits', [{}, {
+    'limits.length_min': (), 'limits.length_max': (), 'geometry.zero_length': 0.0}])
+def test_points_in_the_frame_of_the_base_are_found_at_any_height(
+        height: float, limits: dict[str, Any]) -> None:
+    """A file from a drawing of the whole hexapod, with or without limits of length."""
+    up = np.array([0.0, 0.0, height])
+    center = PLATFORM['platform.center_of_mass']
+    for changes, name in (
+            ({'geometry.platform_joints': TOP + up}, 'geometry.platform_joints'),
+            ({'platform.center_of_mass': center + up}, 'platform.center_of_mass')):
+        found = likely_mistakes(PLATFORM.replaced({**limits, **changes}))
+        assert any(each.startswith(f'{name}: ') and 'base' in each for each in found), found
+    # The frames of positioning hexapods: all of the base below, home at zero.
+    assert not likely_mistakes(PLATFORM.replaced({
+        **limits, 'geometry.base_joints': BASE - up}))
 
 
 @pytest.mark.parametrize('size', [0.1, 1.0])

@@ -25,8 +25,8 @@ from stewart_dynamics.arrays import Array
 
 # A pause this many times as long as usual is a gap.
 _GAP = 1.5
-# Largest change of velocity that gaps may hide, by the RMS of the velocity: a single sample that is
-# lost among twenty in a period of the acceleration is 0.004, and moves the positions by 2 to 6 %.
+# Largest change of velocity that gaps may hide, by the RMS of the velocity: one lost sample, of
+# twenty in a period of the acceleration, is 0.004, and moves the positions by 2 to 6 %.
 _HIDDEN = 0.01
 # Windows in which a gap is tried.
 _WINDOWS = 1000

@@ -93,7 +93,7 @@ _FASTEST = 100.0
 # The base joints of hexapods are as far from their center as the platform joints, or farther.
 _LARGEST_PLATFORM_RATIO = 1.2
 # Points are in the base frame if they are this near to home, in terms of its height.
-_AT_HOME = 0.2
+_AT_HOME = 0.25
 # A rate that needs this many times the possible acceleration along the whole stroke: 1e-4 to 0.5,
 # 3600 times as large in m/min.
 _UNREACHABLE = 3.0
@@ -101,6 +101,11 @@ _UNREACHABLE = 3.0
 _SMALLEST_ANGLE = 0.25
 # The frames of base and platform differ at home by more than this, in terms of its height.
 _APART = 0.7
+# A center of mass this many radii of gyration away from the joints leaves 15 % of the mass for the
+# plate between the joints, at most; this many, near the origin, are enough where joints are far.
+_FAR_FOR_BODY, _FAR_WHERE_JOINTS_ARE = 2.6, 2.0
+# A center of mass in the base frame is between these heights at home, in terms of home's.
+_LOWEST, _HIGHEST = 0.6, 1.7
 # The center of mass of a piston behind its joint, in terms of the longest leg.
 _BEHIND = 0.02
 
@@ -260,28 +265,32 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
     middle = p.geometry.platform_joints.mean(axis=0)
     height = abs(float(home.heights[0]))
     base_middle = p.geometry.base_joints.mean(axis=0)
-    from_base = base_middle + height * away
-    if home.length is None:
-        return  # heights are guesses
-    # A base frame away from its joints may be where the platform frame is at home: then both
-    # frames give the same numbers.
-    if (np.linalg.norm(middle - from_base) < _AT_HOME * height
-            and np.linalg.norm(base_middle) < _APART * height < np.linalg.norm(middle)
-            and np.linalg.norm(center) < 0.5 * np.linalg.norm(center - middle)):
+    inertia = inertia_matrix(p.platform.inertia)
+    across = shape.axes[:2] @ inertia @ shape.axes[:2].T
+    least = math.sqrt(max(float(np.linalg.eigvalsh(across)[0]), 0.0) / p.platform.mass)
+    far = float(np.linalg.norm(center - middle))
+    beyond_body = far > _FAR_FOR_BODY * least
+    if _in_one_frame(p, home, bool(
+            far > _FAR_WHERE_JOINTS_ARE * least and np.linalg.norm(center) < 0.5 * far)):
+        apart = '' if far < 0.5 * np.linalg.norm(middle) else (
+            f', but platform.center_of_mass is {far:.3g} m away from it')
         yield (f'geometry.platform_joints: {_listed(middle.round(9))} m is their center, '
-               'where it is at home in the base frame, but platform.center_of_mass is '
-               f'{np.linalg.norm(center - middle):.3g} m away from it: are the joints given in '
-               'the base frame?')
-    in_base_frame = bool(np.linalg.norm(center - from_base) < _AT_HOME * height
-                         and np.linalg.norm(middle - from_base) > _APART * height
-                         and np.linalg.norm(middle) < 0.5 * height)
+               f'where it is in the base frame, legs of {_legs_in_one_frame(p).min():.3g} m and '
+               f'more{apart}: are the joints given in the base frame? They are expected in the '
+               'platform frame')
+    raised = float((center - base_middle) @ away) / height
+    in_base_frame = bool(
+        np.linalg.norm(middle) < 0.5 * np.linalg.norm(center) and (
+            beyond_body and (home.length is None or _LOWEST < raised < _HIGHEST)
+            or home.length is not None
+            and np.linalg.norm(center - base_middle - height * away) < _AT_HOME * height
+            and far > _APART * height))
     if in_base_frame:
         yield (f'platform.center_of_mass: {_listed(center)} m is where the platform is at home '
                "in the base frame: from the base's origin? It is from that of the platform frame")
-    inertia = inertia_matrix(p.platform.inertia)
+    if home.length is None:
+        return  # heights are guesses
     axial = math.sqrt(max(float(away @ inertia @ away), 0.0) / p.platform.mass)
-    across = shape.axes[:2] @ inertia @ shape.axes[:2].T
-    least = math.sqrt(max(float(np.linalg.eigvalsh(across)[0]), 0.0) / p.platform.mass)
     reference = abs(height + float((center - middle) @ away))
     if in_base_frame:
         reference = abs(float(center @ away))
@@ -290,6 +299,31 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
                f'the hexapod, {axial:.3g} m about it, and the base is {reference:.3g} m from '
                "the center of mass at home: about the base's origin? It is about the center of "
                'mass')
+
+
+def _legs_in_one_frame(p: Parameters) -> Array:
+    """Return the lengths (6,) of the legs if base and platform joints are in one frame [m]."""
+    return np.asarray(np.linalg.norm(p.geometry.platform_joints - p.geometry.base_joints, axis=1))
+
+
+def _in_one_frame(p: Parameters, home: Home, apart: bool) -> bool:
+    """
+    Return whether the platform joints are likely given in the base frame.
+
+    They are then where the legs have a possible length while both frames are the same. A base
+    frame away from its joints may be where the platform frame is at home: this is no mistake.
+
+    apart: the center of mass is near the platform's origin, and too far away from its joints.
+    """
+    lengths = _legs_in_one_frame(p)
+    low, high = p.limits.length_min, p.limits.length_max
+    base_middle, middle = (each.mean(axis=0) for each in _joints(p).values())
+    offset = float((middle - base_middle) @ home.shape.axes[2]) * home.side
+    if offset < 0.5 * lengths.mean() or np.linalg.norm(middle) < np.linalg.norm(base_middle):
+        return False
+    if low is None or high is None:
+        return apart
+    return bool(np.all((lengths > low) & (lengths < high)))
 
 
 def _torques_at_home(p: Parameters, home: Home) -> Iterator[str]:
