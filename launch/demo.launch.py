@@ -9,12 +9,11 @@ Start reference motion, node, simulator and an example controller, in real time.
 """
 
 import math
-from pathlib import Path
 import sys
 from typing import Any
 
 from launch import Action, LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutdown
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
@@ -22,22 +21,23 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.ros.launch_arguments import check_launch_arguments
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.ros.launch_arguments import check_files, check_launch_arguments
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 FILES = {
-    'params_file': ('platform.yaml', 'YAML file with the parameters of the hexapod'),
-    'trajectory_file': ('trajectory_loop.yaml',
+    'params_file': ('platform.yaml', Parameters, 'YAML file with the parameters of the hexapod'),
+    'trajectory_file': ('trajectory_loop.yaml', ReferenceMotionParameters,
                         'YAML file with the parameters of the reference motion'),
-    'simulator_file': ('simulator.yaml', 'YAML file with the parameters of the simulation; the '
-                       'motion must begin at its initial_pose')}
+    'simulator_file': ('simulator.yaml', SimulatorParameters,
+                       'YAML file with the parameters of the simulation; the motion must begin at '
+                       'its initial_pose')}
 
 
 def checked(context: LaunchContext) -> tuple[dict[str, str], float]:
     """Return the files and the payload factor; raise RuntimeError before anything is started."""
     files = {name: LaunchConfiguration(name).perform(context) for name in FILES}
-    for name, file in files.items():
-        if not Path(file).is_file():
-            raise RuntimeError(f'{name}: {file}: no such file')
+    check_files({name: (file, FILES[name][1]) for name, file in files.items()})
     text = LaunchConfiguration('payload_factor').perform(context)
     try:
         factor = float(text)
@@ -55,22 +55,24 @@ def nodes(context: LaunchContext) -> list[Action]:
     payload = {'platform.mass': factor * parameters.platform.mass,
                'platform.inertia': (factor * parameters.platform.inertia).tolist()}
     common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen'}
+    # Without one of these there is no loop; the motion may be complete.
+    needed = {**common, 'on_exit': Shutdown(reason='a program of the loop has ended')}
     package = FindPackageShare('stewart_dynamics')
     return [
         LogInfo(msg=', '.join(f'{name}: {file}' for name, file in files.items())),
         # With the measured legs of the simulator the node estimates the external wrench.
         Node(package='stewart_dynamics', executable='stewart_dynamics', name='stewart_dynamics',
              parameters=[files['params_file']],
-             remappings=[('~/measured_legs', 'stewart_simulator/leg_states')], **common),
+             remappings=[('~/measured_legs', 'stewart_simulator/leg_states')], **needed),
         Node(package='stewart_dynamics', executable='stewart_simulator', name='stewart_simulator',
-             parameters=[files['params_file'], files['simulator_file'], payload], **common),
+             parameters=[files['params_file'], files['simulator_file'], payload], **needed),
         # An example to copy, not an executable of the package.
         Node(executable=sys.executable, name='leg_controller',
              arguments=[PathJoinSubstitution([package, 'examples', 'leg_controller.py'])],
              parameters=[{'params_file': files['params_file'],
                           'feed_forward': ParameterValue(
                               LaunchConfiguration('feed_forward'), value_type=bool)}],
-             condition=IfCondition(LaunchConfiguration('controller')), **common),
+             condition=IfCondition(LaunchConfiguration('controller')), **needed),
         Node(package='stewart_dynamics', executable='stewart_trajectory',
              name='stewart_trajectory', parameters=[files['trajectory_file']], **common)]
 
@@ -81,7 +83,7 @@ def generate_launch_description() -> LaunchDescription:
     description = LaunchDescription([
         *(DeclareLaunchArgument(
             name, default_value=PathJoinSubstitution([share, 'config', file]), description=text)
-          for name, (file, text) in FILES.items()),
+          for name, (file, _, text) in FILES.items()),
         DeclareLaunchArgument(
             'payload_factor', default_value='1.0',
             description='mass and inertia of the simulated platform, relative to those in '

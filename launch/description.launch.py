@@ -24,7 +24,7 @@ from launch_ros.substitutions import FindPackageShare
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.ros.launch_arguments import check_launch_arguments
+from stewart_dynamics.ros.launch_arguments import check_files, check_launch_arguments
 
 PACKAGES = ('robot_state_publisher', 'rviz2')
 JOINT_STATES = '/stewart_dynamics/joint_states'
@@ -33,8 +33,7 @@ JOINT_STATES = '/stewart_dynamics/joint_states'
 def nodes(context: LaunchContext) -> list[Action]:
     """Return the three programs, once their packages and the file of the hexapod are found."""
     file = LaunchConfiguration('params_file').perform(context)
-    if not Path(file).is_file():
-        raise RuntimeError(f'params_file: {file}: no such file')
+    check_files({'params_file': (file, Parameters)})
     for package in PACKAGES:
         if package != 'rviz2' or LaunchConfiguration('rviz').perform(context) == 'true':
             FindPackageShare(package).perform(context)  # raises before anything has started

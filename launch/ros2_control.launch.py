@@ -29,7 +29,7 @@ from launch_ros.substitutions import FindPackageShare
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.ros.launch_arguments import check_launch_arguments
+from stewart_dynamics.ros.launch_arguments import check_files, check_launch_arguments
 import yaml
 
 PACKAGES = ('controller_manager', 'joint_state_broadcaster', 'joint_trajectory_controller',
@@ -63,12 +63,10 @@ def robot_description(params_file: str, urdf_file: str, interfaces: list[str]) -
 def nodes(context: LaunchContext) -> list[Action]:
     """Return all nodes, once their packages and files are found."""
     files = {name: LaunchConfiguration(name).perform(context) for name in FILES}
-    for name, file in files.items():
-        if not Path(file).is_file():
-            raise RuntimeError(f'{name}: {file}: no such file')
     urdf_file = LaunchConfiguration('urdf_file').perform(context)
-    if urdf_file and not Path(urdf_file).is_file():
-        raise RuntimeError(f'urdf_file: {urdf_file}: no such file')
+    check_files({'params_file': (files['params_file'], Parameters),
+                 'controllers_file': (files['controllers_file'], None),
+                 **({'urdf_file': (urdf_file, None)} if urdf_file else {})})
     for package in PACKAGES:
         FindPackageShare(package).perform(context)  # raises before anything has started
     controllers = files['controllers_file']

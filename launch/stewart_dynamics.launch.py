@@ -4,7 +4,6 @@
 
 """Start the node with its parameters from a file; it becomes active by itself."""
 
-from pathlib import Path
 import sys
 
 from launch import Action, LaunchContext, LaunchDescription
@@ -13,7 +12,8 @@ from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
-from stewart_dynamics.ros.launch_arguments import check_launch_arguments
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.ros.launch_arguments import check_files, check_launch_arguments
 
 TOPICS = {
     'leg_forces': 'topic of the leg forces, as the commands of an effort controller',
@@ -22,10 +22,9 @@ TOPICS = {
 
 
 def node(context: LaunchContext) -> list[Action]:
-    """Return the node, once its file is there."""
+    """Return the node, once its file is checked."""
     file = LaunchConfiguration('params_file').perform(context)
-    if not Path(file).is_file():
-        raise RuntimeError(f'params_file: {file}: no such file')
+    check_files({'params_file': (file, Parameters)})
     return [LogInfo(msg=f'params_file: {file}'), Node(
         package='stewart_dynamics',
         executable='stewart_dynamics',

@@ -9,7 +9,6 @@ Start the nodes of two hexapods on one computer, each in a namespace and with fr
         params_file:=left.yaml second_params_file:=right.yaml names:=left,right record:=/data/run_1
 """
 
-from pathlib import Path
 import re
 import sys
 
@@ -19,17 +18,17 @@ from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
-from stewart_dynamics.ros.launch_arguments import check_launch_arguments
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.ros.launch_arguments import check_files, check_launch_arguments
 
 FILES = 'params_file', 'second_params_file'
 
 
 def nodes(context: LaunchContext) -> list[Action]:
-    """Return both nodes and the recorder, once the files are there."""
+    """Return both nodes and the recorder, once the files are checked."""
     files = [LaunchConfiguration(each).perform(context) for each in FILES]
-    for argument, file in zip(FILES, files, strict=True):
-        if not Path(file).is_file():
-            raise RuntimeError(f'{argument}: {file}: no such file')
+    check_files({argument: (file, Parameters)
+                 for argument, file in zip(FILES, files, strict=True)})
     text = LaunchConfiguration('names').perform(context)
     names = text.split(',')
     if len(set(names)) != 2 or not all(re.fullmatch('[a-z][a-z0-9_]*', each) for each in names):
