@@ -35,7 +35,7 @@ def nodes(context: LaunchContext) -> list[Action]:
     check_files({name: (file, FILES[name][1]) for name, file in files.items()})
     package = FindPackageShare('stewart_dynamics')
     common: dict[str, Any] = {
-        'output': 'screen', 'on_exit': Shutdown(reason='a program of the loop has ended')}
+        'output': 'screen', 'on_exit': Shutdown()}
 
     def example(name: str, **more: Any) -> Node:
         # An example to copy, not an executable of the package.

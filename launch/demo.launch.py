@@ -56,7 +56,7 @@ def nodes(context: LaunchContext) -> list[Action]:
                'platform.inertia': (factor * parameters.platform.inertia).tolist()}
     common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen'}
     # Without one of these there is no loop; the motion may be complete.
-    needed = {**common, 'on_exit': Shutdown(reason='a program of the loop has ended')}
+    needed = {**common, 'on_exit': Shutdown()}
     package = FindPackageShare('stewart_dynamics')
     return [
         LogInfo(msg=', '.join(f'{name}: {file}' for name, file in files.items())),

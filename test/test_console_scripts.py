@@ -20,7 +20,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.console_scripts import check_arguments, usage
-from stewart_dynamics.ros.launch_arguments import check_launch_arguments
+from stewart_dynamics.ros.launch_arguments import check_files, check_launch_arguments
 from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 PROGRAM = 'stewart_dynamics'
@@ -189,3 +189,15 @@ def test_an_argument_that_a_launch_file_does_not_have_is_rejected(
     # included by a launch file that has this argument
     check_launch_arguments('/share/launch/stewart_dynamics.launch.py', line, known)
     check_launch_arguments('/share/launch/demo.launch.py', [*line[:-1], 'namespace:=cell'], known)
+
+
+@pytest.mark.parametrize('text', [None, 'platform.mass: -3.0', 'platfrom.mass: 3.0', '[]'])
+def test_a_file_that_a_launch_file_cannot_use_is_named(
+        text: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        snapshot: Snapshot) -> None:
+    monkeypatch.chdir(tmp_path)
+    if text is not None:
+        Path('mine.yaml').write_text(f'/**:\n  ros__parameters:\n    {text}\n')
+    check_files({'urdf_file': (__file__, None), 'params_file': (str(PLATFORM), Parameters)})
+    with snapshot.raises(StewartError):
+        check_files({'params_file': ('mine.yaml', Parameters)})

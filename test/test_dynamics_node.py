@@ -236,6 +236,23 @@ def test_zero_stamps_are_joined_in_order_of_arrival(fresh: Fresh) -> None:
     assert node.program.stderr.count('header stamps are zero') == 1
 
 
+def test_zero_stamps_after_a_stamped_motion_are_answered(fresh: Fresh) -> None:
+    """As ``ros2 topic pub`` sends them after a motion has ended; and another motion follows."""
+    node = fresh()
+    node.until_active()
+    node.answer(MOVING, stamp=time.time_ns())
+    for _ in range(5):
+        begun, answered = time.time_ns(), len(node.raw['leg_states'])
+        node.send(TURNED, 0)
+        node.until(lambda answered=answered: len(node.raw['leg_states']) > answered,
+                   'it is answered')
+        state = node.received('leg_states')[-1]
+        assert begun <= nanoseconds(state.header.stamp) <= time.time_ns()
+        node.check(state, node.result_of(TURNED))
+    node.answer(MOVING, stamp=time.time_ns())
+    node.until_counted()
+
+
 def test_without_setpoints_diagnostics_are_stale_and_nothing_is_repeated(
         node: DynamicsNode) -> None:
     node.answer(MOVING)

@@ -168,6 +168,20 @@ def test_the_demo_runs_and_ends(launch: Launch, peer: Peer) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize('file', ['demo.launch.py', 'cueing.launch.py'])
+def test_a_loop_ends_with_one_of_its_programs(
+        launch: Launch, peer: Peer, tmp_path: Path, file: str) -> None:
+    """A parameter that only the running simulator can judge; the others would go on forever."""
+    simulation = tmp_path / 'simulation.yaml'
+    simulation.write_text('/**:\n  ros__parameters:\n    initial_pose: [0., 0., 9., 0., 0., 0.]\n')
+    program = launch(file, f'simulator_file:={simulation}')
+    program.wait()
+    assert 'stewart_simulator: ' in said(program)
+    assert 'process[stewart_simulator-2] was required: shutting down' in said(program)
+    peer.until(lambda: nodes(peer) == set(), 'all have ended')
+
+
+@pytest.mark.slow
 def test_a_drive_moves_the_simulated_hexapod(launch: Launch, peer: Peer) -> None:
     """Vehicle, motion cueing, node, simulator and controller: the legs follow, and all end."""
     felt = peer.listen('/stewart_cueing/felt', Imu)

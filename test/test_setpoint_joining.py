@@ -372,13 +372,30 @@ def test_samples_without_stamps_that_come_in_bunches_are_lost_but_never_mixed() 
     assert feed.counts == {(topic, NOT_JOINED): 3 for topic in TOPICS}
 
 
-def test_a_zero_stamp_among_others_is_a_time() -> None:
+def test_zero_stamps_after_others_are_joined_in_order_of_arrival() -> None:
+    """A stamp of zero is no time, whatever came before; and stamps are followed again."""
+    feed = Feed()
+    for before, after in ((NOW + SECOND, NOW + SECOND), (20 * MS, 30 * MS)):
+        assert feed.whole(before) is not None
+        for mark in (1.0, 2.0, 3.0):
+            assert feed.used(without_stamps([mark])) == [mark]
+        assert feed.whole(after) is not None
+    assert not feed.counts
+    zero, *restarts = feed.notices
+    assert 'header stamps are zero' in zero
+    assert len(restarts) == 3  # to the clock, to the past, and from the clock to it
+    assert all(re.match('stamps jumped back by .*: followed as a restart', each)
+               for each in restarts)
+
+
+def test_a_zero_stamp_on_one_topic_delays_nothing() -> None:
     feed = Feed()
     assert feed.sample(POSE, 0) is None
     assert feed.whole(20 * MS) is not None
     assert feed.counts == {(POSE, NOT_JOINED): 1}
     assert feed.sample(POSE, 0) is None
-    assert feed.counts == {(POSE, NOT_JOINED): 1, (POSE, TOO_OLD): 1}
+    assert feed.whole(30 * MS) is not None
+    assert feed.counts == {(POSE, NOT_JOINED): 2}
     assert not feed.notices[1:]
 
 

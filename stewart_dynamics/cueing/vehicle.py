@@ -16,8 +16,8 @@ from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.mechanics.gravity_mistakes import IN_G, IN_MM, likely_mistake
 from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE
 from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
-from stewart_dynamics.setpoints.rejections import (
-    jumped_back, Rejections, stamp_words, TOO_OLD, too_old, TWICE)
+from stewart_dynamics.setpoints.rejections import jumped_back, Rejections
+from stewart_dynamics.setpoints.stamp_order import NO_STAMP, Order, order_of, reason_of
 
 # A vehicle is at rest while no reading is further from their mean [m/s^2 by its size, rad/s].
 _STILL_FORCE, _STILL_RATE = 0.03, 0.02
@@ -25,7 +25,7 @@ _LEAST_RATE = 10.0  # of messages [Hz]
 _WINDOW = 2.0  # [s]
 _FASTEST = 20.0  # turns, as degrees would be [rad/s]
 _UPRIGHT = 0.7  # cosine of the largest slope on which a vehicle stands
-_RESTART = 1.0  # stamps that jump back by more are a restart [s]
+_RESTART = SECOND  # stamps that jump back by more are a restart [ns]
 
 
 def vehicle_mistake(times: Array, forces: Array, rates: Array, kind: str) -> str:
@@ -123,15 +123,14 @@ class Vehicle:
                 recent[:, 0], recent[:, 1:4], recent[:, 4:], self.kind)
 
     def _in_order(self, stamp: int) -> bool:
-        """Return whether a stamp may follow the last one; zero ones are taken as they come."""
-        last, self._stamp = self._stamp, stamp
-        if last is None or stamp > last or stamp == 0:
+        """Return whether a reading is used; without a stamp it is used as it comes."""
+        if stamp == NO_STAMP:
             return True
-        back = last - stamp
-        if back > _RESTART * SECOND:
-            self._notice(f'vehicle: {jumped_back(back)}')
-            return True
-        self._stamp = last
-        reason, details = (TOO_OLD, too_old(stamp, back)) if back else (TWICE, stamp_words(stamp))
-        self._rejections.reject(VEHICLE, reason, details)
-        return False
+        last, order = self._stamp or 0, order_of(stamp, self._stamp, _RESTART)
+        if order is Order.RESTART:
+            self._notice(f'vehicle: {jumped_back(last - stamp)}')
+        if order.used:
+            self._stamp = stamp
+        else:
+            self._rejections.reject(VEHICLE, *reason_of(order, stamp, last))
+        return order.used

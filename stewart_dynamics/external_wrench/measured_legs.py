@@ -27,8 +27,8 @@ from stewart_dynamics.messages.joint_state import JointStateError, JointStateRea
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import (
-    BASE_NOT_KNOWN, jumped_back, MALFORMED, OUT_OF_RANGE, Rejection, stamp_words, TOO_OLD, too_old,
-    TWICE)
+    BASE_NOT_KNOWN, jumped_back, MALFORMED, OUT_OF_RANGE, Rejection, stamp_words)
+from stewart_dynamics.setpoints.stamp_order import NO_STAMP, Order, order_of, reason_of
 
 # A row: the stamp [ns, an integer], pose and twist as in a row of motion, the forces that acted
 # since the measurement before [N], the known load, the motion of the base.
@@ -181,7 +181,7 @@ class MeasuredLegs:
         except JointStateError as exc:
             self._reject(exc.reason, exc.details)
             return None
-        if stamp == 0:
+        if stamp == NO_STAMP:
             self._reject(UNSTAMPED, 'accelerations need the time between two messages')
             return None
         p, z = values, self._zero_lengths
@@ -191,11 +191,11 @@ class MeasuredLegs:
 
     def _in_time(self, stamp: int) -> bool:
         """Return whether a measurement may still be used, or reject it."""
-        back = self._last.stamp - stamp if self._last else -1
-        if back > self._timeout:
-            self._noticed(f'{MEASURED_LEGS}: {jumped_back(back)}')
-        elif back == 0:
-            self._reject(TWICE, stamp_words(stamp))
-        elif back > 0:
-            self._reject(TOO_OLD, too_old(stamp, back))
-        return back < 0 or back > self._timeout
+        if self._last is None:
+            return True
+        order = order_of(stamp, self._last.stamp, self._timeout)
+        if order is Order.RESTART:
+            self._noticed(f'{MEASURED_LEGS}: {jumped_back(self._last.stamp - stamp)}')
+        elif not order.used:
+            self._reject(*reason_of(order, stamp, self._last.stamp))
+        return order.used

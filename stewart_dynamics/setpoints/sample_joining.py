@@ -20,7 +20,8 @@ from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.setpoints.input_messages import SampleReader, TopicSamples
 from stewart_dynamics.setpoints.rejections import (
-    jumped_back, NOT_JOINED, Rejections, stamp_words, STAMP_ZERO, TOO_OLD, too_old, TWICE)
+    jumped_back, NOT_JOINED, Rejections, stamp_words, STAMP_ZERO)
+from stewart_dynamics.setpoints.stamp_order import NO_STAMP, Order, order_of, reason_of
 
 # Maximum number of samples of a topic that wait for samples of the other topics, and depth of the
 # queues in the middleware, which may deliver all messages of one topic before another topic's.
@@ -89,10 +90,10 @@ def join_many(samples: Mapping[str, TopicSamples], waiting: Mapping[str, Waiting
 
 
 def _only_rise(stamps: Stamps, new: Stamps, last: int | None) -> bool:
-    """Return whether stamps increase strictly from the last one on and new ones are positive."""
+    """Return whether stamps increase strictly from the last one on and new ones are stamps."""
     # Waiting samples may have arrived out of order.
     return not (np.any(np.diff(stamps) <= 0) or (len(new) and (
-        new[0] <= 0 or (last is not None and stamps[0] <= last))))
+        new[0] <= NO_STAMP or (last is not None and stamps[0] <= last))))
 
 
 def _overflows(stamps: Stamps, places: Integers, common: Stamps, complete: Integers) -> bool:
@@ -126,7 +127,7 @@ class SampleJoining:
     frame: required frame_id; an empty one is accepted. None: the first non-empty one is required.
     tolerance, timeout: maximum difference between the stamps of joined samples, and the jump back
         in time above which a restart is assumed [s].
-    noticed: called with texts for the log: a restart, stamps that are all zero.
+    noticed: called with texts for the log: a restart, stamps that are zero.
     """
 
     def __init__(self, topics: Sequence[str], frame: str | None, tolerance: float, timeout: float,
@@ -142,7 +143,7 @@ class SampleJoining:
         self._unstamped: dict[str, tuple[float, ...] | None] = {}
         self._unstamped_logged = False
         self._unstamped_first = ''
-        self._stamped: set[str] = set()
+        self._without_stamp: set[str] = set()  # topics whose last sample had no stamp
 
     def take(self, topic: str, data: bytes, now: Callable[[], int]) -> JoinedSample | None:
         """
@@ -152,15 +153,16 @@ class SampleJoining:
         """
         sample = self._readers[topic].read(data)
         if sample is None:
-            if self._unstamped_logged and topic not in self._stamped:
+            if topic in self._without_stamp:
                 self._join_unstamped(topic, None, now)  # it keeps its place in the order
             return None
         stamp, values = sample
-        if topic not in self._stamped:
-            if stamp == 0:
-                return self._join_unstamped(topic, values, now)
-            # From now on a stamp of zero is a time like any other.
-            self._stamped.add(topic)
+        if stamp == NO_STAMP:
+            self._without_stamp.add(topic)
+            return self._join_unstamped(topic, values, now)
+        if topic in self._without_stamp:
+            self._without_stamp.discard(topic)
+            self._unstamped_first = ''
             if self._unstamped.pop(topic, None):
                 self._reject(topic, NOT_JOINED, STAMP_ZERO)
         if not self._in_time(topic, stamp):
@@ -200,7 +202,7 @@ class SampleJoining:
         messages: messages of these and other topics.
         places (K,): indices of the messages of each topic; topics without a message are absent.
         """
-        if self._tolerance or self._unstamped_logged:
+        if self._tolerance or self._without_stamp:
             return None
         samples = dict.fromkeys(self.topics, NO_SAMPLES)
         for topic in self.topics:
@@ -215,7 +217,6 @@ class SampleJoining:
 
     def accept(self, joined: Joined, places: Mapping[str, Integers]) -> None:
         """Continue after the samples that ``join_many`` has joined."""
-        self._stamped |= {topic for topic in self.topics if topic in places}
         self._waiting = joined.waiting
         if len(joined.stamps):
             self._last = dict.fromkeys(self.topics, int(joined.stamps[-1]))
@@ -225,17 +226,12 @@ class SampleJoining:
 
     def _in_time(self, topic: str, stamp: int) -> bool:
         """Return whether a sample is in time; reject it otherwise."""
-        if stamp in self._waiting[topic]:
-            self._reject(topic, TWICE, stamp_words(stamp))
-            return False
-        last = self._last.get(topic)
-        if last is None or not 0 <= last - stamp <= self._timeout:
-            return True
-        if stamp == last:
-            self._reject(topic, TWICE, stamp_words(stamp))
-        else:
-            self._reject(topic, TOO_OLD, too_old(stamp, last - stamp))
-        return False
+        # A sample that still waits is followed as the last used one is.
+        last = stamp if stamp in self._waiting[topic] else self._last.get(topic)
+        order = order_of(stamp, last, self._timeout)
+        if last is not None and not order.used:
+            self._reject(topic, *reason_of(order, stamp, last))
+        return order.used
 
     def _join(self, stamp: int) -> JoinedSample | None:
         """Return the joined sample that a sample completes, if stamps are within the tolerance."""
@@ -273,21 +269,21 @@ class SampleJoining:
         Return whether time has jumped back.
         """
         first = self.topics[0]
-        jump: int = self._last[first] - stamps[first] if self._last else 0
-        if jump > self._timeout:
-            self._noticed(jumped_back(jump))
+        restart = order_of(
+            stamps[first], self._last.get(first), self._timeout) is Order.RESTART
+        if restart:
+            self._noticed(jumped_back(self._last[first] - stamps[first]))
         for topic, stamp in stamps.items():
             waiting = self._waiting[topic]
-            if len(waiting) > 1:
+            if len(waiting) > 1 or (waiting and stamp not in waiting):
                 # After a restart, remaining samples from before the restart lie in the future.
-                future = (self._last[topic] - self._timeout if jump > self._timeout
-                          else math.inf)
+                future = self._last[topic] - self._timeout if restart else math.inf
                 for other in [other for other in waiting if other != stamp and (
                         other < stamp or other > future)]:
                     del waiting[other]
                     self._reject(topic, NOT_JOINED, stamp_words(other))
         self._last = stamps
-        return bool(jump > self._timeout)
+        return restart
 
     def _join_unstamped(
             self, topic: str, values: tuple[float, ...] | None, now: Callable[[], int],
@@ -315,7 +311,10 @@ class SampleJoining:
             return None
         self._unstamped_first = self._unstamped_first or next(iter(self._unstamped))
         self._unstamped.clear()
-        return JoinedSample(now(), sum(sound, ()), False, stamped=False)
+        # The clock takes their place: from and to samples with stamps, time may jump back.
+        stamp = now()
+        restart = self._drop_passed(dict.fromkeys(self.topics, stamp))
+        return JoinedSample(stamp, sum(sound, ()), restart, stamped=False)
 
     def _drop_unstamped(self) -> None:
         for topic, values in self._unstamped.items():

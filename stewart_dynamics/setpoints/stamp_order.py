@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The order of stamps: the same rule for setpoints, base, measured legs and vehicle."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from stewart_dynamics.setpoints.rejections import stamp_words, TOO_OLD, too_old, TWICE
+
+NO_STAMP = 0
+"""A stamp of zero is no time, whatever came before: the message has no stamp."""
+
+
+class Order(Enum):
+    """How a stamp follows the last used one."""
+
+    FRESH = 'later, or the first'
+    RESTART = 'earlier by more than the timeout: earlier samples no longer apply'
+    TWICE = 'equal: rejected'
+    TOO_OLD = 'earlier by at most the timeout: rejected'
+
+    @property
+    def used(self) -> bool:
+        """Return whether a message with this stamp is used."""
+        return self in (Order.FRESH, Order.RESTART)
+
+
+def order_of(stamp: int, last: int | None, timeout: int) -> Order:
+    """
+    Return how a stamp follows the last used one.
+
+    stamp, last: [ns], not NO_STAMP; None before the first.
+    timeout: longest time by which messages are late [ns]; a longer jump back is a restart.
+    """
+    if last is None or stamp > last:
+        return Order.FRESH
+    if stamp == last:
+        return Order.TWICE
+    return Order.TOO_OLD if last - stamp <= timeout else Order.RESTART
+
+
+def reason_of(order: Order, stamp: int, last: int) -> tuple[str, str]:
+    """Return reason and details of the rejection of a stamp that is not used."""
+    if order is Order.TWICE:
+        return TWICE, stamp_words(stamp)
+    return TOO_OLD, too_old(stamp, last - stamp)
