@@ -220,7 +220,7 @@ def _inertias() -> list[list[float]]:
 
 
 def test_an_inertia_is_one_that_the_parameter_file_takes(unit: Unit) -> None:
-    """Of platform and payload: positive definite, and semidefinite; status and forces say so."""
+    """The platform's must be positive definite, a payload's semidefinite; the status says so."""
     unit.fmu.exitInitializationMode()
     unit.step()
     for body, given in (('platform', {}), ('payload', {'payload.mass': 20.0})):

@@ -38,9 +38,9 @@ def _arguments() -> argparse.ArgumentParser:
                         help='write an FMU for co-simulation, too, of FMI 3.0 (3, the default) or '
                              'FMI 2.0 (2)')
     parser.add_argument('--flat', action='store_true',
-                        help='with --fmu: flat names of its variables, lengths_1 and position_x in '
-                             'place of lengths[1] and position.x, of which Simulink makes a vector '
-                             'and a bus')
+                        help='with --fmu: flat names, lengths_1 and position_x in place of '
+                             'lengths[1] and position.x, of which Simulink makes a vector and a '
+                             'bus')
     parser.add_argument('--drives', action='store_true',
                         help='write the units of the amplifiers, too: NAME_drives.h and .md, and '
                              'NAME_ethercat_LEG.yaml; needs drive.rated_torque and more')
