@@ -44,6 +44,8 @@ _WIDEST = 0.42
 _WIDTH = 0.3
 # Transition width of both filters, relative to the narrow cut-off.
 _TRANSITION = 1.0
+BAND = 0.9 / SAMPLES
+"""Highest frequency that is used, relative to that of the samples."""
 ORDERS = 4  # number of columns of an effort: its value and its first ORDERS - 1 derivatives
 # Distance from a length limit within which an end stop may be touched, relative to the platform's
 # size; fraction of force_max above which an effort may be saturated. A live measurement is judged
@@ -66,6 +68,12 @@ _STRIBECK, _RESOLVED = (0.1, 0.3), 4.0
 _MOVES = 10.0
 SLIP = 1 + len(_STRIBECK)
 """Number of friction shapes over the rate: Coulomb friction, Stribeck friction."""
+
+
+def time_for_filters(cutoff: float) -> float:
+    """Return the time at each end that the filters need for a cut-off frequency [s]."""
+    fine = 1e-4
+    return 2.0 * LowPass.of(fine, cutoff, _TRANSITION * cutoff).half * fine
 
 
 class Extract(NamedTuple):

@@ -45,5 +45,6 @@ class DesignOptions(NamedTuple):
     """Center of the motion, X Y Z alpha beta gamma [m, rad]; None: home."""
     noise: float = 5.0  # standard deviation of the efforts [N], for the predicted intervals
     rate: float = 500.0  # rate of setpoints and measured efforts [Hz]
+    cutoff: float = CUTOFF  # that of the identification [Hz]
     generations: int = 400
     seed: int = 0

@@ -25,8 +25,7 @@ from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, ParameterError, PoseError, SingularityError
 from stewart_dynamics.identification.extraction import (
-    Extract, Extraction, Extracts, WindowRead)
-from stewart_dynamics.identification.filters import LowPass
+    Extract, Extraction, Extracts, time_for_filters, WindowRead)
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.lack_of_fit import (
     lack_of_fit, LackOfFit, LEFT_BY_FILTERS, long_pieces)
@@ -208,14 +207,15 @@ class Identification:
         options = self._options
         with closing(Recording(path)) as recording:
             topics = find_topics(recording, options.node, options.measured, options.efforts)
-            legs = RecordedLegs(recording, topics, self.parameters.joints,
-                                2.0 * _margin(options.cutoff) + LONGEST_LAG)
+            needed = 2.0 * time_for_filters(options.cutoff)
+            legs = RecordedLegs(
+                recording, topics, self.parameters.joints, needed + LONGEST_LAG)
             bag = self.add(path, legs.windows(progress))
             if bag is None:
                 raise BagError(
                     f'{path}: {topics.legs}: nothing to identify from: '
-                    + (f'{legs.samples} samples, of which no {2.0 * _margin(options.cutoff):.2g} '
-                       's are without a gap; a lower --cutoff needs even more' if legs.samples
+                    + (f'{legs.samples} samples, of which no {needed:.2g} s '
+                       'are without a gap; a lower --cutoff needs even more' if legs.samples
                        else ', '.join(f'{count} messages {why}' for why, count in
                                       legs.rejected.items()) or 'no messages'))
             self.bags[-1] = bag._replace(
@@ -509,9 +509,3 @@ class Identification:
         """Remove the temporary file."""
         self.extracts.close()
         self._noisy.close()
-
-
-def _margin(cutoff: float) -> float:
-    """Return the time at each end that the filters need for a cut-off [s]."""
-    fine = 1e-4
-    return 2.0 * LowPass.of(fine, cutoff, cutoff).half * fine

@@ -31,9 +31,9 @@ from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.estimation.posterior import Posterior, posterior
 from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
 from stewart_dynamics.identification.causes import Cause, Causes, SAME
-from stewart_dynamics.identification.extraction import Extract, Extracts, SAMPLES
+from stewart_dynamics.identification.extraction import BAND, Extract, Extracts, SAMPLES
 from stewart_dynamics.identification.parameter_fit import (
-    BAND, directions, Fit, least_deviation, Noisy, residual_of)
+    directions, Fit, least_deviation, Noisy, residual_of)
 from stewart_dynamics.identification.unknowns import ORIGINS, Unknowns
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 

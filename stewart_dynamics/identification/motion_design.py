@@ -5,13 +5,13 @@
 Design of a motion that minimizes identification intervals within the limits of the hexapod.
 
 The motion is a Fourier series of all six coordinates about home (``motion_functions``).
-Its coefficients minimize the sum of the squared standard errors of the requested parameters, each
-divided by its scale (A-optimal; J. Swevers et al., "Optimal robot excitation and
-identification", IEEE Trans. Robotics and Automation 13, 1997, doi:10.1109/70.631234). Every set of
-coefficients is scaled up to the limits, so that only their ratios are searched, with an
-evolution strategy that adapts the spread of each coefficient (R. Ros, N. Hansen, "A simple
-modification in CMA-ES achieving linear time and space complexity", PPSN X, 2008,
-doi:10.1007/978-3-540-87700-4_30). Equal seeds give equal results.
+Its coefficients minimize the sum of the squared deviations of the requested parameters, each
+divided by that of the file, in the posterior that an identification would state (A-optimal; J.
+Swevers et al., "Optimal robot excitation and identification", IEEE Trans. Robotics and Automation
+13, 1997, doi:10.1109/70.631234). Every set of coefficients is scaled up to the limits, so that
+only their ratios are searched, with an evolution strategy that adapts the spread of each
+coefficient (R. Ros, N. Hansen, "A simple modification in CMA-ES achieving linear time and space
+complexity", PPSN X, 2008, doi:10.1007/978-3-540-87700-4_30). Equal seeds give equal results.
 """
 
 from __future__ import annotations
@@ -25,9 +25,13 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
+from stewart_dynamics.estimation.posterior import IDENTIFIABLE, posterior
+from stewart_dynamics.estimation.whitening import gram_of, spectra_of
+from stewart_dynamics.identification.extraction import BAND, ORDERS, SAMPLES, time_for_filters
 from stewart_dynamics.identification.identification_options import DesignOptions
-from stewart_dynamics.identification.unknowns import (
-    LINEAR_UNKNOWNS, regressor_of, Unknowns)
+from stewart_dynamics.identification.parameter_fit import (
+    covariance_of, delay_deviations, directions)
+from stewart_dynamics.identification.unknowns import regressor_of, Unknowns
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.limits import (
@@ -142,10 +146,9 @@ def _bounds(p: Parameters) -> dict[str, Any]:
         CLEARANCE_MIN: (1.0 + _ANGLE) * (p.limits.leg_clearance_min or 0.0)}
 
 
-# Samples per period of the highest harmonic: in the search, and in the final check.
-_SAMPLES, _FINE_SAMPLES = 20, 100
-# Standard error of an unidentifiable parameter, relative to its scale.
-_NOT_IDENTIFIABLE = 100.0
+# Samples per period of the highest harmonic: in the search, and in the final check. Intervals
+# need fewer of them than limits, in the search every fourth.
+_SAMPLES, _FINE_SAMPLES, _FOURTH = 20, 100, 4
 # Number of iterations that scale a motion to its limits: in the search, and at the end.
 _SCALINGS, _LAST_SCALINGS = 2, 30
 _CLOSE = 1e-3
@@ -159,7 +162,7 @@ class Design(NamedTuple):
     trajectory: ReferenceMotionParameters
     unknowns: Unknowns
     half_widths: Array
-    """Predicted 95 % intervals of the asked unknowns, for white noise in the efforts"""
+    """Predicted 95 % intervals of the asked unknowns, the uncertainty of the file included."""
     use: dict[str, float]  # fraction of each limit that the motion uses
 
 
@@ -180,7 +183,7 @@ def design(parameters: Parameters, options: DesignOptions,
         search.platform, search.unknowns, motion, options.duration, options)
     unknowns = search.unknowns
     unknown = [unknowns.names[n] for n, half in zip(unknowns.asked, half_widths, strict=True)
-               if not half < _NOT_IDENTIFIABLE * unknowns.deviations[n]]
+               if not half < IDENTIFIABLE * TWO_SIDED * unknowns.deviations[n]]
     if unknown:
         raise StewartError(f'no motion within the limits identifies {", ".join(options.kinds)}: '
                            f'{unknown[0]} is not identifiable; ask for less with --identify')
@@ -198,34 +201,32 @@ def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion:
     """
     Return half of the 95 % intervals of the asked unknowns, for a motion of a duration [s].
 
-    Assumes white noise in the efforts alone: numbers that are not asked for are known.
-    Unidentifiable parameters get very wide intervals.
+    They are those that an identification from this motion states, with white noise of the efforts
+    alone: the uncertainty of the file is in them.
     """
-    values, vectors = np.linalg.eigh(_information(
-        platform, unknowns, motion.rows.reshape(1, -1, MOTION), seconds, options)[0])
-    least = max(_NOT_IDENTIFIABLE ** -2, 1e-13 * float(values[-1]))
-    errors: Array = np.sqrt((vectors ** 2) @ (1.0 / np.maximum(values, least)))
-    return TWO_SIDED * unknowns.deviations[unknowns.asked] * errors
+    variances = _variances(
+        platform, unknowns, motion.rows.reshape(1, -1, MOTION), seconds, options)
+    half_widths: Array = TWO_SIDED * np.sqrt(variances[0])
+    return half_widths
 
 
-def _information(platform: StewartPlatform, unknowns: Unknowns, rows: Array, seconds: float,
-                 options: DesignOptions) -> Array:
-    """Return the information (M, k, k) of motions (M, N, MOTION), in units of deviations."""
-    columns = columns_of(platform, unknowns, rows.reshape(-1, MOTION))
-    columns *= unknowns.deviations[unknowns.asked]
-    each = columns.reshape(len(rows), -1, columns.shape[-1])
-    information: Array = each.swapaxes(1, 2) @ each * (
-        seconds * options.rate / rows.shape[1] / options.noise ** 2)
-    return information
-
-
-def columns_of(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> Array:
-    """Return the derivative of the efforts with respect to the asked unknowns, (N, 6, k)."""
-    tilt = bool(unknowns.asked[-1] >= LINEAR_UNKNOWNS)
-    regressor = regressor_of(platform, rows, tilt)
-    columns: Array = regressor @ unknowns.derivative(unknowns.start)[
-        :regressor.shape[-1], unknowns.asked]
-    return columns
+def _variances(platform: StewartPlatform, unknowns: Unknowns, rows: Array, seconds: float,
+               options: DesignOptions) -> Array:
+    """Return the variances (M, a) of the asked unknowns after motions (M, N, MOTION)."""
+    count, samples, _ = rows.shape
+    step = seconds / samples
+    regressor = regressor_of(platform, rows.reshape(-1, MOTION)).reshape(count, samples, 6, -1)
+    efforts = np.zeros((count, samples, 6, ORDERS))
+    efforts[..., 0] = regressor @ unknowns.theta(unknowns.start)
+    efforts[..., 1] = np.gradient(efforts[..., 0], step, axis=1)
+    columns = np.concatenate([regressor, efforts], axis=-1) @ directions(
+        unknowns, unknowns.start, np.zeros(1), 0, delay_deviations(np.array([options.cutoff])))
+    left = 1.0 - 2.0 * time_for_filters(options.cutoff) / seconds
+    columns *= math.sqrt(max(left, 0.0) * step * options.rate) / options.noise
+    zeros = np.zeros((columns.shape[-1], columns.shape[-1]))
+    found = (posterior(gram_of(spectra_of(each, BAND * SAMPLES * options.cutoff * step)),
+                       zeros[0], zeros[0], zeros) for each in columns)
+    return np.array([np.diag(covariance_of(unknowns, each))[unknowns.asked] for each in found])
 
 
 class _Search:
@@ -261,10 +262,10 @@ class _Search:
             coefficients /= np.maximum(excess, 0.2)[:, None, None]
         rows = self._rows(coefficients)
         excess = self.limits.excess(rows)
-        information = _information(self.platform, self.unknowns, rows, self._options.duration,
-                                   self._options)
-        information += np.eye(information.shape[-1]) / _NOT_IDENTIFIABLE ** 2
-        variances = np.trace(np.linalg.inv(information), axis1=1, axis2=2)
+        variances = np.sum(_variances(
+            self.platform, self.unknowns, rows[:, ::_FOURTH], self._options.duration,
+            self._options)
+            / self.unknowns.deviations[self.unknowns.asked] ** 2, axis=1)
         # Information grows with the square of the amplitude; excess amplitude costs as much.
         cost: Array = np.log(variances) + 2.0 * np.abs(np.log(np.maximum(excess, 0.2)))
         return np.where(np.isfinite(cost), cost, np.inf)

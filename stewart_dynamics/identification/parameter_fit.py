@@ -34,7 +34,7 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.estimation.posterior import Posterior, posterior
 from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
-from stewart_dynamics.identification.extraction import Extract, Extracts, ORDERS, SAMPLES
+from stewart_dynamics.identification.extraction import BAND, Extract, Extracts, ORDERS
 from stewart_dynamics.identification.unknowns import CENTER, ORIGINS, PLATFORM, Unknowns
 from stewart_dynamics.mechanics.dynamics.linear_parameters import inertial_derivative
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
@@ -49,8 +49,6 @@ _PASSES = 4
 _DELAY = 0.2
 # Lower bound of the residuals' deviation, reached with exact efforts, relative to the efforts.
 _SMALLEST_DEVIATION = 1e-8
-# Highest frequency used, relative to that of the samples.
-BAND = 0.9 / SAMPLES
 # Relative distance to the bound below which a body is a point or a rod within rounding.
 _SMALLEST_BODY = 1e-6
 _BODY_STEPS = 200
@@ -151,6 +149,20 @@ def directions(unknowns: Unknowns, values: Array, delays: Array, bag: int, devia
     return columns
 
 
+def delay_deviations(cutoffs: Array) -> Array:
+    """Return the deviations of delays in the prior (B,) [s], for cut-off frequencies [Hz]."""
+    deviations: Array = np.divide(
+        _DELAY, cutoffs, out=np.zeros(len(cutoffs)), where=cutoffs > 0.0)
+    return deviations
+
+
+def covariance_of(unknowns: Unknowns, found: Posterior) -> Array:
+    """Return the covariance (k, k) of the unknowns by the posterior of z and the delays."""
+    count = len(unknowns.start)
+    covariance: Array = unknowns.root @ found.covariance[:count, :count] @ unknowns.root.T
+    return covariance
+
+
 class _Sums(NamedTuple):
     """Gram matrices (B, q, q) of whitened columns, less that of the noise in them, and this."""
 
@@ -199,8 +211,7 @@ class _Fitting:
         self._chosen, self._cutoffs = chosen, cutoffs
         self._values: Array = unknowns.start.copy()
         self._delays: Array = np.zeros(len(cutoffs))
-        self._deviations = np.divide(_DELAY, cutoffs, out=np.zeros(len(cutoffs)),
-                                     where=cutoffs > 0.0)
+        self._deviations = delay_deviations(cutoffs)
         self._weights: list[Weights] = []
         self._z: Array = np.zeros(len(unknowns.start) + len(cutoffs))
         self._posterior: Posterior | None = None
@@ -212,7 +223,7 @@ class _Fitting:
         found, unknowns = self._posterior, self._unknowns
         assert found is not None
         count = len(unknowns.start)
-        covariance = unknowns.root @ found.covariance[:count, :count] @ unknowns.root.T
+        covariance = covariance_of(unknowns, found)
         errors = self._deviations * np.sqrt(np.maximum(np.diag(found.covariance)[count:], 0.0))
         bounded, at_bound = consistent(unknowns, self._values, covariance)
         return Fit(bounded, covariance, self._delays,
