@@ -28,8 +28,8 @@ def run(*arguments):
 
 def test_all_files_are_written_and_nothing_is_said(tmp_path, capsys):
     assert run('--params', PLATFORM, '--output', tmp_path) == 0
-    names = ['platform.urdf', 'platform.sdf', 'platform.xml', 'platform.svg', 'robot.yaml',
-             'platform_scene.xml']
+    names = ['platform.urdf', 'platform.sdf', 'platform.xml', 'platform.svg',
+             'platform_loops.yaml', 'platform_scene.xml']
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     printed = capsys.readouterr()
     assert printed.out.split() == [str(tmp_path / name) for name in names]

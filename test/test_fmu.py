@@ -10,6 +10,7 @@ from contextlib import closing
 import importlib.util
 import math
 from pathlib import Path
+import re
 import shutil
 import subprocess
 from typing import Any
@@ -205,6 +206,39 @@ def test_bad_input(unit: Unit) -> None:
         assert unit.status == 0
 
 
+def _inertias() -> list[list[float]]:
+    """Return random inertias, every other with a negative principal moment, and special ones."""
+    random, found = rng(), []
+    for n in range(60):
+        moments = random.uniform(0.1, 20.0, 3)
+        moments[n % 3] *= (1.0, -1.0, 1e-3, -1e-3)[n % 4]
+        turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        whole = turn @ np.diag(moments) @ turn.T
+        found.append(whole[np.triu_indices(3)].tolist())
+    return [*found, [1.0, 0.0, 0.0, -1.0, 0.0, -1.0], [-1.0, 0.0, 0.0, -1.0, 0.0, 1.0],
+            [1.0, 2.0, 0.0, 1.0, 0.0, 1.0], [0.0, 0.1, 0.0, 0.0, 0.0, 0.0]]
+
+
+def test_an_inertia_is_one_that_the_parameter_file_takes(unit: Unit) -> None:
+    """The platform's must be positive definite, a payload's semidefinite; the status says so."""
+    unit.fmu.exitInitializationMode()
+    unit.step()
+    for body, given in (('platform', {}), ('payload', {'payload.mass': 20.0})):
+        for name, value in given.items():
+            unit.put(REFERENCES[name], [value])
+        points = [[0.0] * 6, [-0.0] * 6] if body == 'payload' else []
+        for inertia in [*_inertias(), *points]:
+            unit.put(REFERENCES[f'{body}.inertia.ixx'], inertia)
+            forces = unit.step()
+            try:
+                taken = PARAMETERS.replaced({**given, f'{body}.inertia': inertia})
+            except ParameterError:
+                assert (unit.status, forces) == (OUT_OF_RANGE, [0.0] * 6), inertia
+            else:
+                assert (unit.status, forces) == (0, at_home(taken).forces.tolist()), inertia
+        unit.put(REFERENCES['platform.inertia.ixx'], list(PARAMETERS['platform.inertia']))
+
+
 def test_parameters_are_tunable(unit: Unit) -> None:
     """A payload changes the forces as it changes those of the library."""
     unit.fmu.exitInitializationMode()
@@ -224,6 +258,67 @@ def test_a_payload_is_an_input(unit: Unit) -> None:
     assert unit.step() == at_home(laden).forces.tolist()
     unit.put(REFERENCES['payload.mass'], [0.0])
     assert unit.step() == empty
+
+
+def test_descriptions_name_the_leg_before_what_else_they_say() -> None:
+    for each in variables(PARAMETERS.replaced({
+            'actuator.reflected_mass': None, 'actuator.screw_lead': 0.005,
+            'drive.motor_inertia': 1e-4})):
+        assert '{' not in each.description
+        if '[' in each.name:
+            leg = each.name.split('[')[1].rstrip(']')
+            assert f'leg {leg}' in each.description.split(';')[0]
+            assert each.description.count('leg ') == 1
+
+
+@pytest.mark.parametrize('file', ['platform.yaml', 'ship_hexapod.yaml', 'telescope.yaml'])
+def test_starts_have_no_rounding_errors(file: str) -> None:
+    """A coordinate of a symmetrical hexapod is zero, not -9e-18; the pose is that of home."""
+    parameters = Parameters.from_yaml(ROOT / 'config' / file)
+    home = StewartPlatform(parameters).home_pose()
+    start = [each.start or 0.0 for each in variables(parameters)]
+    assert all(each == 0.0 or abs(each) > 1e-12 for each in start)
+    assert start[:3] == pytest.approx(home.position.tolist(), abs=1e-15)
+    assert np.abs(np.reshape(from_quaternion(*start[3:7]), (3, 3)) - home.rotation).max() < 1e-15
+
+
+def test_units_are_shown_in_millimetres_and_degrees(path: Path) -> None:
+    described = fmpy.read_model_description(str(path))
+    shown = {each.name: each.displayUnit for each in described.modelVariables}
+    assert [shown[name] for name in (
+        'position.x', 'lengths[1]', 'rates[1]', 'angular_velocity.z', 'base.angular_velocity.z',
+        'payload.center_of_mass.z', 'forces[1]', 'linear_acceleration.x', 'orientation.x')] == [
+            'mm', 'mm', 'mm/s', 'deg/s', 'deg/s', 'mm', None, None, None]
+    factors = {each.name: each.factor for unit in described.unitDefinitions
+               for each in unit.displayUnits}
+    assert factors == {'mm': 1000.0, 'mm/s': 1000.0, 'deg/s': 180.0 / math.pi,
+                       'deg/s2': 180.0 / math.pi}
+
+
+def test_flat_names_on_request(version: str, tmp_path: Path) -> None:
+    """Letters, digits and underscores alone; the same variables otherwise, and valid."""
+    path = tmp_path / 'hexapod.fmu'
+    path.write_bytes(fmu(PARAMETERS, 'hexapod', version, COMPILER, flat=True))
+    assert not validate_fmu(str(path))
+    described = fmpy.read_model_description(str(path))
+    assert described.variableNamingConvention == 'flat'
+    names = [each.name for each in described.modelVariables]
+    assert len(set(names)) == len(names) == len(VARIABLES)
+    assert all(re.fullmatch('[a-z0-9_]+', name) for name in names)
+    assert {'lengths_1', 'position_x', 'payload_center_of_mass_z', 'wrench_force_x',
+            'singularity_warn_condition', 'exceeded_6', 'status'} < set(names)
+    done = fmpy.simulate_fmu(str(path), stop_time=0.01, output_interval=0.001)
+    assert set(done['forces_1']) == {at_home(PARAMETERS).forces[0]}
+
+
+def test_flat_names_belong_to_an_fmu(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    params = str(ROOT / 'config' / 'platform.yaml')
+    with pytest.raises(SystemExit):
+        main(['--params', params, '--output', str(tmp_path), '--flat'])
+    assert '--flat: needs --fmu' in capsys.readouterr().err
+    assert main(['--params', params, '--output', str(tmp_path), '--flat', '--fmu']) == 0
+    described = fmpy.read_model_description(str(tmp_path / 'hexapod.fmu'))
+    assert 'forces_1' in [each.name for each in described.modelVariables]
 
 
 def test_a_payload_of_the_file_is_the_start_value() -> None:

@@ -20,6 +20,7 @@ from referees import random_parameters, rng, ROOT
 from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
 from stewart_dynamics.description import read_mjcf as loading
 from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.loops import loops_name, loops_yaml
 from stewart_dynamics.description.mjcf import mjcf
 from stewart_dynamics.description.recognition import read_hexapod
 from stewart_dynamics.description.sdf import sdf, upright
@@ -49,6 +50,8 @@ def written(p, kind, folder, change=lambda text: text):
         pytest.importorskip('mujoco')
     path = folder / f'hexapod.{kind}'
     path.write_text(change(WRITERS[kind](Hexapod(p), 'hexapod')), encoding='utf-8')
+    if kind == 'urdf' and change is foreign:  # whose loops are beside it
+        (folder / loops_name('hexapod')).write_text(loops_yaml(Hexapod(p), 'hexapod'))
     return path
 
 
@@ -94,8 +97,6 @@ def test_closed_files_of_others_are_read_by_how_bodies_are_connected(kind, tmp_p
 @pytest.mark.parametrize('kind', WRITERS)
 @pytest.mark.parametrize('change', [lambda text: text, foreign], ids=['own', 'foreign'])
 def test_a_hanging_hexapod_keeps_its_side_in_every_format(kind, change, tmp_path):
-    if kind == 'urdf' and change is foreign:
-        pytest.skip('its loops are open: it has no pose')
     p = PLATFORM.replaced({
         'geometry.platform_side': 'negative', 'platform.center_of_mass': [0.02, -0.01, -0.12]})
     assert Hexapod(p).position[2] < -1.0
@@ -105,6 +106,113 @@ def test_a_hanging_hexapod_keeps_its_side_in_every_format(kind, change, tmp_path
     for name in ('geometry.base_joints', 'geometry.platform_joints', 'gravity',
                  'platform.center_of_mass', 'legs.cylinder.center_of_mass'):
         assert found[name] == pytest.approx(p[name], abs=1e-6), name
+
+
+@pytest.mark.parametrize('kind', WRITERS)
+@pytest.mark.parametrize('change', [lambda text: text, foreign], ids=['own', 'foreign'])
+@pytest.mark.parametrize('height', [-0.06, -0.4, 0.4])
+@pytest.mark.parametrize('side', ['auto', 'positive', 'negative'])
+def test_the_side_does_not_depend_on_the_frame_of_the_platform(
+        side, height, change, kind, tmp_path):
+    """The loops of a URDF are open: its platform is at the origin of the base there."""
+    joints = PLATFORM['geometry.platform_joints'] + [0.0, 0.0, height]
+    p = PLATFORM.replaced({'geometry.platform_joints': joints, 'geometry.platform_side': side})
+    found = read_hexapod(written(p, kind, tmp_path, change)).parameters
+    assert StewartPlatform(found).home_pose().position == pytest.approx(
+        StewartPlatform(p).home_pose().position, abs=1e-6)
+
+
+MASSLESS = PLATFORM.replaced({'legs.piston.mass': 0.0, 'legs.piston.inertia': 0.0,
+                              'geometry.zero_length': 1.3,
+                              'limits.force_max': None, 'limits.length_max': None})
+MASS_OF = {'sdf': r'(<link name="{}">.*?<mass>)[^<]*(<)',
+           'xml': r'(<body name="{}".*?<inertial [^>]* mass=")[^"]*(")',
+           'urdf': r'(<link name="{}">.*?<mass value=")[^"]*(")'}
+
+
+def edited(pattern, value):
+    """Return an edit of the first place of a pattern with two groups around a value."""
+    def change(text):
+        new, count = re.subn(pattern, rf'\g<1>{value}\g<2>', text, count=1, flags=re.DOTALL)
+        assert count == 1
+        return new
+
+    return change
+
+
+def check_all_else_stays(before, after, *names):
+    """Compare all arrays of two sets of parameters but those named."""
+    for name, value in before.items():
+        if name not in names and isinstance(value, np.ndarray):
+            assert after[name] == pytest.approx(value, rel=EXACT, abs=EXACT), name
+
+
+@pytest.mark.parametrize('p', [PLATFORM, MASSLESS], ids=['full', 'massless'])
+@pytest.mark.parametrize('kind', WRITERS)
+def test_an_edited_mass_of_the_platform_is_read_and_all_else_stays(kind, p, tmp_path):
+    """Legs without mass have a part of the platform's: it is read as zero as it was written."""
+    change = edited(MASS_OF[kind].format('platform'), '250.0')
+    found = read_hexapod(written(p, kind, tmp_path, change))
+    assert found.parameters['platform.mass'] == 250.0
+    check_all_else_stays(p, found.parameters)
+    assert not any('edited' in each for each in found.remarks)
+
+
+@pytest.mark.parametrize('p', [PLATFORM, MASSLESS], ids=['full', 'massless'])
+@pytest.mark.parametrize('kind', ['sdf', 'xml'])
+def test_an_edited_mass_of_a_leg_is_read_and_those_of_the_others_stay(
+        kind, p, tmp_path, snapshot):
+    change = edited(MASS_OF[kind].format('leg_2_piston'), '2.0')
+    found = read_hexapod(written(p, kind, tmp_path, change))
+    masses = p['legs.piston.mass'].copy()
+    masses[1] = 2.0
+    assert np.array_equal(found.parameters['legs.piston.mass'], masses)
+    check_all_else_stays(p, found.parameters, 'legs.piston.mass')
+    if p is MASSLESS:
+        snapshot('\n'.join(found.remarks))
+
+
+@pytest.mark.parametrize(('kind', 'pattern', 'value', 'name', 'expected'), [
+    ('sdf', r'(</lower>)()', '<upper>0.2</upper>', 'limits.length_max', 1.5),
+    ('sdf', r'(<limit>)()', '<effort>400</effort>', 'limits.force_max', 400.0),
+    ('xml', r'(joint="leg_\d")()', ' ctrlrange="-400 400"', 'limits.force_max', 400.0),
+    ('xml', r'(<motor name="leg_\d")()', ' forcerange="-400 400"', 'limits.force_max', 400.0),
+    ('xml', r'(range="-[^ "]* )[^" ]*(")', '0.5', 'limits.length_max', 1.8),
+    ('urdf', r'(effort=")1000000000.0(")', '400', 'limits.force_max', 400.0),
+    ('urdf', r'(upper=")11[^"]*(" velocity="0.5")', '0.5', 'limits.length_max', 1.8)])
+def test_a_limit_that_is_added_to_a_file_without_it_is_read(
+        kind, pattern, value, name, expected, tmp_path):
+    """A limit that is not set is carried as such, and does not hide a limit that is added."""
+    p = MASSLESS
+
+    def change(text):
+        new, count = re.subn(pattern, rf'\g<1>{value}\g<2>', text)
+        assert count == 6
+        return new
+
+    found = read_hexapod(written(p, kind, tmp_path, change)).parameters
+    assert found[name] is expected or found[name] == pytest.approx([expected] * 6, abs=1e-4)
+    others = {'limits.force_max', 'limits.length_max'} - {name}
+    assert all(found[other] is None for other in others)
+    check_all_else_stays(p, found, name)
+
+
+@pytest.mark.parametrize('kind', WRITERS)
+def test_an_edited_gravity_or_tilt_and_an_edited_name_are_read(kind, tmp_path):
+    p = PLATFORM.replaced({'gravity': [0.0, 0.0, -1.62]})
+    tilt = {'sdf': (r'(canonical_link="base">\s*<pose>)[^<]*(<)', '0 0 0 0.1 0 0'),
+            'xml': (r'(gravity=")[^"]*(")', f'0 {-1.62 * np.sin(0.1)} {-1.62 * np.cos(0.1)}'),
+            'urdf': (r'(</material>\s*)(<link name="base">)',
+                     '<link name="world"/><joint name="fix" type="fixed"><parent link="world"/>'
+                     '<child link="base"/><origin rpy="0.1 0 0"/></joint>')}[kind]
+    found = read_hexapod(written(p, kind, tmp_path, edited(*tilt))).parameters['gravity']
+    assert found / np.linalg.norm(found) == pytest.approx(
+        [0.0, -np.sin(0.1), -np.cos(0.1)], abs=1e-9)
+    assert (np.linalg.norm(found) == pytest.approx(1.62)) == (kind == 'xml')
+    renamed = read_hexapod(written(PLATFORM.replaced({'base_frame': 'world'}), kind, tmp_path,
+                                   lambda text: re.sub(
+                                       '(?<!element=")(?<!data=")world_base', 'ground', text)))
+    assert renamed.parameters['base_frame'] == ('world' if kind == 'urdf' else 'ground')
 
 
 def at_home(text, hexapod):

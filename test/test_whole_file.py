@@ -85,7 +85,7 @@ def test_a_full_disk_leaves_no_partial_description(
     before = contents(tmp_path)
     assert set(before) == {
         'platform.urdf', 'platform.sdf', 'platform.xml', 'platform_scene.xml', 'platform.svg',
-        'robot.yaml'}
+        'platform_loops.yaml'}
     capsys.readouterr()
     with full_disk():
         assert describe([*arguments, '--force', '--ros2-control', 'effort']) == 2

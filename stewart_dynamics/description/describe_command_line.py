@@ -37,8 +37,8 @@ def _arguments() -> argparse.ArgumentParser:
     parser = _PROGRAM.parser(
         description='Write a hexapod as URDF, SDFormat and MJCF, or read one from these formats '
                     'into a parameter file.',
-        files='DIR gets NAME.urdf with its loops in robot.yaml, NAME.sdf, NAME.xml (MJCF) and '
-              'NAME_scene.xml around it, or with --from NAME.yaml, and a\npicture with numbered '
+        files='DIR gets NAME.urdf with its loops in NAME_loops.yaml, NAME.sdf, NAME.xml (MJCF), '
+              'NAME_scene.xml around it, or with --from NAME.yaml, and\na picture with numbered '
               'joints, NAME.svg; NAME_points.yaml, the parameters with the '
               'joints as points, where they are on circles.')
     source = parser.add_mutually_exclusive_group(required=True)
@@ -82,7 +82,7 @@ def _interfaces(text: str) -> list[str]:
 def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.description.hexapod import Hexapod
-    from stewart_dynamics.description.loops import loops_yaml
+    from stewart_dynamics.description.loops import loops_name, loops_yaml
     from stewart_dynamics.description.mjcf import mjcf, scene
     from stewart_dynamics.description.picture import picture
     from stewart_dynamics.description.sdf import sdf
@@ -100,7 +100,8 @@ def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
         control = Ros2Control(given.ros2_control, given.hardware)
     texts = {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
              f'{name}.xml': mjcf(hexapod, name), f'{name}.svg': picture(hexapod, name)}
-    texts |= {'robot.yaml': loops_yaml(hexapod, name), f'{name}_scene.xml': scene(hexapod, name)}
+    texts |= {loops_name(name): loops_yaml(hexapod, name),
+              f'{name}_scene.xml': scene(hexapod, name)}
     if given.usd:
         from stewart_dynamics.description.usd import usd
         texts[f'{name}.usda'] = usd(hexapod, name)

@@ -29,6 +29,20 @@ OF_SLIDE = {'limits.length_min': 'lower', 'limits.length_max': 'upper',
 """Parameters of limits that formats have on the slide of a leg, and the fields of ``Joint``."""
 
 
+class CarriedParameter(NamedTuple):
+    """
+    A parameter that stewart_describe has added to a format, as text.
+
+    It holds where the elements of the file are as they were written, ``element``: another value
+    of theirs is an edit, and is taken.
+    """
+
+    value: str
+    element: str = ''
+    """The value that a reader of the elements alone finds, of limits that of the joint; empty
+    where the format has no element for it."""
+
+
 class DescriptionError(StewartError):
     """A file that cannot be read, or in which there is no hexapod."""
 
@@ -142,8 +156,8 @@ class Mechanism:
     parts: dict[str, MechanismBody]
     joints: list[Joint]
     gravity: Array | None = None  # world axes [m/s^2]
-    carried: dict[str, str] = field(default_factory=dict)
-    """Parameters that stewart_describe has added to the format, as text."""
+    carried: dict[str, CarriedParameter] = field(default_factory=dict)
+    """Parameters that stewart_describe has added to the format, by their names."""
     order: tuple[str, ...] = ()  # names of slides in the order of their actuators
     remarks: list[str] = field(default_factory=list)  # assumptions of the reader, one line each
     warnings: list[str] = field(default_factory=list)

@@ -24,8 +24,10 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
     COLORS, Hexapod, LegDescription, PLATE, RigidBody, shapes, VisualShape)
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, LEG_BODIES, numbers, text_of)
+    add, base_element, CARRIED, carried, ELEMENT, length_elements, numbers, solid_elements,
+    text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
 from stewart_dynamics.parameters.table import mean_radius
 
 _TIMESTEP = 0.0005  # [s]
@@ -66,9 +68,15 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     _actuators(root, hexapod)
     add(add(root, 'keyframe'), 'key', name='home', qpos=numbers(*_home(hexapod)))
     custom = add(root, 'custom')
-    names = [*_NOT_IN_MJCF, *(each for each in LEG_BODIES if not p[each].all())]
-    for each, text in {**carried(p, names), 'base_frame': hexapod.base}.items():
-        add(custom, 'text', name=f'{CARRIED}.{each}', data=text)
+    unlimited = (LENGTH_MIN, LENGTH_MAX) if p[LENGTH_MIN] is p[LENGTH_MAX] else ()
+    elements = {**base_element(hexapod), **solid_elements(hexapod),
+                **length_elements(hexapod), **dict.fromkeys(unlimited)}
+    if p['limits.force_max'] is None:
+        elements['limits.force_max'] = None
+    for each, parameter in carried(p, elements, _NOT_IN_MJCF):
+        add(custom, 'text', name=f'{CARRIED}.{each}', data=parameter.value)
+        if parameter.element:
+            add(custom, 'text', name=f'{ELEMENT}.{each}', data=parameter.element)
     return text_of(root, _COMMENT)
 
 

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement, SLIDE,
-    WORLD)
-from stewart_dynamics.description.xml_text import CARRIED
+    BALL, CarriedParameter, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER,
+    Placement, SLIDE, WORLD)
+from stewart_dynamics.description.xml_text import CARRIED, ELEMENT
 from stewart_dynamics.errors import one_line
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.parameters.table import PARAMETERS
 
 _TIME = 30  # [s]
 _WAIT = 4 * _TIME
@@ -39,7 +40,6 @@ except MemoryError:
 except Exception as exc:
     sys.exit(str(exc))
 """
-_PREFIX = f'{CARRIED}.'
 
 
 def read_mjcf(source: Path) -> Mechanism:
@@ -61,12 +61,13 @@ def read_mjcf(source: Path) -> Mechanism:
         _loop(mujoco, model, data, n, mechanism)
     _tendons(mujoco, model, mechanism)
     _actuators(mujoco, model, mechanism)
-    for n in range(model.ntext):
-        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TEXT, n) or ''
-        at = model.text_adr[n]
-        if name.startswith(_PREFIX):
-            text = bytes(model.text_data[at:at + model.text_size[n]])
-            mechanism.carried[name.removeprefix(_PREFIX)] = text.rstrip(b'\0').decode()
+    texts = {mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TEXT, n) or '': bytes(
+        model.text_data[at:at + size]).rstrip(b'\0').decode()
+        for n, (at, size) in enumerate(zip(model.text_adr, model.text_size, strict=True))}
+    for name in PARAMETERS:
+        if f'{CARRIED}.{name}' in texts:
+            mechanism.carried[name] = CarriedParameter(
+                texts[f'{CARRIED}.{name}'], texts.get(f'{ELEMENT}.{name}', ''))
     return mechanism
 
 

@@ -15,7 +15,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
     SLIDE, UNIVERSAL, WORLD)
-from stewart_dynamics.description.read_urdf import body_of, numbers_of, shapes_of, unit
+from stewart_dynamics.description.read_urdf import (
+    body_of, carried_of, numbers_of, shapes_of, unit)
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import INERTIA
@@ -59,7 +60,7 @@ def read_sdf(root: ET.Element, source: Path) -> Mechanism:
         mechanism.gravity = numbers_of(gravity.text, 3, source, 'gravity')
     for each in model:
         if each.tag.endswith('}parameter') or each.tag == f'{CARRIED}:parameter':
-            mechanism.carried[each.get('name', '')] = each.get('value', '')
+            mechanism.carried[each.get('name', '')] = carried_of(each)
     return mechanism
 
 

@@ -2,19 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 
 
-"""URDF as a mechanism; elements ``joint`` in a block ``gazebo`` close loops, as in Gazebo."""
+"""
+URDF as a mechanism.
+
+Elements ``constraint``, ``joint`` in a block ``gazebo``, the block of stewart_describe, or a file
+beside it (``loops``) close its loops.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.loops import loops_beside
 from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
-    SLIDE, UNIVERSAL)
+    BALL, CarriedParameter, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody,
+    OTHER, Placement, SLIDE, UNIVERSAL)
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import INERTIA, inertia_matrix
@@ -42,22 +49,63 @@ def read_urdf(root: ET.Element, source: Path) -> Mechanism:
         str(source), root.get('name', source.stem),
         {name: _part(name, link, placements[name], source) for name, link in links.items()},
         [_joint(joint, placements, source) for joint in found])
-    for joint in root.findall('gazebo/joint'):
-        mechanism.joints.append(_closing(joint, placements, source))
+    closing = [_closing(joint, placements, source) for joint in root.findall('gazebo/joint')]
+    closing += [_constraint(each, placements, source) for each in root.findall('constraint')]
     _add_of_gazebo(root, mechanism, source)
     _add_of_ros2_control(root, mechanism, source)
     block = root.find(CARRIED)
     if block is not None:
-        mechanism.carried = {each.get('name', ''): each.get('value', '')
+        mechanism.carried = {each.get('name', ''): carried_of(each)
                              for each in block.findall('parameter')}
         for loop in block.findall('loop'):
             tip, ball = loop.get('tip', ''), loop.get('platform', '')
             if not {tip, ball} <= set(links):
                 raise DescriptionError(f'{source}: loop: no link {tip!r} or {ball!r}')
-            mechanism.joints.append(Joint(
-                ball, BALL, tip, ball, placements[tip].position,
-                child_anchor=placements[ball].position))
+            closing.append(Joint(ball, BALL, tip, ball, placements[tip].position,
+                                 child_anchor=placements[ball].position))
+    if not closing:
+        closing = [*_beside(source, found, placements)]
+    mechanism.joints += {joint.name: joint for joint in closing}.values()
     return mechanism
+
+
+def _beside(source: Path, joints: Iterable[ET.Element], placements: dict[str, Placement],
+            ) -> Iterator[Joint]:
+    """Yield the joints that close the loops in a file beside the URDF, if it has one."""
+    # A joint has a frame of its name at its child.
+    frames = {joint.get('name', ''): end_of(joint, 'child', source) for joint in joints}
+    frames |= {link: link for link in placements}
+    for loop in loops_beside(source, frames):
+        first, second = frames[loop.first], frames[loop.second]
+        yield Joint(f'{loop.first} to {loop.second}', loop.kind, first, second,
+                    placements[first].position, child_anchor=placements[second].position)
+
+
+def _constraint(element: ET.Element, placements: dict[str, Placement], source: Path) -> Joint:
+    """Return an element ``constraint`` of ros/urdfdom_headers#108, with a frame on each link."""
+    name, ends, points, axes = element.get('name', ''), [], [], []
+    for side in ('parent', 'child'):
+        end, origin, axis = (end_of(element, side, source), element.find(f'{side}_origin'),
+                             element.find(f'{side}_axis'))
+        if end not in placements:
+            raise DescriptionError(f'{source}: constraint {name!r}: no link {end!r}')
+        what = f'{side}_origin of constraint {name!r}'
+        at = HERE if origin is None else Placement(
+            from_euler(numbers_of(origin.get('rpy'), 3, source, what)),
+            numbers_of(origin.get('xyz'), 3, source, what))
+        at = placements[end].of(at)
+        ends.append(end)
+        points.append(at.position)
+        if axis is not None:
+            axes.append(at.rotation @ unit(numbers_of(axis.get('xyz'), 3, source, what), source,
+                                           f'{side}_axis of constraint {name!r}'))
+    return Joint(name, _KINDS.get(element.get('type', ''), OTHER), ends[0], ends[1], points[0],
+                 axes, points[1])
+
+
+def carried_of(element: ET.Element) -> CarriedParameter:
+    """Return a parameter of the block of stewart_describe."""
+    return CarriedParameter(element.get('value', ''), element.get('element', ''))
 
 
 def numbers_of(text: str | None, count: int, source: Path, what: str) -> Array:

@@ -27,8 +27,8 @@ from stewart_dynamics.description.mechanism import (
 from stewart_dynamics.description.read_mjcf import read_mjcf
 from stewart_dynamics.description.read_sdf import read_sdf
 from stewart_dynamics.description.read_urdf import read_urdf
-from stewart_dynamics.description.topology import Chain, LegJoint, Topology, topology_of
-from stewart_dynamics.description.xml_text import NOT_CHECKED
+from stewart_dynamics.description.topology import Chain, LegJoint, LEGS, Topology, topology_of
+from stewart_dynamics.description.xml_text import NOT_SET
 from stewart_dynamics.errors import one_line, shown
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
@@ -46,8 +46,13 @@ _THICK = 0.05
 # A platform with less of the mass of a leg has dummies of joints alone.
 _MISSING = 0.02
 _COUNTS = dict(enumerate(('no', 'one', 'two', 'three', 'four', 'five', 'six')))
-# A platform that is closer to the plane of the base joints, in larger radii, is on neither side.
+# Legs whose mean direction has a smaller part along the normal of the base joints' plane point to
+# neither side of it.
 _FLAT = 0.05
+# Bodies of a smaller part of the platform's mass are dummies of joints.
+_NEGLIGIBLE = 1e-7
+# Numbers of elements that differ by a smaller part are those that were written.
+_AS_WRITTEN = 1e-9
 
 
 class Recognized(NamedTuple):
@@ -97,20 +102,19 @@ def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
         'base_frame': found.base.name, 'platform_frame': found.platform.name,
         'joints': names}
     for key in legs[0]:
-        if key != 'joints':
+        if key not in ('joints', 'direction'):
             values[key] = np.array([leg[key] for leg in legs]).ravel() if all(
                 leg[key] is not None for leg in legs) else None
+    if not geometry_only:
+        values |= _platform(found, remarks, warnings)
+    values['gravity'] = _gravity(mechanism, found, remarks)
+    values |= _carried(mechanism, found, values, remarks)
     if geometry_only:
-        values |= _carried(mechanism)
         values, warnings = _without_masses(values), []
-    else:
-        values |= _platform(mechanism, found, remarks, warnings)
-        values |= _carried(mechanism)
-    values |= {name: value for name, value in _gravity(mechanism, found, remarks).items()
-               if name not in mechanism.carried}
     given = {name: value for name, value in values.items() if value is not None}
     remarks += _missing(given, mechanism, found, legs)
-    parameters = _with_side(Parameters(given, mechanism.source), found)
+    parameters = _with_side(Parameters(given, mechanism.source), [
+        leg['direction'] for leg in legs])
     return Recognized(parameters, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(warnings)))
 
 
@@ -200,7 +204,8 @@ def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
         said.append(f'its position in the file, {slide.position:.4g} m, is outside its limits, '
                     f'{low:.4g} to {high:.4g} m')
     leg: dict[str, Any] = {
-        'joints': slide.name, 'geometry.base_joints': base.inside(root),
+        'joints': slide.name, 'direction': base.rotation.T @ along,
+        'geometry.base_joints': base.inside(root),
         'geometry.platform_joints': found.platform.placement.inside(on_platform),
         'geometry.zero_length': max(zero, 0.0),
         'actuator.reflected_mass': slide.armature, 'actuator.viscous_friction': slide.damping,
@@ -339,23 +344,23 @@ def _missing_mass(found: Topology, mass: float) -> str:
             f'{found.platform.name!r} missing?')
 
 
-def _platform(mechanism: Mechanism, found: Topology, remarks: list[str], warnings: list[str],
-              ) -> dict[str, Any]:
-    body = _together(found.platform_parts, found.platform.placement)
+def _platform(found: Topology, remarks: list[str], warnings: list[str]) -> dict[str, Any]:
+    least = _NEGLIGIBLE * max(part.mass or 0.0 for part in found.platform_parts)
+    heavy = [part for part in found.platform_parts if part.mass and part.mass > least]
+    body = _together(heavy, found.platform.placement)
     if not body.mass:
         raise DescriptionError(f'{found.platform.name}: the platform has no mass; --geometry-only '
                                'reads the geometry without masses')
-    if 'platform.mass' not in mechanism.carried and (
-            missing := _missing_mass(found, body.mass)):
+    if missing := _missing_mass(found, body.mass):
         warnings.append(missing)
-    several = sum(bool(part.mass) for part in found.platform_parts)
-    if several > 1 and 'platform.mass' not in mechanism.carried:
-        remarks.append(f'platform: {several} bodies that are fixed to each other are one here')
+    if len(heavy) > 1:
+        remarks.append(f'platform: {len(heavy)} bodies that are fixed to each other are one here')
     return {'platform.mass': body.mass, 'platform.center_of_mass': body.center,
             'platform.inertia': body.inertia[np.triu_indices(3)]}
 
 
-def _gravity(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[str, Any]:
+def _gravity(mechanism: Mechanism, found: Topology, remarks: list[str]) -> Array:
+    """Return gravity in base axes."""
     gravity = mechanism.gravity
     if gravity is None:
         gravity = np.array(STANDARD_GRAVITY)
@@ -363,38 +368,69 @@ def _gravity(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[
             remarks.append(f'gravity: not in the file: {-STANDARD_GRAVITY[2]} m/s^2 along the '
                            "world's -z")
     turn = found.base.placement.rotation
-    return {'gravity': gravity if np.array_equal(turn, np.eye(3)) else turn.T @ gravity}
+    return gravity if np.array_equal(turn, np.eye(3)) else np.asarray(turn.T @ gravity)
 
 
-def _with_side(p: Parameters, found: Topology) -> Parameters:
-    """Return parameters whose home pose is on the side of the base where the platform is."""
+def _with_side(p: Parameters, directions: list[Array]) -> Parameters:
+    """
+    Return parameters whose home pose is on the side of the base to which the legs point.
+
+    directions: unit vectors along the legs, from the base, in base axes. Where the loops are open
+    in the file, its platform may be anywhere.
+    """
     home = home_of(p)
-    middle = found.base.placement.inside(found.platform.placement.point(
-        p.geometry.platform_joints.mean(axis=0))) - p.geometry.base_joints.mean(axis=0)
-    height = float(home.shape.axes[2] @ middle)
-    if abs(height) < _FLAT * home.shape.radius or height * home.side > 0.0:
+    height = float(home.shape.axes[2] @ np.mean(directions, axis=0))
+    if abs(height) < _FLAT or height * home.side > 0.0:
         return p
     return p.replaced({'geometry.platform_side': POSITIVE if height > 0.0 else NEGATIVE})
 
 
-def _carried(mechanism: Mechanism) -> dict[str, Any]:
-    """Return the parameters that stewart_describe has added to the format."""
-    values: dict[str, Any] = {}
-    for name, text in mechanism.carried.items():
+def _carried(mechanism: Mechanism, found: Topology, values: Mapping[str, Any],
+             remarks: list[str]) -> dict[str, Any]:
+    """Return the parameters that stewart_describe has added, as far as the elements are its."""
+    slides = [chain.steps[chain.slide].joint for chain in found.chains]
+    holding: dict[str, Any] = {}
+    for name, (text, of_element) in mechanism.carried.items():
         if name not in PARAMETERS:
             continue
-        if PARAMETERS[name].kind != 'double':
-            values[name] = text
-            continue
-        try:
-            numbers = [float(each) for each in text.split()] if text != NOT_CHECKED else None
-        except ValueError as exc:
-            raise DescriptionError(f'{mechanism.source}: {name}: {text!r}: must be numbers'
-                                   ) from exc
-        values[name] = numbers
-        if numbers and len(numbers) == 1 and not PARAMETERS[name].sizes:
-            values[name] = numbers[0]
-    return values
+        value, there = _value(mechanism, name, text), values.get(name)
+        if of_element:
+            present = there
+            if name in OF_SLIDE:
+                of_slides = [getattr(slide, OF_SLIDE[name]) for slide in slides]
+                present = None if of_slides.count(None) == LEGS else np.array(of_slides, float)
+            same = _unchanged(present, _value(mechanism, name, of_element))
+            if not np.all(same):
+                remarks.append(f'{name}: edited in the file: its element holds, in place of the '
+                               f'parameter {text} that was written with it')
+                value = there if value is None or there is None or np.ndim(same) == 0 else (
+                    np.where(same, value, there))
+        holding[name] = value
+    return holding
+
+
+def _value(mechanism: Mechanism, name: str, text: str) -> Any:
+    """Return the value of a parameter that stewart_describe has written as text."""
+    if PARAMETERS[name].kind != 'double':
+        return text
+    if text == NOT_SET:
+        return None
+    try:
+        numbers = [float(each) for each in text.split()]
+    except ValueError as exc:
+        raise DescriptionError(f'{mechanism.source}: {name}: {text!r}: must be numbers') from exc
+    return numbers[0] if len(numbers) == 1 and not PARAMETERS[name].sizes else numbers
+
+
+def _unchanged(present: Any, written: Any) -> Any:
+    """Return whether the numbers of elements, or which of several, are those written."""
+    if written is None or present is None:
+        return written is present
+    if isinstance(written, str):
+        return present == written
+    if np.size(present) != np.size(written):
+        return False
+    return np.abs(present - written) <= _AS_WRITTEN * np.max(np.abs(written))
 
 
 def _missing(given: Mapping[str, Any], mechanism: Mechanism, found: Topology,
@@ -402,10 +438,10 @@ def _missing(given: Mapping[str, Any], mechanism: Mechanism, found: Topology,
     """Return one line for each limit that is not in the file, or not of all legs."""
     said = []
     for name, field in OF_SLIDE.items():
-        if name in given or name in mechanism.carried:
-            continue
         without = [leg['joints'] for leg in legs if leg[name] is None]
         slides = [chain.steps[chain.slide].joint for chain in found.chains]
+        if name in given or name in mechanism.carried and len(without) in (0, len(legs)):
+            continue
         if len(without) < len(legs):
             said.append(f'{name}: {", ".join(without)} without it in the file: left out of all '
                         'legs: unlimited')

@@ -29,15 +29,15 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
     COLORS, Hexapod, LegDescription, RigidBody, shapes, solids, VisualShape)
+from stewart_dynamics.description.mechanism import OF_SLIDE
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, inertia_texts, LEG_BODIES, numbers, text_of)
+    add, base_element, CARRIED, carried, inertia_texts, numbers, solid_elements, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler
+from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
 _VERSION = '1.9'
 _NAMESPACE = 'https://stewart-dynamics.example/sdf'
-_NOT_IN_SDF = ('gravity', 'geometry.zero_length', 'actuator.reflected_mass')
-# The tips add to it.
-_OF_PLATFORM = ('platform.mass', 'platform.center_of_mass', 'platform.inertia')
+_NOT_IN_SDF = ('geometry.zero_length', 'actuator.reflected_mass')
 # Mass of a tip as a part of the platform's, and its radius of gyration [m].
 _TIP_MASS, _TIP_GYRATION = 1e-8, 0.1
 _COMMENT = 'Positions of joints are counted from the home pose.'
@@ -62,9 +62,11 @@ def sdf(hexapod: Hexapod, name: str) -> str:
     _shapes(platform, looks[hexapod.platform])
     for leg in hexapod.legs:
         _tip(model, hexapod, leg)
-    names = [*_NOT_IN_SDF, *_OF_PLATFORM, *(each for each in LEG_BODIES if not p[each].all())]
-    for each, text in {**carried(p, names), 'base_frame': hexapod.base}.items():
-        add(model, f'{CARRIED}:parameter', name=each, value=text)
+    elements = {**base_element(hexapod), **solid_elements(hexapod),
+                'gravity': upright(p.gravity).T @ STANDARD_GRAVITY,
+                **{each: None for each in OF_SLIDE if p[each] is None}}
+    for each, parameter in carried(p, elements, _NOT_IN_SDF):
+        add(model, f'{CARRIED}:parameter', name=each, **parameter._asdict())
     return text_of(root, _COMMENT)
 
 

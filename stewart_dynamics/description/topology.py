@@ -190,7 +190,8 @@ def topology_of(mechanism: Mechanism) -> Topology:
         groups = _Groups(mechanism)
         hubs = groups.hubs()
     if len(slides) < LEGS or len(hubs) < 2:
-        hint = '' if slides else '. Cranks with rods (rotary hexapods) are not read'
+        hint = _open_ends(groups) if len(slides) >= LEGS else '' if slides else (
+            '. Cranks with rods (rotary hexapods) are not read')
         raise DescriptionError(
             f'{mechanism.source}: no hexapod: {len(slides)} prismatic joints, and {len(hubs)} '
             'bodies at which six legs end; six prismatic joints are needed between two bodies, '
@@ -209,20 +210,23 @@ def topology_of(mechanism: Mechanism) -> Topology:
         if chain is not None:
             chains[chain.steps[chain.slide].joint.name] = chain
     if len(chains) != LEGS:
-        ends = [group for group, joints in groups.joints.items()
-                if len(joints) == 1 and groups.parts(group)]
-        open_ends = (
-            f'. {len(ends)} bodies have one joint alone, as {groups.shown(ends[0])}: joints or '
-            'constraints that close the loops are needed') if ends else ''
         raise DescriptionError(
             f'{mechanism.source}: no hexapod: legs with one prismatic joint each between '
             f'{groups.shown(base)} and {groups.shown(platform)}: {len(chains)}; there must be '
-            f'six{open_ends}')
+            f'six{_open_ends(groups)}')
     order = [name for name in mechanism.order if name in chains]
     names = order if len(order) == LEGS else [
         joint.name for joint in slides if joint.name in chains]
     return Topology(groups.main(base), groups.main(platform), groups.parts(platform),
                     [chains[name] for name in names])
+
+
+def _open_ends(groups: _Groups) -> str:
+    """Return a sentence about legs that end in the air; empty without such legs."""
+    ends = [group for group, joints in groups.joints.items()
+            if len(joints) == 1 and groups.parts(group)]
+    return (f'. {len(ends)} bodies have one joint alone, as {groups.shown(ends[0])}: the loops '
+            'are open') if ends else ''
 
 
 def _close(mechanism: Mechanism, groups: _Groups, base: str) -> bool:
@@ -246,7 +250,9 @@ def _close(mechanism: Mechanism, groups: _Groups, base: str) -> bool:
         if slides == 2:  # seen from both of its bodies
             last = max(distances, key=lambda group: distances[group])
             lengths[last] = distances[last]
-    if len(lengths) != LEGS:
+    # A leg that ends at its slide has no joint at the platform.
+    slide_last = sum(groups.joints[group][0].kind == SLIDE for group in lengths)
+    if len(lengths) != LEGS or slide_last == LEGS:
         return False
     longest = max(lengths.values())
     shorter = Counter(lengths.values())[longest - 1]

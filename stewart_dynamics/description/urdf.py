@@ -26,11 +26,13 @@ from stewart_dynamics.description.hexapod import (
     COLORS, Hexapod, LegDescription, PASSIVE_RATE, RigidBody, shapes, solids, UNLIMITED,
     VisualShape)
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, inertia_texts, numbers, text_of)
+    add, CARRIED, carried, inertia_texts, length_elements, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.kinematics.leg_joints import PLATFORM_JOINTS
+from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
-_NOT_IN_URDF = ('gravity', 'actuator.reflected_mass')
+_NOT_IN_URDF = ('actuator.reflected_mass',)
+_UNLIMITED = dict.fromkeys(('limits.velocity_max', 'limits.force_max'), [UNLIMITED] * 6)
 _AXES = {'x': (1.0, 0.0, 0.0), 'y': (0.0, 1.0, 0.0), 'z': (0.0, 0.0, 1.0)}
 # Axes of the platform's virtual joints, and the largest angles of their closed form.
 _VIRTUAL = {'yaw': ('z', math.pi), 'pitch': ('y', math.pi / 2), 'roll': ('x', math.pi)}
@@ -63,8 +65,14 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str
         _leg(root, hexapod, leg, looks)
     p = hexapod.parameters
     block = add(root, CARRIED)
-    for each, text in carried(p, _NOT_IN_URDF).items():
-        add(block, 'parameter', name=each, value=text)
+    elements = {'gravity': STANDARD_GRAVITY, **length_elements(hexapod), **{
+        each: values for each, values in _UNLIMITED.items() if p[each] is None}}
+    for part, of_part in p.legs.parts.items():  # no mass has no center
+        if not of_part.mass.all():
+            elements[f'legs.{part}.center_of_mass'] = np.where(
+                of_part.mass > 0.0, of_part.center_of_mass, 0.0)
+    for each, parameter in carried(p, elements, _NOT_IN_URDF):
+        add(block, 'parameter', name=each, **parameter._asdict())
     for leg in hexapod.legs:
         add(block, 'loop', tip=leg.piston.name, platform=leg.ball)
     if control is not None:

@@ -6,29 +6,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from stewart_dynamics import __version__
-from stewart_dynamics.description.hexapod import RigidBody
-from stewart_dynamics.description.mechanism import OF_SLIDE
+from stewart_dynamics.description.hexapod import Hexapod, RigidBody
+from stewart_dynamics.description.mechanism import CarriedParameter, OF_SLIDE
+from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
 from stewart_dynamics.parameters.circles import CIRCLE_NAMES
 from stewart_dynamics.parameters.table import INERTIA, Parameters
 
 CARRIED = 'stewart_dynamics'
 """Name of the block, or prefix of the elements, of parameters without an own element."""
-LEG_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',
-              'legs.piston.inertia')
+ELEMENT = f'{CARRIED}.element'  # prefix in MJCF, which has texts with names alone
 _GROUPS = ('actuator.', 'drive.', 'geometry.', 'legs.', 'limits.')
 # Parameters of these groups that formats have elements for.
 _IN_ELEMENTS = frozenset((
-    *OF_SLIDE, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
+    *OF_SLIDE, *(f'legs.{part}.{each}' for part in ('cylinder', 'piston')
+                 for each in ('mass', 'center_of_mass', 'inertia')),
     *CIRCLE_NAMES, 'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
     'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'))
-NOT_CHECKED = 'none'  # value there of a limit that is not checked
+NOT_SET = 'none'  # value there of a limit that is not set, or of an element that is missing
 
 
 def numbers(*values: Any) -> str:
@@ -58,20 +59,47 @@ def text_of(root: ET.Element, comment: str) -> str:
             f'{ET.tostring(root, encoding="unicode")}\n')
 
 
-def carried(parameters: Parameters, names: Iterable[str]) -> Mapping[str, str]:
+def carried(parameters: Parameters, elements: Mapping[str, Any], without: Iterable[str] = (),
+            ) -> Iterator[tuple[str, CarriedParameter]]:
     """
-    Return parameters as text, for a block of parameters that a format has no elements for.
+    Yield the parameters that a reader of a format's elements alone would not find.
 
-    These are the given ones that no format has elements for, those named, and limits that are not
-    set.
+    elements: those whose elements have another value, with that value; None: no element.
+    without: names of parameters that the format has no elements for. The given ones that no format
+    has elements for are added to them.
     """
-    names = [*names, *(name for name in OF_SLIDE if parameters[name] is None),
-             *(name for name in parameters.given
-               if name.startswith(_GROUPS) and name not in _IN_ELEMENTS)]
-    return {name: _text(parameters[name]) for name in names}
+    for name, element in elements.items():
+        yield name, CarriedParameter(_text(parameters[name]), _text(element))
+    for name in (*without, *(name for name in parameters.given
+                             if name.startswith(_GROUPS) and name not in _IN_ELEMENTS)):
+        yield name, CarriedParameter(_text(parameters[name]))
+
+
+def base_element(hexapod: Hexapod) -> dict[str, Any]:
+    """Return the name of the base where its own is taken by the world of a format."""
+    return {} if hexapod.base_body == hexapod.base else {'base_frame': hexapod.base_body}
+
+
+def solid_elements(hexapod: Hexapod) -> dict[str, Any]:
+    """Return the masses and inertias that ``Hexapod.solid`` has for legs with zeros (6,)."""
+    found = {}
+    for part in ('cylinder', 'piston'):
+        bodies = [hexapod.solid(getattr(leg, part), leg) for leg in hexapod.legs]
+        found[f'legs.{part}.mass'] = [body.mass for body in bodies]
+        found[f'legs.{part}.inertia'] = [body.inertia[0, 0] for body in bodies]
+    return {name: values for name, values in found.items()
+            if not hexapod.parameters[name].all()}
+
+
+def length_elements(hexapod: Hexapod) -> dict[str, Any]:
+    """Return the bounds of joints that stand for limits of length that are not set (6,) [m]."""
+    bounds = np.array([leg.limits.lengths(leg.home_length) for leg in hexapod.legs])
+    bounds -= hexapod.parameters.geometry.zero_length[:, None]
+    return {name: bounds[:, side] for side, name in enumerate((LENGTH_MIN, LENGTH_MAX))
+            if hexapod.parameters[name] is None}
 
 
 def _text(value: Any) -> str:
     if value is None:
-        return NOT_CHECKED
+        return NOT_SET
     return value if isinstance(value, str) else numbers(value)

@@ -17,7 +17,10 @@ _PROGRAM = Program('stewart_export', 'parameters, or files that exist or cannot 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
-    given = _arguments().parse_args(arguments)
+    parser = _arguments()
+    given = parser.parse_args(arguments)
+    if given.flat and not given.fmu:
+        parser.error('--flat: needs --fmu')
     return _PROGRAM.exit_code(lambda: _export(given, FilesOfFolder(given.output, given.force)))
 
 
@@ -34,6 +37,10 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--fmu', nargs='?', const='3', choices=('3', '2'), metavar='VERSION',
                         help='write an FMU for co-simulation, too, of FMI 3.0 (3, the default) or '
                              'FMI 2.0 (2)')
+    parser.add_argument('--flat', action='store_true',
+                        help='with --fmu: flat names, lengths_1 and position_x in place of '
+                             'lengths[1] and position.x, of which Simulink makes a vector and a '
+                             'bus')
     parser.add_argument('--drives', action='store_true',
                         help='write the units of the amplifiers, too: NAME_drives.h and .md, and '
                              'NAME_ethercat_LEG.yaml; needs drive.rated_torque and more')
@@ -59,7 +66,7 @@ def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
     files: dict[str, str | bytes] = {**c_project(parameters, name)}
     if given.fmu:
         compiler = find_compiler() if has_binaries(given.fmu) else None
-        files[f'{name}.fmu'] = fmu(parameters, name, given.fmu, compiler)
+        files[f'{name}.fmu'] = fmu(parameters, name, given.fmu, compiler, flat=given.flat)
         if compiler is None:
             _PROGRAM.complain(f'warning: {name}.fmu has no binary: no C compiler for this '
                               'computer is found ($CC, cc, gcc, clang)')

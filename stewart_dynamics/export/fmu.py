@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import io
+import math
 import os
 from pathlib import Path
 import platform
+import re
 import shutil
 import subprocess
 import tempfile
@@ -39,11 +41,15 @@ _UNITS = {'m': {'m': 1}, 'm/s': {'m': 1, 's': -1}, 'm/s2': {'m': 1, 's': -2}, 'm
           'rad/s2': {'rad': 1, 's': -2}, 'N': {'kg': 1, 'm': 1, 's': -2},
           'N.m': {'kg': 1, 'm': 2, 's': -2}, 'kg': {'kg': 1}, 'kg.m2': {'kg': 1, 'm': 2},
           's': {'s': 1}}
+# Units in which tools show a unit: name, and its value for 1 of the unit.
+_SHOWN = {'m': ('mm', 1e3), 'm/s': ('mm/s', 1e3), 'rad/s': ('deg/s', math.degrees(1.0)),
+          'rad/s2': ('deg/s2', math.degrees(1.0))}
 # Where an FMU has its binary: by version, system and processor.
 _FOLDERS = {('3', 'Linux', 'x86_64'): 'x86_64-linux', ('3', 'Linux', 'aarch64'): 'aarch64-linux',
             ('3', 'Darwin', 'x86_64'): 'x86_64-darwin', ('3', 'Darwin', 'arm64'): 'aarch64-darwin',
             ('2', 'Linux', 'x86_64'): 'linux64', ('2', 'Darwin', 'x86_64'): 'darwin64'}
 _COMPILERS = ('cc', 'gcc', 'clang')
+_NOISE = 1e-14  # parts of the largest coordinate of a pose: below it rounding errors
 _KINDS_OF_2 = {'Float64': 'Real', 'Int32': 'Integer', 'Boolean': 'Boolean'}
 
 
@@ -77,8 +83,8 @@ def variables(parameters: Parameters) -> list[Variable]:
     Where the parameters do not give the height of the platform there, they start at a pose at
     which the forces can be solved. The last variables are those of the motors, with drives.
     """
-    position, rotation = _start_pose(parameters)
-    start = [*position, *to_quaternion(rotation), *np.zeros(18), *parameters.gravity,
+    position, quaternion = _start_pose(parameters)
+    start = [*position, *quaternion, *np.zeros(18), *parameters.gravity,
              *np.zeros(9), *_numbers(parameters.payload.body), *_numbers(parameters.platform.body),
              parameters.singularity.warn_condition,
              parameters.singularity.stop_condition, parameters.singularity.warn_time,
@@ -91,13 +97,18 @@ def variables(parameters: Parameters) -> list[Variable]:
 
 
 def _start_pose(parameters: Parameters) -> tuple[Array, Array]:
-    """Return position and rotation of the first possible home pose that is not singular."""
+    """Return position and quaternion of the first possible home pose that is not singular."""
     positions, rotations = homes(parameters)
     conditions = StewartPlatform(parameters).solve(
         motion_rows(Pose(positions, rotations)))[:, CONDITION]
     regular = conditions < stop_condition_of(parameters)
     at = int(np.argmax(regular))  # the first pose if all of them are singular
-    return positions[at], rotations[at]
+    return _without_noise(positions[at]), _without_noise(np.array(to_quaternion(rotations[at])))
+
+
+def _without_noise(numbers: Array) -> Array:
+    """Return numbers with zeros in place of rounding errors."""
+    return np.where(np.abs(numbers) > _NOISE * np.abs(numbers).max(), numbers, 0.0)
 
 
 def _inputs() -> Iterator[Variable]:
@@ -147,37 +158,46 @@ def _tunable() -> Iterator[Variable]:
                    'forces are zero while a limit is exceeded', '', 'Boolean')
 
 
+def _of_legs(name: str, unit: str, text: str, kind: str = 'Float64') -> Iterator[Variable]:
+    """Yield an output for each leg, whose number the text has."""
+    for leg in range(1, 7):
+        yield Variable(f'{name}[{leg}]', 'output', text.format(leg=leg), unit, kind)
+
+
 def _outputs() -> Iterator[Variable]:
     for name, unit, text in (
-            ('lengths', 'm', 'length'), ('rates', 'm/s', 'rate of the length'),
-            ('forces', 'N', 'force to command, positive pushes; zero unless status is 0'),
-            ('joint_forces', 'N', 'force in rod and joints, positive pushes; likewise')):
-        for leg in range(1, 7):
-            yield Variable(f'{name}[{leg}]', 'output', f'{text} of leg {leg}', unit)
+            ('lengths', 'm', 'length of leg {leg}'),
+            ('rates', 'm/s', 'rate of the length of leg {leg}'),
+            ('forces', 'N', 'force to command to leg {leg}, positive pushes; zero unless status '
+             'is 0'),
+            ('joint_forces', 'N', 'force in rod and joints of leg {leg}, positive pushes; zero '
+             'unless status is 0')):
+        yield from _of_legs(name, unit, text)
     yield Variable('determinant', 'output', 'det(J), zero at a singularity', 'm3')
-    yield Variable('determinant_rate', 'output', 'its time derivative', 'm3/s')
+    yield Variable('determinant_rate', 'output', 'time derivative of determinant', 'm3/s')
     yield Variable('condition_number', 'output',
                    'of J_inv, moments divided by the characteristic length')
     yield Variable('warning', 'output', 'singularity warning', '', 'Boolean')
-    for leg in range(1, 7):
-        yield Variable(f'exceeded[{leg}]', 'output', f'limits that leg {leg} exceeds: bits '
-                       'STEWART_LENGTH_MIN, ... of stewart_dynamics.h', '', 'Int32')
+    yield from _of_legs('exceeded', '', 'limits that leg {leg} exceeds: bits STEWART_LENGTH_MIN, '
+                        '... of stewart_dynamics.h', 'Int32')
     yield Variable('status', 'output', '0: forces are valid; else a code of stewart_dynamics.h',
                    '', 'Int32')
     yield Variable('time', 'independent', 'time of the last step', 's')
 
 
 def _of_motors() -> Iterator[Variable]:
-    for name, unit, text in (
-            ('motor_speeds', 'rad/s', 'speed of the motor'),
-            ('motor_torques', 'N.m', 'torque of the motor for the force to command, not limited; '
-             'zero unless status is 0;')):
-        for leg in range(1, 7):
-            yield Variable(f'{name}[{leg}]', 'output', f'{text} of leg {leg}', unit)
+    yield from _of_legs('motor_speeds', 'rad/s', 'speed of the motor of leg {leg}')
+    yield from _of_legs('motor_torques', 'N.m', 'torque of the motor of leg {leg} for the force '
+                        'to command, not limited; zero unless status is 0')
+
+
+def flat_name(name: str) -> str:
+    """Return the name of a variable with letters, digits and _ alone: ``lengths_1``."""
+    return re.sub(r'\W', '_', name.rstrip(']'))
 
 
 def fmu(parameters: Parameters, name: str, version: str = '3',
-        compiler: list[str] | None = None) -> bytes:
+        compiler: list[str] | None = None, *, flat: bool = False) -> bytes:
     """
     Return the FMU as the bytes of its file, the same for the same parameters and compiler.
 
@@ -185,16 +205,20 @@ def fmu(parameters: Parameters, name: str, version: str = '3',
     version: version of FMI, 3 or 2.
     compiler: words of the command of a C compiler, for the binary of this computer; None: no
         binary.
+    flat: variables have flat names, ``lengths_1`` and ``position_x`` in place of ``lengths[1]``
+        and ``position.x``.
     Raises StewartError: the compiler fails.
     """
     listed = variables(parameters)
+    if flat:
+        listed = [each._replace(name=flat_name(each.name)) for each in listed]
     token = f'{{{uuid.UUID(bytes=bytes.fromhex(digest(parameters))[:16])}}}'
     sources = {each: source(each)
                for each in (*SOURCES, 'fmu.h', 'fmu.c', f'fmi{version}.c')}
     sources['model.c'] = _model_source(parameters, listed, token)
     compiled = [each for each in sources if each.endswith('.c')]
     content: dict[str, str | bytes] = {
-        'modelDescription.xml': _description(listed, name, token, version, compiled)}
+        'modelDescription.xml': _description(listed, name, token, version, compiled, flat)}
     content |= {f'sources/{each}': text for each, text in sources.items()}
     if version == '3':
         content['sources/buildDescription.xml'] = _build_description(name, compiled)
@@ -256,7 +280,7 @@ def _binary(sources: Mapping[str, str], name: str, version: str, compiler: list[
 
 
 def _description(listed: list[Variable], name: str, token: str, version: str,
-                 compiled: list[str]) -> str:
+                 compiled: list[str], flat: bool) -> str:
     """Return modelDescription.xml."""
     new = version == '3'
     root = ET.Element('fmiModelDescription', {
@@ -264,7 +288,7 @@ def _description(listed: list[Variable], name: str, token: str, version: str,
         'instantiationToken' if new else 'guid': token,
         'description': 'Leg lengths and forces of a Gough-Stewart platform',
         'license': 'Apache-2.0', 'generationTool': f'stewart_export {__version__}',
-        'variableNamingConvention': 'structured'})
+        'variableNamingConvention': 'flat' if flat else 'structured'})
     interface = ET.SubElement(root, 'CoSimulation', {
         'modelIdentifier': name, 'canHandleVariableCommunicationStepSize': 'true',
         'canGetAndSetFMUState' if new else 'canGetAndSetFMUstate': 'true'})
@@ -274,8 +298,12 @@ def _description(listed: list[Variable], name: str, token: str, version: str,
             ET.SubElement(sources, 'File', name=file)
     units = ET.SubElement(root, 'UnitDefinitions')
     for unit, exponents in _UNITS.items():
-        ET.SubElement(ET.SubElement(units, 'Unit', name=unit), 'BaseUnit', {
+        group = ET.SubElement(units, 'Unit', name=unit)
+        ET.SubElement(group, 'BaseUnit', {
             base: str(exponent) for base, exponent in exponents.items()})
+        if unit in _SHOWN:
+            shown, factor = _SHOWN[unit]
+            ET.SubElement(group, 'DisplayUnit', name=shown, factor=repr(factor))
     ET.SubElement(root, 'DefaultExperiment', startTime='0', stepSize='0.001')
     model = ET.SubElement(root, 'ModelVariables')
     for reference, each in enumerate(listed):
@@ -283,6 +311,8 @@ def _description(listed: list[Variable], name: str, token: str, version: str,
                    'causality': each.causality, 'variability': each.variability,
                    'description': each.description}
         of_type = {'unit': each.unit} if each.unit else {}
+        if each.unit in _SHOWN:
+            of_type['displayUnit'] = _SHOWN[each.unit][0]
         if each.start is not None:
             of_type['start'] = each.start_text
         if new:

@@ -44,13 +44,29 @@ double * fmu_value(fmu_instance * instance, uint32_t reference, fmu_type type, i
   return type == actual ? &instance->memory.values[reference] : NULL;
 }
 
+/* Return whether an inertia xx xy xz yy yz zz, with a part of its trace added to each moment, is
+   positive definite. */
+static int is_definite(const double * i, double part)
+{
+  double added = part * (i[0] + i[3] + i[5]), xx = i[0] + added;
+  double yy = i[3] + added - i[1] * i[1] / xx, yz = i[4] - i[1] * i[2] / xx;
+  return xx > 0.0 && yy > 0.0 && i[5] + added - i[2] * i[2] / xx - yz * yz / yy > 0.0;
+}
+
+/* Return whether the inertia of a payload is positive semidefinite, as that of a point is. */
+static int is_semidefinite(const double * inertia)
+{
+  int n, is_point = 1;
+  for (n = 0; n < 6; n++) {
+    is_point = is_point && inertia[n] == 0.0;
+  }
+  return is_point || is_definite(inertia, 1e-12);
+}
+
 /* Put the parameters of the instance into a hexapod; return whether they keep their rules. */
 static int put_parameters(const double * values, stewart_platform * platform)
 {
-  const double * i = values + FMU_INERTIA;  /* xx xy xz yy yz zz */
-  double minor = i[0] * i[3] - i[1] * i[1];
-  double determinant = minor * i[5] - i[0] * i[4] * i[4] - i[2] * i[2] * i[3] +
-    2.0 * i[1] * i[2] * i[4];
+  const double * i = values + FMU_INERTIA;
   int n;
   for (n = FMU_MASS; n < FMU_LENGTHS; n++) {
     if (!isfinite(values[n])) {
@@ -65,7 +81,7 @@ static int put_parameters(const double * values, stewart_platform * platform)
   platform->warn_time = values[FMU_WARN_TIME];
   platform->suppress_near_singularity = values[FMU_SUPPRESS_NEAR_SINGULARITY] != 0.0;
   platform->suppress_at_limits = values[FMU_SUPPRESS_AT_LIMITS] != 0.0;
-  return platform->mass > 0.0 && i[0] > 0.0 && minor > 0.0 && determinant > 0.0 &&
+  return platform->mass > 0.0 && is_definite(i, 0.0) &&
     platform->warn_condition >= 1.0 && platform->stop_condition >= platform->warn_condition &&
     platform->warn_time >= 0.0;
 }
@@ -102,9 +118,14 @@ int fmu_step(fmu_instance * instance, double time)
     code = STEWART_OUT_OF_RANGE;
   }
   if (code == STEWART_OK && values[FMU_PAYLOAD_MASS] != 0.0) {
-    code = values[FMU_PAYLOAD_MASS] < 0.0 ? STEWART_OUT_OF_RANGE : stewart_add_payload(
+    code = stewart_add_payload(
       &platform, values[FMU_PAYLOAD_MASS], values + FMU_PAYLOAD_CENTER_OF_MASS,
       values + FMU_PAYLOAD_INERTIA);
+    if (code == STEWART_OK &&
+      !(values[FMU_PAYLOAD_MASS] > 0.0 && is_semidefinite(values + FMU_PAYLOAD_INERTIA)))
+    {
+      code = STEWART_OUT_OF_RANGE;
+    }
   }
   if (code == STEWART_OK) {
     code = stewart_step(
