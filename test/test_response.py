@@ -27,9 +27,10 @@ from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.replay import main
-from stewart_dynamics.replay.even_samples import Run, Runs
-from stewart_dynamics.replay.frequency_response import periodic_parts
-from stewart_dynamics.replay.response import AXES, axes_response
+from stewart_dynamics.response.axes_response import AXES, axes_response
+from stewart_dynamics.response.even_samples import Run, Runs
+from stewart_dynamics.response.frequency_response import periodic_parts
+from stewart_dynamics.response.response_measures import bandwidth
 
 Array = NDArray[np.float64]
 
@@ -344,6 +345,22 @@ def test_what_is_not_excited_is_not_stated() -> None:
     assert found['x']['reason'] == found['ry']['reason'] == 'moves only together with other axes'
     still = axes_of(np.zeros((500, 6)), np.zeros((500, 6)), rate)
     assert all(still[name]['reason'] == 'not excited' for name in AXES)
+
+
+@pytest.mark.parametrize(('drive', 'low', 'high', 'said'), [
+    (Drive(0.05, 0.7, 0.0), None, 0.2, 'below 0.2 Hz'),
+    (Drive(50.0, 0.7, 0.0), 10.0, None, 'above 10 Hz')])
+def test_a_bandwidth_outside_of_the_frequencies_is_said_to_be_there(
+        drive: Drive, low: float | None, high: float | None, said: str,
+        periodic: tuple[Array, Array]) -> None:
+    rate = MOTION['rate']
+    found = axes_of(periodic[0], drive.moved(periodic[0], rate), rate)
+    for name in AXES:
+        for key in ('bandwidth_3db', 'bandwidth_90deg'):
+            assert found[name][key] is None
+            assert found[name][f'{key}_bounds'] == pytest.approx((low, high))
+            assert bandwidth(found[name], key) == said
+    assert (found['x']['delay'] is None) == (low is None)
 
 
 def test_a_step_is_late_by_its_delay() -> None:

@@ -34,8 +34,6 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import NEEDS
-from stewart_dynamics.replay.recorded_response import Followed
-from stewart_dynamics.replay.response_charts import bode_charts, legs_chart, zoom_charts
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
 from stewart_dynamics.replay.summary import Answered, margin_key, unit_key
 from stewart_dynamics.reporting.curves import Curves, Frames
@@ -45,6 +43,9 @@ from stewart_dynamics.reporting.plots import (
     base_wrench_plots, measured_plots, motion_plots, plotted, spectrum_plots)
 from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
+from stewart_dynamics.response.recorded_response import Followed
+from stewart_dynamics.response.response_charts import bode_charts, legs_chart, zoom_charts
+from stewart_dynamics.response.response_measures import bandwidth
 from stewart_dynamics.setpoints.motor_row import OF_DRIVES, RISES
 from stewart_dynamics.setpoints.rejections import stamp_of
 from stewart_dynamics.whole_file import FilesOfFolder, write_files
@@ -154,7 +155,7 @@ class Report:
             quantities={name: limit.quantity for name, limit in LIMITS.items()},
             units={name: each.unit or '' for name, each in PARAMETERS.items()},
             most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
-            unit_key=unit_key, percent=PERCENT, **_response_charts(followed),
+            unit_key=unit_key, percent=PERCENT, bandwidth=bandwidth, **_response_charts(followed),
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})
         write_files({path: text})

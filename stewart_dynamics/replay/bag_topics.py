@@ -15,11 +15,11 @@ from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.response.recorded_response import MEASURED, MEASURED_POSE
 from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.output_messages import LEG_STATES, MOTOR_TYPES, OUTPUT_TYPES
 
-MEASURED, MEASURED_POSE = 'measured', 'measured_pose'
 # JointState topics that the node publishes, under its name: computed, never measured legs.
 _COMPUTED = tuple(name for name, kind in (OUTPUT_TYPES | MOTOR_TYPES | MODEL_TYPES).items()
                   if kind == type_names.JOINT_STATE)

@@ -33,15 +33,16 @@ from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.bag_report import Report
-from stewart_dynamics.replay.bag_topics import find_topics, MEASURED, MEASURED_POSE, notices_of
+from stewart_dynamics.replay.bag_topics import find_topics, notices_of
 from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
-from stewart_dynamics.replay.recorded_response import Followed, RecordedResponse
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
+from stewart_dynamics.response.recorded_response import (
+    Followed, MEASURED, MEASURED_POSE, RecordedResponse)
 from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints

@@ -12,10 +12,11 @@ from typing import Any
 
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.response import AXES
 from stewart_dynamics.replay.statements import (
     INPUTS, JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING, SINGULARITY)
 from stewart_dynamics.reporting.pages import fixed
+from stewart_dynamics.response.axes_response import AXES
+from stewart_dynamics.response.response_measures import bandwidth, BANDWIDTHS
 from stewart_dynamics.setpoints.rejections import Rejection
 
 _LISTED = 5
@@ -102,10 +103,7 @@ def _response_lines(response: Mapping[str, Any]) -> list[str]:
             lines.append(f'response of {axis:<2}  not stated: {each["reason"]}')
             continue
         delay = '-' if each['delay'] is None else f'{1e3 * each["delay"]:.2f} ms'
-        bandwidths = ', '.join(
-            f'{name} at {each[key]:.3g} Hz' if each[key] is not None else
-            f'{name} above {each["frequency"][-1]:.3g} Hz'
-            for name, key in (('-3 dB', 'bandwidth_3db'), ('-90 deg', 'bandwidth_90deg')))
+        bandwidths = ', '.join(f'{name} {bandwidth(each, key)}' for name, key in BANDWIDTHS)
         lines.append(f'response of {axis:<2}  delay {delay}, {bandwidths}')
     return lines
 

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.replay.even_samples import Run, Runs, SHORTEST
-from stewart_dynamics.replay.frequency_response import (
+from stewart_dynamics.response.even_samples import Run, Runs, SHORTEST
+from stewart_dynamics.response.frequency_response import (
     aligned, FrequencyResponses, Part, periodic_parts, responses, segment_length, spectra)
-from stewart_dynamics.replay.response_measures import CERTAIN, Response
+from stewart_dynamics.response.response_measures import CERTAIN, Response
 
 AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
 # Part of the largest motion of an axis below which another axis is not excited.
@@ -223,8 +223,9 @@ def _reason(analysis: Analysis, excited: bool, analyzed: bool, axis: int) -> str
 
 _NOT_EXCITED: dict[str, Any] = {name: [] for name in (
     'frequency', 'gain', 'phase', 'coherence', 'gain_low', 'gain_high', 'phase_low', 'phase_high')
-    } | dict.fromkeys(('delay', 'bandwidth_3db', 'bandwidth_90deg', 'second_order')) | {
-        'opposite': False}
+    } | dict.fromkeys(('delay', 'bandwidth_3db', 'bandwidth_90deg', 'second_order')
+                      ) | dict.fromkeys(('bandwidth_3db_bounds', 'bandwidth_90deg_bounds'),
+                                        (None, None)) | {'opposite': False}
 
 
 def _joined(pieces: Sequence[Response]) -> Response:

@@ -10,12 +10,13 @@ flight simulator motion systems, 1979; 14 CFR Part 60, appendix A, attachment 2)
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.replay.frequency_response import Complex
+from stewart_dynamics.response.frequency_response import Complex
 
 # Coherence from which on a frequency counts for the measures.
 COHERENT = 0.5
@@ -31,6 +32,9 @@ _PHASE_FLOOR = 1e-6
 _LACK_OF_FIT = 0.03
 # A drive of second order is fitted up to this multiple of the frequency of -90 degrees.
 _FITTED = 3.0
+
+# Names of the bandwidths, and the keys in summary.json.
+BANDWIDTHS = ('-3 dB', 'bandwidth_3db'), ('-90 deg', 'bandwidth_90deg')
 
 
 class Response(NamedTuple):
@@ -66,26 +70,37 @@ class Response(NamedTuple):
         with np.errstate(divide='ignore', invalid='ignore'):
             angle = np.degrees(np.arcsin(np.minimum(self.radius / gain, 1.0)))
         angle = np.where(self.radius < gain, angle, 180.0)  # any phase
+        bands = (np.maximum(gain - self.radius, 0.0), gain + self.radius,
+                 phase - angle, phase + angle)
         model = self.second_order()
         return {
             'frequency': self.frequency, 'opposite': self.opposite, 'gain': gain, 'phase': phase,
             'coherence': self.coherence,
-            'gain_low': np.maximum(gain - self.radius, 0.0), 'gain_high': gain + self.radius,
-            'phase_low': phase - angle, 'phase_high': phase + angle,
+            'gain_low': bands[0], 'gain_high': bands[1],
+            'phase_low': bands[2], 'phase_high': bands[3],
             'delay': self.delay(), 'bandwidth_3db': self.bandwidth_3db,
-            'bandwidth_90deg': self.bandwidth_90deg, 'second_order': model}
+            'bandwidth_90deg': self.bandwidth_90deg,
+            'bandwidth_3db_bounds': self._bounds(*(_above_half_power(each) for each in bands[:2])),
+            'bandwidth_90deg_bounds': self._bounds(*(each + 90.0 for each in bands[2:])),
+            'second_order': model}
 
     @property
     def bandwidth_3db(self) -> float | None:
         """Return the lowest frequency at which the gain falls below 1/sqrt(2) [Hz]."""
-        with np.errstate(divide='ignore'):
-            above: Array = np.log(np.abs(self.value) / _HALF_POWER)
-        return self._crossing(above)
+        return self._crossing(self._above_3db)
 
     @property
     def bandwidth_90deg(self) -> float | None:
         """Return the lowest frequency at which the phase falls below -90 degrees [Hz]."""
-        return self._crossing(self.phase + np.pi / 2.0)
+        return self._crossing(self._above_90deg)
+
+    @property
+    def _above_3db(self) -> Array:
+        return _above_half_power(np.abs(self.value))
+
+    @property
+    def _above_90deg(self) -> Array:
+        return self.phase + np.pi / 2.0
 
     def _crossing(self, above: Array) -> float | None:
         """Return where a quantity falls below zero, on the spline over log frequency."""
@@ -101,8 +116,24 @@ class Response(NamedTuple):
               if np.log(f[n]) <= each <= np.log(f[n + 1])]
         return float(np.exp(at[0])) if at else float(f[n])
 
+    def _bounds(self, low: Array, high: Array) -> tuple[float | None, float | None]:
+        """Return the bounds of a crossing from those of its quantity; None: unbounded."""
+        f = self.frequency[self.coherent]
+        if not len(f):
+            return None, None
+        first, last = float(f[0]), float(f[-1])
+        lowest = None if low[self.coherent][0] < 0.0 else self._crossing(low) or last
+        highest = first if high[self.coherent][0] < 0.0 else self._crossing(high)
+        return lowest, highest
+
     def half_bandwidth(self) -> float:
-        """Return half the lower bandwidth; without one the highest frequency [Hz]."""
+        """
+        Return half the lower bandwidth; without one the highest frequency [Hz].
+
+        Zero if a bandwidth is below the lowest frequency.
+        """
+        if any((above[self.coherent][:1] < 0.0).any() for above in (self._above_3db, self._above_90deg)):
+            return 0.0
         bandwidths = [each for each in (self.bandwidth_3db, self.bandwidth_90deg) if each]
         return 0.5 * min(bandwidths) if bandwidths else float(self.frequency.max(initial=0.0))
 
@@ -117,11 +148,9 @@ class Response(NamedTuple):
         Return by how much slow motion is late [s]: -d phase / d omega at zero.
 
         The phase up to half the bandwidth, as an odd polynomial of the frequency. None if slow
-        motion has the opposite sign.
+        motion has the opposite sign, or all frequencies are above half the bandwidth.
         """
         used = self.coherent & (self.frequency <= self.half_bandwidth())
-        if not used.any():
-            used = self.coherent & (self.frequency <= self.frequency[self.coherent].min(initial=0))
         count = int(np.count_nonzero(used))
         if not count or self.opposite:
             return None
@@ -172,3 +201,20 @@ class Response(NamedTuple):
             return None
         return {'gain': gain, 'delay': delay, 'damping': damping,
                 'natural_frequency': float(np.exp(log_omega) / (2.0 * np.pi))}
+
+
+def _above_half_power(gain: Array) -> Array:
+    """Return by how much a gain is above 1/sqrt(2), logarithmic."""
+    with np.errstate(divide='ignore'):
+        above: Array = np.log(gain / _HALF_POWER)
+    return above.clip(-100.0)
+
+
+def bandwidth(measures: Mapping[str, Any], key: str) -> str:
+    """Return in words where a bandwidth is, or on which side of the frequencies."""
+    low, high = measures[f'{key}_bounds']
+    if (at := measures[key]) is not None:
+        return f'at {at:.3g} Hz'
+    if low is None and high is None:
+        return 'not certain'
+    return f'below {high:.3g} Hz' if low is None else f'above {low:.3g} Hz'

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.replay.even_samples import Run, Runs
-from stewart_dynamics.replay.response import AXES
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
+from stewart_dynamics.response.axes_response import AXES
+from stewart_dynamics.response.even_samples import Run, Runs
 
 _WIDTH = 400.0
 _LEFT, _ACROSS = 46.0, 344.0

@@ -27,16 +27,16 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader, NUMBERS_END
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.bag_topics import MEASURED, MEASURED_POSE
-from stewart_dynamics.replay.even_samples import (
+from stewart_dynamics.response.axes_response import AXES, axes_response, legs_response
+from stewart_dynamics.response.even_samples import (
     at_even_times, check_overlap, clock_notices, Runs, Track, Tracks)
-from stewart_dynamics.replay.frequency_response import signal_module
-from stewart_dynamics.replay.response import AXES, axes_response, legs_response
+from stewart_dynamics.response.frequency_response import signal_module
 from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.input_messages import SampleReader
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejections
 from stewart_dynamics.setpoints.step import Batch
 
+MEASURED, MEASURED_POSE = 'measured', 'measured_pose'
 NO_POSE = 'no pose has these lengths'
 
 
