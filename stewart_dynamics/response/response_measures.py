@@ -132,7 +132,8 @@ class Response(NamedTuple):
 
         Zero if a bandwidth is below the lowest frequency.
         """
-        if any((above[self.coherent][:1] < 0.0).any() for above in (self._above_3db, self._above_90deg)):
+        first = self.coherent.argmax()
+        if self.coherent.any() and min(self._above_3db[first], self._above_90deg[first]) < 0.0:
             return 0.0
         bandwidths = [each for each in (self.bandwidth_3db, self.bandwidth_90deg) if each]
         return 0.5 * min(bandwidths) if bandwidths else float(self.frequency.max(initial=0.0))
