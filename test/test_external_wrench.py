@@ -522,6 +522,75 @@ def test_loads_and_a_wrong_mass_are_no_mistake_in_the_efforts(
         assert all(estimate.mistake is None for estimate in late)
 
 
+def moving(rate: float, noise: float = 0.0) -> list[Measurement]:
+    """Return measurements over four seconds."""
+    seconds = np.arange(0.0, 4.0, 1.0 / rate)
+    return with_noise(measured(HEXAPOD, swing(seconds), NO_WRENCH, [
+        BEGIN + round(each * 1e9) for each in seconds]), noise=noise)
+
+
+WRONG_RATES: dict[str, tuple[Callable[[Array, Array], Array], str]] = {
+    'zero': (lambda p, v: 0.0 * v, ': 0 m/s RMS, by the positions ?: it is zero, never filled?'),
+    'half': (lambda p, v: 0.5 * v, ': 0.5 times what is expected'),
+    'negative': (lambda p, v: -v, ': -1 times: a sign?'),
+    'mm/s': (lambda p, v: 1e3 * v, ': 1000 times: in mm/s?'),
+    'positions': (lambda p, v: p, ''),
+    'constant': (lambda p, v: 0.0 * v + 0.5, ''),
+    'one dead': (lambda p, v: v * (np.arange(6) != 2), 'leg_3: 0 m/s RMS, by the positions ?: '
+                 'it is zero, never filled?'),
+    'two of the other sign': (lambda p, v: v * [1, -1, 1, 1, -1, 1], 'leg_2, leg_5: '),
+    'exchanged': (lambda p, v: v[[3, 1, 2, 0, 4, 5]],
+                  ': in another order, leg_4, leg_2, leg_3, leg_1, leg_5, leg_6?')}
+
+
+@pytest.mark.parametrize('rate', [1000.0, 200.0, 50.0])
+@pytest.mark.parametrize('wrong', WRONG_RATES)
+def test_velocities_that_are_not_the_derivative_of_positions_give_no_wrench(
+        wrong: str, rate: float) -> None:
+    change, words = WRONG_RATES[wrong]
+    noise = 1.0 if rate > 50.0 else 0.0
+    found = judged([each._replace(rates=six(change(
+        np.array(each.lengths) - ZERO_LENGTHS, np.array(each.rates)))) for each in moving(
+            rate, noise)])
+    last = found[-1]
+    assert last.wrench is not None and last.published is None
+    assert last.mistake is not None and last.mistake.what == 'rate'
+    said = last.mistake.text
+    assert said.startswith('velocity is not the derivative of position: ')
+    for part in words.split('?: '):
+        assert part in said, said
+    assert {each.mistake.what for each in found if each.mistake} <= {'rate', 'scale', 'sign'}
+
+
+@pytest.mark.parametrize('noise', [0.0, 1.0])
+@pytest.mark.parametrize('rate', [1000.0, 200.0, 50.0])
+def test_right_velocities_are_no_mistake(rate: float, noise: float) -> None:
+    found = judged(moving(rate, noise))
+    assert all(each.published is not None for each in found[1:])
+    # those of encoders, quantized and differences of each other, and those of a filter
+    late = max(1, round(0.01 * rate))
+    steps = moving(rate)
+    lengths = np.round(np.array([each.lengths for each in steps]) / 1e-6) * 1e-6
+    rates = np.diff(lengths, axis=0, prepend=lengths[:1]) * rate
+    for values in (rates, np.repeat(rates[:1], late, axis=0).tolist() + rates.tolist()):
+        assert not any(each.mistake for each in judged([
+            each._replace(lengths=six(length), rates=six(value)) for each, length, value in zip(
+                steps, lengths, values, strict=False)]))
+
+
+@pytest.mark.parametrize('rate', [1000.0, 200.0, 50.0])
+def test_stamps_of_arrival_give_no_wrench(rate: float) -> None:
+    """Messages wait until there are some of them, as behind a slow bus or network."""
+    steps, size = moving(rate), max(2, round(0.02 * rate))
+    late = [each._replace(stamp=steps[min(n - n % size + size - 1, len(steps) - 1)].stamp
+                          + n % size * 10_000) for n, each in enumerate(steps)]
+    last = judged(late)[-1]
+    assert last.published is None and last.mistake is not None and last.mistake.what == 'stamps'
+    # lost messages leave the stamps of the others right
+    assert all(each.mistake is None for each in judged([
+        each for n, each in enumerate(steps) if n % (2 * size) < size]))
+
+
 def test_a_changed_mass_is_judged_anew() -> None:
     heavy = HEXAPOD.replaced({'platform.mass': 6.0 * HEXAPOD['platform.mass']})
     legs = MeasuredLegs(HEXAPOD, ExternalWrench(HEXAPOD), print, print)

@@ -13,7 +13,7 @@ from snapshot import Snapshot
 from stewart_dynamics import Motion
 from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
-from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
+from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, NEVER, OK, STALE, Status, StatusPart, WARN)
@@ -185,14 +185,14 @@ def test_a_rejection_is_reported_and_counted(snapshot: Snapshot) -> None:
 def test_a_likely_mistake_in_the_efforts_is_a_warning_while_it_is_there(
         what: str, snapshot: Snapshot) -> None:
     diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
-    mistaken = CLEAR._replace(mistake=EffortMistake(what, 'all are wrong'))
+    mistaken = CLEAR._replace(mistake=LegMistake(what, 'all are wrong'))
     felt(diagnostics, 1.0, mistaken)
     felt(diagnostics, 1.1, mistaken)
     message = 'measured_legs: likely mistake: all are wrong' + (
         '; no external wrench is published' * (what == 'sign'))
     assert status(diagnostics, 1.1)[1:3] == (WARN, message)
     values = dict(status(diagnostics, 1.1).values)
-    assert values['likely mistake in the efforts'] == what
+    assert values['likely mistake in the measurements'] == what
     assert values['wrenches'] == ('0' if what == 'sign' else '2')
     (level, text), = logged(diagnostics, 1.1)
     assert level == WARN
@@ -205,7 +205,7 @@ def test_a_likely_mistake_in_the_efforts_is_a_warning_while_it_is_there(
     level, text = status(diagnostics, 3.05)[1:3]
     assert level == OK
     snapshot(text)
-    assert 'likely mistake in the efforts' not in dict(status(diagnostics, 3.05).values)
+    assert 'likely mistake in the measurements' not in dict(status(diagnostics, 3.05).values)
 
 
 def test_rejections_after_an_overload_are_named(snapshot: Snapshot) -> None:

@@ -106,6 +106,17 @@ def values_of(case: Case, measured: Array) -> dict[str, Any]:
     return comparison.values()
 
 
+def test_stamps_of_arrival_are_a_mistake() -> None:
+    case = case_of()
+    forces, stamps = case.forces(), case.setpoints.stamps
+    n = np.arange(len(stamps))
+    bursts = stamps[np.minimum(n - n % 5 + 4, n[-1])] + n % 5 * 10_000
+    for times, expected in ((stamps, 0), (bursts, 1)):
+        comparison = Comparison(case.parameters)
+        compared(comparison, case, (times, forces))
+        assert len(comparison.stamps.mistakes(True, ['measured'])) == expected
+
+
 # The residual and the external wrench
 
 @pytest.mark.parametrize('seed', range(4))

@@ -47,7 +47,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
 from stewart_dynamics.core.binding import CODES, function, Sample
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
+from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
@@ -96,11 +96,11 @@ class Estimate(NamedTuple):
     """Measured - model, not filtered (6) [N]; none of the first measurement."""
     base: tuple[float, ...] = NO_BASE  # a row of the base's motion; of nan: it is still
     overloads: tuple[Overload, ...] = ()
-    mistake: EffortMistake | None = None  # likely mistake in the efforts
+    mistake: LegMistake | None = None  # likely mistake in the measurements
 
     @property
     def published(self) -> Six | None:
-        """Return the wrench; None without one, or where the efforts are likely no forces."""
+        """Return the wrench; None without one, or where it likely is that of a mistake."""
         return self.wrench if self.mistake is None or self.mistake.leaves_wrench else None
 
     @property

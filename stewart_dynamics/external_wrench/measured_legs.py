@@ -20,11 +20,13 @@ from stewart_dynamics.errors import MotionError, PoseError, SingularityError, St
 from stewart_dynamics.external_wrench.effort_check import EffortCheck
 from stewart_dynamics.external_wrench.estimate import (
     Estimate, ExternalWrench, Measurement, Target)
-from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
+from stewart_dynamics.external_wrench.rate_check import RateCheck
+from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake, STAMPS
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, NO_BASE, TWIST, WRENCH
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, jumped_back, MALFORMED, OUT_OF_RANGE, Rejection, stamp_words)
@@ -117,7 +119,8 @@ class MeasuredLegs:
             rejected: Callable[[Rejection, str], None],
             noticed: Callable[[str], object], history: LegHistory | None = None) -> None:
         self._step = step
-        self._efforts = EffortCheck(parameters)
+        self._efforts, self._rates = EffortCheck(parameters), RateCheck(parameters)
+        self._stamps = ArrivalStamps()
         self._reader = JointStateReader(parameters.joints)
         self._zero_lengths = tuple(parameters.geometry.zero_length.tolist())
         self._timeout = round(parameters.setpoint.timeout * SECOND)
@@ -132,9 +135,11 @@ class MeasuredLegs:
         return self._last.motion if self._last else None
 
     @property
-    def mistake(self) -> EffortMistake | None:
-        """Likely mistake in the efforts."""
-        return self._efforts.mistake
+    def mistake(self) -> LegMistake | None:
+        """Likely mistake in stamps, velocities or efforts: the former may look like the latter."""
+        if self._stamps.present is not None:
+            return LegMistake(STAMPS, self._stamps.present[0])
+        return self._rates.mistake or self._efforts.mistake
 
     def use(self, parameters: Parameters, step: ExternalWrench) -> None:
         """Use changed parameters from now on."""
@@ -162,7 +167,9 @@ class MeasuredLegs:
             self._reject(_OF_ERROR[type(exc)], str(exc))
             return None
         self._efforts.add(last.stamp, measurement.forces, last.differences)
-        mistake = self._efforts.mistake
+        self._rates.add(measurement, last)
+        self._stamps.add(last.stamp, measurement.lengths)
+        mistake = self.mistake
         self._last = last if mistake is None else last._replace(mistake=mistake)
         if self._history is not None:
             self._history.add(measurement.forces, self._last, known)

@@ -20,6 +20,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
+from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
 from stewart_dynamics.setpoints.input_messages import LARGEST
 from stewart_dynamics.setpoints.step import Batch
 
@@ -102,6 +103,8 @@ class Differentiator:
         # already and stay for the next window's sake, and its first stamp
         self._given = 0
         self._begun = 0  # [ns]
+        self.stamps = ArrivalStamps()
+        """The check of the stamps: uneven ones become accelerations."""
         # of a setpoint that was left out, by its spline and before it
         self._restart = self._restart_before = False
         self._gathered = 0
@@ -122,6 +125,7 @@ class Differentiator:
             out: they would disturb the splines of all poses around them.
         """
         near = np.all(np.abs(batch.motions[:, POSITION]) <= LARGEST, axis=1)
+        self.stamps.add_many(batch.stamps, batch.motions[:, POSE])
         if self._restart_before or not near.all():
             restarts, self._restart_before = _restarts_of(
                 batch.restarts, near, self._restart_before)

@@ -224,6 +224,10 @@ class _Run:
         elif values['setpoints']['base_unknown'] == values['setpoints']['answered']:
             missing.append("the base's motion is not known at any setpoint: there are no forces")
         mistakes = self._setpoints.mistakes(ever=True)
+        if self._differentiator is not None:
+            mistakes += self._differentiator.stamps.mistakes(True, [inputs.POSE])
+        if self._comparison is not None:
+            mistakes += self._comparison.stamps.mistakes(True, [MEASURED])
         values['limit_met'] = values['limit_met'] or bool(mistakes)
         measured = None if self._comparison is None else self._comparison.values()
         if measured and not measured['setpoints_compared']:

@@ -22,6 +22,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics
 from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.setpoints.input_messages import POSE
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.step import Batch
 
@@ -76,6 +77,9 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         if not known.any():
             raise BagError(f"{bag}: the base's motion is not known at any setpoint")
         recorded = recorded.chosen(known)
+    mistakes = setpoints.mistakes(ever=True)
+    if splines is not None:
+        mistakes += splines.stamps.mistakes(True, [POSE])
     stamps, bases = recorded.stamps, recorded.bases
     steps = np.maximum(np.diff(stamps, prepend=stamps[0]), 0)  # a bag that loops
     return RecordedMotion(np.cumsum(steps) * NANOSECOND, Motion.of_rows(recorded.motions.copy()),
@@ -83,4 +87,4 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
                           None if bases is None else BaseMotion.of_rows(bases.copy()), missing,
                           sum(setpoints.counts.values())
                           + (0 if splines is None else splines.left_out.total()),
-                          tuple(each.words for each in setpoints.mistakes(ever=True)), stamps)
+                          tuple(each.words for each in mistakes), stamps)

@@ -37,6 +37,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.summary import COMPONENTS, unit_key
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
 from stewart_dynamics.reporting.block_statistics import Extreme
+from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
 from stewart_dynamics.setpoints.motor_row import OF_DRIVES
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 from stewart_dynamics.setpoints.step import Batch, Outputs
@@ -123,6 +124,8 @@ class Comparison:
         self._sums = EffortSums(parameters, of_motors)
         self._wrench = _Statistics()
         self._bins = WrenchBins()
+        self.stamps = ArrivalStamps()
+        """The check of the stamps of the measured efforts."""
 
     def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
         """Add setpoints, see Summary.add; return the compared setpoints."""
@@ -135,6 +138,7 @@ class Comparison:
 
     def add_measured(self, stamps: Stamps, efforts: Array) -> Compared:
         """Add finite forces (M, 6) [N] at stamps (M,) [ns]; return the compared setpoints."""
+        self.stamps.add_many(stamps, efforts)
         self._samples.add(stamps, efforts)
         return self._compared()
 

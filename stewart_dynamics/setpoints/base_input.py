@@ -26,6 +26,7 @@ from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import BASE, GRAVITY, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import BY_IMU, MOVING, Parameters
+from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
 from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, Mistake
 from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
 from stewart_dynamics.setpoints.input_messages import BASE_ACCEL, BASE_SOURCES, BASE_TWIST
@@ -70,6 +71,7 @@ class BaseInput:
             of_motion if source == MOVING else of_pose)
         self._samples: deque[tuple[int, _Row]] = deque(maxlen=_KEPT)
         self._gravity = MeasuredGravity(parameters) if self.topics else None
+        self._stamps = ArrivalStamps()
         self.consistency = Consistency(
             parameters.singularity.characteristic_length,
             (parameters.world_frame, parameters.base_frame)) if source == MOVING else None
@@ -87,6 +89,7 @@ class BaseInput:
         if self._gravity is not None:
             of_gravity = self._gravity.found.values() if ever else [self._gravity.present]
             found += [Mistake(self.topics[0], *each) for each in of_gravity if each]
+        found += self._stamps.mistakes(ever, self.topics[:1])
         return found
 
     def at_rest(self, known: bool) -> Array | None:
@@ -104,13 +107,14 @@ class BaseInput:
             return False
         if sample.restart or (self._samples and sample.stamp <= self._samples[-1][0]):
             self._samples.clear()
-        self._note(sample.stamp, self._row_of(sample.stamp, sample.values))
+        self._note(sample.stamp, self._row_of(sample.stamp, sample.values), sample.values)
         if self.consistency is not None:
             self.consistency.noted.append((sample.stamp, sample.values, sample.restart))
         return True
 
-    def _note(self, stamp: int, row: _Row) -> None:
+    def _note(self, stamp: int, row: _Row, values: _Row) -> None:
         self._samples.append((stamp, row))
+        self._stamps.add(stamp, values)
         if self._gravity is not None:
             self._gravity.add(stamp, row)
 
@@ -160,11 +164,12 @@ class BaseInput:
             return None
         self.joining.accept(joined, places)
         old = len(self._samples)
-        new = [(stamp, self._row_of(stamp, tuple(values))) for stamp, values in zip(
-            joined.stamps.tolist(), joined.motions.tolist(), strict=True)]
+        motions = [tuple(values) for values in joined.motions.tolist()]
+        new = [(stamp, self._row_of(stamp, values)) for stamp, values in zip(
+            joined.stamps.tolist(), motions, strict=True)]
         kept = [*self._samples, *new]
-        for each in new:
-            self._note(*each)
+        for each, motion in zip(new, motions, strict=True):
+            self._note(*each, motion)
         if self.consistency is not None and new:
             self.consistency.add(
                 joined.stamps, joined.motions, np.zeros(len(new), dtype=bool))

@@ -99,10 +99,12 @@ class Consistency:
     The check of a stream of motions.
 
     radius: size of the platform [m]; smaller motions are not judged, in terms of it.
-    frame: name of the axes in which twists are expected, and of those of the body, for words.
+    frame: name of the axes in which twists are expected, and of those of the body, for words;
+        None: the motion is that of measured legs, which have neither axes nor accelerations.
     """
 
-    def __init__(self, radius: float, frame: tuple[str, str] = ('base', 'platform')) -> None:
+    def __init__(self, radius: float,
+                 frame: tuple[str, str] | None = ('base', 'platform')) -> None:
         self._radius = radius
         self._frame = frame
         self._pending: list[tuple[Stamps, Array, Flags]] = []
@@ -206,10 +208,10 @@ class Consistency:
         twists = yield from periods.windows(TWISTS, None, [
             (size * _SMALLEST, size * _SMALLEST_INTEGRAL, size * _SLOWEST)
             for size in (radius, 1.0)])
-        rates = yield from periods.windows(RATES, {
+        rates = {} if self._frame is None else (yield from periods.windows(RATES, {
             twist: found.bad for twist, found in twists.items()}, [
             (size * _WEAKEST * 1e-3, size * _WEAKEST, size * _WEAKEST)
-            for size in (1.0, 1.0 / radius)])
+            for size in (1.0, 1.0 / radius)]))
         for n in range(len(at)):
             for quantity, found in (twists | rates).items():
                 if found.moving[n]:

@@ -10,6 +10,7 @@ one under which the difference vanishes.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import math
 from typing import NamedTuple
 
@@ -93,9 +94,12 @@ class Sums:
         self.step = 0.0  # seconds between two samples, the sum over periods
 
 
-def reason_of(quantity: str, sums: Sums, frame: tuple[str, str]) -> str:
-    """Return the likeliest reason, with a question mark; empty if it is not clear."""
-    axes, body = frame
+def reason_of(quantity: str, sums: Sums, frame: tuple[str, str] | None) -> str:
+    """
+    Return the likeliest reason, with a question mark; empty if it is not clear.
+
+    frame: names of the axes, see ``Consistency``; None: no reason is one of axes or points.
+    """
     dd, uu, difference = sums.squares.tolist()
     if uu <= 1e-14 * dd:
         return 'it is zero, never filled?'
@@ -103,38 +107,46 @@ def reason_of(quantity: str, sums: Sums, frame: tuple[str, str]) -> str:
     similar = sums.product * sums.product / (dd * uu) if dd > 0.0 else 0.0
     if similar > 0.0:
         # Noise is in the differences of poses, rather than in the integral.
-        found.append((1.0 - similar, _factor(
+        found.append((1.0 - similar, factor_words(
             quantity, uu / sums.product, sums.step / sums.periods)))
-    of = TWIST_OF.get(quantity, '')
-    names = {'body': f'in {body} axes? It is expected in {axes} axes',
-             'euler': 'rates of Euler angles? An angular velocity is expected',
-             'same': f'the derivative of the given {of}, which is wrong?'}
-    found += [(square / difference, names[name]) for name, square in sums.candidates.items()]
     product, square = sums.late.tolist()
     if square > 0.0:
         late = -product / square
         found.append((1.0 - product * product / square / difference,
                       f'{abs(late) * 1e3:.3g} ms {"late" if late > 0.0 else "early"}?'))
-    if quantity in (VELOCITY, ACCELERATION):
-        matrix, right = sums.point
-        place: Array = np.asarray(
-            np.linalg.lstsq(matrix, right, rcond=1e-6)[0].round(6), dtype=np.float64)
-        found.append((1.0 - float(right @ place) / difference,
-                      f'of another point, {listed(place, 3)} m in the {body} frame?'))
-    if quantity == ACCELERATION:
-        total, mean = sums.gravity
-        constant = mean / total if total > 0.0 else np.zeros(3)
-        if abs(float(np.linalg.norm(constant)) / -STANDARD_GRAVITY[2] - 1.0) < 0.1:
-            found.append((1.0 - float(mean @ constant) / difference,
-                          f'gravity is in it, {listed(constant.round(2), 3)} m/s^2?'))
-    best = min(left for left, _ in found)
+    if frame is not None:
+        found += _of_axes(quantity, sums, *frame)
+    best = min((left for left, _ in found), default=1.0)
     if best > _EXPLAINED:
         return ''
     # The first of those that explain the difference as well as the best one: simpler ones first.
     return next(words for left, words in found if left <= max(best / _CLEAR, _EXACT))
 
 
-def _factor(quantity: str, factor: float, step: float) -> str:
+def _of_axes(quantity: str, sums: Sums, axes: str, body: str) -> Iterator[tuple[float, str]]:
+    """Yield reasons of axes, points and gravity, see ``reason_of``."""
+    difference = float(sums.squares[2])
+    of = TWIST_OF.get(quantity, '')
+    names = {'body': f'in {body} axes? It is expected in {axes} axes',
+             'euler': 'rates of Euler angles? An angular velocity is expected',
+             'same': f'the derivative of the given {of}, which is wrong?'}
+    for name, square in sums.candidates.items():
+        yield square / difference, names[name]
+    if quantity in (VELOCITY, ACCELERATION):
+        matrix, right = sums.point
+        place: Array = np.asarray(
+            np.linalg.lstsq(matrix, right, rcond=1e-6)[0].round(6), dtype=np.float64)
+        yield (1.0 - float(right @ place) / difference,
+               f'of another point, {listed(place, 3)} m in the {body} frame?')
+    if quantity == ACCELERATION:
+        total, mean = sums.gravity
+        constant = mean / total if total > 0.0 else np.zeros(3)
+        if abs(float(np.linalg.norm(constant)) / -STANDARD_GRAVITY[2] - 1.0) < 0.1:
+            yield (1.0 - float(mean @ constant) / difference,
+                   f'gravity is in it, {listed(constant.round(2), 3)} m/s^2?')
+
+
+def factor_words(quantity: str, factor: float, step: float) -> str:
     """Return a constant factor in words, with the mistake that has it."""
     words = next((words for known, words in _FACTORS[quantity].items()
                   if abs(factor / known - 1.0) < _NEAR), '')

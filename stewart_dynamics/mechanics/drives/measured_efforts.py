@@ -24,6 +24,7 @@ _FACTORS = ((1e-3, 'kN in place of N'), (-1.0 / STANDARD_GRAVITY[2], 'kgf in pla
             (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
 ZERO, SIGN, UNIT, TORQUE, FORCE, SCALE, SWAPPED = (
     'zero', 'sign', 'unit', 'torque', 'force', 'scale', 'swapped')
+RATE, STAMPS = 'rate', 'stamps'  # not of the efforts
 # The same for forces that were converted as torques: the losses of the drives are taken off them.
 _LOSSES = 3.0
 
@@ -84,8 +85,8 @@ def without_losses(forces: Array, rates: Array, accelerations: Array, p: Paramet
     return loads
 
 
-class EffortMistake(NamedTuple):
-    """A likely mistake in measured efforts."""
+class LegMistake(NamedTuple):
+    """A likely mistake in measured efforts, velocities or stamps."""
 
     what: str  # keyword: ZERO, SIGN, ...
     text: str
@@ -130,7 +131,7 @@ class EffortSums:
         scale = self._scale()
         return scale is not None and 1.0 / FAR < scale < FAR
 
-    def mistake(self) -> EffortMistake | None:
+    def mistake(self) -> LegMistake | None:
         """Return the likely mistake in the efforts; None without one."""
         residual = float(self._residuals.sum())
         # Friction may hold the platform with any force up to its own.
@@ -156,7 +157,7 @@ class EffortSums:
         """Return the squared differences of measured and computed forces (6,) [N^2]."""
         return self.measured_squares - 2.0 * self.own_products + self.computed_squares
 
-    def _of_one_leg(self) -> EffortMistake | None:
+    def _of_one_leg(self) -> LegMistake | None:
         """Return the mistake in one leg's sign, if the other legs are right; a load moves all."""
         leg, joints = int(np.argmax(self._residuals)), self._parameters.joints
         residual = float(self._residuals[leg])
@@ -164,16 +165,16 @@ class EffortSums:
                 float(self._residuals.sum()) - residual > _OTHERS * residual):
             return None
         if not self.measured_squares[leg]:
-            return EffortMistake(ZERO, f'the effort of {joints[leg]} is zero')
+            return LegMistake(ZERO, f'the effort of {joints[leg]} is zero')
         product = self.products[leg, leg]
         if _is_near(product / self.computed_squares[leg], -1.0) and (
                 product ** 2 > _ALIKE ** 2 * self.measured_squares[leg]
                 * self.computed_squares[leg]):
-            return EffortMistake(SIGN, f'the effort of {joints[leg]} has the opposite sign of '
+            return LegMistake(SIGN, f'the effort of {joints[leg]} has the opposite sign of '
                                        'those of the other legs: + must push')
         return None
 
-    def _swapped(self) -> EffortMistake | None:
+    def _swapped(self) -> LegMistake | None:
         """Return the two legs whose efforts are swapped, if they vary and show it."""
         if not self.count:
             return None
@@ -192,21 +193,21 @@ class EffortSums:
                 best, text = max(left), (
                     f'the efforts of {joints[a]} and {joints[b]} look swapped: the residual '
                     f'becomes {np.sqrt(max(*left, 0.0)):.2f} times as large')
-        return EffortMistake(SWAPPED, text) if text else None
+        return LegMistake(SWAPPED, text) if text else None
 
 
-def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> EffortMistake | None:
+def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> LegMistake | None:
     """
     Return the likely mistake if efforts are ``scale`` times the model's.
 
     of_motors: whether the efforts were torques or currents of the motors.
     """
     if not np.isfinite(scale) or scale == 0.0:
-        return EffortMistake(ZERO, 'all efforts are zero')
+        return LegMistake(ZERO, 'all efforts are zero')
     if scale < 0.0:
         other = '' if p.geometry.platform_side != AUTO else (
             '; or the platform is on the other side of the base: geometry.platform_side')
-        return EffortMistake(SIGN, (
+        return LegMistake(SIGN, (
             'the efforts have the opposite sign: + must push, as the forces of the node do (they '
             f'are {scale:.3g} times what the model computes){other}'))
     if 1.0 / FAR < scale < FAR:
@@ -231,7 +232,7 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> EffortMist
                                 f'{2.0 * np.pi * scale:.2g} m would fit)')
     else:
         what, likely = SCALE, 'another unit, or a wrong platform.mass'
-    return EffortMistake(
+    return LegMistake(
         what, f'the efforts are {scale:.3g} times what the model computes: {likely}')
 
 

@@ -18,7 +18,7 @@ from stewart_dynamics.estimation.confidence_level import INTERVAL
 from stewart_dynamics.external_wrench.estimate import Estimate, Overload, WRENCH_LIMITS
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome, rows_of
-from stewart_dynamics.mechanics.drives.measured_efforts import EffortMistake
+from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, MISTAKEN, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
@@ -47,7 +47,7 @@ class ExternalWrenchDiagnostics(StatusPart):
         self._estimated_at = NEVER
         self._estimate: Estimate | None = None
         self._target: Sequence[float] | None = None
-        self._mistake: EffortMistake | None = None
+        self._mistake: LegMistake | None = None
 
     def heard(self, now: float) -> None:
         """Note that a message has arrived."""
@@ -120,11 +120,11 @@ class ExternalWrenchDiagnostics(StatusPart):
         return values
 
 
-def _mistake(found: EffortMistake) -> Mistake:
+def _mistake(found: LegMistake) -> Mistake:
     """Return the likely mistake in the efforts for the status."""
     wrench = '' if found.leaves_wrench else '; no external wrench is published'
     return Mistake(MEASURED_LEGS, f'likely mistake: {found.text}{wrench}', values=(
-        ('likely mistake in the efforts', found.what),))
+        ('likely mistake in the measurements', found.what),))
 
 
 def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, float]:

@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The likely mistake in measured velocities: they are not the derivatives of the measured positions.
+
+Poses and twists follow from them, and are compared as those of setpoints are (``Consistency``). The
+legs and the reason are then found in the last measurements.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND
+from stewart_dynamics.external_wrench.estimate import Estimate, Measurement
+from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake, RATE
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.consistency import Consistency
+from stewart_dynamics.setpoints.inconsistency import factor_words, VELOCITY
+
+# Measurements in which legs and reason are found, and the length of windows in them [s].
+_RECENT, _WINDOW = 2000, 0.05
+# A leg is wrong, and a reason explains it, from this part of the motion (squared).
+_WRONG, _EXPLAINED = 0.02, 0.05
+# Velocities are zero below this part of the motion (squared).
+_ZERO = 1e-12
+
+
+class RateCheck:
+    """The check of a stream of measurements."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._joints = parameters.joints
+        self._consistency = Consistency(parameters.singularity.characteristic_length, None)
+        self._recent: deque[Measurement] = deque(maxlen=_RECENT)
+        self.mistake: LegMistake | None = None
+        """The likely mistake; None without one."""
+
+    def add(self, measurement: Measurement, estimate: Estimate) -> None:
+        """Add a measurement, and the estimate from it; one without a wrench is a restart."""
+        restart = estimate.wrench is None
+        if restart:
+            self._recent.clear()
+        self._recent.append(measurement)
+        self._consistency.noted.append((estimate.stamp, estimate.motion, restart))
+        self._consistency.judge()
+        found = self._consistency.present
+        if not found:
+            self.mistake = None
+        elif self.mistake is None:
+            reasons = [each.reason for each in found.values()]
+            late = next((each for each in reasons if each.endswith(('late?', 'early?'))), '')
+            self.mistake = LegMistake(RATE, _words(list(self._recent), self._joints, late))
+
+
+def _words(recent: Sequence[Measurement], joints: Sequence[str], late: str) -> str:
+    """Return the legs whose velocities are wrong, by how much, and the reason."""
+    times = np.array([each.stamp for each in recent]) * NANOSECOND
+    lengths, rates = (np.array(each) for each in zip(*(each[1:3] for each in recent), strict=True))
+    steps = np.diff(times)
+    integrals = np.vstack([np.zeros((1, 6)), np.cumsum(
+        0.5 * steps[:, None] * (rates[1:] + rates[:-1]), axis=0)])
+    ends = slice(None, None, max(1, round(_WINDOW / float(np.median(steps)))))
+    seconds, expected, given = (np.diff(each[ends], axis=0) for each in (
+        times[:, None], lengths, integrals))
+    off, moved, all_given = (np.sum(each ** 2, axis=0) for each in (
+        given - expected, expected, given))
+    wrong: Flags = off > _WRONG * np.maximum(moved, all_given)
+    if not wrong.any():
+        wrong[:] = True
+    of = '' if wrong.all() else ', '.join(
+        name for name, is_wrong in zip(joints, wrong, strict=True) if is_wrong) + ': '
+    by_rates, by_lengths = (float(np.sqrt(np.sum(each[wrong]) / np.sum(seconds ** 2) / wrong.sum()))
+                            for each in (all_given, moved))
+    reason = _reason(expected[:, wrong], given[:, wrong], float(np.mean(steps)))
+    if not reason and (order := _order(expected, given)):
+        reason = f'in another order, {", ".join(joints[n] for n in order)}?'
+    return (f'velocity is not the derivative of position: {of}{by_rates:.3g} m/s RMS, by the '
+            f'positions {by_lengths:.3g} m/s' + (f': {reason or late}' if reason or late else ''))
+
+
+def _reason(expected: Array, given: Array, step: float) -> str:
+    """Return that legs are zero or have one factor, empty otherwise; step: between samples [s]."""
+    dd, uu, product = (float(np.sum(each)) for each in (
+        expected ** 2, given ** 2, expected * given))
+    if uu <= _ZERO * dd:
+        return 'it is zero, never filled?'
+    if product ** 2 < (1.0 - _EXPLAINED) * dd * uu:
+        return ''
+    return factor_words(VELOCITY, uu / product, step)
+
+
+def _order(expected: Array, given: Array) -> Sequence[int]:
+    """Return the legs of which the velocities are, if they are in another order."""
+    squares = np.sum((given[:, :, None] - expected[:, None, :]) ** 2, axis=0)
+    orders = np.array(list(permutations(range(6))))
+    sums = squares[np.arange(6), orders].sum(axis=1)
+    best = int(np.argmin(sums))
+    explained = sums[best] < _EXPLAINED * np.sum(expected ** 2)
+    return orders[best].tolist() if explained and best else []
