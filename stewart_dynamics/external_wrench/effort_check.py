@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import SECOND, Six
-from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake, EffortSums
+from stewart_dynamics.mechanics.drives.measured_efforts import EffortSums, LegMistake
 from stewart_dynamics.parameters.table import Parameters
 
 # Length of a block [ns]; the first ones are shorter, of 1, 2, 4, ... measurements.

@@ -4,8 +4,8 @@
 """
 The likely mistake in measured velocities: they are not the derivatives of the measured positions.
 
-Poses and twists follow from them, and are compared as those of setpoints are (``Consistency``). The
-legs and the reason are then found in the last measurements.
+Poses and twists follow from them, and are compared as those of setpoints are (``Consistency``).
+The legs and the reason are then found in the last measurements.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def _words(recent: Sequence[Measurement], joints: Sequence[str], late: str) -> s
         wrong[:] = True
     of = '' if wrong.all() else ', '.join(
         name for name, is_wrong in zip(joints, wrong, strict=True) if is_wrong) + ': '
-    by_rates, by_lengths = (float(np.sqrt(np.sum(each[wrong]) / np.sum(seconds ** 2) / wrong.sum()))
+    by_rates, by_lengths = (float(np.sqrt(each[wrong].mean() / np.sum(seconds ** 2)))
                             for each in (all_given, moved))
     reason = _reason(expected[:, wrong], given[:, wrong], float(np.mean(steps)))
     if not reason and (order := _order(expected, given)):

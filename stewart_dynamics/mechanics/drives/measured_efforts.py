@@ -171,7 +171,7 @@ class EffortSums:
                 product ** 2 > _ALIKE ** 2 * self.measured_squares[leg]
                 * self.computed_squares[leg]):
             return LegMistake(SIGN, f'the effort of {joints[leg]} has the opposite sign of '
-                                       'those of the other legs: + must push')
+                                    'those of the other legs: + must push')
         return None
 
     def _swapped(self) -> LegMistake | None:
