@@ -44,6 +44,9 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--drives', action='store_true',
                         help='write the units of the amplifiers, too: NAME_drives.h and .md, and '
                              'NAME_ethercat_LEG.yaml; needs drive.rated_torque and more')
+    parser.add_argument('--linuxcnc', action='store_true',
+                        help='write NAME_linuxcnc.hal, too: HAL lines for genhexkins, the '
+                             'kinematics of LinuxCNC for hexapods')
     parser.add_argument('--name', default='hexapod', metavar='NAME',
                         help='name of the hexapod in C (default: hexapod)')
     add_node(parser)
@@ -55,6 +58,7 @@ def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
     from stewart_dynamics.export.c_project import c_project, check_name
     from stewart_dynamics.export.drive_files import drive_files
     from stewart_dynamics.export.fmu import find_compiler, fmu, has_binaries
+    from stewart_dynamics.export.linuxcnc import hal_lines
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
@@ -72,6 +76,8 @@ def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
                               'computer is found ($CC, cc, gcc, clang)')
     if given.drives:
         files |= drive_files(parameters, name)
+    if given.linuxcnc:
+        files[f'{name}_linuxcnc.hal'] = hal_lines(parameters)
     for path in files_of_folder.write(files):
         _PROGRAM.say(str(path))
     return DONE
