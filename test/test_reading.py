@@ -12,13 +12,14 @@ import pstats
 import re
 import shutil
 import subprocess
+import sys
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 from referees import random_parameters, rng, ROOT
 from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
-from stewart_dynamics.description import read_mjcf as loading
+from stewart_dynamics.description import bounded_process as loading
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.loops import loops_name, loops_yaml
 from stewart_dynamics.description.mjcf import mjcf
@@ -32,6 +33,11 @@ PROGRAM = 'stewart_describe'
 PLATFORM = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 WRITERS = {'urdf': urdf, 'sdf': sdf, 'xml': mjcf}
 EXACT = 1e-12
+# Parameters that all formats have elements for.
+OF_FORMATS = ('geometry.base_joints', 'geometry.platform_joints', 'platform.inertia',
+              'platform.mass', 'legs.piston.mass', 'legs.piston.center_of_mass',
+              'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max',
+              'actuator.viscous_friction', 'actuator.coulomb_friction')
 
 
 def machines():
@@ -552,6 +558,72 @@ def test_springs_and_links_without_weight_of_an_sdf_are_warnings(tmp_path):
                          ('<link name="platform">', '<link name="platform"><gravity>0</gravity>'))
     assert any('each leg: stiffness 50 N/m about 0 m' in each for each in found.warnings)
     assert any(each.startswith('platform: gravity switched off') for each in found.warnings)
+
+
+@pytest.mark.parametrize('empty', [
+    ['damping'], ['friction'], ['effort'], ['velocity'], ['damping', 'friction', 'effort'],
+    ['spring_stiffness'], ['lower', 'upper'], ['mass'], ['ixx'], ['pose']])
+def test_empty_elements_of_an_sdf_have_their_defaults(empty, tmp_path):
+    """As in libsdformat: 0, unlimited, 1 kg."""
+    def change(text):
+        root = ET.fromstring(foreign(text))
+        for joint in root.iter('joint'):
+            for axis in [*joint.findall('axis'), *joint.findall('axis2')]:
+                dynamics = axis.find('dynamics')
+                if dynamics is None:
+                    dynamics = ET.SubElement(axis, 'dynamics')
+                    ET.SubElement(dynamics, 'damping').text = '3'
+                ET.SubElement(dynamics, 'spring_stiffness').text = '0'
+        for tag in empty:
+            for element in [*root.iter(tag)]:
+                if tag != 'pose' or element.text == '0.0 0.0 0.0 0.0 0.0 0.0':
+                    element.text = '\n  ' if tag == 'friction' else None
+        return ET.tostring(root, encoding='unicode')
+
+    found = read_hexapod(written(PLATFORM, 'sdf', tmp_path, change)).parameters
+    changes = {'damping': ('actuator.viscous_friction', 0.0), 'velocity': (
+        'limits.velocity_max', None), 'friction': ('actuator.coulomb_friction', 0.0),
+        'effort': ('limits.force_max', None), 'lower': ('limits.length_min', None),
+        'upper': ('limits.length_max', None), 'mass': ('platform.mass', 7.0)}
+    expected = {name: PLATFORM[name] for name in OF_FORMATS} | dict(
+        changes[tag] for tag in empty if tag in changes)
+    for name, value in expected.items():
+        if 'mass' not in empty and 'ixx' not in empty or name.startswith(('geo', 'lim')):
+            assert (found[name] is None) == (value is None), name
+            assert value is None or found[name] == pytest.approx(value, abs=1e-6), name
+    if 'mass' in empty:  # the tips have 1 kg as well
+        assert found['platform.mass'] == 7.0 and found['legs.piston.mass'] == pytest.approx(1.0)
+
+
+def test_placeholders_of_other_tools_are_named(tmp_path, snapshot):
+    def change(text):
+        one = ('<inertial><mass value="1.0"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" '
+               'izz="1"/></inertial>')
+        return re.sub(r'(<link name="leg_\d_cross">).*?</inertial>', rf'\1{one}', text,
+                      flags=re.DOTALL)
+
+    found = read_hexapod(written(PLATFORM, 'urdf', tmp_path, change))
+    snapshot('\n'.join(found.warnings))
+    assert found.parameters['legs.cylinder.mass'] == pytest.approx(
+        PLATFORM['legs.cylinder.mass'] + 1.0)
+
+
+@pytest.mark.parametrize('code', [
+    'raise ImportError("libmujoco.so.4.0.0: cannot open")', 'raise AttributeError("mjtBias")',
+    '__version__ = "2.0"', 'raise OSError("wrong ELF class")'])
+def test_a_package_mujoco_that_is_broken_or_too_old_is_named_in_one_line(code, tmp_path):
+    path = written(PLATFORM, 'xml', tmp_path)
+    package = tmp_path / 'broken' / 'mujoco'
+    package.mkdir(parents=True)
+    (package / '__init__.py').write_text(f'{code}\n')
+    done = subprocess.run(
+        [sys.executable, '-c', 'import sys; from stewart_dynamics.description import main; '
+         'sys.exit(main(sys.argv[1:]))', '--from', path, '--output', tmp_path / 'read'],
+        env={**os.environ, 'PYTHONPATH': f'{package.parent}'}, capture_output=True, text=True,
+        timeout=300)
+    assert done.returncode == 2
+    assert done.stderr.count('\n') == 1 and 'pip install --force-reinstall' in done.stderr
+    assert 'unexpected' not in done.stderr
 
 
 def cad_urdf(platform, limit='lower="-0.1" upper="0.1" effort="500" velocity="0.3"', extra='',

@@ -22,6 +22,7 @@ from snapshot import Snapshot
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.loops import loops_yaml
+from stewart_dynamics.description.recognition import read_hexapod
 from stewart_dynamics.description.urdf import Ros2Control, urdf
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 import yaml
@@ -151,12 +152,67 @@ def test_urdfdom_reads_the_urdf(tmp_path):
     assert 'error' not in (done.stdout + done.stderr).lower()
 
 
-def test_legs_without_mass_have_no_inertial_element():
+def test_all_links_have_their_mass_and_inertia_zeros_too():
+    """PyBullet and urchin take 1 kg and 1 kg m^2 for a link without an element ``inertial``."""
     p = Parameters.from_yaml(PLATFORM).replaced(
         {'legs.piston.mass': 0.0, 'legs.piston.inertia': 0.0})
-    links = {link.get('name'): link for link in ET.fromstring(urdf(Hexapod(p), 'x')).iter('link')}
-    assert links['leg_1_piston'].find('inertial') is None
-    assert links['leg_1_cylinder'].find('inertial') is not None
+    links = [*ET.fromstring(urdf(Hexapod(p), 'x')).iter('link')]
+    masses = {link.get('name'): float(link.find('inertial/mass').get('value')) for link in links}
+    heavy = {'platform': 150.0, **{f'leg_{n}_cylinder': 12.0 for n in range(1, 7)}}
+    assert len(masses) == 31
+    assert {name: mass for name, mass in masses.items() if mass} == heavy
+    for link in links:
+        inertia = link.find('inertial/inertia').attrib
+        assert len(inertia) == 6
+        assert link.get('name') in heavy or {*map(float, inertia.values())} == {0.0}
+
+
+@pytest.mark.parametrize('massless', [True, False])
+def test_a_solid_urdf_has_no_zero_in_a_link_that_moves_and_reads_back_equal(massless, tmp_path):
+    p = Parameters.from_yaml(PLATFORM)
+    if massless:
+        p = p.replaced({'legs.piston.mass': 0.0, 'legs.piston.inertia': 0.0})
+    text = urdf(Hexapod(p), 'x', solid=True)
+    root = ET.fromstring(text)
+    fixed = {joint.find('child').get('link') for joint in root.iter('joint')
+             if joint.get('type') == 'fixed'}
+    for link in root.iter('link'):
+        if link.get('name') not in {'base', *fixed}:
+            assert float(link.find('inertial/mass').get('value')) > 0.0
+            assert all(float(link.find('inertial/inertia').get(key)) > 0.0
+                       for key in ('ixx', 'iyy', 'izz'))
+    file = tmp_path / 'x.urdf'
+    file.write_text(text)
+    read = read_hexapod(file).parameters
+    for name, value in p.items():
+        if isinstance(value, np.ndarray):
+            assert read[name] == pytest.approx(value, rel=1e-12, abs=1e-12), name
+
+
+def test_the_name_of_the_robot_is_not_that_of_a_link():
+    """pytransform3d takes it for a frame of its own, and places both as one."""
+    p = Parameters.from_yaml(PLATFORM)
+    assert ET.fromstring(urdf(Hexapod(p), 'platform')).get('name') == 'platform_hexapod'
+    assert ET.fromstring(urdf(Hexapod(p), 'hexapod')).get('name') == 'hexapod'
+
+
+@pytest.mark.parametrize('seed', range(2))
+def test_constraint_elements_close_the_loops_in_place_of_the_block(seed, tmp_path):
+    p = random_parameters(rng(seed))
+    root = ET.fromstring(urdf(Hexapod(p), 'x', constraints=True))
+    assert root.find('stewart_dynamics/loop') is None
+    for n, each in enumerate(root.findall('constraint')):
+        at = np.array([float(x) for x in each.find('child_origin').get('xyz').split()])
+        assert each.get('type') == 'spherical' and each.find('child').get('link') == 'platform'
+        assert at == pytest.approx(p['geometry.platform_joints'][n])
+        # An edit here is not hidden by another element.
+        each.find('child_origin').set('xyz', ' '.join(map(repr, (at + [0.0, 0.0, 0.1]).tolist())))
+    file = tmp_path / 'x.urdf'
+    file.write_text(ET.tostring(root, encoding='unicode'))
+    read = read_hexapod(file).parameters
+    assert read['geometry.platform_joints'] == pytest.approx(
+        p['geometry.platform_joints'] + [0.0, 0.0, 0.1], abs=1e-12)
+    assert read['geometry.base_joints'] == pytest.approx(p['geometry.base_joints'], abs=1e-12)
 
 
 def test_meshes_take_the_place_of_the_simple_shapes():

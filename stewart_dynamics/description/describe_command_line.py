@@ -47,6 +47,11 @@ def _arguments() -> argparse.ArgumentParser:
                         help='URDF, SDFormat or MJCF (needs mujoco) of a hexapod')
     parser.add_argument('--usd', action='store_true',
                         help='write NAME.usda, too (needs usd-core)')
+    parser.add_argument('--solid', action='store_true',
+                        help='URDF: mass and inertia about all axes in all links that move, for '
+                             'engines that reject zeros')
+    parser.add_argument('--constraints', action='store_true',
+                        help='URDF: elements <constraint> that close its loops')
     parser.add_argument('--geometry-only', action='store_true',
                         help='with --from: geometry and limits of a file without masses')
     _PROGRAM.add_results(parser, '.')
@@ -98,10 +103,11 @@ def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
     control = None
     if given.ros2_control is not None:
         control = Ros2Control(given.ros2_control, given.hardware)
-    texts = {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
-             f'{name}.xml': mjcf(hexapod, name), f'{name}.svg': picture(hexapod, name)}
-    texts |= {loops_name(name): loops_yaml(hexapod, name),
-              f'{name}_scene.xml': scene(hexapod, name)}
+    texts = {
+        f'{name}.urdf': urdf(hexapod, name, control, given.constraints, given.solid),
+        f'{name}.sdf': sdf(hexapod, name), f'{name}.xml': mjcf(hexapod, name),
+        f'{name}.svg': picture(hexapod, name), loops_name(name): loops_yaml(hexapod, name),
+        f'{name}_scene.xml': scene(hexapod, name)}
     if given.usd:
         from stewart_dynamics.description.usd import usd
         texts[f'{name}.usda'] = usd(hexapod, name)
@@ -118,9 +124,9 @@ def _read(given: argparse.Namespace, files: FilesOfFolder) -> int:
     from stewart_dynamics.description.recognition import read_hexapod
 
     interrupt_on_signals()
-    if given.ros2_control is not None or given.usd:
-        option = '--usd' if given.usd else '--ros2-control'
-        raise StewartError(f'{option}: not with --from')
+    for option in ('ros2_control', 'usd', 'solid', 'constraints'):
+        if getattr(given, option):
+            raise StewartError(f'--{option.replace("_", "-")}: not with --from')
     found = read_hexapod(given.source, given.geometry_only)
     text = found.parameters.yaml_text(_STANDS_FOR_NONE if given.geometry_only else None)
     name = given.name or given.source.stem

@@ -33,6 +33,10 @@ AXIAL_INERTIA = 1e-6
 """Inertia of a leg's part about its own axis, in terms of the transverse one, where a format
 requires one: in the model it is zero."""
 
+# Mass of a link that is only a frame, in terms of the platform, where it needs one; its radius of
+# gyration [m].
+_FRAME_MASS, _FRAME_GYRATION = 1e-8, 0.1
+
 PASSIVE_RATE = 1000.0
 """Limit of passive joints in formats that require a limit of every joint [m/s, rad/s]."""
 _UNLIMITED_LENGTH = 10.0  # longest leg without a limit, in terms of its length at home
@@ -46,6 +50,11 @@ class RigidBody(NamedTuple):
     mass: float  # [kg]
     center: Array  # center of mass, axes of the body (3,) [m]
     inertia: Array  # about the center of mass, axes of the body (3, 3) [kg m^2]
+
+
+def massless(name: str) -> RigidBody:
+    """Return a body that is only a frame."""
+    return RigidBody(name, 0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 class LegDescription(NamedTuple):
@@ -146,6 +155,11 @@ class Hexapod:
         across = float(body.inertia[0, 0]) or mass * (_LEAST_GYRATION * leg.home_length) ** 2
         return body._replace(mass=mass, inertia=np.diag([
             across, across, AXIAL_INERTIA * across]))
+
+    def frame_body(self, name: str) -> RigidBody:
+        """Return a body of a mass that has no influence, where a frame needs one."""
+        mass = _FRAME_MASS * self.platform_body.mass
+        return RigidBody(name, mass, np.zeros(3), mass * _FRAME_GYRATION ** 2 * np.eye(3))
 
 
 Color = tuple[float, float, float, float]

@@ -8,38 +8,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-import subprocess
-import sys
 import tempfile
 from typing import Any
 
 import numpy as np
 
+from stewart_dynamics.description.bounded_process import load_in_process, unusable
 from stewart_dynamics.description.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER,
     Placement, SLIDE, WORLD)
 from stewart_dynamics.description.xml_text import CARRIED, ELEMENT
-from stewart_dynamics.errors import one_line
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.parameters.table import PARAMETERS
-
-_TIME = 30  # [s]
-_WAIT = 4 * _TIME
-_MEMORY = 8 << 30  # of addresses; libraries reserve some without using them [bytes]
-_LOAD = """
-import resource, sys
-source, model, time, memory = sys.argv[1:]
-for kind, most in ((resource.RLIMIT_CPU, int(time)), (resource.RLIMIT_AS, int(memory))):
-    _, hard = resource.getrlimit(kind)
-    resource.setrlimit(kind, (most if hard < 0 else min(most, hard), hard))
-import mujoco
-try:
-    mujoco.mj_saveModel(mujoco.MjModel.from_xml_path(source), model)
-except MemoryError:
-    sys.exit(2)
-except Exception as exc:
-    sys.exit(str(exc))
-"""
 
 
 def read_mjcf(source: Path) -> Mechanism:
@@ -49,6 +29,15 @@ def read_mjcf(source: Path) -> Mechanism:
     except ModuleNotFoundError as exc:
         raise DescriptionError(
             f"{source}: MJCF is read by mujoco: pip install 'stewart_dynamics[mujoco]'") from exc
+    except Exception as exc:  # a package of parts of several versions fails in any way
+        raise unusable(source, 'MJCF is read', 'mujoco', 'mujoco', exc) from exc
+    try:
+        return _mechanism(mujoco, source)
+    except (AttributeError, ImportError) as exc:
+        raise unusable(source, 'MJCF is read', 'mujoco', 'mujoco', exc) from exc
+
+
+def _mechanism(mujoco: Any, source: Path) -> Mechanism:
     model = _loaded(mujoco, source)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -72,28 +61,12 @@ def read_mjcf(source: Path) -> Mechanism:
 
 
 def _loaded(mujoco: Any, source: Path) -> Any:
-    """
-    Return the model that MuJoCo's loader, in a process of its own, makes of a file.
-
-    A file can make the loader repeat a body a billion times or read a device; warnings go to a
-    MUJOCO_LOG.TXT in its working folder.
-    """
+    """Return the model that MuJoCo makes of a file; it writes warnings to a MUJOCO_LOG.TXT."""
     with tempfile.TemporaryDirectory() as folder:
         model = Path(folder) / 'model.mjb'
-        try:
-            ended = subprocess.run(
-                [sys.executable, '-c', _LOAD, source.absolute(), model, str(_TIME), str(_MEMORY)],
-                cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, timeout=_WAIT,
-                check=False)
-        except subprocess.TimeoutExpired as exc:
-            raise DescriptionError(f'{source}: MuJoCo: not loaded within {_WAIT} s') from exc
-        if ended.returncode == 1:
-            why = one_line(ended.stderr.decode('utf-8', 'replace'))
-            raise DescriptionError(f'{source}: MuJoCo: {why}')
-        if ended.returncode:
-            raise DescriptionError(
-                f'{source}: MuJoCo: not loaded within {_TIME} s of processor time and '
-                f'{_MEMORY >> 30} GiB (exit code {ended.returncode})')
+        load_in_process(
+            'MuJoCo', 'import mujoco\nsave, load = mujoco.mj_saveModel, '
+            'mujoco.MjModel.from_xml_path', 'save(load(source), target)', source, model)
         return mujoco.MjModel.from_binary_path(str(model))
 
 

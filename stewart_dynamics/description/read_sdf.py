@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -123,13 +124,16 @@ class _Model:
             return MechanismBody(
                 name, self.place(name), _DEFAULT_MASS, inertia=np.eye(3), shapes=shapes,
                 note=f'{name}: no mass: {_DEFAULT_MASS:g} kg, as SDFormat has it')
-        six = numbers_of(' '.join(
-            inertial.findtext(f'inertia/{key}', '1' if key in ('ixx', 'iyy', 'izz') else '0')
-            for key in INERTIA), 6, self._source, f'{name}: inertia')
-        text = inertial.findtext('mass')
-        mass = _DEFAULT_MASS if text is None else float(
-            numbers_of(text, 1, self._source, f'{name}: mass')[0])
+        six = np.array([self._number(
+            inertial, f'inertia/{key}', name, 1.0 if key in ('ixx', 'iyy', 'izz') else 0.0)
+            for key in INERTIA])
+        mass = self._number(inertial, 'mass', name, _DEFAULT_MASS)
         return body_of(name, self.place(name), mass, six, self._own(inertial), shapes)
+
+    def _number(self, element: ET.Element, path: str, name: str, default: float) -> float:
+        """Return a number; its default where it is missing or empty, as libsdformat does."""
+        text = (element.findtext(path) or '').strip()
+        return float(numbers_of(text, 1, self._source, f'{name}: {path}')[0]) if text else default
 
     def joint(self, joint: ET.Element) -> Joint | None:
         """Return a joint."""
@@ -150,14 +154,12 @@ class _Model:
 
     def _add_axis(self, axis: ET.Element, made: Joint) -> None:
         """Add limits and dynamics of an axis; a joint with two has the larger dynamics."""
-        def number(path: str) -> float:
-            return float(numbers_of(axis.findtext(path), 1, self._source,
-                                    f'{made.name}: {path}')[0])
-
-        made.damping = max(made.damping, number('dynamics/damping'))
-        made.friction = max(made.friction, number('dynamics/friction'))
-        if number('dynamics/spring_stiffness'):
-            made.spring(number('dynamics/spring_stiffness'), number('dynamics/spring_reference'))
+        damping, friction, stiffness, reference = (
+            self._number(axis, f'dynamics/{key}', made.name, 0.0)
+            for key in ('damping', 'friction', 'spring_stiffness', 'spring_reference'))
+        made.damping, made.friction = max(made.damping, damping), max(made.friction, friction)
+        if stiffness:
+            made.spring(stiffness, reference)
         mimic = axis.find('mimic')
         if mimic is not None:
             made.left_out.append(f'mimic of {mimic.get("joint", "")!r}')
@@ -165,10 +167,9 @@ class _Model:
             return
         for field, key in (('lower', 'lower'), ('upper', 'upper'), ('velocity_max', 'velocity'),
                            ('force_max', 'effort')):
-            if axis.find(f'limit/{key}') is not None:
-                value = number(f'limit/{key}')
-                if abs(value) < _UNLIMITED and not (value < 0.0 and field.endswith('_max')):
-                    setattr(made, field, value)
+            value = self._number(axis, f'limit/{key}', made.name, math.inf)
+            if abs(value) < _UNLIMITED and not (value < 0.0 and field.endswith('_max')):
+                setattr(made, field, value)
 
     def fixed(self, plugin: ET.Element) -> Joint | None:
         """Return the joint by which Gazebo fixes a link of the model to another; None if none."""

@@ -49,7 +49,7 @@ _COUNTS = dict(enumerate(('no', 'one', 'two', 'three', 'four', 'five', 'six')))
 # Legs whose mean direction has a smaller part along the normal of the base joints' plane point to
 # neither side of it.
 _FLAT = 0.05
-# Bodies of a smaller part of the platform's mass are dummies of joints.
+# Bodies of a smaller part of the platform's mass are only frames.
 _NEGLIGIBLE = 1e-7
 # Numbers of elements that differ by a smaller part are those that were written.
 _AS_WRITTEN = 1e-9
@@ -81,6 +81,9 @@ def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
     rule of the parameters.
     """
     found = topology_of(mechanism)
+    parts = [*found.platform_parts, *(
+        part for chain in found.chains for part in chain.lower + chain.upper)]
+    _leave_out_frames(found.platform_parts, parts)
     remarks, warnings = list(mechanism.remarks), list(mechanism.warnings)
     legs, of_legs = [], []
     for chain in found.chains:
@@ -89,13 +92,12 @@ def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
         of_legs.append(said)
     names = [leg['joints'] for leg in legs]
     warnings += _grouped(names, [[*_springs(chain)] for chain in found.chains])
-    parts = [*found.platform_parts, *(
-        part for chain in found.chains for part in chain.lower + chain.upper)]
     remarks += [part.note for part in parts if part.note]
     remarks += [f'{part.name}: {what} of this body is left out'
                 for part in parts for what in part.left_out]
     warnings += [f'{part.name}: {part.weightless} is left out: forces have its whole weight'
                  for part in parts if part.weightless and part.mass]
+    warnings += _placeholders(parts)
     _add_of_platform_joints(mechanism, found, remarks, warnings)
     remarks += _grouped(names, of_legs)
     values: dict[str, Any] = {
@@ -116,6 +118,26 @@ def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
     parameters = _with_side(Parameters(given, mechanism.source), [
         leg['direction'] for leg in legs])
     return Recognized(parameters, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(warnings)))
+
+
+def _leave_out_frames(of_platform: Iterable[MechanismBody], parts: Iterable[MechanismBody],
+                      ) -> None:
+    """Take away the masses of bodies that have one only because an engine needs it."""
+    least = _NEGLIGIBLE * max(part.mass or 0.0 for part in of_platform)
+    for part in parts:
+        if part.mass and part.mass < least:
+            part.mass, part.inertia = 0.0, np.zeros((3, 3))
+
+
+def _placeholders(parts: Iterable[MechanismBody]) -> list[str]:
+    """Return the warning about bodies with the mass and inertia that other tools begin with."""
+    names = [part.name for part in parts if part.mass == 1.0 and not part.note
+             and np.array_equal(part.inertia, np.eye(3))]
+    if not names:
+        return []
+    more = f' and {len(names) - 1} more' if len(names) > 1 else ''
+    return [f'{names[0]}{more}: 1 kg and 1 kg m^2 about each axis: likely placeholders of another '
+            'tool, in place of the masses of these bodies']
 
 
 def _springs(chain: Chain) -> Iterator[str]:
@@ -345,8 +367,7 @@ def _missing_mass(found: Topology, mass: float) -> str:
 
 
 def _platform(found: Topology, remarks: list[str], warnings: list[str]) -> dict[str, Any]:
-    least = _NEGLIGIBLE * max(part.mass or 0.0 for part in found.platform_parts)
-    heavy = [part for part in found.platform_parts if part.mass and part.mass > least]
+    heavy = [part for part in found.platform_parts if part.mass]
     body = _together(heavy, found.platform.placement)
     if not body.mass:
         raise DescriptionError(f'{found.platform.name}: the platform has no mass; --geometry-only '

@@ -38,8 +38,6 @@ from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 _VERSION = '1.9'
 _NAMESPACE = 'https://stewart-dynamics.example/sdf'
 _NOT_IN_SDF = ('geometry.zero_length', 'actuator.reflected_mass')
-# Mass of a tip as a part of the platform's, and its radius of gyration [m].
-_TIP_MASS, _TIP_GYRATION = 1e-8, 0.1
 _COMMENT = 'Positions of joints are counted from the home pose.'
 
 
@@ -113,9 +111,8 @@ def _leg(model: ET.Element, hexapod: Hexapod, leg: LegDescription,
 
 def _tip(model: ET.Element, hexapod: Hexapod, leg: LegDescription) -> None:
     """Write a ball joint, the tip that it leads to, and the plugin that fixes the tip."""
-    mass = _TIP_MASS * hexapod.platform_body.mass
     tip = _link(model, leg.tip, hexapod.platform, leg.platform_joint, np.eye(3))
-    _inertial(tip, RigidBody(leg.tip, mass, np.zeros(3), mass * _TIP_GYRATION ** 2 * np.eye(3)))
+    _inertial(tip, hexapod.frame_body(leg.tip))
     _joint(model, leg.ball, 'ball', leg.piston.name, leg.tip)
     fixes = add(model, 'plugin', filename='gz-sim-detachable-joint-system',
                 name='gz::sim::systems::DetachableJoint')

@@ -14,7 +14,7 @@ readers ignore.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
@@ -23,10 +23,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
-    COLORS, Hexapod, LegDescription, PASSIVE_RATE, RigidBody, shapes, solids, UNLIMITED,
+    COLORS, Hexapod, LegDescription, massless, PASSIVE_RATE, RigidBody, shapes, solids, UNLIMITED,
     VisualShape)
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, inertia_texts, length_elements, numbers, text_of)
+    add, CARRIED, carried, inertia_texts, length_elements, numbers,
+    solid_elements, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.kinematics.leg_joints import PLATFORM_JOINTS
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
@@ -53,35 +54,56 @@ class Ros2Control(NamedTuple):
     hardware: str  # a key of HARDWARE, or the name of a plugin
 
 
-def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str:
-    """Return a hexapod as URDF; ``control`` adds a block ros2_control for the six legs."""
-    root = ET.Element('robot', {'name': name})
+def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None,
+         constraints: bool = False, solid: bool = False) -> str:
+    """
+    Return a hexapod as URDF; the robot has this name, or another one where a link has it.
+
+    control: adds a block ros2_control for the six legs.
+    constraints: adds elements ``constraint`` of ros/urdfdom_headers#108 that close its loops.
+    solid: all links that move have a mass, and inertia about all axes.
+    """
+    root = ET.Element('robot')
     for color, rgba in COLORS.items():
         add(add(root, 'material', name=color), 'color', rgba=numbers(rgba))
     looks = shapes(hexapod)
-    _link(root, RigidBody(hexapod.base, 0.0, np.zeros(3), np.zeros((3, 3))), looks[hexapod.base])
-    _platform(root, hexapod, looks[hexapod.platform])
+    _link(root, massless(hexapod.base), looks[hexapod.base])
+    frame = hexapod.frame_body if solid else massless
+    _platform(root, hexapod, frame, looks[hexapod.platform])
     for leg in hexapod.legs:
-        _leg(root, hexapod, leg, looks)
+        _leg(root, hexapod, leg, frame, solid, looks)
+    links = {link.get('name') for link in root.iter('link')}
+    # Readers take the name of the robot as a frame, which would be that link's.
+    root.set('name', f'{name}_hexapod' if name in links else name)
     p = hexapod.parameters
     block = add(root, CARRIED)
     elements = {'gravity': STANDARD_GRAVITY, **length_elements(hexapod), **{
         each: values for each, values in _UNLIMITED.items() if p[each] is None}}
-    for part, of_part in p.legs.parts.items():  # no mass has no center
-        if not of_part.mass.all():
-            elements[f'legs.{part}.center_of_mass'] = np.where(
-                of_part.mass > 0.0, of_part.center_of_mass, 0.0)
+    if solid:
+        elements |= solid_elements(hexapod)
+    else:
+        elements |= {f'legs.{part}.center_of_mass': np.where(
+            of_part.mass > 0.0, of_part.center_of_mass, 0.0)  # no mass has no center
+            for part, of_part in p.legs.parts.items() if not of_part.mass.all()}
     for each, parameter in carried(p, elements, _NOT_IN_URDF):
         add(block, 'parameter', name=each, **parameter._asdict())
     for leg in hexapod.legs:
-        add(block, 'loop', tip=leg.piston.name, platform=leg.ball)
+        if constraints:
+            _constraint(root, hexapod, leg)
+        else:
+            add(block, 'loop', tip=leg.piston.name, platform=leg.ball)
     if control is not None:
         _ros2_control(root, hexapod, name, control)
     return text_of(root, _COMMENT)
 
 
-def _platform(root: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) -> None:
-    """Write the chain of virtual joints, the platform and the frames of its joints."""
+def _platform(root: ET.Element, hexapod: Hexapod, frame: Callable[[str], RigidBody],
+              looks: Sequence[VisualShape]) -> None:
+    """
+    Write the chain of virtual joints, the platform and the frames of its joints.
+
+    frame: makes the body of a link that is only a frame.
+    """
     parent = hexapod.base
     reach = sum(np.linalg.norm(joints, axis=1).max() for joints in (
         hexapod.parameters.geometry.base_joints,
@@ -93,22 +115,23 @@ def _platform(root: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) 
         if child == hexapod.platform:
             _link(root, hexapod.platform_body, looks)
         else:
-            add(root, 'link', name=child)
+            _link(root, frame(child))
         joint = _joint(root, name, 'revolute' if each in _VIRTUAL else 'prismatic', parent, child)
         add(joint, 'axis', xyz=numbers(_AXES[axis]))
         _limit(joint, (-bound, bound), PASSIVE_RATE, 0.0)
         parent = child
     for leg in hexapod.legs:
-        add(root, 'link', name=leg.ball)
+        _link(root, massless(leg.ball))
         _joint(root, f'{leg.ball}_fixed', 'fixed', hexapod.platform, leg.ball,
                leg.platform_joint)
 
 
 def _leg(root: ET.Element, hexapod: Hexapod, leg: LegDescription,
+         frame: Callable[[str], RigidBody], solid: bool,
          looks: dict[str, tuple[VisualShape, ...]]) -> None:
-    add(root, 'link', name=leg.cross)
-    _link(root, leg.cylinder, looks[leg.cylinder.name])
-    _link(root, leg.piston, looks[leg.piston.name])
+    _link(root, frame(leg.cross))
+    for body in (leg.cylinder, leg.piston):
+        _link(root, hexapod.solid(body, leg) if solid else body, looks[body.name])
     first = _joint(root, leg.universal[0], 'revolute', hexapod.base, leg.cross, leg.base_joint,
                    leg.mount)
     add(first, 'axis', xyz=numbers(_AXES['x']))
@@ -126,13 +149,21 @@ def _leg(root: ET.Element, hexapod: Hexapod, leg: LegDescription,
         friction=numbers(leg.coulomb_friction))
 
 
-def _link(root: ET.Element, body: RigidBody, looks: Sequence[VisualShape]) -> None:
+def _constraint(root: ET.Element, hexapod: Hexapod, leg: LegDescription) -> None:
+    closing = add(root, 'constraint', name=leg.ball, type='spherical')
+    for side, link, at in (('parent', leg.piston.name, np.zeros(3)),
+                           ('child', hexapod.platform, leg.platform_joint)):
+        add(closing, side, link=link)
+        add(closing, f'{side}_origin', xyz=numbers(at), rpy=numbers(np.zeros(3)))
+
+
+def _link(root: ET.Element, body: RigidBody, looks: Sequence[VisualShape] = ()) -> None:
     link = add(root, 'link', name=body.name)
-    if body.mass or body.inertia.any():
-        inertial = add(link, 'inertial')
-        add(inertial, 'origin', xyz=numbers(body.center))
-        add(inertial, 'mass', value=numbers(body.mass))
-        add(inertial, 'inertia', **inertia_texts(body))
+    # Zeros are written: some readers take 1 kg where there is no such element.
+    inertial = add(link, 'inertial')
+    add(inertial, 'origin', xyz=numbers(body.center))
+    add(inertial, 'mass', value=numbers(body.mass))
+    add(inertial, 'inertia', **inertia_texts(body))
     for kind, some in (('visual', looks), ('collision', solids(looks))):
         for shape in some:
             one = add(link, kind)

@@ -20,7 +20,7 @@ import numpy as np
 from stewart_dynamics import __version__
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
-    COLORS, Hexapod, LegDescription, RigidBody, shapes, VisualShape)
+    COLORS, Hexapod, LegDescription, massless, RigidBody, shapes, VisualShape)
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 
@@ -56,8 +56,7 @@ def usd(hexapod: Hexapod, name: str) -> str:
     scene.CreateGravityDirectionAttr(Gf.Vec3f(*(gravity / size if size else (0.0, 0.0, -1.0))))
     writer = _Writer(stage, str(root.GetPath()))
     looks = shapes(hexapod, uris=False)
-    writer.body(RigidBody(hexapod.base, 0.0, np.zeros(3), np.zeros((3, 3))), np.zeros(3),
-                np.eye(3), looks[hexapod.base])
+    writer.body(massless(hexapod.base), np.zeros(3), np.eye(3), looks[hexapod.base])
     writer.joint('Fixed', f'{hexapod.base}_to_world', None, hexapod.base, np.zeros(3), np.eye(3),
                  np.zeros(3))
     writer.body(hexapod.platform_body, hexapod.position, hexapod.rotation,
