@@ -219,15 +219,32 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group('recordings of other sources')
     group.add_argument('--child', metavar='FRAME',
                        help='child_frame_id of the platform in tf2_msgs/TFMessage (default: '
-                            'platform_frame)')
+                            'platform_frame), or its body in the file of a tracker')
+    group.add_argument('--columns', metavar='NAME=HEADING,...', type=columns, default={},
+                       help='columns of a CSV file by their headings, as '
+                            '"x=Surge [mm],roll=PtfmRoll [deg]", with the unit in brackets where '
+                            'the file does not have it')
     group.add_argument('--euler', metavar='ORDER', choices=EULER,
                        help='order of the rotations about x, y, z in a CSV file, as XYZ: capital '
                             'letters about axes that turn along, others about fixed axes '
                             '(default: xyz, Rz Ry Rx, for roll pitch yaw; XYZ for u v w, those of '
                             'PI hexapods)')
-    group.add_argument('--axes', metavar='X,Y,Z', type=axes, default=AXES,
+    group.add_argument('--axes', metavar='X,Y,Z', type=axes,
                        help='axes of the source that are x, y, z of the base frame, as x,-y,-z '
                             'for z downward, or x,-y,z for a left-handed source')
+
+
+def columns(text: str) -> dict[str, str]:
+    """Return the headings of columns that an option gives, by the names of the columns."""
+    found: dict[str, str] = {}
+    # A heading may contain commas.
+    for each in re.split(r',(?=\s*[A-Za-z_][\w.-]*\s*=)', text):
+        name, sign, heading = (part.strip() for part in each.partition('='))
+        if not (name and sign and heading) or name in found:
+            raise argparse.ArgumentTypeError(
+                f'{_shown(each)}: must be a name, = and a heading, each name once')
+        found[name] = heading
+    return found
 
 
 def axes(text: str) -> str:

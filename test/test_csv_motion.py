@@ -11,6 +11,7 @@ import io
 from itertools import count
 import json
 from pathlib import Path
+import shlex
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,10 @@ from snapshot import Snapshot
 
 from stewart_dynamics import BagError, Motion, Parameters, read_setpoints, StewartPlatform
 from stewart_dynamics.bags.baseline import integrated
-from stewart_dynamics.bags.csv_motion import _GROUPS, factor, QUATERNION
 from stewart_dynamics.datasheet.datasheet_command_line import main as capability
 from stewart_dynamics.program import EULER
 from stewart_dynamics.replay import main as replay
+from stewart_dynamics.tables.column_names import MOTION as QUANTITIES, QUATERNION, si_factor
 
 PROGRAM = 'stewart_replay'
 
@@ -254,6 +255,80 @@ def test_a_record_with_a_gap_is_not_integrated(tmp_path: Path, snapshot: Snapsho
             read_setpoints(path, PLATFORM)
 
 
+# -- angles in degrees ----------------------------------------------------------------------------
+
+def ship(amplitude: float, names: str = 'roll pitch yaw', unit: float = 1.0) -> dict[str, Array]:
+    """Return poses whose angles have an amplitude, as numbers."""
+    t = np.arange(0.0, 10.0, 0.02)
+    table = {'t': t, 'x': 0.0 * t, 'y': 0.0 * t, 'z': 1.18 + 0.1 * np.sin(0.8 * t)}
+    return table | {name: unit * size * amplitude * np.sin(rate * t) for name, size, rate in zip(
+        names.split(), (1.0, 0.6, 0.2), (0.7, 0.6, 0.5), strict=True)}
+
+
+def mistakes_of(path: Path, tmp_path: Path, *options: str) -> list[str]:
+    """Return the likely mistakes that a replay names in a motion."""
+    replay([str(path), '--params', str(PARAMS), *options, '--output', str(tmp_path / 'r'),
+            '--no-report', '--force', '--differentiate'])
+    return [f'{each["topic"]}: {each["text"]}' for each in json.loads(
+        (tmp_path / 'r' / path.stem / 'summary.json').read_text())['mistakes']]
+
+
+def rated(path: Path, tmp_path: Path) -> dict[str, Any]:
+    """Return what a datasheet says about a motion."""
+    capability(['--params', str(PARAMS), '--motion', str(path), '--output', str(tmp_path / 'c'),
+                '--differentiate', '10'])
+    found: dict[str, Any] = json.loads((tmp_path / 'c' / 'datasheet.json').read_text())['motion']
+    return found
+
+
+@pytest.mark.parametrize('amplitude', [1.5, 5.0, 30.0])
+@pytest.mark.parametrize(('names', 'axes'), [
+    ('roll pitch yaw', 'x,y,z'), ('u v w', 'x,y,z'), ('Alpha Beta Gamma', 'x,-y,-z')])
+def test_angles_in_degrees_are_named_and_the_advice_reads_them(
+        amplitude: float, names: str, axes: str, tmp_path: Path, snapshot: Snapshot) -> None:
+    table = ship(amplitude, names)
+    if axes != 'x,y,z':
+        table['z'] = -table['z']
+    path = write(tmp_path / 'ship.csv', table)
+    text, *others = mistakes_of(path, tmp_path, '--axes', axes)
+    assert 'likely mistake: angles in degrees' in text and not others
+    snapshot(text)
+    option, value = shlex.split(text[text.index('--columns'):text.index(' reads degrees')])
+    assert not mistakes_of(path, tmp_path, '--axes', axes, option, value)
+
+
+@pytest.mark.parametrize('amplitude', [0.02, 0.2, 0.45, 0.8])
+def test_angles_in_radians_are_no_mistake(amplitude: float, tmp_path: Path) -> None:
+    """Even if they exceed the limits: this hexapod reaches 0.6 rad."""
+    assert not mistakes_of(write(tmp_path / 'ship.csv', ship(amplitude)), tmp_path)
+
+
+def test_the_capability_names_the_mistakes_of_the_replay(tmp_path: Path) -> None:
+    path = write(tmp_path / 'ship.csv', ship(5.0))
+    found = rated(path, tmp_path)
+    assert found['mistakes'] == mistakes_of(path, tmp_path)
+    assert 'angles in degrees' in found['mistakes'][0]
+
+
+def test_angles_with_a_unit_are_taken_as_they_are(tmp_path: Path) -> None:
+    table = {name + (' [rad]' if name in ('roll', 'pitch', 'yaw') else ''): values
+             for name, values in ship(5.0).items()}
+    assert not any('degrees' in text for text in mistakes_of(
+        write(tmp_path / 'ship.csv', table), tmp_path))
+
+
+def test_the_capability_says_what_is_not_read(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path / 'level.csv', {
+        't': TIMES, 'x': 0.0 * TIMES, 'y': 0.0 * TIMES, 'z': 1.1 + 0.01 * TIMES, 'wind': TIMES})
+    mistakes_of(path, tmp_path)
+    notices = rated(path, tmp_path)['notices']
+    assert notices == ['columns that are not read: wind',
+                       'no columns of the rotation: the platform stays level']
+    for program in capsys.readouterr().out.split('payload at')[:2]:
+        assert all(notice in program for notice in notices)
+
+
 # -- bad files ------------------------------------------------------------------------------------
 
 HEAD = 't,x,y,z,qx,qy,qz,qw'
@@ -267,7 +342,7 @@ def rows(*more: str) -> str:
 @pytest.mark.parametrize('text', [
     '',
     HEAD,
-    rows().replace('t,', 'time,'),
+    rows().replace('t,', 'tick,'),
     rows().replace(',y,', ',why,'),
     rows().replace('qw', 'q4'),
     rows().replace('x,y', 'x [furlong],y', 1),
@@ -310,10 +385,10 @@ def test_files_as_programs_write_them(change: Callable[[str], str], tmp_path: Pa
 
 
 def test_every_unit_is_known_in_all_its_spellings() -> None:
-    for group in _GROUPS:
-        assert factor(group, '') == 1.0
+    for group in QUANTITIES:
+        assert si_factor(group, '') == 1.0
         for unit, si in group.units.items():
             for ending in {0: ('',), 1: ('/s', ' / s'), 2: (
                     '/s^2', '/s2', '/s²', '/s/s', '/s**2')}[group.order]:
-                assert factor(group, unit + ending) == si
-    assert factor(QUATERNION, 'm') is None
+                assert si_factor(group, unit + ending) == si
+    assert si_factor(QUATERNION, 'm') is None

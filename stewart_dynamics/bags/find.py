@@ -17,8 +17,6 @@ from stewart_dynamics.parameters.yaml_file import read_document
 
 # Suffixes of the files of a bag, also of files compressed as a whole.
 STORAGES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd', '.bag')
-# Suffix of files with named columns, which are read where they are named.
-TABLE = '.csv'
 METADATA = 'metadata.yaml'
 # In a folder of results of a replay: the file by which it is known, and the output bag.
 RESULT, OUTPUT_BAG = 'summary.json', 'bag'

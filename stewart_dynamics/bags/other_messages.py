@@ -18,8 +18,6 @@ from functools import lru_cache
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.bags.reading import Reading
-from stewart_dynamics.bags.source_axes import axes_matrix, turned
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import (
     aligned8, check_encapsulation, COUNT, MalformedError, nanoseconds, READ_ERRORS, sequence,
@@ -27,6 +25,8 @@ from stewart_dynamics.messages.cdr import (
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.setpoint import combined, layout_of, pose, StampedWriter, twist
 from stewart_dynamics.program import AXES
+from stewart_dynamics.tables.reading import Reading
+from stewart_dynamics.tables.source_axes import axes_matrix, turned
 
 POSE = 'geometry_msgs/msg/Pose'
 POSE_WITH_COVARIANCE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
@@ -60,8 +60,8 @@ class Converter:
 
     def __init__(self, kinds: Mapping[str, str], reading: Reading, frame: str) -> None:
         self.child = (reading.child or frame).lstrip('/')
-        self._matrix = axes_matrix(reading.axes)
-        turns = reading.axes != AXES
+        self._matrix = axes_matrix(reading.axes_of_bag)
+        turns = reading.axes_of_bag != AXES
         self.children: set[str] = set()  # child frames of transforms that were seen
         self.found = False  # whether the platform's was among them
         self._headed = [name for name, kind in kinds.items() if kind in _HEADED]

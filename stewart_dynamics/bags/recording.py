@@ -13,15 +13,17 @@ import tempfile
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.blocks import of_good_length, Source
 from stewart_dynamics.bags.csv_motion import CsvMotion
-from stewart_dynamics.bags.find import files_of, TABLE
+from stewart_dynamics.bags.find import files_of
 from stewart_dynamics.bags.mcap_file import MAGIC, McapFile
 from stewart_dynamics.bags.other_messages import Converter, POSE_TYPES
-from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.bags.sqlite_file import SqliteFile
 from stewart_dynamics.errors import BagError, one_line, shown_name
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import PoseByAngles
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import PARAMETERS
+from stewart_dynamics.tables.named_table import is_table
+from stewart_dynamics.tables.reading import Reading
 import zstandard
 
 _SQLITE = b'SQLite format 3\0'
@@ -42,8 +44,8 @@ class Recording:
     """
     A bag of ROS 2, a folder or one of its files, or a bag of ROS 1, a file or a folder of files.
 
-    A file .csv is read as one, see ``csv_motion``, and so are poses of other types and in other
-    axes, see ``other_messages``.
+    A table, a file .csv, .tsv or .txt, is read as one, see ``csv_motion``, and so are poses of
+    other types and in other axes, see ``other_messages``.
 
     reading: options for those.
     frame: frame of the platform, the child of its transforms.
@@ -54,6 +56,7 @@ class Recording:
     topics: the type of each topic in it.
     missing: descriptions of the parts that could not be read so far.
     notices: notices to the user about the reading of the bag.
+    unknown_angles: poses of a table by angles without a unit; empty if the unit is known.
     """
 
     def __init__(self, path: Path, reading: Reading | None = None,
@@ -63,6 +66,7 @@ class Recording:
         self._reading, self._frame, self._home = reading or Reading(), frame, home
         self.missing: list[str] = []
         self.notices: list[str] = []
+        self.unknown_angles: tuple[PoseByAngles, ...] = ()
         self._sources: list[tuple[Path, Source]] = []
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         faults = []
@@ -182,9 +186,10 @@ class Recording:
             self._folder.cleanup()
 
     def _opened(self, file: Path) -> Source:
-        if file.suffix.lower() == TABLE:
+        if is_table(file):
             motion = CsvMotion(file, self._reading, self._home)
             self.notices += motion.notices
+            self.unknown_angles = motion.unknown_angles
             return motion
         try:
             unpacked = file

@@ -9,7 +9,6 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.calibration import design_command
 from stewart_dynamics.program import (
     add_accepted, add_node, add_parameters, add_reading, add_report, between, DONE, names_of,
@@ -17,6 +16,7 @@ from stewart_dynamics.program import (
 from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
 from stewart_dynamics.reporting.results_folder import CALIBRATED, DESIGNED
 from stewart_dynamics.signals import interrupt_on_signals
+from stewart_dynamics.tables.reading import Reading
 
 _PROGRAM = Program(
     'stewart_calibrate', 'parameters or poses, or a likely mistake: nothing is written',
@@ -107,7 +107,8 @@ def _run(given: argparse.Namespace) -> int:
             given.poses, parameters, given.node, given.measured, given.pose,
             Reading.given(given))
     else:
-        measured = read_poses(given.poses, parameters.joints, given.mm, given.degrees)
+        measured = read_poses(given.poses, parameters.joints, given.mm, given.degrees,
+                              Reading.given(given))
     _PROGRAM.prepare(likely_mistakes(parameters))
     result = run(measured, str(given.poses), parameters, output, options)
     for each in result['likely_mistakes']:

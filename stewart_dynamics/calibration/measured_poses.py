@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measured legs and poses from a CSV file whose first line names the columns."""
+"""Measured legs and poses from a table, one pose in each row."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.bags.csv_table import read_table
-from stewart_dynamics.errors import shown_name, StewartError
+from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.parameters.tolerances import is_unit, unit_rule
+from stewart_dynamics.tables.column_names import (
+    ANGLES, leg_positions, POSITION, QUATERNION, ROTATION_VECTOR, ROTATIONS, TIME, U_V_W)
+from stewart_dynamics.tables.named_table import NamedTable
+from stewart_dynamics.tables.reading import Reading
 
 # Minimum number of poses: one for each of the 7 unknowns of a leg, and one for the noise.
 FEWEST = 8
-POSITION = ('x', 'y', 'z')
-QUATERNION = ('qx', 'qy', 'qz', 'qw')
-ANGLES = ('alpha', 'beta', 'gamma')
-# Largest size of a file [bytes], and number of its poses.
-_LARGEST, _MOST = 64 << 20, 20_000
+_MOST = 20_000  # poses of a file
+_MILLIMETER, _DEGREE = 1e-3, np.pi / 180.0
 
 
 class MeasuredPoses(NamedTuple):
@@ -34,54 +33,46 @@ class MeasuredPoses(NamedTuple):
     poses: Pose
     names: tuple[str, ...]  # of each pose, such as ``row 2``
     angles: Array | None = None
-    """(N, 3) angles as they were read, if the poses were given by angles."""
+    """(N, 3) angles as they were read, if the poses were given by angles without a unit."""
     topics: tuple[str, str] | None = None  # of the legs and of the poses, if they are from a bag
     notices: tuple[str, ...] = ()
 
 
 def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
-               degrees: bool = False) -> MeasuredPoses:
+               degrees: bool = False, reading: Reading | None = None) -> MeasuredPoses:
     """
-    Return the poses of a file with the columns of ``joints``, x, y, z and the rotation.
+    Return the poses of a file with the columns of ``joints``, x, y, z and a rotation.
 
-    Row 1 has the names of the columns, separated by commas, semicolons or tabs; others than the
-    names of the legs, ``joints``, and those of the pose are ignored. Beside semicolons and tabs
-    numbers may have decimal commas, then all of them. The rotation is a quaternion,
-    qx, qy, qz, qw, or the angles alpha, beta, gamma of Rz(gamma) Ry(beta) Rx(alpha). Units are m
-    and rad, or ``millimeters`` and ``degrees``. StewartError if the file cannot be read, lacks a
-    column, or has a value that is not a number.
+    Units are those of the headings; without them m and rad, or ``millimeters`` and ``degrees``.
+
+    Raises BagError if the file cannot be read, lacks a column, or has a value that is not a
+    number.
     """
-    table = read_table(path, {*joints, *POSITION, *QUATERNION, *ANGLES}.__contains__, _LARGEST)
-    header = table.header
-    rotation = max((QUATERNION, ANGLES), key=lambda names: bool(set(names) & set(header)))
-    wanted = (*joints, *POSITION, *rotation)
-    missing = [name for name in wanted if name not in header]
-    if missing:
-        other = f' (or {", ".join(ANGLES)})' if missing[-4:] == list(QUATERNION) else ''
-        raise StewartError(f'{path}: has no column {shown_name(", ".join(missing))}{other}; row 1 '
-                           f'has {shown_name(", ".join(header))}')
-    double = [name for name in wanted if header.count(name) > 1]
-    if double:
-        raise StewartError(f'{path}: column {double[0]}: is there {header.count(double[0])} times')
-    if len(table.rows) > _MOST:
-        raise StewartError(f'{path}: {len(table.rows)} poses: at most {_MOST}')
-    names = tuple(f'row {line}' for line in table.lines)
-    values = table.numbers([header.index(name) for name in wanted])
-    unit = 1e-3 if millimeters else 1.0
-    lengths, positions, turns = unit * values[:, :6], unit * values[:, 6:9], values[:, 9:]
-    if rotation == ANGLES:
-        return MeasuredPoses(lengths, Pose.from_euler(positions, turns, degrees=degrees), names,
-                             turns)
-    sizes = np.linalg.norm(turns, axis=1)
-    for n in np.flatnonzero(~is_unit(sizes))[:1]:
-        raise StewartError(f'{path}: {names[n]}: quaternion: {unit_rule(sizes[n])}')
-    return MeasuredPoses(lengths, Pose.from_quaternion(positions, turns), names)
+    legs, meter = leg_positions(joints), _MILLIMETER if millimeters else 1.0
+    radian = _DEGREE if degrees else 1.0
+    table = NamedTable(path, (legs, TIME, POSITION, *ROTATIONS), reading, {
+        joints: meter, POSITION.columns: meter, **dict.fromkeys(
+            (ANGLES.columns, U_V_W.columns, ROTATION_VECTOR.columns), radian)})
+    lengths, positions, rotations = (
+        table.values(legs), table.values(POSITION), table.rotations())
+    if len(lengths) > _MOST:
+        raise StewartError(f'{path}: {len(lengths)} poses: at most {_MOST}')
+    if rotations is None:
+        raise StewartError(f'{path}: row {table.header_line}: has no column qx, qy, qz, qw (or '
+                           f'roll, pitch, yaw); it has {table.headings}')
+    pose = table.in_base_axes(np.hstack([positions, rotations.quaternions]), 'vq')
+    plain = rotations.order == 'xyz' and table.plain_axes and rotations.angles is not None
+    return MeasuredPoses(
+        lengths, Pose.from_quaternion(pose[:, :3], pose[:, 3:]),
+        tuple(f'row {line}' for line in table.lines),
+        rotations.angles / radian if plain and rotations.angles is not None else None,
+        notices=tuple(table.notices))
 
 
 def poses_csv(joints: tuple[str, ...], lengths: Array, poses: Pose) -> str:
     """Return poses and leg positions as text that ``read_poses`` reads."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator='\n')
-    table.writerow([*joints, *POSITION, *QUATERNION])
+    table.writerow([*joints, *POSITION.columns, *QUATERNION.columns])
     table.writerows(np.concatenate([lengths, poses.position, poses.quaternion], axis=1).tolist())
     return text.getvalue()

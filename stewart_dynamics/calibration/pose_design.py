@@ -22,7 +22,6 @@ from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.calibration.calibrate import check_number
 from stewart_dynamics.calibration.equations import Equations, GEOMETRY, names_of, values_of
 from stewart_dynamics.calibration.geometry_fit import Unknowns
-from stewart_dynamics.calibration.measured_poses import POSITION, QUATERNION
 from stewart_dynamics.calibration.noise import covariances, Noise, whitening
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
@@ -33,6 +32,7 @@ from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.approach import approach, TimedMotion
+from stewart_dynamics.tables.column_names import POSITION, QUATERNION
 
 NOISE = Noise(1e-5, 1e-5, 1e-5)  # noise for the predicted intervals, by default [m, m, rad]
 # Poses to choose from, poses tried for each of them, and random sets for comparison.
@@ -184,7 +184,7 @@ def visit(platform: StewartPlatform, poses: Pose, rest: float,
 def trajectory_csv(motion: TimedMotion) -> str:
     """Return a planned trajectory as text: time, pose, twist and acceleration of each point."""
     text = io.StringIO()
-    names = ['time', *POSITION, *QUATERNION, *(f'{kind}{axis}' for kind in (
+    names = ['time', *POSITION.columns, *QUATERNION.columns, *(f'{kind}{axis}' for kind in (
         'v', 'w', 'a', 'dw') for axis in 'xyz')]
     m = motion.motion
     np.savetxt(text, np.column_stack([

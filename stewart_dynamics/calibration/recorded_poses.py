@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND, Stamps
-from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.errors import BagError
@@ -24,6 +23,7 @@ from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit
 from stewart_dynamics.replay.bag_topics import find_calibrated_legs
+from stewart_dynamics.tables.reading import Reading
 
 # Legs are at rest while no position changes by more than this part of the characteristic length,
 # for at least this time [s], of which this part at each end is left out: the platform settles.

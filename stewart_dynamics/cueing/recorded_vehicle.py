@@ -12,18 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND
-from stewart_dynamics.bags.csv_motion import (
-    ACCELERATION, ANGULAR_VELOCITY, columns_of, split, TIME)
-from stewart_dynamics.bags.csv_table import read_table
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.errors import BagError, shown_name, StewartError
+from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import Rejections
-
-_GROUPS = TIME, ACCELERATION, ANGULAR_VELOCITY
-_COLUMNS = tuple(name for group in _GROUPS for name in group.columns)
-_LARGEST = 1 << 30  # [bytes]
+from stewart_dynamics.tables.column_names import ACCELERATION, ANGULAR_VELOCITY, TIME
+from stewart_dynamics.tables.named_table import is_table, NamedTable
+from stewart_dynamics.tables.reading import Reading
+from stewart_dynamics.tables.source_axes import axes_matrix, turned
 
 
 class RecordedVehicle(NamedTuple):
@@ -36,21 +33,26 @@ class RecordedVehicle(NamedTuple):
     missing: tuple[str, ...] = ()  # parts of a bag that could not be read
 
 
-def read_vehicle(path: Path, topic: str | None) -> RecordedVehicle:
+def read_vehicle(path: Path, topic: str | None, reading: Reading | None = None,
+                 ) -> RecordedVehicle:
     """
     Return the motion of a vehicle that was recorded.
 
-    A CSV file has columns t [s], ax, ay, az [m/s^2] and, if the vehicle turns, wx, wy, wz
-    [rad/s]; other units are in brackets behind the names, as in ``csv_motion``. StewartError for
-    a file that cannot be read, or whose times are not strictly increasing.
+    A table has columns t, ax, ay, az and, if the vehicle turns, wx, wy, wz, see ``NamedTable``.
+
+    reading: axes and names of columns.
+
+    Raises StewartError for a file that cannot be read, or whose times are not strictly
+    increasing.
     """
-    found = _read_csv(path) if path.suffix.lower() == '.csv' else _read_bag(path, topic)
+    reading = reading or Reading()
+    found = _read_table(path, reading) if is_table(path) else _read_bag(path, topic, reading)
     if len(found.times) < 2:
         raise StewartError(f'{path}: {len(found.times)} samples: must be at least 2')
     return found._replace(times=found.times - found.times[0])
 
 
-def _read_bag(path: Path, given: str | None) -> RecordedVehicle:
+def _read_bag(path: Path, given: str | None, reading: Reading) -> RecordedVehicle:
     said: list[str] = []
     rejections = Rejections(
         lambda rejection, details: said.append(rejection.words(details)))
@@ -75,30 +77,18 @@ def _read_bag(path: Path, given: str | None) -> RecordedVehicle:
     if not stamps:
         raise BagError(f'{path}: {topic}: no valid message' + (
             f': {said[0]}' if said else ''))
-    array = np.array(values)
+    # Angular velocity first, as in the message.
+    array = turned(np.array(values), axes_matrix(reading.axes_of_bag), 'av')
     notices = tuple(f'{each.counted(count).words("")}' for each, count in
                     rejections.counts.items())
     return RecordedVehicle((np.array(stamps) - stamps[0]) * NANOSECOND, array[:, 3:],
                            array[:, :3], notices, missing)
 
 
-def _read_csv(path: Path) -> RecordedVehicle:
-    table = read_table(path, lambda cell: split(cell)[0] in _COLUMNS, _LARGEST)
-    columns = columns_of(path, table.header, _GROUPS)
-    turning = any(name in columns for name in ANGULAR_VELOCITY.columns)
-    names = _COLUMNS if turning else _COLUMNS[:4]
-    for name in names:
-        if name not in columns:
-            raise StewartError(
-                f'{path}: row 1: no column {name}: {shown_name(", ".join(table.header))}')
-    places, scales = zip(*(columns[name] for name in names), strict=True)
-    # a cell that is missing is named, as an empty one
-    rows = [row + [''] * (len(table.header) - len(row)) for row in table.rows]
-    values = np.zeros((len(rows), 7))
-    values[:, :len(scales)] = table._replace(rows=rows).numbers(places) * scales
-    times = values[:, 0]
-    if (stuck := np.diff(times) <= 0.0).any():
-        n = int(np.argmax(stuck))
-        raise StewartError(f'{path}: row {table.lines[n + 1]}: t: {times[n + 1]:.9g} s: must be '
-                           f'after {times[n]:.9g} s')
-    return RecordedVehicle(times, values[:, 1:4], values[:, 4:])
+def _read_table(path: Path, reading: Reading) -> RecordedVehicle:
+    table = NamedTable(path, (TIME, ACCELERATION, ANGULAR_VELOCITY), reading)
+    turning = table.has(ANGULAR_VELOCITY)
+    values = table.in_base_axes(np.hstack([
+        table.values(ACCELERATION), table.values(ANGULAR_VELOCITY, complete=turning)]), 'va')
+    return RecordedVehicle(
+        table.times(), values[:, :3], values[:, 3:], tuple(table.notices))

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from stewart_dynamics.program import (
-    add_node, add_parameters, add_report, DONE, PARTLY_READ, Program, SOFTWARE)
+    add_node, add_parameters, add_reading, add_report, DONE, PARTLY_READ, Program, SOFTWARE)
 from stewart_dynamics.signals import interrupt_on_signals
+from stewart_dynamics.tables.reading import Reading
 
 CUEING_FOLDER = 'cueing'
 _PROGRAM = Program('stewart_cueing_report', 'parameters or recording: nothing is written',
@@ -45,6 +46,7 @@ def _arguments() -> argparse.ArgumentParser:
     add_report(parser)
     add_node(parser)
     parser.add_argument('--vehicle', dest='topic', metavar='TOPIC', help='of a bag: its Imu')
+    add_reading(parser)
     parser.add_argument('--tune', action='store_true',
                         help='propose gains that use 90 %% of the limits, with the reason of each')
     return parser
@@ -71,7 +73,7 @@ def _run(given: argparse.Namespace) -> int:
     before = check_free(given.output, options, CUEING)
     remove_abandoned([given.output])
     parameters = Parameters.from_yaml(given.params, given.node)
-    vehicle = read_vehicle(given.vehicle, given.topic)
+    vehicle = read_vehicle(given.vehicle, given.topic, Reading.given(given))
     _PROGRAM.prepare(likely_mistakes(parameters))
     first = vehicle.times <= 2.0
     mistake = vehicle_mistake(vehicle.times[first], vehicle.forces[first], vehicle.rates[first],

@@ -114,7 +114,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
         used = uses(platform, recorded)
         sheet['motion'] = {'bag': str(order.bag)} | judged(platform, recorded, used) | {
             'rejected': recorded.rejected, 'missing': recorded.missing,
-            'mistakes': list(recorded.mistakes)}
+            'mistakes': list(recorded.mistakes), 'notices': list(recorded.notices)}
     progress.stage('page')
     sheet['parameters'] = hexapod.given.plain()
     pictures = Pictures(hexapod, sheet, sections, modes, tilts, ranges,

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.program import (
     add_node, add_parameters, add_reading, between, frequency, NODE, Program)
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import DATASHEETS
 from stewart_dynamics.signals import interrupt_on_signals
+from stewart_dynamics.tables.reading import Reading
 
 _PROGRAM = Program('stewart_capability', 'parameters or bags',
                    'the motion or the box is not possible', partly=True)

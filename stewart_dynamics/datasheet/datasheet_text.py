@@ -123,6 +123,7 @@ def sheet_text(sheet: dict[str, Any]) -> str:
     motion = sheet['motion']
     if motion:
         lines.append(f'  {setpoints_used(motion)}')
+        lines += [f'  {notice}' for notice in motion['notices']]
         if not motion.get('mistakes') and motion['payload'] and (
                 motion['payload']['value'] is not None):
             lines.append('  payload at the pivot that can be added in the motion: '

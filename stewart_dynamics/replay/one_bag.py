@@ -153,6 +153,7 @@ class _Run:
         self._firsts: dict[Rejection, _First] = {}
         self._first_time: int | None = None
         self._setpoints = Setpoints(parameters, self._rejected, self._notice)
+        self._setpoints.unknown_angles = recording.unknown_angles
         self._step = Step(parameters)
         self._platform = StewartPlatform(parameters)
         self._base_wrench = BaseWrench(parameters)

@@ -14,20 +14,20 @@ from typing import NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, Stamps
-from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.bags.source_axes import axes_matrix
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.leg_columns import columns, data_frame
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.parameters.table import COMBINED, Parameters, POSES_ALONE, SEPARATE
-from stewart_dynamics.program import AXES, EULER, NODE, node_name
+from stewart_dynamics.program import EULER, NODE, node_name
 from stewart_dynamics.replay.bag_topics import find_measured_legs, name_of
 from stewart_dynamics.replay.recorded_motion import read_motion
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.setpoints import input_messages as inputs
+from stewart_dynamics.tables.reading import Reading
+from stewart_dynamics.tables.source_axes import axes_matrix
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -107,7 +107,8 @@ class RecordedLegStates(NamedTuple):
 def read_setpoints(
         path: str | os.PathLike[str], parameters: Parameters | StewartPlatform | None = None, *,
         node: str = NODE, topics: Mapping[str, str] | None = None, cutoff: float | None = None,
-        child: str | None = None, euler: str | None = None, axes: str = AXES,
+        child: str | None = None, euler: str | None = None, axes: str | None = None,
+        columns: Mapping[str, str] | None = None,
 ) -> RecordedSetpoints:
     """
     Return the setpoints of a bag or of a CSV file, as ``stewart_replay`` reads them.
@@ -127,12 +128,15 @@ def read_setpoints(
         Compute twist and acceleration from the poses by smoothing splines of this cut-off
         frequency [Hz]. Without it, those of poses alone are zero.
     child : str, optional
-        ``child_frame_id`` of the platform in transforms.
+        ``child_frame_id`` of the platform in transforms, or its body in the file of a tracker.
     euler : str, optional
         Order of the rotations about x, y, z of a CSV file, as ``XYZ``: capital letters about axes
         that turn along, others about fixed axes.
     axes : str, optional
-        Axes of the source that are x, y, z of the base frame, as ``x,-y,z``.
+        Axes of the source that are x, y, z of the base frame, as ``x,-y,z``; by default
+        ``x,y,z``, or those of a tracker.
+    columns : mapping, optional
+        Headings of the columns of a CSV file, by their names: ``{'x': 'Surge [mm]'}``.
 
     Raises
     ------
@@ -143,7 +147,7 @@ def read_setpoints(
 
     """
     whole = Path(os.fspath(path))
-    options = Options(node=node_name(node), reading=_reading(child, euler, axes),
+    options = Options(node=node_name(node), reading=_reading(child, euler, axes, columns),
                       topics=dict(topics or {}), cutoff=cutoff)
     known = [name_of(key) for key in inputs.INPUT_TYPES]
     if other := [name for name in options.topics if name not in known]:
@@ -233,9 +237,12 @@ def read_legs(
                              values['velocity'], values['effort'], whole, missing)
 
 
-def _reading(child: str | None, euler: str | None, axes: str) -> Reading:
+def _reading(child: str | None, euler: str | None, axes: str | None,
+             columns: Mapping[str, str] | None) -> Reading:
     """Return the options for other sources; StewartError if one breaks a rule."""
     if euler is not None and euler not in EULER:
         raise StewartError(f'euler: {euler!r}: must be one of {", ".join(EULER)}')
-    axes_matrix(axes)
-    return Reading(child, euler, axes.replace(' ', ''))
+    if axes is not None:
+        axes_matrix(axes)
+        axes = axes.replace(' ', '')
+    return Reading(child, euler, axes, dict(columns or {}))

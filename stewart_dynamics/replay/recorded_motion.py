@@ -37,6 +37,7 @@ class RecordedMotion(NamedTuple):
     missing: list[str]  # parts of the bag that could not be read
     rejected: int = 0  # number of rejected messages
     mistakes: tuple[str, ...] = ()  # likely mistakes in the setpoints, or in the base's motion
+    notices: tuple[str, ...] = ()  # about the reading of the bag
     stamps: Stamps = np.empty(0, dtype=np.int64)  # of the messages (N,) [ns]
 
 
@@ -59,6 +60,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
             )) as recording:
         topics = find_topics(recording, parameters, options)
         setpoints = Setpoints(parameters, lambda rejection, details: None, lambda text: None)
+        setpoints.unknown_angles = recording.unknown_angles
         for messages, size in recording.messages({name: key for key, name in topics.items()}):
             batch = setpoints.take(messages)
             batches.append(batch if splines is None else splines.add(batch))
@@ -66,7 +68,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         setpoints.end('the bag ends')
         if splines is not None:
             batches.append(splines.finish())
-        missing = list(recording.missing)
+        missing, notices = list(recording.missing), tuple(recording.notices)
     recorded = Batch.joined([each for each in batches if len(each.stamps)])
     if not len(recorded.stamps):
         why = ''.join(f'; {each.topic}: {each.reason}' for each in setpoints.counts)
@@ -87,4 +89,4 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
                           None if bases is None else BaseMotion.of_rows(bases.copy()), missing,
                           sum(setpoints.counts.values())
                           + (0 if splines is None else splines.left_out.total()),
-                          tuple(each.words for each in mistakes), stamps)
+                          tuple(each.words for each in mistakes), notices, stamps)

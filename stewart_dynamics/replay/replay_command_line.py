@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.program import (
     add_motor_efforts, add_node, add_parameters, add_reading, add_report, frequency, Program,
     whole)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
 from stewart_dynamics.reporting.results_folder import REPLAYS
 from stewart_dynamics.signals import interrupt_on_signals
+from stewart_dynamics.tables.reading import Reading
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from stewart_dynamics.bags.find import TABLE
-from stewart_dynamics.bags.reading import Reading
 from stewart_dynamics.program import DONE, NODE, PARTLY_READ, STRICT
+from stewart_dynamics.tables.named_table import is_table
+from stewart_dynamics.tables.reading import Reading
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -50,7 +50,7 @@ class Options(NamedTuple):
         """Return the parameters with the source of setpoints that options and bag demand."""
         source = ('pose' if self.cutoff is not None
                   else 'combined' if 'combined' in self.topics
-                  else 'separate' if bag.suffix.lower() == TABLE
+                  else 'separate' if is_table(bag)
                   and parameters.setpoint.source == 'combined' else None)
         return parameters.replaced({'setpoint.source': source}) if source else parameters
 

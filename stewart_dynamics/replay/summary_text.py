@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import re
 import textwrap
 from typing import Any
 
@@ -57,8 +58,14 @@ def summary_lines(summary: Mapping[str, Any]) -> list[str]:
     lines += [each.line for each in about if each.topic in (
         INPUTS, LIMITS, MOTOR_LIMITS, JOINTS, LOADS, MOTORS)]
     lines += [*reading, '', *(each.line for each in about if each.topic == SINGULARITY)]
-    return [textwrap.fill(line, _WIDTH, subsequent_indent='  ') if len(line) > _WIDTH else line
-            for line in lines]
+    return [_filled(line) if len(line) > _WIDTH else line for line in lines]
+
+
+def _filled(line: str) -> str:
+    """Return a line in several ones; an option with a quoted value stays whole, to be copied."""
+    whole = re.sub(r"--[a-z-]+ '[^']*'", lambda found: found[0].replace(' ', '\0'), line)
+    return textwrap.fill(whole, _WIDTH, subsequent_indent='  ', break_long_words=False,
+                         break_on_hyphens=False).replace('\0', ' ')
 
 
 def measured_headline(measured: Mapping[str, Any]) -> str:

@@ -20,7 +20,8 @@ from struct import Struct
 import numpy as np
 
 from stewart_dynamics.arrays import Six, Stamps
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+from stewart_dynamics.mechanics.kinematics.pose_mistakes import (
+    IN_DEGREES, pose_mistake, PoseByAngles)
 from stewart_dynamics.mechanics.rows import MOTION, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
@@ -71,6 +72,8 @@ class Setpoints:
         self._last: Sequence[float] = ()
         self._topic_of = dict.fromkeys(QUANTITIES, COMBINED) if COMBINED in self.topics else (
             dict.fromkeys(QUANTITIES, TWIST) | dict.fromkeys(RATES, ACCEL))
+        self.unknown_angles: Sequence[PoseByAngles] = ()
+        """Poses of a table by angles without a unit, which are checked at the end."""
         self.recorded: int | None = None
         """Time of recording [ns] of the message of a block that is being processed."""
 
@@ -92,12 +95,23 @@ class Setpoints:
         """
         found = inconsistencies(self._consistency, ever, self._topic_of)
         # The last pose is judged only where twists differ.
-        mistake = (self._pose_mistake('first', self._first) if ever
+        mistake = (self._angle_mistake() or self._pose_mistake('first', self._first) if ever
                    else self._pose_mistake('last', self._last) if found else [])
         if mistake:
             # Derivatives of wrong poses do not show the mistake in twists.
             found = inconsistencies(self._consistency, ever, self._topic_of, reasons=False)
         return mistake + found + self.base.mistakes(ever)
+
+    def _angle_mistake(self) -> list[Mistake]:
+        """Return the likely mistake in most poses by angles without a unit, if they are wrong."""
+        found = Counter(pose_mistake(self._parameters, pose.row, False, pose.angles)
+                        for pose in self.unknown_angles)
+        for text, count in found.most_common(1):
+            if IN_DEGREES in text and 2 * count >= found.total():
+                pose = max(self.unknown_angles, key=lambda each: each.angles.largest)
+                return [Mistake(self.topics[0], f'{text}: {pose.angles.largest:.3g} is read in '
+                                                f'rad; {pose.advice} reads degrees')]
+        return []
 
     def _pose_mistake(self, which: str, motion: Sequence[float]) -> list[Mistake]:
         """Return the likely mistake in the pose of a row of motion."""

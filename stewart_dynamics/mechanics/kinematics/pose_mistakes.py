@@ -6,7 +6,7 @@ The likely mistake in a pose that the hexapod cannot have: the one without which
 
 A pose may be counted from home, its position in mm, its quaternion in the order w x y z. Each is a
 hypothesis: the pose without the mistake has all legs within their limits, and det(J) has the sign
-that it has at home.
+that it has at home. Angles may be in degrees if even half of them could not be reached in radians.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations
+import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,27 +37,44 @@ _THOUSAND = 100.0, 10_000.0
 # Smallest distance that may be in mm, in terms of the longest leg.
 _FAR = 2.0
 
-# Smallest angle that may be in degrees.
+# Angles of which one is as large may be in degrees, whatever half of them reaches.
 _TILTED = 1.0
 
-_MM, _FROM_HOME, _W_FIRST, _DEGREES = (
+_MM, _FROM_HOME, _W_FIRST, IN_DEGREES = (
     'position in mm', 'a pose counted from home', 'a quaternion in the order w x y z',
     'angles in degrees')
 
 
+class Angles(NamedTuple):
+    """Angles whose unit is not given, and their rotations, base axes."""
+
+    largest: float  # as a number
+    half: Array  # rotation (3, 3) of half the numbers in radians
+    in_degrees: Array  # rotation (3, 3) of the numbers in degrees
+
+
+class PoseByAngles(NamedTuple):
+    """A pose by angles whose unit is not given."""
+
+    row: Array  # position and rotation (12,) with the angles in radians, base axes
+    angles: Angles
+    advice: str  # the option by which the angles are read in degrees
+
+
 def typed_pose_mistake(parameters: Parameters, pose: Sequence[float]) -> str:
     """Return the likely mistake in a pose X Y Z ALPHA BETA GAMMA as a user types it."""
-    row = np.append(pose[:3], from_euler(np.array(pose[3:])))
-    return pose_mistake(parameters, row, angles=np.array(pose[3:]))
+    angles = np.array(pose[3:])
+    return pose_mistake(parameters, np.append(pose[:3], from_euler(angles)), angles=Angles(
+        float(np.abs(angles).max()), from_euler(0.5 * angles), from_euler(np.radians(angles))))
 
 
 def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
-                 first: bool = True, angles: Array | None = None) -> str:
+                 first: bool = True, angles: Angles | None = None) -> str:
     """
     Return the likely mistake in the pose of a row of motion; empty without one.
 
     first: whether the motion begins there; on the other side of a singularity is a mistake then.
-    angles: alpha, beta, gamma in place of a quaternion, which may be in degrees.
+    angles: of the rotation, which may be in degrees.
 
     Without a home pose only a position in mm is named.
     """
@@ -76,9 +95,10 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
             np.all(lengths >= shortest) and np.all(lengths <= longest))
 
     with np.errstate(all='ignore'):
-        if is_possible(position, rotation):
+        turns = angles is not None and angles.largest > math.pi  # no platform turns so far
+        if not turns and is_possible(position, rotation):
             return ''
-        known = _MM, _FROM_HOME, _W_FIRST if angles is None else _DEGREES
+        known = _MM, _FROM_HOME, _W_FIRST if angles is None else IN_DEGREES
         # The fewest mistakes first.
         for each in (each for number in (1, 2, 3) for each in combinations(known, number)):
             at, turned = position, rotation
@@ -91,10 +111,10 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
                 if 2.0 * w * w < 1.0:
                     continue  # no platform turns so far
                 turned = np.reshape(from_quaternion(x, y, z, w), (3, 3))
-            if _DEGREES in each:
-                if angles is None or np.abs(angles).max() < _TILTED:
-                    continue  # an angle that large is not reachable, a smaller one may be meant
-                turned = from_euler(np.radians(angles))
+            if IN_DEGREES in each:
+                if angles is None or angles.largest < _TILTED and is_possible(at, angles.half):
+                    continue  # such an angle is not far from those that are reached
+                turned = angles.in_degrees
             if _FROM_HOME in each:
                 at, turned = home.position + at, turned @ home.rotation
             if is_possible(at, turned):
