@@ -23,6 +23,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics  # noqa: E402, I100
 
 Array = NDArray[np.float64]
 FILE = Parameters.from_yaml(Path(__file__).parents[1] / 'config' / 'platform.yaml')
+Y_UP = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 FLOAT = 2e-7  # resolution of positions of joints, which are single-precision
 
 
@@ -83,7 +84,8 @@ def test_five_loops_are_excluded_from_the_articulation_and_the_rest_is_a_tree() 
     for name in ('leg_{}_universal', 'leg_{}', 'leg_{}_platform_joint'):
         for n in range(1, 7):
             joint = joints[name.format(n)]
-            (parent,), (child,) = joint.GetBody0Rel().GetTargets(), joint.GetBody1Rel().GetTargets()
+            parent, child = (each.GetTargets()[0] for each in (
+                joint.GetBody0Rel(), joint.GetBody1Rel()))
             assert parent in reached
             assert joint.GetExcludeFromArticulationAttr().Get() or child not in reached
             reached.add(child)
@@ -133,10 +135,9 @@ def test_masses_inertias_limits_drives_and_gravity_are_those_of_the_file() -> No
 
 
 def other_usd(units: str) -> str:
-    """Return a hexapod as another tool writes it: y up, in cm, joints with a scope of their own."""
+    """Return a hexapod as another tool writes it, in cm with y up, joints beside the bodies."""
     p = FILE
-    meters, up = (0.01, 'Y') if units == 'cm' else (1.0, 'Z')
-    turn = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]) if up == 'Y' else np.eye(3)
+    meters, up, turn = (0.01, 'Y', Y_UP) if units == 'cm' else (1.0, 'Z', np.eye(3))
     home = StewartPlatform(p).home_pose()
     tips = home.position + p['geometry.platform_joints'] @ home.rotation.T
     stage = Usd.Stage.CreateInMemory()
@@ -194,8 +195,7 @@ def test_the_usd_of_another_tool_is_read_in_its_units(units: str, tmp_path: Path
     found = read_hexapod(file)
     p = found.parameters
     assert (p['base_frame'], p['platform_frame']) == ('ground', 'plate')
-    turn = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]) if (
-        units == 'cm') else np.eye(3)
+    turn = Y_UP if units == 'cm' else np.eye(3)
     for name in ('geometry.base_joints', 'geometry.platform_joints'):
         assert p[name] == pytest.approx(FILE[name] @ turn.T, abs=1e-6)
     assert p['gravity'] == pytest.approx(turn @ [0.0, 0.0, -9.80665], abs=1e-5)

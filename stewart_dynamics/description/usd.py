@@ -7,11 +7,11 @@ A hexapod as USD with UsdPhysics: rigid bodies, joints, drives; for Isaac Sim an
 The world's axes are base axes, in which gravity is given. A solver of articulations (reduced
 coordinates) needs a tree: the platform hangs on the first leg, and the ball joints of the other
 five have ``excludeFromArticulation``, so that they close the loops. Solvers of maximal coordinates
-ignore the flag. ``body0`` of each joint is the parent in the tree. The positions of the legs' joints
+ignore the flag. ``body0`` of each joint is the parent in the tree. Positions of the legs' joints
 are counted from the home pose.
 
-Coulomb friction, reflected mass and the limit of the rate have no attribute in UsdPhysics: they are
-written for Newton and for PhysX. ``physxJoint:jointFriction`` is a number without unit, and not
+Coulomb friction, reflected mass and the limit of the rate have no attribute in UsdPhysics, but in
+the schemas of Newton and PhysX. ``physxJoint:jointFriction``, a number without unit, is not
 written. Attributes are single-precision: attributes ``stewart_dynamics:...`` of the model have the
 parameters in full.
 """
@@ -81,8 +81,8 @@ def usd(hexapod: Hexapod, name: str) -> str:
     writer = _Writer(stage, str(root.GetPath()))
     looks = shapes(hexapod, uris=False)
     writer.body(massless(hexapod.base_body), np.zeros(3), np.eye(3), looks[hexapod.base])
-    writer.joint('Fixed', f'{hexapod.base_body}_to_world', None, hexapod.base_body, np.zeros(3), np.eye(3),
-                 np.zeros(3))
+    writer.joint('Fixed', f'{hexapod.base_body}_to_world', None, hexapod.base_body, np.zeros(3),
+                 np.eye(3), np.zeros(3))
     writer.body(hexapod.platform_body, hexapod.position, hexapod.rotation,
                 looks[hexapod.platform])
     for n, leg in enumerate(hexapod.legs):
