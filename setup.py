@@ -181,6 +181,7 @@ setup(
     cmdclass={'build_ext': BuildCore} | (
         {'bdist_wheel': Wheel} if hasattr(bdist_wheel, 'get_tag') else {}),
     package_data={package_name: ['py.typed'], f'{package_name}.core': ['*.c', '*.h'],
+                  f'{package_name}.ros': ['one_host.xml'],
                   f'{package_name}.calibration': ['templates/*'],
                   f'{package_name}.cueing': ['templates/*'],
                   f'{package_name}.datasheet': ['templates/*'],

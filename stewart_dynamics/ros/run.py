@@ -26,6 +26,7 @@ from stewart_dynamics.ros.console_scripts import parameter_files
 from stewart_dynamics.ros.rclpy_workarounds import reject_impossible_times, shut_down, spin
 from stewart_dynamics.ros.security import check_environment, without_security_libraries
 from stewart_dynamics.ros.signal_flag import SIGNALS
+from stewart_dynamics.ros.transports import leave_shared_memory
 
 # Errors that the user can correct: reported in one line. All others are defects of this package.
 _OF_THE_USER = (StewartError, RCLError, NameValidationException)
@@ -49,6 +50,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         for stray in remove_ros_args(sys.argv)[1:]:
             raise ParameterError(f'{stray}: unknown argument; see --help')
         warning = check_environment(sys.argv)
+        leave_shared_memory()
         reject_impossible_times()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         logger = get_logger(kind.node)

@@ -22,10 +22,12 @@ from xml.etree import ElementTree
 from stewart_dynamics.errors import StewartError
 
 _OLD, _NEW = 'FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'
+PROFILE_VARIABLES = _OLD, _NEW
+BUILTIN_TRANSPORTS, RANGE = 'FASTDDS_BUILTIN_TRANSPORTS', 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 # Discovery ranges with which a profile keeps its transports; ROS takes any other for LOCALHOST.
-_RANGES = ('', 'SYSTEM_DEFAULT', 'SUBNET', 'OFF')
+WIDE_RANGES = ('', 'SYSTEM_DEFAULT', 'SUBNET', 'OFF')
 # Files of profiles that Fast DDS 2 and 3 load from the working folder.
-_REPLACING = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
+DEFAULT_FILES = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
 _VARIABLE = re.compile(r'\$\{([A-Z_][A-Z0-9_]*)\}')  # in the syntax of Fast DDS
 _COMMENT = re.compile('<!--.*?-->', re.DOTALL)
 _KEY_FILES = ('private_key_file', 'cert_chain_file', 'verify_file')
@@ -157,13 +159,13 @@ def _check_profile(path: Path) -> None:
 
 def _check_that_nothing_replaces(path: Path) -> None:
     """Raise StewartError where ROS or Fast DDS adds transports to those of the profile."""
-    discovery = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
-    if discovery not in _RANGES or os.environ.get('ROS_LOCALHOST_ONLY') == '1':
+    discovery = os.environ.get(RANGE, '')
+    if discovery not in WIDE_RANGES or os.environ.get('ROS_LOCALHOST_ONLY') == '1':
         raise StewartError(f'{PROFILES}: {path}: is not in effect where '
                            'ROS_AUTOMATIC_DISCOVERY_RANGE is LOCALHOST, as which ROS reads '
                            'unknown values, too: it adds shared memory and UDP on all addresses. '
                            'Set it to SYSTEM_DEFAULT, and ROS_LOCALHOST_ONLY not at all')
-    for name in _REPLACING:
+    for name in DEFAULT_FILES:
         if os.environ.get('SKIP_DEFAULT_XML_FILE') != '1' and Path(name).exists():
             raise StewartError(f'{PROFILES}: {path}: is replaced by {name} in the working folder '
                                'where SKIP_DEFAULT_XML_FILE is not 1')
