@@ -173,16 +173,18 @@ class Program:
             self._process = subprocess.Popen(
                 command, stdout=output, stderr=output, stdin=subprocess.DEVNULL)
 
-    @property
-    def last_line(self) -> str:
-        """Return the last line that it has printed."""
-        return (self._output.read_text(errors='replace').splitlines() or ['no output'])[-1]
+    def last_line(self, without: str = '\n') -> str:
+        """Return the last line that it has printed, of those without some words."""
+        lines = self._output.read_text(errors='replace').splitlines()
+        return ([line for line in lines if without not in line] or ['no output'])[-1]
 
     def check(self) -> None:
         """Raise Failure if it has ended, unless the reference motion is complete."""
         code = self._process.poll()
         if code or (code == 0 and self.name != 'stewart_trajectory'):
-            raise Failure(f'{self.name} ended with exit code {code}: {self.last_line}')
+            # It waits for others at each start: that is not why it has ended.
+            line = self.last_line(without='time stands still')
+            raise Failure(f'{self.name} ended with exit code {code}: {line}')
 
     def stop(self) -> None:
         """Terminate it, if it still runs."""
@@ -238,7 +240,7 @@ def simulate(commands: Mapping[str, Sequence[str | Path]], files: Mapping[str, S
                 progress(reached)
             if now - since > PATIENCE:
                 raise Failure(f'no progress at {reached * 1e-9:.3f} s; ' + '; '.join(
-                    f'{each.name}: {each.last_line}' for each in programs))
+                    f'{each.name}: {each.last_line()}' for each in programs))
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / 'given.yaml'

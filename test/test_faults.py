@@ -19,12 +19,16 @@ import numpy as np
 import pytest
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from rclpy.time import Time
 from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from running import (
     bits, DynamicsNode, ERROR, FEEDER, Feeder, HOME, log_lines, MOVING, nanoseconds, NODE,
     NOT_JOINED, OK, OUTPUTS, Peer, Planner, Program, raw, ROOT, Sample, says, SEPARATE, STALE,
     STEP, WARN, wrench_message)
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.ros.security import PROFILES
 
@@ -170,6 +174,62 @@ def test_simulated_time_stands_still_and_jumps(begin: Start) -> None:
 
     node.until(said, 'a negative time is rejected')
     node.answer(MOVING)
+
+
+def test_a_clock_that_jumps_back_by_little_is_followed(begin: Start) -> None:
+    """As of a simulation that is started again at once; its setpoint may come before /clock."""
+    node = begin('use_sim_time:=true')
+    clock = node.peer.writer('/clock', Clock)
+    node.until(lambda: clock.get_subscription_count() > 0, 'it hears the clock')
+
+    def until_answered(stamp: int, condition: str) -> None:
+        def answered() -> bool:
+            clock.publish(Clock(clock=Time(nanoseconds=stamp).to_msg()))
+            node.peer.spin(0.1)
+            return any(nanoseconds(state.header.stamp) == stamp
+                       for state in node.received('leg_states'))
+
+        node.until(answered, condition)
+
+    for stamp in (1_050_000_000, 1_000_000_000):
+        node.send(MOVING, stamp)
+        until_answered(stamp, f'{stamp} ns is answered')
+    for topic in SEPARATE:  # until the clock had come
+        node.rejects(topic, 'older than the last used')
+
+
+def test_in_simulated_time_a_late_subscriber_gets_the_last_answer(begin: Start) -> None:
+    """The clock may wait for it; a force is given again to none that had it."""
+    node = begin('use_sim_time:=true')
+    stamp = nanoseconds(node.answer(MOVING).header.stamp)
+    late = Peer(node.domain, 'late')
+    try:
+        states = late.listen('/stewart_dynamics/leg_states', JointState)
+        forces = late.listen('/stewart_dynamics/leg_forces', Float64MultiArray)
+        late.until(lambda: states, 'the last answer comes')
+        assert nanoseconds(deserialize_message(states[0], JointState).header.stamp) == stamp
+        node.until(lambda: len(node.raw['leg_states']) == 2, 'others get it again')
+        late.until(lambda: late.node.count_subscribers('/stewart_dynamics/leg_forces') == 2,
+                   'both are there')
+        assert not forces
+        node.raw['leg_states'].pop()
+    finally:
+        late.close()
+
+
+def test_in_simulated_time_a_setpoint_that_came_while_inactive_is_answered(begin: Start) -> None:
+    node = begin('use_sim_time:=true')
+    clock = node.peer.writer('/clock', Clock)
+    assert node.change(Transition.TRANSITION_DEACTIVATE)
+    stamp = 2_000_000_000
+    node.send(MOVING, stamp)
+    while not node.received('leg_states'):
+        clock.publish(Clock(clock=Time(nanoseconds=stamp).to_msg()))
+        node.peer.spin(0.1)
+        if node.state == 'active':
+            assert node.change(Transition.TRANSITION_DEACTIVATE)
+        assert node.change(Transition.TRANSITION_ACTIVATE)
+    node.check(node.received('leg_states')[-1], node.result_of(MOVING))
 
 
 # Topics that are late or too many

@@ -255,6 +255,39 @@ def test_the_motion_restarts_with_the_clock(start: Start) -> None:
     assert all('it restarts' in warning for warning in warnings)
 
 
+def test_in_simulated_time_a_late_subscriber_gets_the_last_setpoint(
+        start: Start, domain: int) -> None:
+    trajectory = start(MOTION.format(kind='sine', more=COMBINED), 'use_sim_time:=true')
+    trajectory.at(SECOND, 1)
+    trajectory.at(SECOND + PERIOD, 2)
+    late = Peer(domain, 'late')
+    try:
+        heard = late.listen(f'/stewart_dynamics/{TOPIC[0]}', INPUTS[TOPIC[0]])
+        late.until(lambda: heard, 'the last one comes')
+        assert heard[0] == trajectory.raw[TOPIC[0]][1]
+    finally:
+        late.close()
+    trajectory.program.kill()
+
+
+def test_in_simulated_time_the_motion_waits_for_subscribers(start: Start) -> None:
+    trajectory = start(MOTION.format(kind='hold', more='start_timeout: 0.1'),
+                       'use_sim_time:=true', 'target:=nobody')
+    words = 'waiting for a subscriber of /nobody/setpoint/pose, /nobody/setpoint/twist'
+
+    def said() -> bool:
+        trajectory._clock.publish(Clock(clock=Time(nanoseconds=SECOND).to_msg()))
+        return words in trajectory.program.stderr
+
+    trajectory.peer.until(said, 'it says so')
+    assert 'begun' not in trajectory.program.stderr
+    heard = trajectory.peer.listen('/nobody/setpoint/pose', INPUTS['setpoint/pose'])
+    for topic in ('twist', 'accel'):
+        trajectory.peer.listen(f'/nobody/setpoint/{topic}', INPUTS[f'setpoint/{topic}'])
+    trajectory.peer.until(lambda: heard, 'it begins')
+    trajectory.program.kill()
+
+
 def test_the_motion_waits_for_the_clock(start: Start) -> None:
     trajectory = start(MOTION.format(kind='hold', more='start_timeout: 0.1'),
                        'use_sim_time:=true')

@@ -85,6 +85,15 @@ def nanoseconds(data: bytes, sec: int, nanosec: int) -> int:
     return int(sec) * SECOND + int(nanosec)
 
 
+def stamp_of(data: bytes) -> int | None:
+    """Return the stamp of a message that has a header [ns]; None if it cannot be read."""
+    try:
+        sec, nanosec, _ = TIME_AND_LENGTH[data[1]].unpack_from(data, 4)
+        return nanoseconds(data, sec, nanosec)
+    except (*READ_ERRORS, MalformedError):
+        return None
+
+
 def text(data: bytes, start: int, size: int) -> bytes:
     """Return a string without its zero byte; the size counts that byte."""
     if size == 0:

@@ -11,7 +11,9 @@ import math
 import time
 from typing import Any, NamedTuple
 
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock, ClockType, JumpThreshold
+from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
@@ -22,6 +24,7 @@ from stewart_dynamics.external_wrench.estimate import (
 from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.messages.cdr import stamp_of
 from stewart_dynamics.node.diagnostics.levels import LogLine, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics, TICK
 from stewart_dynamics.node.markers import Markers
@@ -32,6 +35,7 @@ from stewart_dynamics.node.tasks import (
 from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD, TRAVEL
 from stewart_dynamics.parameters.table import AS_MEASURED, Parameters, payload_values
 from stewart_dynamics.planned import trajectory_messages as planned
+from stewart_dynamics.ros.late_subscribers import is_simulated
 from stewart_dynamics.ros.managed_node import ManagedNode
 from stewart_dynamics.ros.rclpy_workarounds import OneShotTimer
 from stewart_dynamics.ros.run import run
@@ -77,6 +81,12 @@ class DynamicsNode(ManagedNode[Parameters]):
         super().__init__(Parameters)
         self._topics = NodeTopics(self)
         self._base_wrench_read = False  # it has a subscriber
+        self._kept: dict[str, bytes] = {}  # last setpoint messages, with use_sim_time
+        self._simulated = is_simulated(self)
+        if self._simulated:
+            self._jumps = self.get_clock().create_jump_callback(
+                JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1),
+                              on_clock_change=False), post_callback=self._on_clock_back)
         self._planned: TaskQueue[planned.PlannedOutcome] = TaskQueue(
             partial(OneShotTimer, self, PAUSE), self._on_outcome)
         self._payload = PayloadService(self, self._identify_payload, self._on_payload)
@@ -104,6 +114,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._gathering = False  # a task answers them after the messages received
         self._state = FIRST  # of the step
         self._last: tuple[Batch, Outputs] | None = None  # the last answered setpoint
+        self._answered: dict[str, bytes] = {}  # its messages, with use_sim_time
         publishers, rate = self._topics.publishers, parameters.visualization_rate
         self._markers = PublisherAtRate(publishers.get(MARKERS), rate, Markers(parameters).write)
         self._joint_states = PublisherAtRate(
@@ -122,16 +133,45 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._model_messages = ModelMessages(self._settings)
         self._topics.make(self._settings, self._on_setpoint, self._on_base, {
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
-            planned.INPUT: self._on_trajectory})
+            planned.INPUT: self._on_trajectory}, self._publish_again)
+        self._kept.clear()
         self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
         self._exclusive = self._settings.setpoint.exclusive
 
     def close_topics(self) -> None:
         self._topics.destroy()
 
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin to work; a simulation may wait for the answer to a setpoint that came before."""
+        done = super().on_activate(state)
+        self._take_kept()
+        return done
+
+    # -- a simulation whose clock waits for answers -----------------------------------------
+
+    def _on_clock_back(self, jump: Any) -> None:
+        """Follow /clock where it jumps back, also by less than ``setpoint.timeout``."""
+        if self._active:
+            self._setpoints.restart('/clock has jumped back')
+            self._take_kept()
+
+    def _take_kept(self) -> None:
+        """Take the last messages again that are not of a time to come."""
+        now = self._ros_time()
+        for topic, data in list(self._kept.items()):
+            if (stamp_of(data) or 0) <= now:
+                self._on_setpoint(topic, data)
+
+    def _publish_again(self, topic: str) -> None:
+        """Publish the last answer on a topic again, if there was one on it."""
+        if self._active and topic in self._answered:
+            self._topics.publishers[topic].publish(self._answered[topic])
+
     # -- setpoints: from the topic to the published answer ----------------------------------
 
     def _on_setpoint(self, topic: str, data: bytes) -> None:
+        if self._simulated:
+            self._kept[topic] = data
         if not self._active:
             return
         came = time.monotonic()
@@ -182,8 +222,12 @@ class DynamicsNode(ManagedNode[Parameters]):
             self._setpoints.reject('setpoint', OUT_OF_RANGE, stamp_words(int(setpoint.stamps[0])))
             return
         publishers = self._topics.publishers
-        for topic, _, messages in self._messages.of(outputs):
-            publishers[topic].publish(messages.tobytes())
+        answered = {topic: messages.tobytes()
+                    for topic, _, messages in self._messages.of(outputs)}
+        for topic, message in answered.items():
+            publishers[topic].publish(message)
+        if self._simulated:
+            self._answered = answered
         if self._base_wrench_read:
             topic, known, messages = self._messages.of_base_wrenches(
                 outputs.stamps, self._models.base_wrench(setpoint))

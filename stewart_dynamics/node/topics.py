@@ -29,6 +29,7 @@ from stewart_dynamics.messages import type_names
 from stewart_dynamics.node.tasks import LENGTH
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned import trajectory_messages as planned
+from stewart_dynamics.ros.late_subscribers import for_late_subscribers
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.input_messages import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
@@ -137,6 +138,9 @@ PUBLISHED = (
 
 _INPUTS = {topic.name: topic for topic in SUBSCRIBED}
 
+# Their messages have a stamp, by which a repetition is known as such.
+_STAMPED = LEG_STATES, MOTOR_STATES
+
 
 class NodeTopics:
     """
@@ -156,7 +160,8 @@ class NodeTopics:
 
     def make(self, parameters: Parameters, on_setpoint: Callable[[str, bytes], None],
              on_base: Callable[[str, bytes], None],
-             others: Mapping[str, Callable[[bytes], None]]) -> None:
+             others: Mapping[str, Callable[[bytes], None]],
+             publish_again: Callable[[str], None]) -> None:
         """
         Create all publishers and subscriptions.
 
@@ -165,6 +170,8 @@ class NodeTopics:
         on_setpoint, on_base: called with topic and bytes of a message on a setpoint topic, or on
             one of the base.
         others: called with the bytes of a message on each of the other topics.
+        publish_again: called with a topic that a subscriber has joined late, see
+            ``for_late_subscribers``.
         Raises ParameterError: ``publish_tf`` needs a package that is not installed.
         """
         there = {MARKERS: parameters.visualization_rate > 0.0, TF: parameters.publish_tf}
@@ -172,7 +179,7 @@ class NodeTopics:
         there[MOTOR_STATES] = there[MOTOR_TORQUES] = bool(parameters.drives)
         for topic in PUBLISHED:
             if there.get(topic.name, True):
-                self._publish(topic)
+                self._publish(topic, publish_again)
         # The executor takes messages in the order of the subscriptions: a setpoint needs the
         # earlier messages of the base.
         self.base, self.setpoints = ({
@@ -197,12 +204,14 @@ class NodeTopics:
         while self._destroy:
             self._destroy.pop()()
 
-    def _publish(self, topic: Topic) -> None:
+    def _publish(self, topic: Topic, publish_again: Callable[[str], None]) -> None:
         durability = (DurabilityPolicy.TRANSIENT_LOCAL if topic.latched
                       else DurabilityPolicy.VOLATILE)
         publisher = self._node.create_publisher(
             _message_class(topic.kind), topic.ros_name,
-            QoSProfile(depth=topic.depth, durability=durability))
+            QoSProfile(depth=topic.depth, durability=durability),
+            event_callbacks=for_late_subscribers(
+                self._node, partial(publish_again, topic.name), once=topic.name not in _STAMPED))
         self._destroy.append(partial(self._node.destroy_publisher, publisher))
         self.publishers[topic.name] = publisher
 

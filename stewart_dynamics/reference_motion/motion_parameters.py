@@ -98,7 +98,7 @@ class ReferenceMotionParameters(ParameterSet):
     rate: float = declare('rate of the setpoints', 'Hz', 100.0, minimum=1e-3, maximum=1e4)
     start_timeout: float = declare(
         'the motion starts half a second after all its topics have subscribers, at the latest '
-        'after this time', 's', 5.0, minimum=0.0, maximum=86400.0)
+        'after this time; with use_sim_time never before', 's', 5.0, minimum=0.0, maximum=86400.0)
     loop: bool = declare(
         'repeat until stopped: paper and quintic back and forth; sine, fourier and hold without '
         'end', default=False)

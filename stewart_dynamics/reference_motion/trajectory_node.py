@@ -19,6 +19,7 @@ from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_count, sample_time
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.declared_parameters import declare_parameters, MADE_WITH
+from stewart_dynamics.ros.late_subscribers import is_simulated
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
 
@@ -26,6 +27,8 @@ from stewart_dynamics.ros.setpoint_publisher import SetpointPublisher
 _BLOCK = 256
 
 _SETTLE = 500_000_000  # [ns]
+_PATIENCE = 2 * SECOND  # after which a wait is logged [ns]
+_AGAIN = 5.0  # interval of these lines [s]
 
 
 class TrajectoryNode(Node):
@@ -33,7 +36,8 @@ class TrajectoryNode(Node):
     Publishes the motion's samples when they are due, then holds the final pose or is done.
 
     With ``use_sim_time`` they are due by /clock and published as soon as it comes: a simulation
-    may run as fast or as slowly as it can, or wait for the answers to it.
+    may run as fast or as slowly as it can, or wait for the answers to it. The motion begins once
+    there is a clock and all topics have subscribers, however long that takes.
 
     done: gets the exit code after the last sample.
 
@@ -54,11 +58,12 @@ class TrajectoryNode(Node):
         self._setpoints = SetpointPublisher(
             self, target, self._settings.output, self._settings.base_frame)
         self._begun = self._subscribed = False
-        self._start = time.monotonic_ns() + round(self._settings.start_timeout * SECOND)
+        self._made = time.monotonic_ns()
+        self._start = self._made + round(self._settings.start_timeout * SECOND)
         self._timer = self.create_timer(
             1.0 / self._settings.rate, self._on_timer,
             clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._simulated = self.get_parameter('use_sim_time').value
+        self._simulated = is_simulated(self)
         if self._simulated:
             self._jumps = self.get_clock().create_jump_callback(
                 JumpThreshold(min_forward=Duration(nanoseconds=1),
@@ -119,24 +124,30 @@ class TrajectoryNode(Node):
 
     def _wait(self, now: int) -> None:
         """Begin when it is time, which comes sooner once all topics have subscribers."""
-        publishers = self._setpoints.publishers
-        if not self._subscribed and all(p.get_subscription_count() for p in publishers):
+        missing = ', '.join(publisher.topic_name for publisher in self._setpoints.publishers
+                            if not publisher.get_subscription_count())
+        if not self._subscribed and not missing:
             self._subscribed = True
             # A subscriber may discover the publisher later than the publisher discovers it.
             if now < -_SETTLE:
                 self._start += now + _SETTLE
                 now = -_SETTLE
         stamp = self.get_clock().now().nanoseconds
-        if now >= 0 and not stamp:  # simulated time stands at zero until there is a clock
-            self.get_logger().warning('waiting for /clock', once=True)
+        if self._simulated and not self._subscribed:  # the clock would wait for their answers
+            self._log_waiting(f'a subscriber of {missing}')
+        elif now >= 0 and not stamp:  # simulated time stands at zero until there is a clock
+            self._log_waiting('/clock')
         elif now >= 0:
             self._begun = True
             if not self._subscribed:
-                self.get_logger().warning('begun, but not every topic has a subscriber: '
-                                          + ', '.join(p.topic_name for p in publishers
-                                                      if not p.get_subscription_count()))
+                self.get_logger().warning(
+                    f'begun, but not every topic has a subscriber: {missing}')
             self._start += now
             self._stamp = stamp
+
+    def _log_waiting(self, what: str) -> None:
+        if time.monotonic_ns() - self._made > _PATIENCE:
+            self.get_logger().warning(f'waiting for {what}', throttle_duration_sec=_AGAIN)
 
     def _row(self) -> list[list[float]]:
         """Return position, quaternion and the four rates of the sample that is due."""

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import (
@@ -15,6 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 from stewart_dynamics.parameters.table import COMBINED
+from stewart_dynamics.ros.late_subscribers import for_late_subscribers
 from stewart_dynamics.setpoints import input_messages as inputs
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
@@ -33,17 +35,25 @@ class SetpointPublisher:
     def __init__(self, node: Node, target: str, output: str, frame: str) -> None:
         self._frame = frame
         self._combined = output == COMBINED
+        self._last: tuple[Any, ...] = ()
         kinds = {inputs.COMBINED: MultiDOFJointTrajectory} if self._combined else {
             inputs.POSE: PoseStamped, inputs.TWIST: TwistStamped, inputs.ACCEL: AccelStamped}
-        self.publishers = [node.create_publisher(kind, f'{target}/{topic}', QoSProfile(depth=1000))
-                           for topic, kind in kinds.items()]
+        self.publishers = [
+            node.create_publisher(
+                kind, f'{target}/{topic}', QoSProfile(depth=1000),
+                event_callbacks=for_late_subscribers(node, partial(self._publish_again, n)))
+            for n, (topic, kind) in enumerate(kinds.items())]
 
     def publish(self, row: SetpointRow, stamp: Any) -> None:
         """Publish a setpoint with a stamp, a builtin_interfaces/Time."""
         header = Header(stamp=stamp, frame_id=self._frame)
-        messages = (_combined if self._combined else _separate)(header, row)
-        for publisher, message in zip(self.publishers, messages, strict=True):
+        self._last = (_combined if self._combined else _separate)(header, row)
+        for publisher, message in zip(self.publishers, self._last, strict=True):
             publisher.publish(message)
+
+    def _publish_again(self, n: int) -> None:
+        if self._last:
+            self.publishers[n].publish(self._last[n])
 
 
 def _separate(header: Header, row: SetpointRow) -> tuple[Any, ...]:

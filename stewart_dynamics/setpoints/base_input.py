@@ -143,8 +143,12 @@ class BaseInput:
     def restarted(self, stamp: int) -> None:
         """Discard samples later than the stamp [ns] of a setpoint that is a restart."""
         if self._samples and self._samples[-1][0] > stamp + self._restart:
-            self._samples.clear()
-            self.joining.restart('before setpoints restarted')
+            self.restart('before setpoints restarted')
+
+    def restart(self, why: str) -> None:
+        """Follow samples of any time from now on, and none before."""
+        self._samples.clear()
+        self.joining.restart(why)
 
     def join_many(self, messages: Messages, places: Mapping[str, Integers]) -> Joined | None:
         """Join messages, see ``SampleJoining.join_many``."""

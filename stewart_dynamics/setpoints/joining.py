@@ -74,6 +74,7 @@ class Setpoints:
             dict.fromkeys(QUANTITIES, TWIST) | dict.fromkeys(RATES, ACCEL))
         self.unknown_angles: Sequence[PoseByAngles] = ()
         """Poses of a table by angles without a unit, which are checked at the end."""
+        self._restarting = False  # the next setpoint is a restart
         self.recorded: int | None = None
         """Time of recording [ns] of the message of a block that is being processed."""
 
@@ -154,6 +155,7 @@ class Setpoints:
                 self.base.take(topic, data, now)
             elif (sample := self._joining.take(topic, data, now)) is not None:
                 stamp, values, restart, stamped = sample
+                restart, self._restarting = restart or self._restarting, False
                 # Twist and acceleration are zero if only the pose is given.
                 motion = values if len(values) == MOTION else (*values, *_STANDSTILL)
                 self._first = self._first or motion
@@ -179,6 +181,12 @@ class Setpoints:
         self.base.joining.end(why)
         for consistency in self._checks:
             consistency.finish()
+
+    def restart(self, why: str) -> None:
+        """Follow setpoints and base from any time on; the next setpoint is a restart."""
+        self._restarting = True
+        self._joining.restart(why)
+        self.base.restart(why)
 
     def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
         """Count and report messages that are not used."""

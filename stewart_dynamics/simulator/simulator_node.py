@@ -27,12 +27,13 @@ from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
 from stewart_dynamics.ros.declared_parameters import declare_parameters, MADE_WITH
 from stewart_dynamics.ros.due_periods import DuePeriods
+from stewart_dynamics.ros.late_subscribers import for_late_subscribers, is_simulated
 from stewart_dynamics.ros.managed_node import keep_present_objects
 from stewart_dynamics.ros.repeated_log import RepeatedLog, WARNING
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signal_flag import SIGNALS
 from stewart_dynamics.setpoints.input_messages import WrenchInput
-from stewart_dynamics.setpoints.output_messages import MOTOR_STATES
+from stewart_dynamics.setpoints.output_messages import LEG_STATES, MOTOR_STATES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
 from stewart_dynamics.simulator.moving_base import BaseOfTopics, BasePeriod, GeneratedBase
 from stewart_dynamics.simulator.plant import Plant, PlantState
@@ -54,6 +55,7 @@ _QUEUE = 1000
 # Simulated time begins here [ns]: zero is no stamp.
 _BEGIN = SECOND
 _ANNOUNCE_SECONDS = 0.1
+_PATIENCE = 20  # announcements without a command after which it is said that time stands still
 _WATCH_SECONDS = 1.0
 
 NOT_SIX = 'not six numbers'
@@ -78,7 +80,7 @@ class SimulatorNode(Node):
     def __init__(self) -> None:
         super().__init__(SimulatorParameters.node, **MADE_WITH)
         self._settings = declare_parameters(self, SimulatorParameters)
-        self._stepped = bool(self.get_parameter('use_sim_time').value)
+        self._stepped = is_simulated(self)
         self._log = RepeatedLog(self.get_logger())
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
@@ -104,16 +106,20 @@ class SimulatorNode(Node):
         rate: float = self._settings.rate
         self._periods = DuePeriods(rate, partial(self._say, 'late'), _BEGIN)
         qos = QoSProfile(depth=_QUEUE)
-        self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
-                         for topic, kind in self._output_types().items()}
+        self._messages: list[tuple[str, bytes]] = []
+        self._outputs = {
+            topic: self.create_publisher(
+                _TYPES[kind], f'~/{topic}', qos,
+                event_callbacks=for_late_subscribers(self, partial(self._publish_again, topic)))
+            for topic, kind in self._output_types().items()}
         inputs: dict[str, Callable[[bytes], None]] = {
             'commands': self._on_commands, 'wrench': self._wrench_input.take}
         if isinstance(self._base, BaseOfTopics):
             inputs.update({topic: partial(self._on_base, self._base, topic)
                            for topic in BASE_TYPES})
-        for topic, take in inputs.items():
-            self.create_subscription(
-                _TYPES[{**INPUT_TYPES, **BASE_TYPES}[topic]], f'~/{topic}', take, qos, raw=True)
+        self._inputs = {topic: self.create_subscription(
+            _TYPES[{**INPUT_TYPES, **BASE_TYPES}[topic]], f'~/{topic}', take, qos, raw=True)
+            for topic, take in inputs.items()}
         self.get_logger().info(
             f'dynamics ready after {time.monotonic() - begun:.1f} s; ' + (
                 'one period for each command' if self._stepped else 'in real time')
@@ -123,6 +129,7 @@ class SimulatorNode(Node):
             self._move_base()
             self._messages = self._messages_now()
             self._announcing = self._timer(_ANNOUNCE_SECONDS, self._announce)
+            self._announced = 0  # since the last command
         else:
             self._timer(1.0 / rate, self._on_time)
         self._timer(_WATCH_SECONDS, self._on_watch)
@@ -163,6 +170,7 @@ class SimulatorNode(Node):
         self._commanded = self._index
         if self._stepped:
             self._announcing.reset()
+            self._announced = 0
             self._advance()
 
     def _on_base(self, base: BaseOfTopics, topic: str, data: bytes) -> None:
@@ -220,12 +228,24 @@ class SimulatorNode(Node):
             self._publish()
         else:
             self._publish_clock()  # its subscribers are best effort and may have lost it
+        self._announced += 1
+        if self._announced >= _PATIENCE:
+            topics = self._inputs['commands'].topic_name, self._outputs[LEG_STATES].topic_name
+            self._say('standing', f'time stands still at {self._index / self._settings.rate:.3f} s'
+                      f' since the start: no command for {_PATIENCE * _ANNOUNCE_SECONDS:g} s; '
+                      f'{topics[0]} has {self.count_publishers(topics[0])} publishers, '
+                      f'{topics[1]} {self.count_subscribers(topics[1])} subscribers')
 
     def _publish(self) -> None:
         for topic, message in self._messages:
             self._outputs[topic].publish(message)
         if self._stepped:
             self._publish_clock()
+
+    def _publish_again(self, topic: str) -> None:
+        for each, message in self._messages:
+            if each == topic:
+                self._outputs[topic].publish(message)
 
     def _publish_clock(self) -> None:
         self._clock_output.publish(clock(self._periods.stamp_of(self._index)))
