@@ -16,6 +16,7 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
+from stewart_dynamics.messages.received import shown_text
 
 
 def main() -> None:
@@ -46,7 +47,7 @@ def main() -> None:
         for each in (signal.SIGINT, signal.SIGTERM):
             signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C
         rclpy.try_shutdown()
-    print(answer.result().message)
+    print(shown_text(answer.result().message))
     sys.exit(not answer.result().success)
 
 

@@ -12,9 +12,12 @@ It receives the UDP packets of a game and publishes sensor_msgs/Imu on /stewart_
   xplane12   X-Plane 12: the same, where angular velocities are roll, pitch, yaw in deg/s
 
 Packets have no stamp of a clock that others know: they get the time at which they come. OutSim has
-accelerations without gravity in axes of the world, X-Plane has specific forces in g. Malformed
-packets, and those that are older than the last, are counted and dropped.
-Its options follow the format: --port 4123 --address 0.0.0.0.
+accelerations without gravity in axes of the world, X-Plane has specific forces in g. Packets with
+other numbers than a game has, and those that are older than the last, are counted and dropped.
+
+It hears games on this computer. For a game on another one, --address is the address of this
+computer in the network of the game: then everybody there can move the hexapod.
+Its options follow the format: --port 4123 --address 192.168.1.10.
 """
 
 import argparse
@@ -24,6 +27,7 @@ import struct
 import sys
 
 import numpy as np
+from stewart_dynamics.messages.received import checked_numbers, ReceivedError
 
 GRAVITY = 9.80665
 # The axes of a game, by how each of forward, left and up is made of them: (axis, sign).
@@ -32,10 +36,7 @@ XPLANE_AXES = ((0, 1.0), (1, -1.0), (2, -1.0))  # x forward, y right, z down
 _OUTSIM = struct.Struct('<I12f3i')
 _XPLANE_ROW = struct.Struct('<i8f')
 _G_LOAD, _ANGULAR_VELOCITY = 4, 16
-
-
-class NotOfTheGame(ValueError):
-    """A packet that is not of the format."""
+LARGEST = 1e4  # of any number that is used, in the units of the game
 
 
 def to_vehicle(vector, axes, axial=False):
@@ -70,10 +71,11 @@ class OutSim:
     def read(self, packet):
         """Return specific force [m/s^2] and angular velocity [rad/s]; None: an old packet."""
         if len(packet) not in (_OUTSIM.size, _OUTSIM.size + 4):
-            raise NotOfTheGame(f'{len(packet)} bytes: must be {_OUTSIM.size}, or with an ID '
-                               f'{_OUTSIM.size + 4} (OutSim Opts must be 0)')
+            raise ReceivedError(f'{len(packet)} bytes: must be {_OUTSIM.size}, or with an ID '
+                                f'{_OUTSIM.size + 4} (OutSim Opts must be 0)')
         milliseconds, *numbers = _OUTSIM.unpack_from(packet)
-        turning, angles, acceleration = np.array(numbers[:9]).reshape(3, 3)
+        turning, angles, acceleration = np.reshape(
+            checked_numbers('OutSim', numbers[:9], 9, LARGEST), (3, 3))
         # A game that is restarted begins at zero again.
         if self._last is not None and 0 < self._last - milliseconds < 1000:
             return None
@@ -95,17 +97,17 @@ class XPlane:
         """Return specific force [m/s^2] and angular velocity [rad/s]; None: no g-load in it."""
         rows, left = divmod(len(packet) - 5, _XPLANE_ROW.size)
         if packet[:4] != b'DATA' or rows < 1 or left:
-            raise NotOfTheGame(f'{len(packet)} bytes, begins with {packet[:4]!r}: must be DATA '
-                               'and rows of 36 bytes')
+            raise ReceivedError(f'{len(packet)} bytes, begins with {packet[:4]!r}: must be DATA '
+                                'and rows of 36 bytes')
         force = None
         for n in range(rows):
             index, *values = _XPLANE_ROW.unpack_from(packet, 5 + n * _XPLANE_ROW.size)
             if index == _ANGULAR_VELOCITY:
-                a, b, c = values[:3]
+                a, b, c = checked_numbers('angular velocities', values[:3], 3, LARGEST)
                 # roll, pitch, yaw [deg/s]; before, pitch, roll, yaw [rad/s]
                 self._turning = np.radians([a, b, c]) if self._twelve else np.array([b, a, c])
             elif index == _G_LOAD:
-                normal, axial, side = values[4:7]
+                normal, axial, side = checked_numbers('g-load', values[4:7], 3, LARGEST)
                 force = GRAVITY * np.array([axial, side, -normal])
         if force is None:
             return None
@@ -136,11 +138,9 @@ def run(options):
                 found = reader.read(receiver.recv(65535))
                 if found is None:
                     continue
-                if not np.isfinite(found).all():
-                    raise NotOfTheGame('a number is not finite')
             except TimeoutError:
                 continue
-            except NotOfTheGame as exc:
+            except ReceivedError as exc:
                 dropped += 1
                 if dropped == 1 or dropped % 1000 == 0:
                     node.get_logger().warning(f'packet dropped ({dropped} so far): {exc}')
@@ -156,22 +156,26 @@ def run(options):
 def main():
     import rclpy
     from rclpy.utilities import remove_ros_args
+    from stewart_dynamics.ros.transports import leave_shared_memory
 
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('format', choices=FORMATS)
     parser.add_argument('--port', type=int, default=4123, help='UDP port (default: %(default)s)')
-    parser.add_argument('--address', default='0.0.0.0',
-                        help='of this computer; 127.0.0.1: of games on it (default: %(default)s)')
+    parser.add_argument('--address', default='127.0.0.1',
+                        help='address of this computer on which games are heard; 0.0.0.0: all of '
+                        'them (default: %(default)s, games on this computer)')
     if {'-h', '--help'} & set(sys.argv[1:]):
         parser.parse_args(['--help'])
+    # A process that joins could make publish() wait for a third of a second.
+    leave_shared_memory()
     try:
         rclpy.init()
     except RuntimeError as exc:  # bad ROS arguments
         sys.exit(f'game_telemetry: {exc}')
     try:
         run(parser.parse_args(remove_ros_args(sys.argv)[1:]))
-    except OSError as exc:
+    except (OSError, OverflowError) as exc:  # address or port
         sys.exit(f'game_telemetry: {exc}')
     except (KeyboardInterrupt, rclpy._rclpy_pybind11.RCLError):
         pass

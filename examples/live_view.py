@@ -6,6 +6,9 @@ Example: the hexapod live in a browser, with the use of its force limits and its
 
 It reads ~/markers, which the node makes at visualization_rate (30 Hz) after its answers, and
 /diagnostics: no topic at the rate of the setpoints. Needs websockets.
+
+The page is for browsers on this computer: it is served on 127.0.0.1 and by the names of this
+computer alone, and only pages that come from there get pictures (no other page in the browser).
 """
 
 import argparse
@@ -17,15 +20,19 @@ import signal
 import sys
 import threading
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-from visualization_msgs.msg import MarkerArray
+from stewart_dynamics.messages.received import checked_numbers, ReceivedError, shown_text
+from visualization_msgs.msg import Marker, MarkerArray
 
 PAGE = Path(__file__).with_name('live_view.html')
-LEVELS = 'OK', 'WARN', 'ERROR', 'STALE'
+LEVELS = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.WARN: 'WARN',
+          DiagnosticStatus.ERROR: 'ERROR', DiagnosticStatus.STALE: 'STALE'}
+MOST_STATUSES = 100
+OWN_NAMES = 'localhost', '127.0.0.1', '[::1]'
 
 
 class View(Node):
@@ -39,27 +46,50 @@ class View(Node):
         self.create_subscription(DiagnosticArray, '/diagnostics', self.on_diagnostics, 10)
 
     def on_markers(self, message: MarkerArray) -> None:
-        found = {(each.ns, each.id): each for each in message.markers}
-        body = found['platform', 1]
-        pose = body.pose
+        try:
+            picture = picture_of({(each.ns, each.id): each for each in message.markers})
+        except ReceivedError as exc:
+            self.get_logger().warning(f'markers dropped: {exc}', throttle_duration_sec=5.0)
+            return
         self.count += 1
-        self.text = json.dumps({
-            'count': self.count,
-            'base': [[p.x, p.y, p.z] for p in found['base', 1].points],
-            'joints': [[p.x, p.y, p.z] for p in body.points],
-            'position': [pose.position.x, pose.position.y, pose.position.z],
-            'orientation': [pose.orientation.x, pose.orientation.y, pose.orientation.z,
-                            pose.orientation.w],
-            'names': [found['names', n].text for n in range(6)],
-            'colors': [[c.r, c.g, c.b] for c in (found['pistons', n].color for n in range(6))],
-            'text': found['singularity', 0].text, 'statuses': self.statuses})
+        self.text = json.dumps({'count': self.count, **picture, 'statuses': self.statuses})
 
     def on_diagnostics(self, message: DiagnosticArray) -> None:
         own = f'{self.get_namespace().rstrip("/")}/stewart_dynamics'.lstrip('/')
         for status in message.status:
-            node, _, name = status.name.partition(': ')
-            if node == own:
-                self.statuses[name] = [LEVELS[status.level[0]], status.message]
+            node, _, name = shown_text(status.name).partition(': ')
+            if node == own and (name in self.statuses or len(self.statuses) < MOST_STATUSES):
+                self.statuses[name] = [LEVELS.get(status.level, '?'), shown_text(status.message)]
+
+
+def picture_of(markers: dict[tuple[str, int], Marker]) -> dict[str, object]:
+    """Return the numbers and texts of the page; raise ReceivedError without all of its markers."""
+    needed = [('platform', 1), ('base', 1), ('singularity', 0),
+              *((part, n) for part in ('names', 'pistons') for n in range(6))]
+    missing = [f'{name} {n}' for name, n in needed if (name, n) not in markers]
+    if missing:
+        raise ReceivedError(f'lacks {", ".join(missing)}')
+
+    def points(name: str) -> list[list[float]]:
+        numbers = checked_numbers(
+            name, [number for p in markers[name, 1].points for number in (p.x, p.y, p.z)], 18)
+        return [numbers[n:n + 3] for n in range(0, 18, 3)]
+
+    position, q = markers['platform', 1].pose.position, markers['platform', 1].pose.orientation
+    colors = [markers['pistons', n].color for n in range(6)]
+    return {
+        'base': points('base'), 'joints': points('platform'),
+        'position': checked_numbers('position', [position.x, position.y, position.z], 3),
+        'orientation': checked_numbers('orientation', [q.x, q.y, q.z, q.w], 4),
+        'names': [shown_text(markers['names', n].text) for n in range(6)],
+        'colors': [checked_numbers('color', [c.r, c.g, c.b], 3, 1.0) for c in colors],
+        'text': '\n'.join(map(shown_text, markers['singularity', 0].text.split('\n')[:100]))}
+
+
+def is_own(hosts: list[str], origins: list[str]) -> bool:
+    """Return whether a request is for this computer by its own name, and from no other page."""
+    return (len(hosts) == 1 and hosts[0].rpartition(':')[0] in OWN_NAMES
+            and all(origin == f'http://{hosts[0]}' for origin in origins))
 
 
 async def serve(view: View, port: int, rate: float, ended: threading.Event) -> None:
@@ -68,6 +98,8 @@ async def serve(view: View, port: int, rate: float, ended: threading.Event) -> N
     from websockets.exceptions import ConnectionClosed
 
     def page(connection, request):
+        if not is_own(*map(request.headers.get_all, ('Host', 'Origin'))):
+            return connection.respond(HTTPStatus.FORBIDDEN, 'for pages of this computer only\n')
         if request.path == '/live':
             return None
         response = connection.respond(HTTPStatus.OK, PAGE.read_text(encoding='utf-8'))
@@ -118,12 +150,14 @@ def main() -> None:
 
     thread = threading.Thread(target=run)
     thread.start()
-    while not signals and thread.is_alive():
-        rclpy.spin_once(view, timeout_sec=0.1)
-    ended.set()
-    thread.join()
-    view.destroy_node()
-    rclpy.shutdown()
+    try:
+        while not signals and thread.is_alive():
+            rclpy.spin_once(view, timeout_sec=0.1)
+    finally:  # the server ends with this thread, whatever ends it
+        ended.set()
+        thread.join()
+        view.destroy_node()
+        rclpy.shutdown()
     if failed:
         sys.exit(failed[0])
 

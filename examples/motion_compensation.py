@@ -35,6 +35,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from stewart_dynamics import Motion, Pose, StewartError, StewartPlatform
+from stewart_dynamics.ros.transports import leave_shared_memory
 
 TYPES = {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
 
@@ -157,6 +158,8 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: signals.append(number))
     # The handlers of rclpy would shut ROS down in the middle of a callback.
+    # A process that joins could make publish() wait for a third of a second.
+    leave_shared_memory()
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as exc:  # bad ROS arguments

@@ -34,6 +34,8 @@ from sensor_msgs.msg import JointState
 from stewart_dynamics import Capability, Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_euler, to_quaternion
+from stewart_dynamics.messages.received import (
+    checked_joints, checked_numbers, ReceivedError, shown_text)
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from trajectory_msgs.msg import (
@@ -94,21 +96,41 @@ class Planner(Node):
         self.motions = self.create_publisher(
             MultiDOFJointTrajectory, 'stewart_dynamics/platform_trajectory', 1)
         self.answer = self.create_subscription(
-            JointTrajectory, 'stewart_dynamics/leg_trajectory', self.answers.append, 1)
+            JointTrajectory, 'stewart_dynamics/leg_trajectory', self.on_answer, 1)
         self.create_subscription(DiagnosticArray, '/diagnostics', self.on_diagnostics, 10)
         self.legs: dict[str, float] = {}
         self.measured = self.create_subscription(
             JointState, 'stewart_dynamics/measured_legs', self.on_legs, qos_profile_sensor_data)
 
     def on_legs(self, message: JointState) -> None:
-        self.legs = dict(zip(message.name, message.position, strict=False))
+        try:
+            found = checked_joints(message)['position']
+        except ReceivedError as exc:
+            self.get_logger().warning(
+                f'measured legs dropped: {exc}', throttle_duration_sec=5.0)
+            return
+        self.legs = dict(zip(message.name, found, strict=True))
 
     def on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.connected |= status.name.startswith('stewart_dynamics: ')
             if status.name == 'stewart_dynamics: planned trajectory':
-                values = {pair.key: pair.value for pair in status.values}
-                self.rejected, self.reason = int(values['rejected']), status.message
+                count = {pair.key: pair.value for pair in status.values}.get('rejected', '')
+                if count.isdecimal():
+                    self.rejected, self.reason = int(count), shown_text(status.message)
+
+    def on_answer(self, message: JointTrajectory) -> None:
+        try:
+            legs = len(message.joint_names)
+            for n, point in enumerate(message.points):
+                checked_numbers(f'points[{n}]', point.positions, legs)
+                checked_numbers(f'points[{n}]: effort', point.effort, len(point.effort))
+            if not message.points:
+                raise ReceivedError('no points')
+        except ReceivedError as exc:
+            self.get_logger().warning(f'answer dropped: {exc}')
+            return
+        self.answers.append(message)
 
     def missing(self) -> str:
         """List missing connections: the node answers only once."""
@@ -200,7 +222,7 @@ def main() -> None:
         rclpy.try_shutdown()
     last = answer.points[-1].time_from_start
     line = f'accepted: {len(answer.points)} points over {last.sec + 1e-9 * last.nanosec:g} s'
-    if len(answer.points[0].effort):  # the node's trajectory.effort
+    if all(len(point.effort) for point in answer.points):  # the node's trajectory.effort
         line += f', largest effort {max(np.abs(p.effort).max() for p in answer.points):.0f} N'
     print(line)
 

@@ -20,6 +20,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
+from stewart_dynamics.messages.received import checked_numbers, ReceivedError
 
 SETTLE = 1_000_000_000  # duration of the load by the stamps of the answers [ns]
 
@@ -40,6 +41,14 @@ class Pusher(Node):
             WrenchStamped, 'stewart_dynamics/external_wrench', self.on_found, 1)
 
     def on_found(self, found: WrenchStamped) -> None:
+        stamp, numbers = found.header.stamp, wrench_of(found)
+        try:
+            checked_numbers('external wrench', [*numbers[0], *numbers[1]], 6)
+            if stamp.sec < 0:
+                raise ReceivedError(f'stamp {stamp.sec} s: must be at least 0')
+        except ReceivedError as exc:
+            self.get_logger().warning(f'external wrench dropped: {exc}')
+            return
         self.found = found
 
     def wait(self, timeout: float) -> WrenchStamped:
@@ -63,9 +72,12 @@ class Pusher(Node):
         return found
 
 
+def wrench_of(found: WrenchStamped) -> list:
+    return [[three.x, three.y, three.z] for three in (found.wrench.force, found.wrench.torque)]
+
+
 def text(found: WrenchStamped) -> str:
-    force, moment = ([round(number, 1) + 0.0 for number in (three.x, three.y, three.z)]
-                     for three in (found.wrench.force, found.wrench.torque))
+    force, moment = ([round(number, 1) + 0.0 for number in three] for three in wrench_of(found))
     return f'{force} N, {moment} N m'
 
 

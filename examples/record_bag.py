@@ -34,6 +34,17 @@ NODES = ('/stewart_dynamics/', '/stewart_simulator/')
 DEPTH = 1000  # messages that wait while the disk is slow
 
 
+def message_class(kind: str) -> type | None:
+    """Return the class of a type of ROS itself; None for others, and where it is not installed."""
+    if kind not in TYPES.types:
+        return None
+    package, _, name = kind.split('/')
+    try:
+        return getattr(importlib.import_module(f'{package}.msg'), name)
+    except (AttributeError, ImportError):
+        return None
+
+
 class Recorder(Node):
     """Writes messages as they arrive, with the time of their arrival."""
 
@@ -51,14 +62,14 @@ class Recorder(Node):
                     topic.endswith('/joint_states') or any(node in topic for node in NODES)))
             if is_wanted and topic not in self.counts and self.count_publishers(topic):
                 self.counts[topic] = 0
-                if len(types) == 1 and types[0] in TYPES.types:
-                    self.record(topic, types[0])
+                kind = message_class(types[0]) if len(types) == 1 else None
+                if kind:
+                    self.record(topic, types[0], kind)
                 else:
                     print(f'{topic}: not recorded: {" and ".join(types)}', file=sys.stderr)
 
-    def record(self, topic: str, kind: str) -> None:
-        package, _, name = kind.split('/')
-        connection = self.writer.add_connection(topic, kind, typestore=TYPES)
+    def record(self, topic: str, name: str, kind: type) -> None:
+        connection = self.writer.add_connection(topic, name, typestore=TYPES)
         # The strictest profile that all publishers match: latched messages are recorded as well.
         offered = [each.qos_profile for each in self.get_publishers_info_by_topic(topic)]
         qos = QoSProfile(
@@ -70,8 +81,7 @@ class Recorder(Node):
                 each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offered)
             else DurabilityPolicy.VOLATILE)
         self.create_subscription(
-            getattr(importlib.import_module(f'{package}.msg'), name), topic,
-            partial(self.write, topic, connection), qos, raw=True)
+            kind, topic, partial(self.write, topic, connection), qos, raw=True)
 
     def write(self, topic: str, connection: object, data: bytes) -> None:
         self.writer.write(connection, self.get_clock().now().nanoseconds, data)

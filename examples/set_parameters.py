@@ -22,6 +22,7 @@ from rclpy.parameter import get_parameter_value, parameter_dict_from_yaml_file
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
+from stewart_dynamics.messages.received import shown_text
 import yaml
 
 
@@ -76,7 +77,7 @@ def main() -> None:
         rclpy.try_shutdown()
     result = answer.result().result
     if not result.successful:
-        sys.exit(f'set_parameters: {result.reason}')
+        sys.exit(f'set_parameters: {shown_text(result.reason)}')
     print(f'{len(parameters)} parameters of {options.node} set')
 
 

@@ -18,9 +18,11 @@ import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
+from stewart_dynamics.messages.received import shown_text
 
 LEVELS = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.WARN: 'WARN',
           DiagnosticStatus.ERROR: 'ERROR', DiagnosticStatus.STALE: 'STALE'}
+MOST_STATUSES = 1000
 
 
 class Monitor(Node):
@@ -33,13 +35,17 @@ class Monitor(Node):
 
     def on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            state = status.level, re.sub(r'[\d.]+', '', status.message)
-            if self.values or self.last.get(status.name) != state:
-                print(f'{LEVELS.get(status.level, "?"):5}  {status.name}: {status.message}')
-            self.last[status.name] = state
+            name, text = shown_text(status.name), shown_text(status.message)
+            state = status.level, re.sub(r'[\d.]+', '', text)
+            if self.values or self.last.get(name) != state:
+                print(f'{LEVELS.get(status.level, "?"):5}  {name}: {text}')
+            self.last.pop(name, None)
+            self.last[name] = state
+            if len(self.last) > MOST_STATUSES:  # the one that is silent for longest
+                del self.last[next(iter(self.last))]
             if self.values:
                 for pair in status.values:
-                    print(f'         {pair.key}: {pair.value}')
+                    print(f'         {shown_text(pair.key)}: {shown_text(pair.value)}')
         sys.stdout.flush()
 
 

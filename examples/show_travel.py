@@ -17,8 +17,10 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import Float64MultiArray
+from stewart_dynamics.messages.received import checked_numbers, ReceivedError
 
 HALF = 25
+AXES = 'x', 'y', 'z', 'rx', 'ry', 'rz'
 
 
 class Panel(Node):
@@ -31,16 +33,22 @@ class Panel(Node):
             Float64MultiArray, 'stewart_dynamics/travel', self.on_travel, 1)
 
     def on_travel(self, message: Float64MultiArray) -> None:
+        try:
+            # The largest finite number: no limit on the way.
+            values = checked_numbers('travel', message.data, 12, sys.float_info.max)
+        except ReceivedError as exc:
+            self.get_logger().warning(f'dropped: {exc}', throttle_duration_sec=5.0)
+            return
         if self.rows and sys.stdout.isatty():
             print(f'\x1b[{self.rows}A', end='')
-        axes, values = message.layout.dim[0].label.split(), message.data
-        for n, (axis, full) in enumerate(zip(axes, self.full, strict=True)):
+        for n, (axis, full) in enumerate(zip(AXES, self.full, strict=True)):
             least, most = values[2 * n:2 * n + 2]
-            left, right = (round(HALF * min(each / full, 1.0)) for each in (least, most))
+            left, right = (round(HALF * min(max(each / full, 0.0), 1.0))
+                           for each in (least, most))
             scale, unit = (1e3, 'mm') if n < 3 else (180.0 / math.pi, 'deg')
             print(f'{axis:>2} {-least * scale:9.1f} {"#" * left:>{HALF}}|{"#" * right:<{HALF}} '
                   f'{most * scale:9.1f} {unit}')
-        self.rows = len(axes)
+        self.rows = len(AXES)
         sys.stdout.flush()
 
 

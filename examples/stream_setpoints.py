@@ -32,6 +32,8 @@ from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 from stewart_dynamics import approach, Capability, Motion, Pose, StewartError, StewartPlatform
+from stewart_dynamics.messages.received import checked_joints, ReceivedError
+from stewart_dynamics.ros.transports import leave_shared_memory
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
 RATE = 100.0  # setpoints per second
@@ -69,7 +71,13 @@ class Stream(Node):
                                            ('accel', AccelStamped))]
 
     def on_legs(self, message: JointState) -> None:
-        self.legs = dict(zip(message.name, message.position, strict=False))
+        try:
+            found = checked_joints(message)['position']
+        except ReceivedError as exc:
+            self.get_logger().warning(
+                f'measured legs dropped: {exc}', throttle_duration_sec=5.0)
+            return
+        self.legs = dict(zip(message.name, found, strict=True))
 
     def on_answer(self, message: JointState) -> None:
         self.answered |= len(message.effort) > 0  # forces flow
@@ -138,6 +146,8 @@ def main() -> None:
     parser.add_argument('--timeout', type=float, default=10.0,
                         help='for measured legs, and for the first answer of the node [s]')
     # The handlers of rclpy would shut ROS down in the middle of a call.
+    # A process that joins could make publish() wait for a third of a second.
+    leave_shared_memory()
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as exc:  # bad ROS arguments

@@ -78,7 +78,10 @@ def publish(parser: argparse.ArgumentParser) -> None:
     import rclpy
     from rclpy.utilities import remove_ros_args
     from sensor_msgs.msg import Imu
+    from stewart_dynamics.ros.transports import leave_shared_memory
 
+    # A process that joins could make publish() wait for a third of a second.
+    leave_shared_memory()
     try:
         rclpy.init()
     except RuntimeError as exc:  # bad ROS arguments

@@ -16,10 +16,11 @@ import numpy as np
 import pytest
 from referees import ROOT
 from snapshot import Snapshot
+from stewart_dynamics.messages.received import ReceivedError
 
 sys.path.insert(0, str(ROOT / 'examples'))
 from game_telemetry import (  # noqa: E402, I100, I202
-    GRAVITY, NotOfTheGame, OutSim, outsim_rotation, to_vehicle, XPlane)
+    GRAVITY, OutSim, outsim_rotation, to_vehicle, XPlane)
 
 
 def outsim(milliseconds: int = 1000, turning: Any = (0.0,) * 3, angles: Any = (0.0,) * 3,
@@ -83,7 +84,7 @@ def test_left_handed_axes_turn_the_other_way() -> None:
     (OutSim(), b''), (OutSim(), bytes(272)), (XPlane(12), b'RREF,' + bytes(36)),
     (XPlane(12), b'DATA*'), (XPlane(12), b'DATA*' + bytes(35))])
 def test_other_packets_are_rejected(reader: Any, packet: bytes, snapshot: Snapshot) -> None:
-    with snapshot.raises(NotOfTheGame):
+    with snapshot.raises(ReceivedError):
         reader.read(packet)
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import re
 import signal
 import sys
+import time
 from types import ModuleType
 from typing import Any
 
@@ -20,8 +21,9 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.serialization import deserialize_message
+from rosgraph_msgs.msg import Clock
 from running import (
-    assert_only_log_lines, nanoseconds, own_domain, Peer, PLATFORM, Program, ROOT)
+    assert_only_log_lines, executable, nanoseconds, own_domain, Peer, PLATFORM, Program, ROOT)
 from sensor_msgs.msg import JointState
 from snapshot import Snapshot
 from std_msgs.msg import Float64MultiArray
@@ -199,3 +201,145 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
     finally:
         program.kill()
         peer.close()
+
+
+def test_after_a_gap_the_controller_returns_slowly_and_within_the_limits_of_force(
+        domain: int, tmp_path: Path) -> None:
+    """The desired lengths have gone on by 150 mm: stiffness times distance is 60 kN."""
+    limit = StewartPlatform.from_yaml(PLATFORM).parameters.limits.force_max[0]
+    names = StewartPlatform.from_yaml(PLATFORM).parameters.joints
+    program = Program([sys.executable, CONTROLLER, '--ros-args', '-p', 'timeout:=0.5', '-p',
+                       f'params_file:={PLATFORM}', '-p', 'proportional_gain:=4e5', '-p',
+                       'derivative_gain:=1.6e4'], domain, tmp_path)
+    peer = Peer(domain)
+    peer.watched = program
+    commands = peer.listen('/stewart_simulator/commands', Float64MultiArray)
+    measured, desired = (peer.writer(f'/{node}/leg_states', JointState)
+                         for node in ('stewart_simulator', 'stewart_dynamics'))
+
+    def state(position: float) -> JointState:
+        return JointState(name=names, position=[position] * 6, velocity=[0.0] * 6,
+                          effort=[300.0] * 6)
+
+    def last() -> Any:
+        return np.array(deserialize_message(commands[-1], Float64MultiArray).data)
+
+    def until_commanded(target: float, force: float, tolerance: float) -> None:
+        def came() -> bool:
+            desired.publish(state(target))
+            measured.publish(state(0.3))
+            peer.spin(0.02)
+            return bool(commands) and bool(np.all(np.abs(last() - force) <= tolerance))
+
+        peer.until(came, f'{force:g} N at {target:g} m')
+
+    try:
+        until_commanded(0.3, 300.0, 1e-6)
+        for stalled in (desired, measured):  # the node, and then the controller or the drives
+            begun, running = time.monotonic(), measured if stalled is desired else desired
+            while time.monotonic() - begun < 1.0:
+                running.publish(state(0.3))
+                peer.spin(0.02)
+            commands.clear()
+            # From the measured lengths, not from where the desired ones are by now ...
+            until_commanded(0.45, 300.0, 200.0)
+            # ... to them, with at most the largest force.
+            until_commanded(0.45, limit, 1e-6)
+            assert max(np.abs(deserialize_message(each, Float64MultiArray).data).max()
+                       for each in commands) <= limit
+            until_commanded(0.3, 300.0, 1e-6)
+    finally:
+        program.kill()
+        peer.close()
+
+
+COMMANDS: dict[str, list[str | Path]] = {
+    'simulator': [executable('stewart_simulator'), '--ros-args', '--params-file', PLATFORM,
+                  '--params-file', ROOT / 'config' / 'simulator.yaml'],
+    'node': [executable('stewart_dynamics'), '--ros-args', '--params-file', PLATFORM,
+             '-r', '~/measured_legs:=/stewart_simulator/leg_states'],
+    'controller': [sys.executable, CONTROLLER, '--ros-args', '-p', f'params_file:={PLATFORM}'],
+    'trajectory': [executable('stewart_trajectory'), '--ros-args', '--params-file', MOTION,
+                   '-p', 'rate:=500.0']}
+
+
+class SimulatedLoop:
+    """The loop of docs/simulator.md with ``use_sim_time``, and the clock as others see it."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        self._domain, self._folder = domain, folder
+        self.programs: dict[str, Program] = {}
+        self.peer = Peer(domain)
+        self._clocks = self.peer.listen('/clock', Clock)
+
+    def start(self, name: str) -> None:
+        """Start a program, for the first time or again."""
+        self.programs[name] = Program(
+            [*COMMANDS[name], '-p', 'use_sim_time:=true'], self._domain,
+            self._folder / f'{name}_{len(list(self._folder.glob(name + "_*")))}')
+
+    def until_it_runs(self) -> None:
+        """Wait until the clock has advanced by 50 ms more."""
+        self._clocks.clear()
+
+        def runs() -> bool:
+            times = [nanoseconds(deserialize_message(data, Clock).clock)
+                     for data in (*self._clocks[:1], *self._clocks[-1:])]
+            return bool(times) and times[-1] - times[0] >= 50_000_000
+
+        self.peer.until(runs, 'the loop runs')
+
+    def until_said(self, name: str, words: str) -> None:
+        """Wait until a program has said something."""
+        self.peer.until(lambda: words in self.programs[name].stderr, f'{name}: {words}')
+
+    def close(self) -> None:
+        """End all."""
+        for program in self.programs.values():
+            program.kill()
+        self.peer.close()
+
+
+@pytest.fixture
+def simulated(domain: int, tmp_path: Path) -> Iterator[SimulatedLoop]:
+    """Return a loop without programs."""
+    loop = SimulatedLoop(domain, tmp_path)
+    yield loop
+    loop.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('order', [
+    ('trajectory', 'simulator', 'controller', 'node'),
+    ('node', 'trajectory', 'simulator', 'controller'),
+    ('controller', 'node', 'trajectory', 'simulator')], ids=lambda order: order[-1])
+def test_with_simulated_time_the_loop_begins_once_its_last_program_is_there(
+        simulated: SimulatedLoop, order: tuple[str, ...]) -> None:
+    """Each of them waits, and those that are first to stop the clock say so."""
+    for name in order[:-1]:
+        simulated.start(name)
+    for name, words in (
+            ('simulator', 'time stands still at 0.000 s since the start: no command for 2 s'),
+            ('trajectory', 'waiting for ' + (
+                '/clock' if order[-1] == 'simulator' else 'a subscriber of')),
+            ('controller', 'waiting for 2 s and more: no ' + (
+                'measured state' if order[-1] == 'simulator' else 'desired state'))):
+        if name != order[-1] and not (name == 'trajectory' and order[-1] == 'controller'):
+            simulated.until_said(name, words)
+    simulated.start(order[-1])
+    simulated.until_it_runs()
+
+
+@pytest.mark.slow
+def test_with_simulated_time_the_loop_goes_on_after_any_of_its_programs_is_started_again(
+        simulated: SimulatedLoop) -> None:
+    for name in COMMANDS:
+        simulated.start(name)
+    simulated.until_it_runs()
+    for name in ('controller', 'node', 'trajectory', 'simulator'):
+        simulated.programs[name].kill()
+        if name != 'simulator':
+            simulated.until_said('simulator', 'time stands still')
+            simulated.programs['simulator'].forget()
+        simulated.start(name)
+        simulated.until_it_runs()
