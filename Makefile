@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
   bench-replay clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
-  lint lint-flake8 lint-layers lint-mypy lint-ruff test tools
+  lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff test tools
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -89,7 +89,7 @@ test: $(if $(VERSIONS),$(TOOLS),lint)
 
 # Beside one another: mypy and flake8 take nearly the same time.
 lint: $(TOOLS)
-	@$(MAKE) --no-print-directory --jobs --output-sync lint-mypy lint-flake8 lint-ruff lint-layers
+	@$(MAKE) --no-print-directory --jobs --output-sync lint-mypy lint-flake8 lint-pep257 lint-ruff lint-layers
 
 lint-flake8: $(TOOLS)
 	$(VENV)/bin/python -m flake8
@@ -99,6 +99,12 @@ lint-layers: $(TOOLS)
 
 lint-mypy: $(TOOLS)
 	$(VENV)/bin/python -m mypy
+
+# Its list of all files is printed only where it finds something.
+lint-pep257: $(TOOLS)
+	@mkdir -p $(CACHE)
+	@$(VENV)/bin/ament_pep257 setup.py $(filter-out build/ install/ log/,$(wildcard */)) \
+	  > $(CACHE)/pep257 2>&1 || { grep -v ^checking $(CACHE)/pep257; false; }
 
 lint-ruff: $(TOOLS)
 	$(VENV)/bin/python -m ruff check --quiet .

@@ -246,9 +246,9 @@ def test_many_entries_are_rejected_before_they_are_read(snapshot: Snapshot) -> N
     no_name = struct.pack('<I', 0)
     reader = JointStateReader(('leg_1',))
     for read, data in (
-            (reader.read_one, header + entries),
-            (reader.read_one, header + no_name + entries),
-            (reader.read_one, header + 3 * no_name + entries),
+            (reader.read, header + entries),
+            (reader.read, header + no_name + entries),
+            (reader.read, header + 3 * no_name + entries),
             (float64_values, b'\0\1\0\0' + entries),
             (float64_values, b'\0\1\0\0' + 2 * no_name + entries)):
         with little_memory(), snapshot.raises(MalformedError):
@@ -259,7 +259,7 @@ def test_long_names_are_cut_in_the_details_of_a_rejection() -> None:
     names = ['x' * 1_000_000, *map(str, range(100))]
     data = serialize_message(JointState(name=names))
     with pytest.raises(JointStateError) as caught:
-        JointStateReader(('leg_1',)).read_one(data)
+        JointStateReader(('leg_1',)).read(data)
     assert caught.value.details == (
         f'leg_1; there are {"x" * 60}, {", ".join(map(str, range(59)))}')
 

@@ -176,6 +176,25 @@ def test_limited_tilt_is_that_of_an_integration() -> None:
     np.testing.assert_allclose(motion.angular_velocity[:, 0], exact.y[1], atol=1e-8)
 
 
+@pytest.mark.parametrize('rate', [3.0, 20.0, 60.0, 300.0])
+def test_tilt_is_never_faster_than_its_limit(rate: float) -> None:
+    """Also where the input is slower than the filter, and the law changes its side in between."""
+    random = np.random.default_rng(round(rate))
+    for _ in range(60):
+        frequency, damping = 10.0 ** random.uniform(-0.3, 2.0), random.choice([0.5, 1.0, 5.0])
+        rate_max = 10.0 ** random.uniform(-2.5, 0.3)
+        cueing = cueing_of(GAIN_1, {
+            'cueing.govern': False, 'cueing.translation.gain': [0.0] * 3,
+            'cueing.rotation.gain': [0.0] * 3, 'cueing.tilt.rate_max': rate_max,
+            'cueing.tilt.natural_frequency': [frequency] * 2,
+            'cueing.tilt.damping': [damping] * 2})
+        times = np.cumsum(random.uniform(0.5, 1.5, 200)) / rate
+        force = AT_REST + np.outer(
+            random.normal(size=200), 10.0 ** random.uniform(-1.0, 1.5) * np.eye(3)[0])
+        motion = cueing.run(times, force)
+        assert np.abs(motion.angular_velocity[:, 1]).max() <= rate_max
+
+
 @pytest.mark.parametrize('changes', [{}, {'cueing.govern': False}, {
     'cueing.translation.gain': [3.0] * 3, 'cueing.rotation.gain': [3.0] * 3}])
 def test_pieces_give_the_same_bits(changes: dict[str, Any]) -> None:

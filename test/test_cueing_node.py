@@ -94,12 +94,12 @@ class Cueing:
 
     @property
     def complete(self) -> int:
-        """The number of setpoints of which all topics have come."""
+        """Return the number of setpoints of which all topics have come."""
         return min(map(len, self.raw.values()))
 
     @property
     def last(self) -> Array:
-        """The last row; far away without one."""
+        """Return the last row; far away without one."""
         if self.complete != self._decoded:
             self._decoded = self.complete
             self._last = np.array(self.row(self.complete - 1)[1])
@@ -120,7 +120,7 @@ class Cueing:
 
     @property
     def status(self) -> Any:
-        """The last status."""
+        """Return the last status."""
         return deserialize_message(self.diagnostics[-1], DiagnosticArray).status[0]
 
 

@@ -98,7 +98,7 @@ def one_by_one(reader: JointStateReader, messages: Sequence[bytes],
     found, values, rejected = [], [], Counter[str]()
     for data in messages:
         try:
-            stamp, numbers = reader.read_one(data)
+            (stamp, numbers), = reader.read(data)
         except MalformedError:
             rejected[MALFORMED] += 1
         except JointStateError as exc:
@@ -143,14 +143,14 @@ def test_values_are_field_by_field_in_the_order_of_the_joints(fields: list[str])
     data = joint_state(7, names, given['effort'].tolist(), positions=7, velocities=7)
     expected = tuple(number for field in fields for number in given[field][5::-1].tolist())
     for _ in range(2):
-        assert JointStateReader(JOINTS, fields).read_one(data) == (7, expected)
+        assert JointStateReader(JOINTS, fields).read(data) == [(7, expected)]
 
 
 def test_only_fields_that_are_wanted_must_be_there() -> None:
     data = joint_state(7, JOINTS, range(6), positions=6)
-    assert JointStateReader(JOINTS, ['position', 'effort']).read_one(data)[0] == 7
+    assert JointStateReader(JOINTS, ['position', 'effort']).read(data)[0][0] == 7
     with pytest.raises(JointStateError) as caught:
-        JointStateReader(JOINTS).read_one(data)
+        JointStateReader(JOINTS).read(data)
     assert (caught.value.reason, caught.value.details) == ('without velocity', '6 names')
 
 

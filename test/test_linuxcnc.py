@@ -44,7 +44,7 @@ def unit(vectors: Array) -> Array:
 
 
 def joints(values: dict[str, float], motion: Motion) -> Array:
-    """Return the joints (N, 6) [mm] of genhexkins, by X Y Z [mm] and A B C [degrees]."""
+    """Return the (N, 6) joints [mm] of genhexkins, by X Y Z [mm] and A B C [degrees]."""
     def vectors(name: str) -> Array:
         return np.array([[values[f'{name}.{leg}.{axis}'] for axis in 'xyz'] for leg in range(6)])
 

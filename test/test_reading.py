@@ -26,13 +26,15 @@ from stewart_dynamics.description.mjcf import mjcf
 from stewart_dynamics.description.recognition import read_hexapod
 from stewart_dynamics.description.sdf import sdf, upright
 from stewart_dynamics.description.urdf import urdf
+from stewart_dynamics.description.usd import usd
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 
 PROGRAM = 'stewart_describe'
 
 PLATFORM = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
-WRITERS = {'urdf': urdf, 'sdf': sdf, 'xml': mjcf}
+WRITERS = {'urdf': urdf, 'sdf': sdf, 'xml': mjcf, 'usda': usd}
 EXACT = 1e-12
+READ_BY = {'xml': 'mujoco', 'usda': 'pxr'}
 # Parameters that all formats have elements for.
 OF_FORMATS = ('geometry.base_joints', 'geometry.platform_joints', 'platform.inertia',
               'platform.mass', 'legs.piston.mass', 'legs.piston.center_of_mass',
@@ -51,9 +53,9 @@ def machines():
 
 
 def written(p, kind, folder, change=lambda text: text):
-    """Return the file of a hexapod; an MJCF is read by MuJoCo, where that is installed."""
-    if kind == 'xml':
-        pytest.importorskip('mujoco')
+    """Return the file of a hexapod; MJCF and USD are read by packages, where these are there."""
+    if kind in READ_BY:
+        pytest.importorskip(READ_BY[kind])
     path = folder / f'hexapod.{kind}'
     path.write_text(change(WRITERS[kind](Hexapod(p), 'hexapod')), encoding='utf-8')
     if kind == 'urdf' and change is foreign:  # whose loops are beside it
@@ -63,6 +65,8 @@ def written(p, kind, folder, change=lambda text: text):
 
 def foreign(text):
     """Return a document without what stewart_describe has added to its format."""
+    if text.startswith('#usda'):
+        return '\n'.join(line for line in text.splitlines() if 'stewart_dynamics:' not in line)
     root = ET.fromstring(text)
     for parent in [*root.iter()]:
         for child in [*parent]:
@@ -133,7 +137,8 @@ MASSLESS = PLATFORM.replaced({'legs.piston.mass': 0.0, 'legs.piston.inertia': 0.
                               'limits.force_max': None, 'limits.length_max': None})
 MASS_OF = {'sdf': r'(<link name="{}">.*?<mass>)[^<]*(<)',
            'xml': r'(<body name="{}".*?<inertial [^>]* mass=")[^"]*(")',
-           'urdf': r'(<link name="{}">.*?<mass value=")[^"]*(")'}
+           'urdf': r'(<link name="{}">.*?<mass value=")[^"]*(")',
+           'usda': r'(def Xform "{}".*?float physics:mass = )\S*(\n)'}
 
 
 def edited(pattern, value):
@@ -161,11 +166,14 @@ def test_an_edited_mass_of_the_platform_is_read_and_all_else_stays(kind, p, tmp_
     found = read_hexapod(written(p, kind, tmp_path, change))
     assert found.parameters['platform.mass'] == 250.0
     check_all_else_stays(p, found.parameters)
-    assert not any('edited' in each for each in found.remarks)
+    # USD carries all numbers, because its own are single-precision.
+    assert [each for each in found.remarks if 'edited' in each] == (
+        [each for each in found.remarks if each.startswith('platform.mass: edited in the file')])
+    assert any('edited' in each for each in found.remarks) == (kind == 'usda')
 
 
 @pytest.mark.parametrize('p', [PLATFORM, MASSLESS], ids=['full', 'massless'])
-@pytest.mark.parametrize('kind', ['sdf', 'xml'])
+@pytest.mark.parametrize('kind', ['sdf', 'xml', 'usda'])
 def test_an_edited_mass_of_a_leg_is_read_and_those_of_the_others_stay(
         kind, p, tmp_path, snapshot):
     change = edited(MASS_OF[kind].format('leg_2_piston'), '2.0')
@@ -184,6 +192,10 @@ def test_an_edited_mass_of_a_leg_is_read_and_those_of_the_others_stay(
     ('xml', r'(joint="leg_\d")()', ' ctrlrange="-400 400"', 'limits.force_max', 400.0),
     ('xml', r'(<motor name="leg_\d")()', ' forcerange="-400 400"', 'limits.force_max', 400.0),
     ('xml', r'(range="-[^ "]* )[^" ]*(")', '0.5', 'limits.length_max', 1.8),
+    ('usda', r'(physics:axis = "Z")(\n)', '\n float physics:upperLimit = 0.4',
+     'limits.length_max', 1.7),
+    ('usda', r'(float drive:linear:physics:damping = \S*)(\n)',
+     '\n float drive:linear:physics:maxForce = 400', 'limits.force_max', 400.0),
     ('urdf', r'(effort=")1000000000.0(")', '400', 'limits.force_max', 400.0),
     ('urdf', r'(upper=")11[^"]*(" velocity="0.5")', '0.5', 'limits.length_max', 1.8)])
 def test_a_limit_that_is_added_to_a_file_without_it_is_read(
@@ -208,17 +220,19 @@ def test_an_edited_gravity_or_tilt_and_an_edited_name_are_read(kind, tmp_path):
     p = PLATFORM.replaced({'gravity': [0.0, 0.0, -1.62]})
     tilt = {'sdf': (r'(canonical_link="base">\s*<pose>)[^<]*(<)', '0 0 0 0.1 0 0'),
             'xml': (r'(gravity=")[^"]*(")', f'0 {-1.62 * np.sin(0.1)} {-1.62 * np.cos(0.1)}'),
+            'usda': (r'(gravityDirection = )[^\n]*(\n)', f'(0, {-np.sin(0.1)}, {-np.cos(0.1)})'),
             'urdf': (r'(</material>\s*)(<link name="base">)',
                      '<link name="world"/><joint name="fix" type="fixed"><parent link="world"/>'
                      '<child link="base"/><origin rpy="0.1 0 0"/></joint>')}[kind]
     found = read_hexapod(written(p, kind, tmp_path, edited(*tilt))).parameters['gravity']
     assert found / np.linalg.norm(found) == pytest.approx(
-        [0.0, -np.sin(0.1), -np.cos(0.1)], abs=1e-9)
-    assert (np.linalg.norm(found) == pytest.approx(1.62)) == (kind == 'xml')
+        [0.0, -np.sin(0.1), -np.cos(0.1)], abs=1e-7 if kind == 'usda' else 1e-9)
+    assert (np.linalg.norm(found) == pytest.approx(1.62)) == (kind in ('xml', 'usda'))
     renamed = read_hexapod(written(PLATFORM.replaced({'base_frame': 'world'}), kind, tmp_path,
                                    lambda text: re.sub(
                                        '(?<!element=")(?<!data=")world_base', 'ground', text)))
-    assert renamed.parameters['base_frame'] == ('world' if kind == 'urdf' else 'ground')
+    assert renamed.parameters['base_frame'] == (
+        'world' if kind in ('urdf', 'usda') else 'ground')
 
 
 def at_home(text, hexapod):

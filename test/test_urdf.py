@@ -153,7 +153,7 @@ def test_urdfdom_reads_the_urdf(tmp_path):
 
 
 def test_all_links_have_their_mass_and_inertia_zeros_too():
-    """PyBullet and urchin take 1 kg and 1 kg m^2 for a link without an element ``inertial``."""
+    """Engines such as PyBullet take 1 kg and 1 kg m^2 for a link without ``inertial``."""
     p = Parameters.from_yaml(PLATFORM).replaced(
         {'legs.piston.mass': 0.0, 'legs.piston.inertia': 0.0})
     links = [*ET.fromstring(urdf(Hexapod(p), 'x')).iter('link')]

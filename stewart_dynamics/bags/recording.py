@@ -110,8 +110,10 @@ class Recording:
             return others[0]
         lacking = f'no topic {usual}, and ' if usual else ''
         if others:
+            parts = ('; if each has some of the legs, select them together, separated by commas'
+                     if kind == type_names.JOINT_STATE else '')
             raise BagError(f'{self.path}: has {lacking}several of type {kind}: {joined(others)}: '
-                           f'select one by {option}')
+                           f'select one by {option}{parts}')
         none = f'{lacking}no other of type {kind}' if usual else (
             f'no topic of type {kind} for {option}')
         raise BagError(f'{self.path}: has {none}; it contains {self.contents}{advice}')
@@ -130,7 +132,13 @@ class Recording:
             if other != type_names.TF_MESSAGE or self._reading.child is not None)
 
     def checked_topic(self, name: str, kind: str) -> str:
-        """Return a topic; raise BagError if the bag has no such topic, or one of another type."""
+        """
+        Return a topic; raise BagError if the bag has no such topic, or one of another type.
+
+        Joint states may be in several topics, separated by commas.
+        """
+        if kind == type_names.JOINT_STATE and len(names := topics_in(name)) > 1:
+            return ','.join(self.checked_topic(each, kind) for each in names)
         if name not in self.topics:
             raise BagError(f'{self.path}: has no topic {name}; it contains {self.contents}')
         others = POSE_TYPES if kind == type_names.POSE_STAMPED else ()
@@ -150,8 +158,10 @@ class Recording:
         """
         Yield the messages of some topics, and the number of bytes read for them.
 
-        keys: from topics in the bag to the names under which their messages are given.
+        keys: from topics in the bag, several separated by commas, to the names under which their
+            messages are given.
         """
+        keys = {topic: key for topics, key in keys.items() for topic in topics_in(topics)}
         convert = Converter({key: self.topics[topic] for topic, key in keys.items()
                              if topic in self.topics}, self._reading, self._frame)
         for file, source in self._sources:
@@ -222,6 +232,11 @@ class Recording:
             self._folder = tempfile.TemporaryDirectory()
         folder = Path(self._folder.name)
         return folder / f'{len(list(folder.iterdir()))}'
+
+
+def topics_in(names: str) -> list[str]:
+    """Return the topics in names that are separated by commas."""
+    return [name.strip() for name in names.split(',')]
 
 
 def listed(texts: Sequence[str]) -> list[str]:

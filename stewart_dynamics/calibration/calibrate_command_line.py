@@ -50,7 +50,9 @@ def _arguments() -> argparse.ArgumentParser:
     add_report(parser)
     add_node(parser, ', and name before its topics')
     data = parser.add_argument_group('measurements')
-    data.add_argument('--measured', metavar='TOPIC', help='of a bag: JointState of the legs')
+    data.add_argument('--measured', metavar='TOPIC,...',
+                      help='of a bag: JointState of the legs; several topics where each has some '
+                           'of them')
     data.add_argument('--pose', metavar='TOPIC', help='of a bag: PoseStamped of the device')
     data.add_argument('--mm', action='store_true',
                       help='x, y, z and the leg positions are in mm, not in m')

@@ -89,7 +89,7 @@ class Clearance(Quantity):
         return found
 
     def margins(self, moved: Moved) -> Enclosure:
-        """Return margins (N, M): those of a pair's corners all are positive where it is clear."""
+        """Return (N, M) margins: those of a pair's corners all are positive where it is clear."""
         frames = list(self._corners(moved))
         return joined([self._of_pairs(frames, moved, *kind) for kind in self._kinds])
 

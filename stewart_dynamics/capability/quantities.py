@@ -175,7 +175,7 @@ class Quantity(ABC):
 
     @abstractmethod
     def margins(self, moved: Moved) -> Enclosure:
-        """Return margins (N, M) over cells."""
+        """Return (N, M) margins over cells."""
 
     def values(self, moved: Moved) -> Array:
         """Return numbers (N, M) of the signs of the margins at points, with simple roots."""
@@ -292,7 +292,7 @@ class Conditioning(Quantity):
         return np.asarray(np.where(room > 0.0, 1.0 / room - 1.0, math.inf))
 
     def margins(self, moved: Moved) -> Enclosure:
-        """Return margins (N, 1)."""
+        """Return the margin of the quantity (N, 1)."""
         matrices = moved.matrices
         with np.errstate(all='ignore'):
             inverse = _inverses(matrices.center)

@@ -115,7 +115,7 @@ class _Travels:
 def travels(margins: PoseMargins, starts: Starts, directions: Array,
             units: Array | None = None) -> Ends:
     """
-    Return the ends of travels (N,) in directions (N, 6), not zero.
+    Return the (N,) ends of travels in directions (N, 6), not zero.
 
     units (N,): only the smallest value, each in its unit, is needed. It is exact, others may be
         too large: travels are not searched behind it.

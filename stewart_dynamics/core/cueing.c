@@ -14,6 +14,8 @@
 #define LIMITER 10.0          /* rate with which the rate of tilt nears its limit, times w */
 #define BLENDING 4.0           /* rate with which the limit nears one that was changed [1/s] */
 #define BISECTIONS 40
+#define SHORT_PART 0.5         /* of a tilt's motion, times its fastest rate */
+#define CHANGES 8             /* of sides of the law in such a part */
 
 /* Advance x, x', ... of x^(n) + a[n-1] x^(n-1) + ... + a[0] x = u + slope t by a time.
 
@@ -57,20 +59,38 @@ static double angle_acceleration(const double y[2], double y_acceleration) {
   return (y_acceleration + y[0] * y[1] * y[1] / squared) / sqrt(squared);
 }
 
-/* The acceleration of the angle by the filter, which its law limits; *side: 1 or -1 where it is
-   larger that way than the limit of the rate lets it, else 0. */
+/* The acceleration of the angle by the filter, and its rate of change. */
+static void find_wanted(
+  const tilt_filter * f, double time, const double y[2], double * wanted, double * change) {
+  double w = f->w, fall = 2.0 * f->damping * w, squared = 1.0 - y[0] * y[0];
+  double y_acceleration = w * w * (f->u + f->slope * time - y[0]) - fall * y[1];
+  double cosine = sqrt(squared), rate = y[1] / cosine;
+  *wanted = angle_acceleration(y, y_acceleration);
+  *change = (w * w * (f->slope - y[1]) - fall * y_acceleration + 3.0 * y[0] * rate * *wanted) /
+    cosine + rate * rate * rate;
+}
+
+/* The side of the law, by which the acceleration is limited: 1 or -1 where it is larger that way
+   than the limit of the rate lets it, else 0. */
 static int tilt_side(const tilt_filter * f, double time, const double y[2]) {
-  double u = f->u + f->slope * time, rate = y[1] / sqrt(1.0 - y[0] * y[0]);
-  double wanted = angle_acceleration(
-    y, f->w * f->w * (u - y[0]) - 2.0 * f->damping * f->w * y[1]);
-  double k = LIMITER * f->w;
+  double wanted, change, rate = y[1] / sqrt(1.0 - y[0] * y[0]), k = LIMITER * f->w;
+  find_wanted(f, time, y, &wanted, &change);
   return wanted > k * (f->rate_max - rate) ? 1 : -wanted > k * (f->rate_max + rate) ? -1 : 0;
+}
+
+/* The rate of change of the room of a side of the law: the acceleration that it lets, less
+   that of the filter. */
+static double change_of_room(const tilt_filter * f, int side, double time, const double y[2]) {
+  double wanted, change;
+  find_wanted(f, time, y, &wanted, &change);
+  return -side * (LIMITER * f->w * wanted + change);
 }
 
 /* Advance a tilt by a time on one side of its law: angle'' = k (+-rate_max - angle') there. */
 static void advance_on_side(
-  const tilt_filter * f, int side, double begin, double time, double y[2]) {
+  const tilt_filter * f, int side, double begin, double time, const double from[2], double y[2]) {
   double w = f->w;
+  y[0] = from[0], y[1] = from[1];
   if (side == 0) {
     double a[2] = {w * w, 2.0 * f->damping * w};
     double u = f->u + f->slope * begin;
@@ -84,25 +104,52 @@ static void advance_on_side(
   y[0] = sin(angle), y[1] = cos(angle) * rate;
 }
 
-/* Advance a tilt by a time; sides of its law change where it does, to rounding. */
-static void advance_tilt(const tilt_filter * f, double time, double y[2]) {
-  double done = 0.0;
-  for (int changes = 0; done < time; changes++) {
-    int side = tilt_side(f, done, y);
-    double low = 0.0, high = time - done, tried[2] = {y[0], y[1]};
-    advance_on_side(f, side, done, high, tried);
-    if (tilt_side(f, time, tried) != side && changes < 8) {
-      for (int n = 0; n < BISECTIONS; n++) {
-        double middle = 0.5 * (low + high);
-        tried[0] = y[0], tried[1] = y[1];
-        advance_on_side(f, side, done, middle, tried);
-        *(tilt_side(f, done + middle, tried) == side ? &low : &high) = middle;
-      }
-      tried[0] = y[0], tried[1] = y[1];
-      advance_on_side(f, side, done, high, tried);
+/* A time, at most `high`, at which a tilt has left a side of its law; `high` where it has not. Of a
+   short part: between its ends the room of either side of the law has one minimum at most. */
+static double find_left(
+  const tilt_filter * f, int side, double begin, double high, const double from[2]) {
+  double y[2];
+  advance_on_side(f, side, begin, high, from, y);
+  if (tilt_side(f, begin + high, y) != side || side != 0) {return high;}
+  for (int toward = -1; toward <= 1; toward += 2) {
+    if (change_of_room(f, toward, begin, from) >= 0.0 ||
+        change_of_room(f, toward, begin + high, y) <= 0.0) {continue;}
+    double low = 0.0, later = high, tried[2];
+    for (int n = 0; n < BISECTIONS; n++) {
+      double middle = 0.5 * (low + later);
+      advance_on_side(f, 0, begin, middle, from, tried);
+      if (tilt_side(f, begin + middle, tried) != 0) {return middle;}
+      *(change_of_room(f, toward, begin + middle, tried) < 0.0 ? &low : &later) = middle;
     }
-    y[0] = tried[0], y[1] = tried[1];
-    done += high;
+  }
+  return high;
+}
+
+/* Advance a tilt by a time, in short parts; sides of its law change where it does, to rounding. */
+static void advance_tilt(const tilt_filter * f, double time, double y[2]) {
+  double longest = SHORT_PART / (f->w * largest(1.0, 2.0 * f->damping)), done = 0.0;
+  int64_t parts = 1 + (int64_t)(time / longest);
+  for (int64_t part = 1; part <= parts; part++) {
+    double end = part == parts ? time : (double)part * (time / (double)parts);
+    for (int changes = 0; done < end; changes++) {
+      int side = tilt_side(f, done, y);
+      double low = 0.0, high = find_left(f, side, done, end - done, y), tried[2];
+      advance_on_side(f, side, done, high, y, tried);
+      int other = tilt_side(f, done + high, tried);
+      if (other != side && changes < CHANGES) {
+        for (int n = 0; n < BISECTIONS; n++) {
+          double middle = 0.5 * (low + high);
+          advance_on_side(f, side, done, middle, y, tried);
+          *(tilt_side(f, done + middle, tried) == side ? &low : &high) = middle;
+        }
+        advance_on_side(f, side, done, high, y, tried);
+      } else if (side == 0 && other != 0) {
+        /* Too many changes: the side that limits it never exceeds the limit. */
+        advance_on_side(f, other, done, high, y, tried);
+      }
+      y[0] = tried[0], y[1] = tried[1];
+      done += high;
+    }
   }
 }
 

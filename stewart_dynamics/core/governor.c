@@ -7,20 +7,36 @@
 
 #include <string.h>
 
-#define STOP_SAMPLES 16    /* of a stop that are checked */
-#define COARSE_SAMPLES 8   /* enough within this share of the limits of rates and loads: */
-#define COARSE_SHARE 0.95
+#define STOP_SAMPLES 16    /* of a stop, at which rates and loads are checked */
+#define SAMPLES_AT_ONCE 8
+#define STOP_POSES 48      /* most poses of a stop that are checked for a limit */
+#define SHORTEST_PART 0.004 /* of a stop between two of them, times its rate */
+#define CERTAIN 0.5        /* share of the largest condition number below which a bound will do */
+#define MARGINS 1.6        /* between two of them: of both, less a quarter, by which legs shorten */
 #define HALVINGS 5         /* of the share of the demand */
 #define RECOVERY 0.25      /* time in which a share grows from 0 to 1 [s] */
 #define SETTLED 1e-12      /* a smaller deviation from the demand is none [m, rad; times rates] */
 #define LONGEST_STEP 0.01  /* a longer one is divided [s] */
+#define CURVATURE 0.1      /* accelerations between two setpoints exceed both by this share */
+#define NEGLIGIBLE 1e-10   /* difference between setpoints [m, rad] */
+#define LARGEST 1e9        /* coordinate of a demand, or derivative of it, that is followed */
 
-/* Times of the samples of a stop, times its rate; after the coarse ones, the last of which is at
-   rest, those between them. The rate that the present acceleration leads to peaks at 1 to 1.3, with
-   the curvature k^2: samples 0.35 apart, which coarse ones are, miss 1.5 % of it, the others 0.3 %,
-   and the turning of the legs some more. */
+/* Times of the samples of a stop, times its rate, first those that find most. The rate that the
+   present acceleration leads to peaks at 1 to 1.3, with the curvature k^2: samples 0.18 apart miss
+   0.4 % of it, and the turning of the legs some more. */
 static const double stop_times[STOP_SAMPLES] = {
   0.0, 0.25, 0.6, 0.95, 1.3, 1.9, 3.2, HUGE_VAL, 0.12, 0.42, 0.77, 1.12, 1.5, 1.7, 2.4, 4.5};
+
+/* Their places in the order of time. */
+static const int in_order[STOP_SAMPLES] = {
+  0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 13, 5, 14, 6, 15, 7};
+
+/* The samples of a stop from a state. */
+typedef struct {
+  const coordinates * from;
+  stewart_motion motions[STOP_SAMPLES];
+  stewart_result results[STOP_SAMPLES];  /* without condition numbers */
+} stop_samples;
 
 /* A hexapod whose limits have the margins of a governor, and what else that keeps. */
 typedef struct {
@@ -93,10 +109,10 @@ static void put_motion(
   }
 }
 
-/* Whether one of six values is above a share of its bound; nan is. */
-static int one_above(const double * values, const double * most, double share) {
+/* Whether one of six values is above its bound; nan is. */
+static int one_above(const double * values, const double * most) {
   for (int i = 0; i < 6; i++) {
-    if (!(fabs(values[i]) <= share * most[i])) {return 1;}
+    if (!(fabs(values[i]) <= most[i])) {return 1;}
   }
   return 0;
 }
@@ -108,67 +124,208 @@ static int lowest(unsigned bits) {
   return bits ? bit : 0;
 }
 
-/* The limit, counted from 1, that a motion exceeds, 0 if none; of rates and loads a share of it. */
-static int exceeded_by(
-  const governed * on, const stewart_motion * motion, const stewart_result * result,
-  double share) {
+/* Limits of poses, each of which is checked at poses of its own. */
+enum { LENGTHS, ANGLES, CLEARANCES, SINGULARITIES, KINDS };
+
+/* Lengths of the legs [m], and by how much a limit of one kind is not exceeded: lengths and
+   clearances [m], angles of the joints [rad]; or the condition number, or more. */
+typedef struct { double lengths[6], room[12], condition; } pose_room;
+
+/* Write a bound of the condition number of a result, larger by up to the number of legs, where that
+   is enough; else the condition number. Returns det(J). */
+static double find_condition(
+  const governed * on, const stewart_motion * motion, const stewart_result * known, double * to) {
+  const stewart_platform * platform = on->of.platform;
+  double enough = CERTAIN * on->limits->condition_max;
+  leg_pose at[6];
+  double rows[6][6], inverse[6][6], of_rows = 6.0, of_inverse = 0.0;
+  if (known && pitch_of(&platform->legs[0]) == 0.0) {
+    for (int i = 0; i < 6; i++) {
+      double moment = on->limits->radii[i] / platform->characteristic_length;
+      of_rows += moment * moment;
+      of_inverse += known->unit_load_forces[i] * known->unit_load_forces[i];
+    }
+    *to = sqrt(of_rows * of_inverse);
+    if (*to < enough) {return known->determinant;}
+  }
+  double determinant = scaled_jacobian(
+    platform, motion->position, motion->rotation, at, rows, inverse);
+  *to = CONDITION_OF(rows, inverse);
+  return determinant;
+}
+
+/* Write the room of a pose; return the limit of a kind, counted from 1, that it exceeds, or 0.
+   known: a result of it, or NULL. */
+static int find_room(
+  const governed * on, int kind, const stewart_motion * motion, const stewart_result * known,
+  pose_room * to) {
   const governor_limits * g = on->limits;
   const machine * of = &on->of;
   const stewart_leg * legs = of->platform->legs;
   unsigned exceeded = 0;
-  if (!(result->condition_number < g->condition_max && result->determinant * g->side > 0.0)) {
-    return GOVERNED_SINGULARITY + 1;
+  for (int i = 0; i < 6; i++) {
+    to->lengths[i] =
+      known ? known->lengths[i] : pose_of(&legs[i], motion->position, motion->rotation).length;
   }
-  for (int i = 0; i < 6; i++) {exceeded |= check_leg(&legs[i], result, i, share);}
-  if (!exceeded && of->checks->angles != 0.0) {
+  if (kind == SINGULARITIES) {
+    double determinant = find_condition(on, motion, known, &to->condition);
+    return to->condition < g->condition_max && determinant * g->side > 0.0 ? 0
+      : GOVERNED_SINGULARITY + 1;
+  } else if (kind == LENGTHS) {
+    for (int i = 0; i < 6; i++) {
+      double length = to->lengths[i];
+      to->room[i] = least(length - legs[i].length_min, legs[i].length_max - length);
+      exceeded |= below(length, legs[i].length_min, STEWART_LENGTH_MIN) |
+        above(length, legs[i].length_max, STEWART_LENGTH_MAX);
+    }
+  } else if (kind == ANGLES) {
     double angles[12];
     put_angles(of, motion, angles);
-    for (int i = 0; i < 6; i++) {exceeded |= check_angles(&legs[i], angles[i], angles[i + 6]);}
-  }
-  if (!exceeded && of->checks->clearance != 0.0) {
+    for (int i = 0; i < 6; i++) {
+      double base = legs[i].base_joint_angle_max, moving = legs[i].platform_joint_angle_max;
+      to->room[i] = isinf(base) ? HUGE_VAL : base - angles[i];  /* without it, the angle is nan */
+      to->room[i + 6] = isinf(moving) ? HUGE_VAL : moving - angles[i + 6];
+      exceeded |= check_angles(&legs[i], angles[i], angles[i + 6]);
+    }
+  } else {
     double clearances[6];
     int64_t nearest[6];
     put_clearances(of, motion, clearances, nearest);
+    for (int i = 0; i < 6; i++) {to->room[i] = clearances[i] - of->platform->leg_clearance_min;}
     exceeded |= check_clearances(of, clearances);
+  }
+  return lowest(exceeded);
+}
+
+/* Largest displacement of the head, and largest turn, from one state of a stop until a time. */
+typedef struct { double way, turn; } displacement;
+
+static displacement displace(const coordinates * from, double k, double time) {
+  double kt = k * time, left = exp(-kt), gone = isinf(kt) ? 0.0 : kt * left;
+  double of_rate = (1.0 - left) / k, of_change = (1.0 - left - gone) / (k * k), square = 0.0;
+  displacement to = {0.0, 0.0};
+  for (int i = 0; i < 6; i++) {
+    double v = from->rate[i], b = from->acceleration[i] + k * v;
+    double way = fabs(v) * of_rate + fabs(b) * of_change;
+    if (i < 3) {square += way * way;} else {to.turn += way;}
+  }
+  to.way = sqrt(square);
+  return to;
+}
+
+/* Whether a displacement from a pose could exceed the limits of a kind by more than some of their
+   margins.
+
+   A leg whose platform joint moves by d turns by less than asin(d / L), each of its points moves
+   by at most d, and distances between two of them change by no more than both move. Singular
+   values of J change by no more than its rows do (Weyl), and the largest is at least 1. */
+static int leaves(
+  const governed * on, int kind, const pose_room * from, displacement by, double margins) {
+  const governor_limits * g = on->limits;
+  double farthest = by.way + by.turn * g->reach, square = 0.0;
+  for (int i = 0; i < 6; i++) {
+    double d = by.way + by.turn * g->arms[i], sine = d / from->lengths[i], turn = 1.02 * sine;
+    if (!(sine <= 0.25)) {return 1;}  /* up to which that is more than the arc */
+    if (kind == LENGTHS) {
+      if (!(d <= from->room[i] + margins * g->length_margin[i])) {return 1;}
+    } else if (kind == ANGLES) {
+      if (!(turn <= from->room[i] + margins * g->base_angle_margin[i]) ||
+          !(turn + by.turn <= from->room[i + 6] + margins * g->platform_angle_margin[i])) {
+        return 1;
+      }
+    } else if (kind == CLEARANCES) {
+      /* A cylinder may end beyond the joint: where the piston begins for the plate of the base. */
+      d *= largest(1.0, on->of.platform->legs[i].cylinder_length / from->lengths[i]);
+      if (!(d + farthest <= from->room[i] + margins * g->clearance_margin)) {return 1;}
+    } else {
+      double moment = g->radii[i] * (by.turn + turn) / on->of.platform->characteristic_length;
+      square += turn * turn + moment * moment;
+    }
+  }
+  double change = sqrt(square), condition = from->condition;
+  return kind == SINGULARITIES && !(condition * (1.0 + change) < (1.0 - condition * change) * (
+    margins > 0.0 ? g->stop_condition : g->condition_max));
+}
+
+/* The limit of a kind, counted from 1, that a pose of a stop exceeds, 0 if none.
+
+   Conservative advancement: from one pose to a later one that cannot be reached without passing
+   poses that are surely within the limits. Both are within the margins, so that between them each
+   pose is nearer than a margin to poses that one of them reaches. */
+static int check_poses(const governed * on, int kind, const stop_samples * stop) {
+  static const int limits[KINDS] = {0, 4, 6, GOVERNED_SINGULARITY};
+  double k = on->limits->stop_rate, now = 0.0;  /* times its rate */
+  int last = 0, between = 0;  /* sample before or at this time */
+  for (int n = 0; n < STOP_POSES; n++) {
+    coordinates at = stopped(stop->from, k, now / k);
+    stewart_motion motion;
+    pose_room room;
+    if (between) {put_motion(on->limits, &at, &motion);}
+    int limit = find_room(on, kind, between ? &motion : &stop->motions[in_order[last]],
+                          between ? NULL : &stop->results[in_order[last]], &room);
+    if (limit || isinf(now)) {return limit;}
+    if (!leaves(on, kind, &room, displace(&at, k, HUGE_VAL), 0.0)) {return 0;}
+    int next = STOP_SAMPLES - 1;
+    double time = HUGE_VAL;
+    while (leaves(on, kind, &room, displace(&at, k, (time - now) / k), MARGINS)) {
+      if (next > last + 1) {
+        next = (last + next) / 2, time = stop_times[in_order[next]];
+      } else {
+        next = last, time = 0.5 * (now + least(time, now + 4.0));
+        if (time - now < SHORTEST_PART) {return limits[kind] + 1;}
+      }
+    }
+    between = next == last, last = next, now = time;
+  }
+  return limits[kind] + 1;
+}
+
+/* The limit of rates and loads, counted from 1, that a motion exceeds, 0 if none. */
+static int overloads(
+  const governed * on, const leg_drives * drives, const stewart_motion * motion,
+  const stewart_result * result) {
+  const governor_limits * g = on->limits;
+  const machine * of = &on->of;
+  unsigned exceeded = 0;
+  for (int i = 0; i < 6; i++) {
+    exceeded |= check_leg(&of->platform->legs[i], result, i, 1.0);
   }
   if (exceeded || of->checks->motors == 0.0) {return lowest(exceeded);}
   motor_row row;
-  leg_drives at_any_rate = *of->drives;  /* breakaway torques, as if each leg could reverse */
-  for (int i = 0; i < 6; i++) {at_any_rate.legs[i].slow = HUGE_VAL;}
-  put_motors(of->platform, &at_any_rate, of->n_curve, of->curve, motion, result->forces,
+  put_motors(of->platform, drives, of->n_curve, of->curve, motion, result->forces,
              result->forces, &row);
-  for (int i = 0; i < 6; i++) {row.available_torques[i] *= g->load_share;}
-  return one_above(row.speeds, g->speed_max, share) ? GOVERNED_SPEED_MAX + 1
-    : one_above(row.breakaway_torques, row.available_torques, share) ? GOVERNED_TORQUE_MAX + 1 : 0;
-}
-
-/* The limit, counted from 1, that one of some motions exceeds, 0 if none. */
-static int one_exceeded(
-  const governed * on, const stewart_motion * motions, const stewart_result * results,
-  double share) {
-  int found = 0;
-  for (int n = 0; n < COARSE_SAMPLES && !found; n++) {
-    found = exceeded_by(on, &motions[n], &results[n], share);
+  for (int i = 0; i < 6; i++) {
+    row.available_torques[i] = g->load_share * row.available_torques[i] - g->friction_torque[i];
   }
-  return found;
+  return one_above(row.speeds, g->speed_max) ? GOVERNED_SPEED_MAX + 1
+    : one_above(row.breakaway_torques, row.available_torques) ? GOVERNED_TORQUE_MAX + 1 : 0;
 }
 
 /* The limit, counted from 1, that a state or the stop from it exceeds, 0 if none. */
 static int inadmissible(const governed * on, const coordinates * state) {
   static const double no_wrench[6] = {0.0};
   static const stewart_base still = {{NAN, NAN, NAN}, {0.0}, {0.0}, {0.0}};
+  const machine * of = &on->of;
+  const double checked[KINDS] = {1.0, of->checks->angles, of->checks->clearance, 1.0};
   double rate = on->limits->stop_rate;
+  stop_samples stop;
+  leg_drives drives = *of->drives;  /* breakaway torques, as if each leg could reverse */
+  for (int i = 0; i < 6; i++) {drives.legs[i].slow = HUGE_VAL;}
   int found = 0;
-  for (int first = 0; first < STOP_SAMPLES && !found; first += COARSE_SAMPLES) {
-    stewart_motion motions[COARSE_SAMPLES];
-    stewart_result results[COARSE_SAMPLES];
-    for (int n = 0; n < COARSE_SAMPLES; n++) {
-      coordinates at = stopped(state, rate, stop_times[first + n] / rate);
-      put_motion(on->limits, &at, &motions[n]);
+  stop.from = state;
+  for (int first = 0; first < STOP_SAMPLES && !found; first += SAMPLES_AT_ONCE) {
+    for (int n = first; n < first + SAMPLES_AT_ONCE; n++) {
+      coordinates at = stopped(state, rate, stop_times[n] / rate);
+      put_motion(on->limits, &at, &stop.motions[n]);
     }
-    solve_many(on->of.platform, COARSE_SAMPLES, motions, 1, no_wrench, 1, &still, 1, results);
-    if (first == 0 && !one_exceeded(on, motions, results, COARSE_SHARE)) {return 0;}
-    found = one_exceeded(on, motions, results, 1.0);
+    solve_many(of->platform, SAMPLES_AT_ONCE, &stop.motions[first], 1, no_wrench, 1, &still, 0,
+               &stop.results[first]);
+    for (int n = first; n < first + SAMPLES_AT_ONCE && !found; n++) {
+      found = overloads(on, &drives, &stop.motions[n], &stop.results[n]);
+    }
+  }
+  for (int kind = 0; kind < KINDS && !found; kind++) {
+    if (checked[kind] != 0.0) {found = check_poses(on, kind, &stop);}
   }
   return found;
 }
@@ -179,6 +336,11 @@ static coordinates toward(
   coordinates at;
   for (int i = 0; i < 6; i++) {
     double s = share[i];
+    if (s == 0.0) {  /* the demand may be anything */
+      at.value[i] = stop->value[i], at.rate[i] = stop->rate[i];
+      at.acceleration[i] = stop->acceleration[i];
+      continue;
+    }
     at.value[i] = stop->value[i] + s * (demand->value[i] - stop->value[i]);
     at.rate[i] = stop->rate[i] + s * (demand->rate[i] - stop->rate[i]);
     at.acceleration[i] =
@@ -276,6 +438,92 @@ static void govern(
   }
 }
 
+/* The coordinates of the motion of fifth order between two states a time apart, at a part of it. */
+static coordinates between_states(
+  const coordinates * begin, const coordinates * end, double time, double part) {
+  coordinates at;
+  double t = part * time, s = part;
+  for (int i = 0; i < 6; i++) {
+    double v = begin->rate[i], a = begin->acceleration[i];
+    double x_by = end->value[i] - (begin->value[i] + time * (v + 0.5 * time * a));
+    double v_by = time * (end->rate[i] - (v + time * a));
+    double a_by = time * time * (end->acceleration[i] - a);
+    double c3 = 10.0 * x_by - 4.0 * v_by + 0.5 * a_by, c4 = -15.0 * x_by + 7.0 * v_by - a_by;
+    double c5 = 6.0 * x_by - 3.0 * v_by + 0.5 * a_by;
+    at.value[i] = begin->value[i] + t * (v + 0.5 * t * a) + s * s * s * (c3 + s * (c4 + s * c5));
+    at.rate[i] = v + t * a + s * s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)) / time;
+    at.acceleration[i] = a + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5)) / (time * time);
+  }
+  return at;
+}
+
+/* Whether a state is that of a motion from another one, a time before, whose accelerations are
+   between those of both, but for their CURVATURE. */
+static int continues(const coordinates * begin, const coordinates * end, double time) {
+  for (int i = 0; i < 6; i++) {
+    double a = begin->acceleration[i], b = end->acceleration[i];
+    double more = CURVATURE * largest(fabs(a), fabs(b)), range = fabs(b - a) + 2.0 * more;
+    double change = end->rate[i] - begin->rate[i] - 0.5 * time * (a + b);
+    double mean = 0.5 * (begin->rate[i] + end->rate[i]);
+    double way = end->value[i] - begin->value[i] - time * mean;
+    if (!(fabs(change) <= 0.5 * time * range + NEGLIGIBLE / LONGEST_STEP &&
+          fabs(way) <= 0.125 * time * time * range + NEGLIGIBLE)) {return 0;}
+  }
+  return 1;
+}
+
+static int is_followed(const coordinates * demand) {
+  const double * numbers = demand->value;
+  for (size_t n = 0; n < sizeof *demand / sizeof *numbers; n++) {
+    if (!(fabs(numbers[n]) <= LARGEST)) {return 0;}
+  }
+  return 1;
+}
+
+/* Advance a stream by a time to a demand. Its rates and accelerations may not be those of its
+   poses: then these are taken from the differences. Where the hexapod could not follow these, the
+   demand jumps: it is as if the motion had always been away from it. */
+static void follow(
+  const governed * on, double time, const coordinates * demand, governed_stream * stream) {
+  double k = on->limits->stop_rate, last = least(time, LONGEST_STEP);
+  governor_state * governor = &stream->governor;
+  coordinates begin = stream->demand, end = *demand;
+  if (!is_followed(demand)) {
+    governor->now = stopped(&governor->now, k, time), governor->following = 0.0;
+    memset(governor->share, 0, sizeof governor->share);
+    stream->demand.value[0] = NAN;  /* the next one is a jump */
+    return;
+  }
+  int jumped = 0;
+  if (!continues(&begin, &end, time)) {
+    for (int i = 0; i < 6; i++) {
+      end.rate[i] = (end.value[i] - begin.value[i]) / time;
+      end.acceleration[i] = (end.rate[i] - begin.rate[i]) / time;
+    }
+    jumped = inadmissible(on, &end);
+  }
+  if (jumped) {
+    governor->held[jumped - 1] += time;
+    governor->following = 0.0;
+    governor->now = stopped(&governor->now, k, time - last);
+    begin = end = *demand;
+    for (int i = 0; i < 6; i++) {
+      double v = end.rate[i], a = end.acceleration[i];
+      begin.value[i] -= last * (v - 0.5 * last * a), begin.rate[i] -= last * a;
+    }
+    time = last;
+  }
+  int64_t steps = (int64_t)largest(1.0, ceil(time / LONGEST_STEP - 1e-6));
+  coordinates from = begin;
+  for (int64_t n = 1; n <= steps; n++) {
+    coordinates to = n == steps ? end
+      : between_states(&begin, &end, time, (double)n / (double)steps);
+    govern(on, 1, &from, &to, time / (double)steps, governor);
+    from = to;
+  }
+  stream->demand = end;
+}
+
 int64_t governed_limit(
   const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
   int64_t n_base, const double * base, int64_t n_moving, const double * moving,
@@ -294,10 +542,12 @@ void govern_many(
   governed on = {
     {platform, drives, n, curve, n_base, base, n_moving, moving, checks}, limits};
   for (int64_t k = 0; k < count; k++) {
-    if (!isnan(stream->time)) {
-      govern(&on, 1, &stream->demand, &demands[k], times[k] - stream->time, &stream->governor);
+    if (isnan(stream->time)) {
+      stream->demand = demands[k];
+    } else {
+      follow(&on, times[k] - stream->time, &demands[k], stream);
     }
-    stream->time = times[k], stream->demand = demands[k];
+    stream->time = times[k];
     put_motion(limits, &stream->governor.now, &motions[k]);
   }
 }

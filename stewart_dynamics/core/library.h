@@ -145,13 +145,18 @@ typedef struct { double value[6], rate[6], acceleration[6]; } coordinates;
 enum { GOVERNED_TORQUE_MAX = 16, GOVERNED_SPEED_MAX = 17, GOVERNED_SINGULARITY = 18 };
 
 /* What a governor keeps besides the limits of the platform's legs: see mechanics/governor.py. All
-   have its margins. */
+   have its margins, which stand here by themselves for lengths, clearance [m] and angles [rad]. */
 typedef struct {
   stewart_pose home;
   double head[3];                     /* platform frame [m] */
   double stop_rate, return_rate;      /* of the stop, and of the return to the demand [1/s] */
   double speed_max[6], load_share;    /* of motors; part of the available torque that is used */
+  double friction_torque[6];          /* change of the torque where the leg reverses [N m] */
   double condition_max, side;         /* side: sign of det(J) at home */
+  double stop_condition;              /* without a margin */
+  double arms[6], radii[6], reach;    /* distances of platform joints from the head, and from the
+                                         origin; of the farthest part from the head [m] */
+  double length_margin[6], base_angle_margin[6], platform_angle_margin[6], clearance_margin;
 } governor_limits;
 
 /* A governed motion, all zero at rest at home; following: it is the demand. */

@@ -133,8 +133,10 @@ class CueingNode(ManagedNode[CueingParameters]):
             return
         platform = StewartPlatform(self._settings)
         try:
-            _, positions = self._legs.read_one(data)
-            lengths = np.array(positions) + self._settings.geometry.zero_length
+            samples = self._legs.read(data)
+            if not samples:
+                return  # a part: the others follow
+            lengths = np.array(samples[-1][1]) + self._settings.geometry.zero_length
             away = np.abs(lengths - platform.inverse_kinematics(self._cueing.governor.home))
             pose = (self._cueing.governor.home if away.max() < _AWAY
                     else platform.forward_kinematics(lengths))

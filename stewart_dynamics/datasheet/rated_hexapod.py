@@ -107,7 +107,7 @@ class RatedHexapod:
 
     def frequencies(self, poses: Pose, leg_stiffness: float) -> Array:
         """
-        Return natural frequencies (..., 6) [Hz] at poses of the pivot, with held motors.
+        Return (..., 6) natural frequencies [Hz] at poses of the pivot, with held motors.
 
         A leg's stiffness [N/m] is between its motor and the platform, so rotors stand still.
         """

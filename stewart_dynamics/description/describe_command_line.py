@@ -44,7 +44,8 @@ def _arguments() -> argparse.ArgumentParser:
     source = parser.add_mutually_exclusive_group(required=True)
     add_parameters(source, required=False)
     source.add_argument('--from', dest='source', type=Path, metavar='FILE',
-                        help='URDF, SDFormat or MJCF (needs mujoco) of a hexapod')
+                        help='URDF, SDFormat, MJCF (needs mujoco) or USD (needs usd-core) of a '
+                             'hexapod')
     parser.add_argument('--usd', action='store_true',
                         help='write NAME.usda, too (needs usd-core)')
     parser.add_argument('--solid', action='store_true',

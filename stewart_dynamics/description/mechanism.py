@@ -158,6 +158,7 @@ class Mechanism:
     gravity: Array | None = None  # world axes [m/s^2]
     carried: dict[str, CarriedParameter] = field(default_factory=dict)
     """Parameters that stewart_describe has added to the format, by their names."""
+    resolution: float = 1e-9  # numbers of the file that differ by a smaller part are equal
     order: tuple[str, ...] = ()  # names of slides in the order of their actuators
     remarks: list[str] = field(default_factory=list)  # assumptions of the reader, one line each
     warnings: list[str] = field(default_factory=list)

@@ -27,6 +27,7 @@ from stewart_dynamics.description.mechanism import (
 from stewart_dynamics.description.read_mjcf import read_mjcf
 from stewart_dynamics.description.read_sdf import read_sdf
 from stewart_dynamics.description.read_urdf import read_urdf
+from stewart_dynamics.description.read_usd import read_usd, SUFFIXES
 from stewart_dynamics.description.topology import Chain, LegJoint, LEGS, Topology, topology_of
 from stewart_dynamics.description.xml_text import NOT_SET
 from stewart_dynamics.errors import one_line, shown
@@ -51,8 +52,6 @@ _COUNTS = dict(enumerate(('no', 'one', 'two', 'three', 'four', 'five', 'six')))
 _FLAT = 0.05
 # Bodies of a smaller part of the platform's mass are only frames.
 _NEGLIGIBLE = 1e-7
-# Numbers of elements that differ by a smaller part are those that were written.
-_AS_WRITTEN = 1e-9
 
 
 class Recognized(NamedTuple):
@@ -410,6 +409,8 @@ def _carried(mechanism: Mechanism, found: Topology, values: Mapping[str, Any],
              remarks: list[str]) -> dict[str, Any]:
     """Return the parameters that stewart_describe has added, as far as the elements are its."""
     slides = [chain.steps[chain.slide].joint for chain in found.chains]
+    length = float(max(np.max(values[name]) for name in (
+        'geometry.base_joints', 'geometry.zero_length')))
     holding: dict[str, Any] = {}
     for name, (text, of_element) in mechanism.carried.items():
         if name not in PARAMETERS:
@@ -420,7 +421,9 @@ def _carried(mechanism: Mechanism, found: Topology, values: Mapping[str, Any],
             if name in OF_SLIDE:
                 of_slides = [getattr(slide, OF_SLIDE[name]) for slide in slides]
                 present = None if of_slides.count(None) == LEGS else np.array(of_slides, float)
-            same = _unchanged(present, _value(mechanism, name, of_element))
+            size = length if PARAMETERS[name].unit == 'm' else 0.0
+            same = _unchanged(present, _value(mechanism, name, of_element), size,
+                              mechanism.resolution)
             if not np.all(same):
                 remarks.append(f'{name}: edited in the file: its element holds, in place of the '
                                f'parameter {text} that was written with it')
@@ -443,7 +446,7 @@ def _value(mechanism: Mechanism, name: str, text: str) -> Any:
     return numbers[0] if len(numbers) == 1 and not PARAMETERS[name].sizes else numbers
 
 
-def _unchanged(present: Any, written: Any) -> Any:
+def _unchanged(present: Any, written: Any, size: float, resolution: float) -> Any:
     """Return whether the numbers of elements, or which of several, are those written."""
     if written is None or present is None:
         return written is present
@@ -451,7 +454,7 @@ def _unchanged(present: Any, written: Any) -> Any:
         return present == written
     if np.size(present) != np.size(written):
         return False
-    return np.abs(present - written) <= _AS_WRITTEN * np.max(np.abs(written))
+    return np.abs(present - written) <= resolution * max(size, np.max(np.abs(written)))
 
 
 def _missing(given: Mapping[str, Any], mechanism: Mechanism, found: Topology,
@@ -489,9 +492,9 @@ _LARGEST = 20_000_000  # bytes
 _KINDS = (
     (b'version https://git-lfs.github.com/spec/', 'a Git LFS pointer, not the file: run git lfs '
      'pull first'),
-    (b'#usda', 'USD (text): convert it to MJCF or URDF first'),
-    (b'PXR-USDC', 'USD (binary): convert it to MJCF or URDF first'),
-    (b'PK\x03\x04', 'a zip archive, as usdz is: unpack and convert it first'),
+    (b'#usda', 'USD (text): its name must end in .usda or .usd'),
+    (b'PXR-USDC', 'USD (binary): its name must end in .usdc or .usd'),
+    (b'PK\x03\x04', 'a zip archive: unpack it first, or name it .usdz if it is USD'),
     (b'\x1f\x8b', 'compressed with gzip: unpack it first'),
     (b'ISO-10303-21', 'a STEP file: shapes without joints'))
 _XACRO = re.compile(r'<xacro:|\$[{(][^})]*[})]')
@@ -520,6 +523,8 @@ def _check_kind(path: Path, data: bytes) -> None:
 
 def read_mechanism(path: Path) -> Mechanism:
     """Return the mechanism that a file describes."""
+    if path.suffix in SUFFIXES:
+        return read_usd(path)
     text = read_text(path, _LARGEST, DescriptionError, _check_kind)
     if path.suffix == '.xacro' or _XACRO.search(text) and '<robot' in text:
         raise DescriptionError(f'{path}: is xacro: run xacro first: xacro FILE > FILE.urdf')

@@ -7,8 +7,13 @@ A hexapod as USD with UsdPhysics: rigid bodies, joints, drives; for Isaac Sim an
 The world's axes are base axes, in which gravity is given. A solver of articulations (reduced
 coordinates) needs a tree: the platform hangs on the first leg, and the ball joints of the other
 five have ``excludeFromArticulation``, so that they close the loops. Solvers of maximal coordinates
-ignore the flag. Coulomb friction and reflected mass have no attribute in UsdPhysics: they are
-custom attributes ``stewart_dynamics:...`` of the leg's joint.
+ignore the flag. ``body0`` of each joint is the parent in the tree. Positions of the legs' joints
+are counted from the home pose.
+
+Coulomb friction, reflected mass and the limit of the rate have no attribute in UsdPhysics, but in
+the schemas of Newton and PhysX. ``physxJoint:jointFriction``, a number without unit, is not
+written. Attributes are single-precision: attributes ``stewart_dynamics:...`` of the model have the
+parameters in full.
 """
 
 from __future__ import annotations
@@ -21,13 +26,32 @@ from stewart_dynamics import __version__
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
     COLORS, Hexapod, LegDescription, massless, RigidBody, shapes, VisualShape)
+from stewart_dynamics.description.mechanism import OF_SLIDE
+from stewart_dynamics.description.xml_text import CARRIED, carried, solid_elements
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
 
 if TYPE_CHECKING:
     from pxr import Usd
 
 _LOCKED = 1.0, -1.0  # a lower limit above the upper one locks an axis
+# Attributes of a leg's joint, those of Newton and of PhysX, and the schemas that they belong to.
+ARMATURE = 'newton:armature', 'physxJointAxis:linear:armature', 'physxJoint:armature'
+COULOMB_FRICTION = ('newton:friction', 'physxJointAxis:linear:staticFrictionEffort',
+                    'physxJointAxis:linear:dynamicFrictionEffort')
+RATE_LIMIT = ('newton:velocityLimit', 'physxJointAxis:linear:maxJointVelocity',
+              'physxJoint:maxJointVelocity')
+_SCHEMAS = 'NewtonJointAPI', 'PhysxJointAPI', 'PhysxJointAxisAPI:linear'
+# Attributes of the model with a parameter, and with the value that its own attributes have.
+VALUE, ELEMENT = f'{CARRIED}:value', f'{CARRIED}:element'
+_EXACT = (
+    'gravity', 'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',
+    'platform.center_of_mass', 'platform.inertia', 'actuator.reflected_mass',
+    'actuator.viscous_friction', 'actuator.coulomb_friction',
+    *(f'legs.{part}.{each}' for part in ('cylinder', 'piston')
+      for each in ('mass', 'center_of_mass', 'inertia')))
+_NOT_IN_USD = ('geometry.zero_length',)
 
 
 def usd(hexapod: Hexapod, name: str) -> str:
@@ -37,7 +61,7 @@ def usd(hexapod: Hexapod, name: str) -> str:
     Raises StewartError: usd-core is not installed.
     """
     try:
-        from pxr import Gf, Usd, UsdGeom, UsdPhysics
+        from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
     except ImportError as exc:
         raise StewartError(
             "--usd: needs usd-core: pip install 'stewart_dynamics[usd]'") from exc
@@ -56,15 +80,37 @@ def usd(hexapod: Hexapod, name: str) -> str:
     scene.CreateGravityDirectionAttr(Gf.Vec3f(*(gravity / size if size else (0.0, 0.0, -1.0))))
     writer = _Writer(stage, str(root.GetPath()))
     looks = shapes(hexapod, uris=False)
-    writer.body(massless(hexapod.base), np.zeros(3), np.eye(3), looks[hexapod.base])
-    writer.joint('Fixed', f'{hexapod.base}_to_world', None, hexapod.base, np.zeros(3), np.eye(3),
-                 np.zeros(3))
+    writer.body(massless(hexapod.base_body), np.zeros(3), np.eye(3), looks[hexapod.base])
+    writer.joint('Fixed', f'{hexapod.base_body}_to_world', None, hexapod.base_body, np.zeros(3),
+                 np.eye(3), np.zeros(3))
     writer.body(hexapod.platform_body, hexapod.position, hexapod.rotation,
                 looks[hexapod.platform])
     for n, leg in enumerate(hexapod.legs):
         _leg(writer, hexapod, leg, looks, excluded=n > 0)
+    for name, parameter in carried(hexapod.parameters, _elements(hexapod), _NOT_IN_USD):
+        for prefix, value in ((VALUE, parameter.value), (ELEMENT, parameter.element)):
+            if value:
+                root.GetPrim().CreateAttribute(
+                    attribute_name(prefix, name), Sdf.ValueTypeNames.String).Set(value)
     text: str = stage.GetRootLayer().ExportToString()
     return text
+
+
+def attribute_name(prefix: str, name: str) -> str:
+    """Return the name of an attribute for a parameter."""
+    return f'{prefix}:{name.replace(".", ":")}'
+
+
+def _elements(hexapod: Hexapod) -> dict[str, Any]:
+    """Return the values of the attributes of the formats, before they are single-precision."""
+    p = hexapod.parameters
+    found: dict[str, Any] = {name: p[name] for name in _EXACT} | solid_elements(hexapod)
+    frames = {'base_frame': hexapod.base_body, 'platform_frame': hexapod.platform}
+    found |= {name: _prim(frame) for name, frame in frames.items() if _prim(frame) != p[name]}
+    homes = np.array([leg.home_length for leg in hexapod.legs])
+    found |= {name: None if p[name] is None else p[name] - (
+        homes if name in (LENGTH_MIN, LENGTH_MAX) else 0.0) for name in OF_SLIDE}
+    return found
 
 
 def _leg(writer: _Writer, hexapod: Hexapod, leg: LegDescription,
@@ -73,20 +119,20 @@ def _leg(writer: _Writer, hexapod: Hexapod, leg: LegDescription,
     writer.body(hexapod.solid(leg.cylinder, leg), leg.base_joint, leg.mount,
                 looks[leg.cylinder.name])
     writer.body(hexapod.solid(leg.piston, leg), tip, leg.mount, looks[leg.piston.name])
-    universal = writer.joint('', f'{leg.name}_universal', hexapod.base, leg.cylinder.name,
+    universal = writer.joint('', f'{leg.name}_universal', hexapod.base_body, leg.cylinder.name,
                              leg.base_joint, leg.mount, np.zeros(3))
     for axis in ('transX', 'transY', 'transZ', 'rotZ'):
         writer.limit(universal, axis, *_LOCKED)
     slide = writer.joint('Prismatic', leg.name, leg.cylinder.name, leg.piston.name,
-                         np.zeros(3), np.eye(3), np.zeros(3))
+                         np.array([0.0, 0.0, leg.home_length]), np.eye(3), np.zeros(3))
     slide.CreateAxisAttr('Z')
-    low, high = leg.limits.lengths(leg.home_length)
-    if leg.limits.length_min is not None or leg.limits.length_max is not None:
-        slide.CreateLowerLimitAttr(low)
-        slide.CreateUpperLimitAttr(high)
-    writer.drive(slide, leg)
-    ball = writer.joint('Spherical', leg.ball, hexapod.platform, leg.piston.name,
-                        leg.platform_joint, hexapod.rotation.T @ leg.mount, np.zeros(3))
+    if leg.limits.length_min is not None:
+        slide.CreateLowerLimitAttr(leg.limits.length_min - leg.home_length)
+    if leg.limits.length_max is not None:
+        slide.CreateUpperLimitAttr(leg.limits.length_max - leg.home_length)
+    writer.actuator(slide, leg)
+    ball = writer.joint('Spherical', leg.ball, leg.piston.name, hexapod.platform, np.zeros(3),
+                        leg.mount.T @ hexapod.rotation, leg.platform_joint)
     ball.CreateExcludeFromArticulationAttr(excluded)
 
 
@@ -148,8 +194,8 @@ class _Writer:
         limit.CreateLowAttr(low)
         limit.CreateHighAttr(high)
 
-    def drive(self, slide: Any, leg: LegDescription) -> None:
-        """Add the actuator of a leg: a force, its limit and viscous friction."""
+    def actuator(self, slide: Any, leg: LegDescription) -> None:
+        """Add the actuator of a leg: a force, its limit, friction and reflected mass."""
         from pxr import Sdf
 
         drive = self._physics.DriveAPI.Apply(slide.GetPrim(), 'linear')
@@ -158,9 +204,15 @@ class _Writer:
         drive.CreateDampingAttr(leg.viscous_friction)
         if leg.limits.force_max is not None:
             drive.CreateMaxForceAttr(leg.limits.force_max)
-        for name in ('reflected_mass', 'coulomb_friction', 'zero_length'):
-            slide.GetPrim().CreateAttribute(
-                f'stewart_dynamics:{name}', Sdf.ValueTypeNames.Double).Set(getattr(leg, name))
+        for schema in _SCHEMAS:
+            slide.GetPrim().AddAppliedSchema(schema)
+        for keys, value in ((ARMATURE, leg.reflected_mass),
+                            (COULOMB_FRICTION, leg.coulomb_friction),
+                            (RATE_LIMIT, leg.limits.velocity_max)):
+            for key in keys:
+                if value is not None:
+                    slide.GetPrim().CreateAttribute(
+                        key, Sdf.ValueTypeNames.Float, custom=False).Set(value)
 
     def _path(self, name: str) -> str:
         return f'{self._root}/{_prim(name)}'

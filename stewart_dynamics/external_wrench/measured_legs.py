@@ -10,7 +10,7 @@ the time between the two.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from struct import Struct
 
 import numpy as np
@@ -121,7 +121,8 @@ class MeasuredLegs:
         self._step = step
         self._efforts, self._rates = EffortCheck(parameters), RateCheck(parameters)
         self._stamps = ArrivalStamps()
-        self._reader = JointStateReader(parameters.joints)
+        self._reader = JointStateReader(
+            parameters.joints, gap=round(parameters.setpoint.timeout * SECOND))
         self._zero_lengths = tuple(parameters.geometry.zero_length.tolist())
         self._timeout = round(parameters.setpoint.timeout * SECOND)
         self._rejected = rejected
@@ -152,11 +153,20 @@ class MeasuredLegs:
         """
         Return the estimate from a sensor_msgs/JointState (CDR), or None where it is rejected.
 
+        A part of the legs gives the last estimate that it completes, None if it completes no
+        measurement.
+
         ``known`` and ``target`` are those of ``ExternalWrench``; by default the base is still.
         """
-        measurement = self._sound(data)
-        if measurement is None or not self._in_time(measurement.stamp):
-            return None
+        found = None
+        for measurement in self._measurements(data):
+            if self._in_time(measurement.stamp):
+                found = self._estimated(measurement, known, target, base) or found
+        return found
+
+    def _estimated(self, measurement: Measurement, known: Six, target: Target | None,
+                   base: BaseInput | None) -> Estimate | None:
+        """Return the estimate from a measurement, or reject it."""
         row = (base.at(measurement.stamp) if base else None) or NO_BASE
         if base and base.topics and row[0] != row[0]:
             self._reject(BASE_NOT_KNOWN, stamp_words(measurement.stamp))
@@ -178,23 +188,25 @@ class MeasuredLegs:
     def _reject(self, reason: str, details: str) -> None:
         self._rejected(Rejection(MEASURED_LEGS, reason), details)
 
-    def _sound(self, data: bytes) -> Measurement | None:
-        """Return the measurement in a message, or reject the message."""
+    def _measurements(self, data: bytes) -> Iterator[Measurement]:
+        """Yield the measurements that a message completes, or reject it."""
         try:
-            stamp, values = self._reader.read_one(data)
+            samples = self._reader.read(data)
         except MalformedError as exc:
             self._reject(MALFORMED, str(exc))
-            return None
+            return
         except JointStateError as exc:
             self._reject(exc.reason, exc.details)
-            return None
-        if stamp == NO_STAMP:
-            self._reject(UNSTAMPED, 'accelerations need the time between two messages')
-            return None
-        p, z = values, self._zero_lengths
-        return Measurement(
-            stamp, (p[0] + z[0], p[1] + z[1], p[2] + z[2], p[3] + z[3], p[4] + z[4], p[5] + z[5]),
-            values[6:12], values[12:18])
+            return
+        z = self._zero_lengths
+        for stamp, p in samples:
+            if stamp == NO_STAMP:
+                self._reject(UNSTAMPED, 'accelerations need the time between two messages')
+                continue
+            yield Measurement(
+                stamp,
+                (p[0] + z[0], p[1] + z[1], p[2] + z[2], p[3] + z[3], p[4] + z[4], p[5] + z[5]),
+                p[6:12], p[12:18])
 
     def _in_time(self, stamp: int) -> bool:
         """Return whether a measurement may still be used, or reject it."""

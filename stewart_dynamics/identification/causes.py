@@ -96,7 +96,7 @@ class Causes:
         self._each_and_all = [*self._each, ('', slice(None))]
 
     def columns(self, extract: Extract, at: Array) -> tuple[Array, tuple[Cause, ...]]:
-        """Return columns (N, 6, m) at times ``at``, as fractions of all, and the causes."""
+        """Return (N, 6, m) columns at times ``at``, as fractions of all, and the causes."""
         poses = self._platform.forward_kinematics(
             extract.legs[..., 0], Pose.of_rows(extract.poses))
         parts = [*self._of_forces(extract, poses, at),

@@ -137,7 +137,7 @@ class Identified:
 
     @cached_property
     def parameters(self) -> Parameters:
-        """The file's parameters with the identified values; ParameterError if invalid."""
+        """Return the file's parameters with the identified values; ParameterError if invalid."""
         return self.unknowns.parameters(self.written)
 
 

@@ -57,8 +57,9 @@ def _arguments() -> argparse.ArgumentParser:
     add_report(parser)
     topics = parser.add_argument_group('topics')
     add_node(topics, ', and name before the usual topic, NAME/measured_legs')
-    topics.add_argument('--measured', metavar='TOPIC',
-                        help='JointState with positions and efforts, and rates where they are')
+    topics.add_argument('--measured', metavar='TOPIC,...',
+                        help='JointState with positions and efforts, and rates where they are; '
+                             'several topics where each has some of the legs')
     topics.add_argument('--efforts', metavar='TOPIC',
                         help='another JointState with the efforts, at stamps of its own')
     what = parser.add_argument_group('what is identified, and how')

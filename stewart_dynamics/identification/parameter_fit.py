@@ -71,12 +71,12 @@ class Fit(NamedTuple):
 
     @property
     def deviations(self) -> Array:
-        """Return the standard deviations (k,) of the values."""
+        """Return the (k,) standard deviations of the values."""
         deviations: Array = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return deviations
 
     def ratios(self, unknowns: Unknowns) -> Array:
-        """Return the deviations (k,) of the unknowns after the data, by those before."""
+        """Return the (k,) deviations of the unknowns after the data, by those before."""
         before = unknowns.deviations
         ratios: Array = np.divide(
             self.deviations, before, out=np.ones(len(before)), where=before > 0.0)

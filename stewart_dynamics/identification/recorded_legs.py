@@ -99,7 +99,7 @@ class RecordedLegs:
             return JointStateReader(self._joints, ['effort'])
         efforts = ['effort'] if self._one else []
         reader = JointStateReader(self._joints, ['position', 'velocity', *efforts])
-        self.rates = len(reader.read_many(messages.data, starts, sizes).stamps) > 0
+        self.rates = reader.reads_all(messages.data[starts[0]:starts[0] + sizes[0]].tobytes())
         return reader if self.rates else JointStateReader(self._joints, ['position', *efforts])
 
     def _released(self, last: bool) -> Iterator[Window]:

@@ -101,7 +101,7 @@ class Tilt:
         return self.gravity(angles) - self._gravity
 
     def derivative(self, angles: Array) -> Array:
-        """Return the derivative (3, 2) of rotated gravity by the angles."""
+        """Return the (3, 2) derivative of rotated gravity by the angles."""
         first, second = self._axes
         _, once, twice = self._turns(angles)
         return np.stack([_turned(np.cross(np.eye(3)[first], once), second, angles[1]),
@@ -166,7 +166,7 @@ class Unknowns:
 
     @property
     def deviations(self) -> Array:
-        """Return the prior standard deviations (k,)."""
+        """Return the (k,) prior standard deviations."""
         deviations: Array = np.sqrt(np.sum(self.root ** 2, axis=1))
         return deviations
 

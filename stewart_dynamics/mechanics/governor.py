@@ -18,8 +18,16 @@ limits: one share of all six coordinates first, then each of them alone. A share
 with the stop that was checked before: there is always a next state. A share falls as it must, and
 grows in a quarter of a second; where the deviation has vanished, the motion is the demand itself.
 
-Between the samples of a stop that are checked, bounds could be exceeded by less than the margins
-with which they are checked. The computation is ``core/governor.c``.
+Lengths, angles, clearance and condition number are within their limits at each pose of a stop:
+from one pose that is checked to the next one, no point moves farther than the room of both (the
+conservative advancement of collision detection: B. Mirtich, Impulse-based Dynamic Simulation,
+Berkeley, 1996). Rates, forces and torques are checked at 16 samples of it; between these they
+exceed the bounds by less than the margins with which they are checked.
+
+A stream may demand anything. Where rates and accelerations are not those of its poses, they are
+taken from differences; where the hexapod cannot follow these, the demand has jumped, and the
+motion returns to it. Setpoints more than 10 ms apart are joined by a motion of fifth order. The
+computation is ``core/governor.c``.
 """
 
 from __future__ import annotations
@@ -37,17 +45,19 @@ from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds
+from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, Pose
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.limits import (
-    LIMITS, LOAD, OF_LEGS, short_name, SINGULARITY, SPEED_MAX, TORQUE_MAX)
+    BASE_ANGLE_MAX, LIMITS, LOAD, OF_JOINTS, OF_LEGS, PLATFORM_ANGLE_MAX, POSE, short_name,
+    SINGULARITY, SPEED_MAX, TORQUE_MAX)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
-from stewart_dynamics.mechanics.rows import DETERMINANT, MOTION, POSE
+from stewart_dynamics.mechanics.rows import DETERMINANT, MOTION, ROTATION
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import Parameters, six_of
 
 KEPT: Mapping[int, str] = {
     **{LIMITS[name].bit.bit_length() - 1: name for name in OF_LEGS},
@@ -58,8 +68,10 @@ KEPT: Mapping[int, str] = {
 # Margins: of lengths a part of the stroke; of forces, torques and the condition number, which
 # change fastest between two samples, and of the other limits, parts of themselves.
 _OF_STROKE, _OF_LOADS, _OF_OTHERS = 0.005, 0.03, 0.02
-# Margin of the clearance of the legs, by the characteristic length.
-_OF_CLEARANCE = 0.003
+# Margin of the clearance of the legs, and of lengths without a stroke, by the characteristic
+# length.
+_OF_SIZE = 0.003
+_ANGLE_MARGINS = {BASE_ANGLE_MAX: 'base_angle_margin', PLATFORM_ANGLE_MAX: 'platform_angle_margin'}
 # A stop from velocity_max needs this part of the stroke, where its rate is between two bounds
 # [1/s]; the third is the rate without these limits.
 _STOP_IN, _SLOWEST_STOP, _FASTEST_STOP, _USUAL_STOP = 0.15, 5.0, 50.0, 10.0
@@ -84,31 +96,49 @@ class Governor:
         row = Motion.from_pose(home).rows
         result = batch.solve(within, row[None])[0]
         limits: Any = np.zeros((), record('governor_limits'))
-        limits['home'] = np.ascontiguousarray(row[POSE]).view(record('stewart_pose'))[0]
+        limits['home'] = np.ascontiguousarray(row[:ROTATION.stop]).view(record('stewart_pose'))[0]
         limits['head'] = head
         limits['stop_rate'], limits['return_rate'] = _stop_rate(parameters), _RETURN_RATE
         limits['condition_max'] = (1.0 - _OF_LOADS) * stop_condition_of(parameters)
+        limits['stop_condition'] = stop_condition_of(parameters)
         limits['side'] = math.copysign(1.0, result[DETERMINANT])
         limits['load_share'] = 1.0 - _OF_LOADS
+        self._pose_limits = PoseLimits(parameters)
+        joints, clearance = parameters.geometry.platform_joints, self._pose_limits.clearance
+        corners = joints if clearance is None else np.concatenate([joints, clearance.platform])
+        limits['arms'] = np.linalg.norm(joints - head, axis=1)
+        limits['radii'] = np.linalg.norm(joints, axis=1)
+        limits['reach'] = np.linalg.norm(corners - head, axis=1).max()
+        for name, margins in _margins(parameters).items():
+            limits[name] = margins
+        arguments = list(self._pose_limits.arguments)
         if parameters.drives:
             limits['speed_max'] = (1.0 - _OF_OTHERS) * largest_speeds(parameters)
+            # Friction changes its sign where a leg reverses between two samples.
+            limits['friction_torque'] = Friction.of(parameters).largest_change / motor_ratio(
+                parameters) * np.maximum(1.0 / parameters.drive.efficiency, 1.0)
+            if (curve := parameters.drive.torque_speed) is not None:
+                lowest = _lowest_nearby(curve)
+                arguments[1:3] = len(lowest), lowest
         self.limits: Records = limits
         self.home = home
-        self._pose_limits = PoseLimits(parameters)
-        self.arguments = within, *self._pose_limits.arguments, limits
+        self.arguments = within, *arguments, limits
         self._at_home = row, result
 
     def coordinates(self, motion: Motion) -> Records:
         """Return motions (N,) of the platform as the structure ``coordinates``."""
         home = self.home.rotation
+        with np.errstate(all='ignore'):  # of enormous numbers: not followed
+            return self._coordinates(motion, home)
+
+    def _coordinates(self, motion: Motion, home: Array) -> Records:
         rotation = home.T @ motion.rotation
         velocity, acceleration, omega, alpha = (vectors @ home for vectors in (
             motion.linear_velocity, motion.linear_acceleration, motion.angular_velocity,
             motion.angular_acceleration))
         angles = rotations.to_euler(rotation)
-        matrix = rotations.euler_rate_matrix(angles)
-        rates = np.linalg.solve(matrix, omega[..., None])[..., 0]
-        carried = rotations.euler_rate_matrix_rate(angles, rates) @ rates[..., None]
+        rates = rotations.euler_rates(angles, omega)
+        carried = (rotations.euler_rate_matrix_rate(angles, rates) @ rates[..., None])[..., 0]
         head = self.limits['head']
         arm = rotation @ head
         turning = np.cross(omega, arm)
@@ -118,7 +148,7 @@ class Governor:
         found['rate'] = np.column_stack([velocity + turning, rates])
         found['acceleration'] = np.column_stack([
             acceleration + np.cross(alpha, arm) + np.cross(omega, turning),
-            np.linalg.solve(matrix, alpha[..., None] - carried)[..., 0]])
+            rotations.euler_rates(angles, alpha - carried)])
         return found  # type: ignore[no-any-return]
 
     def limit_of(self, state: Records) -> str | None:
@@ -177,8 +207,8 @@ class GovernedStream:
         """
         Return the governed motion (N,) at times (N,) [s], which must increase from call to call.
 
-        demand: (N,), with the twist and acceleration that belong to its poses. Setpoints at 100 Hz
-            or more: motions between two of them are not checked.
+        demand: (N,), finite, with the twist and acceleration that belong to its poses. Samples may
+            be lost, and it may jump: the motion then goes there within the limits.
         """
         check_kind(demand, Motion)
         array = np.ascontiguousarray(as_array('times', times, demand.shape), dtype=float)
@@ -215,20 +245,43 @@ def check_gaps(times: Array, before: Array) -> None:
 def _within(parameters: Parameters) -> Records:
     """Return the structure of a hexapod whose limits have the margins of a governor."""
     found: Any = hexapod_structure(parameters)
-    legs = found['legs']
+    legs, margins = found['legs'], _margins(parameters)
     for name in OF_LEGS:
         limit = LIMITS[name]
-        if limit.quantity.unit == 'm':
-            continue
-        part = _OF_LOADS if limit.depends == LOAD else _OF_OTHERS
-        legs[short_name(name)] *= 1.0 - part
+        if limit.depends != POSE:
+            legs[short_name(name)] *= 1.0 - (_OF_LOADS if limit.depends == LOAD else _OF_OTHERS)
     # Friction changes its sign where a leg reverses between two samples.
     legs['force_max'] -= Friction.of(parameters).largest_change
-    margin = _OF_STROKE * _stroke(parameters)
-    legs['length_min'] += margin
-    legs['length_max'] -= margin
-    found['leg_clearance_min'] += _OF_CLEARANCE * parameters.singularity.characteristic_length
+    legs['length_min'] += margins['length_margin']
+    legs['length_max'] -= margins['length_margin']
+    for name in OF_JOINTS:
+        legs[short_name(name)] -= margins[_ANGLE_MARGINS[name]]
+    found['leg_clearance_min'] += margins['clearance_margin']
     return found  # type: ignore[no-any-return]
+
+
+def _margins(parameters: Parameters) -> dict[str, Array]:
+    """Return the margins of the limits of poses, by their fields of ``governor_limits``."""
+    size, stroke = parameters.singularity.characteristic_length, _stroke(parameters)
+    return {
+        'length_margin': np.where(stroke > 0.0, _OF_STROKE * stroke, _OF_SIZE * size),
+        'clearance_margin': np.array(_OF_SIZE * size),
+        **{field: _OF_OTHERS * six_of(parameters[limit], 0.0)
+           for limit, field in _ANGLE_MARGINS.items()}}
+
+
+def _lowest_nearby(curve: Array) -> Array:
+    """Return the lowest torques (M, 2) of a torque-speed curve (N, 2), margins of speed around."""
+    near = 1.0 - _OF_OTHERS, 1.0 / (1.0 - _OF_OTHERS)
+    speeds = np.unique(np.concatenate([curve[:, 0], *(curve[:, 0] * part for part in near)]))
+    speeds = speeds[speeds <= near[0] * curve[-1, 0]]
+
+    def lowest(speed: float) -> float:
+        low, high = (speed * part for part in near)
+        inner = curve[(curve[:, 0] > low) & (curve[:, 0] < high), 1]
+        return float(min(*np.interp([low, high], *curve.T), *inner))
+
+    return np.ascontiguousarray(np.column_stack([speeds, [lowest(each) for each in speeds]]))
 
 
 def _stroke(parameters: Parameters) -> Array:

@@ -17,7 +17,7 @@ LEGS = tuple(f'leg_{leg}' for leg in range(1, 7))
 
 
 def columns(quantities: Mapping[str, Array]) -> dict[str, Array]:
-    """Return quantities (..., 6) as columns (N,), whose names end in _1 to _6."""
+    """Return quantities (..., 6) as (N,) columns, whose names end in _1 to _6."""
     return {f'{name}_{leg + 1}': values.reshape(-1, 6)[:, leg]
             for name, values in quantities.items() for leg in range(6)}
 

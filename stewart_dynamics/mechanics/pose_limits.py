@@ -58,7 +58,7 @@ class PoseLimits:
             *drives.arguments[1:], len(base), base, len(platform), platform, checks)
 
     def values(self, motions: Array, results: Array) -> dict[str, Array]:
-        """Return the values (N, 6) of all limits at rows of motion and their results."""
+        """Return the (N, 6) values of all limits at rows of motion and their results."""
         return {**self.lengths_and_angles(motions, results), **self.clearances(motions)}
 
     def lengths_and_angles(self, motions: Array, results: Array) -> dict[str, Array]:

@@ -5,13 +5,14 @@
 Reading and writing of sensor_msgs/JointState.
 
 A message may have other joints besides the six of the hexapod, in any order; joints are found
-by name.
+by name. One with half of the six or fewer is a part of a sample, see ``joint_parts``.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from itertools import repeat
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -24,7 +25,8 @@ from stewart_dynamics.messages.cdr import (
     aligned8, COUNT, finite, header, LITTLE_ENDIAN, MALFORMED, MalformedError, nanoseconds,
     NOT_FINITE, put_count, put_text, READ_ERRORS, sequence, short_sequence, text, TIME_AND_LENGTH,
     unreadable)
-from stewart_dynamics.messages.layout import Layout
+from stewart_dynamics.messages.joint_parts import GAP, Joined, JointParts, Sample
+from stewart_dynamics.messages.layout import Layout, values_at
 
 FIELDS = ('position', 'velocity', 'effort')
 
@@ -106,6 +108,8 @@ class _Known(NamedTuple):
     """Returns the columns of one message's numbers."""
     reason: str
     details: str
+    part: list[int]
+    """Places of its joints, if it has at most half of them."""
 
 
 class JointStateReader:
@@ -118,21 +122,28 @@ class JointStateReader:
 
     joints: names of the joints in the order wanted.
     fields: which of FIELDS are wanted; the others may be empty.
+    gap: longest time between the parts of a sample [ns].
     """
 
-    def __init__(self, joints: Sequence[str], fields: Sequence[str] = FIELDS) -> None:
+    def __init__(self, joints: Sequence[str], fields: Sequence[str] = FIELDS,
+                 gap: int = GAP) -> None:
         self._found = self._lacking = False  # whether a message had all joints, or lacked one
-        self._others: list[str] = []  # the names in the first message that lacked one
+        # The names in the first message that lacked one, or in all parts.
+        self._others: list[str] = []
         self._joints = list(joints)
+        self._parts = JointParts(self._joints, len(fields), gap)
         self._fields = list(fields)
         self._known: list[_Known] = []
 
-    def read_one(self, data: bytes) -> tuple[int, tuple[Any, ...]]:
+    def read(self, data: bytes) -> list[Sample]:
         """
-        Return stamp [ns] and values, laid out as in JointStates.
+        Return stamp [ns] and values, laid out as in JointStates, of the samples that are complete.
+
+        A message with all joints is one; a part completes some samples, or none yet.
 
         Raises MalformedError: the bytes are no JointState.
-        Raises JointStateError: it lacks joints or fields, or a number is not finite.
+        Raises JointStateError: it lacks joints or fields, or a number is not finite; or a part
+            completes no sample, because another one has not come.
         """
         for known in self._known:
             read = known.layout.read_one(data)
@@ -147,11 +158,22 @@ class JointStateReader:
         values = known.chosen(read[1])
         if not finite(values):
             raise JointStateError(NOT_FINITE, str(values))
-        return read[0], values
+        if not known.part:
+            return [(read[0], values)]
+        samples, lacking = self._joined(read[0], known, values)
+        if lacking and not samples:
+            raise JointStateError(MISSING_JOINTS, lacking[-1])
+        return samples
+
+    def _joined(self, stamp: int, known: _Known, values: Sequence[float]) -> Joined:
+        """Join a part."""
+        joined = self._parts.add(stamp, known.part, values)
+        self._found = self._found or bool(joined.samples)
+        return joined
 
     def read_many(self, data: bytes | Bytes, starts: ArrayLike, sizes: ArrayLike) -> JointStates:
         """
-        Return the results of ``read_one`` for many messages, and the number of rejections.
+        Return the results of ``read`` for many messages, and the number of rejections.
 
         data: it holds all messages.
         starts, sizes (M,): where each begins, and its length in bytes.
@@ -161,6 +183,7 @@ class JointStateReader:
         stamps, values = np.zeros(len(begins), dtype=np.int64), np.zeros(
             (len(begins), len(self._fields) * len(self._joints)))
         used, rejected = np.zeros(len(begins), dtype=bool), Counter[str]()
+        parts: list[tuple[int, int, _Known, Sequence[float]]] = []
 
         def take(known: _Known, which: Stamps) -> Stamps:
             """Read those of the messages that have the layout, and return which have not."""
@@ -178,6 +201,10 @@ class JointStateReader:
                 chosen = numbers[:, known.columns]
                 sound = np.isfinite(chosen).all(axis=1)
                 rejected[NOT_FINITE] += int(np.count_nonzero(~sound))
+                if known.part:
+                    parts.extend(zip(part[sound].tolist(), part_stamps[sound].tolist(),
+                                     repeat(known), chosen[sound].tolist(), strict=False))
+                    continue
                 stamps[part], values[part], used[part] = part_stamps, chosen, sound
             return np.sort(np.concatenate(others))
 
@@ -194,12 +221,36 @@ class JointStateReader:
                 left = left[1:]
                 continue
             left = take(known, left)
-        return JointStates(stamps[used], values[used], dict(+rejected))
+        if not parts:
+            return JointStates(stamps[used], values[used], dict(+rejected))
+        at, more = np.flatnonzero(used).tolist(), list[Sample]()
+        for place, stamp, known, numbers in sorted(parts, key=itemgetter(0)):
+            samples, lacking = self._joined(stamp, known, numbers)
+            rejected[MISSING_JOINTS] += len(lacking)
+            at += [place] * len(samples)
+            more += samples
+        order = np.argsort(at, kind='stable')
+        return JointStates(
+            np.concatenate([stamps[used], np.array([each for each, _ in more], dtype=np.int64)])[
+                order],
+            np.concatenate([values[used], np.array([each for _, each in more]).reshape(
+                -1, values.shape[1])])[order], dict(+rejected))
+
+    def reads_all(self, data: bytes) -> bool:
+        """Return whether a message has all fields of the joints, or of a part of them."""
+        try:
+            self.read(data)
+        except (MalformedError, JointStateError):
+            return False
+        return True
 
     def check(self, where: str) -> None:
         """Raise BagError if messages lacked a joint, and none had all joints."""
         if self._lacking and not self._found:
             missing = [joint for joint in self._joints if joint not in self._others]
+            if not missing:
+                raise BagError(f'{where}: each message has some of the joints, and their stamps '
+                               'are never close enough to be joined')
             raise BagError(
                 f'{where}: no message contains {", ".join(missing)}; they contain '
                 f'{", ".join(self._others) or "nothing"}: they must be those of the parameter '
@@ -209,7 +260,10 @@ class JointStateReader:
         """Read a message field by field and remember its layout."""
         fields = _fields(data)
         known = self._judge(data, fields)
-        if known.reason != MISSING_JOINTS:
+        if known.part:
+            self._lacking = True
+            self._others += [name for name in fields.names if name not in self._others]
+        elif known.reason != MISSING_JOINTS:
             self._found = True
         else:
             self._lacking = True
@@ -223,10 +277,12 @@ class JointStateReader:
         wanted = {field: fields.numbers[n] for n, field in enumerate(FIELDS)
                   if field in self._fields}
         reason = details = ''
-        if missing := [joint for joint in self._joints if joint not in names]:
+        there = [joint for joint in self._joints if joint in names]
+        missing = [joint for joint in self._joints if joint not in names]
+        if missing and not 0 < len(there) <= len(missing):
             reason = MISSING_JOINTS
-            there = ', '.join(name[:_SHOWN] for name in names[:_SHOWN]) or 'none'
-            details = f'{", ".join(missing)}; there are {there}'
+            shown = ', '.join(name[:_SHOWN] for name in names[:_SHOWN]) or 'none'
+            details = f'{", ".join(missing)}; there are {shown}'
         elif empty := [field for field, (_, count) in wanted.items() if not count]:
             reason = f'without {" and ".join(empty)}'
             details = f'{n_names} names'
@@ -239,9 +295,10 @@ class JointStateReader:
         free = [slice(at, at + 8 * count) for at, count in fields.numbers]
         columns = [] if reason else [
             list(wanted).index(field) * n_names + names.index(joint)
-            for field in self._fields for joint in self._joints]
+            for field in self._fields for joint in there]
+        part = [self._joints.index(joint) for joint in there] if missing and not reason else []
         return _Known(Layout(data, numbers, gaps=[*fields.gaps, *free]), columns,
-                      itemgetter(*columns or [0]), reason, details)
+                      values_at(columns), reason, details, part)
 
 
 class JointStateWriter:

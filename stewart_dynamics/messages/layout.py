@@ -79,8 +79,7 @@ class Layout:
         self._template = [*self._struct.unpack(self.message)]
         self._stamp_places, self._number_places = places['I'], places['d']
         values = [n for place in places['d'] for n in range(place.start, place.stop)]
-        self._values: Callable[[tuple[Any, ...]], tuple[float, ...]] = (
-            itemgetter(*values) if values else lambda fields: ())
+        self._values = values_at(values)
         self._constant = itemgetter(*(place.start for place in places['s']))
         self._expected = self._constant(self._template)
 
@@ -133,6 +132,13 @@ class Layout:
         for name, values in zip(self._parts, numbers, strict=True):
             rows[name] = values
         return messages
+
+
+def values_at(places: Sequence[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
+    """Return a function that returns the values at some places, fast where these are many."""
+    if len(places) > 1:
+        return itemgetter(*places)
+    return lambda values: tuple(values[place] for place in places)
 
 
 class Written(NamedTuple):

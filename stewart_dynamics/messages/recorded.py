@@ -59,6 +59,9 @@ class Messages(NamedTuple):
 
     def places(self) -> dict[str, Integers]:
         """Return the indices of the messages of each topic that has any."""
-        found = ((topic, np.flatnonzero(self.of_topic == n))
-                 for n, topic in enumerate(self.topics))
-        return {topic: places for topic, places in found if len(places)}
+        places: dict[str, Integers] = {}
+        for n, topic in enumerate(self.topics):
+            if len(found := np.flatnonzero(self.of_topic == n)):
+                places[topic] = (np.sort(np.concatenate([places[topic], found]))
+                                 if topic in places else found)
+        return places

@@ -78,7 +78,7 @@ class _Lines:
         self._turns = 1j ** orders
 
     def signals(self, phases: Array) -> Array:
-        """Return the signals (3, N) over one period, each of an RMS of 1."""
+        """Return the (3, N) signals over one period, each of an RMS of 1."""
         lines = np.zeros((3, self._size // 2 + 1), dtype=complex)
         lines[:, self._harmonics] = self._weights * np.exp(1j * phases) * self._turns
         found: Array = np.fft.irfft(lines, self._size) * (self._size / 2.0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from stewart_dynamics.bags.recording import joined, Recording
+from stewart_dynamics.bags.recording import joined, Recording, topics_in
 from stewart_dynamics.description.model import MODEL_TYPES
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
@@ -106,8 +106,8 @@ def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Para
              or name.endswith(f'/{inputs.BASE_POSE}')))
     if base:
         notices.append(f'{joined(base)}: not used: base.source is {parameters.base.source}')
-    legs = recording.topics_of(type_names.JOINT_STATE,
-                               {*topics.values(), *_computed_by(options.node)})
+    legs = recording.topics_of(type_names.JOINT_STATE, {
+        *topics_in(topics.get(MEASURED, '')), *_computed_by(options.node)})
     if legs and MEASURED not in topics:
         notices.append(f'{joined(legs)}: not used; --measured compares the efforts of measured '
                        'legs with the computed forces')

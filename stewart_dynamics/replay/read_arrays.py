@@ -198,7 +198,7 @@ def read_legs(
     node : str, optional
         Name before the usual topic, ``NODE/measured_legs``.
     topic : str, optional
-        Another topic of type sensor_msgs/JointState.
+        Another topic of type sensor_msgs/JointState, or several with commas, of some legs each.
 
     Raises
     ------

@@ -70,9 +70,10 @@ def _arguments() -> argparse.ArgumentParser:
     for name, what in _TOPICS.items():
         topics.add_argument(f'--{name.replace("_", "-")}', metavar='TOPIC',
                             help=f'topic of the {what}')
-    topics.add_argument('--measured', metavar='TOPIC',
+    topics.add_argument('--measured', metavar='TOPIC,...',
                         help='JointState whose efforts are compared with the computed forces, '
-                             'and whose positions are the achieved ones of --response')
+                             'and whose positions are the achieved ones of --response; several '
+                             'topics where each has some of the legs')
     add_motor_efforts(topics)
     response = parser.add_argument_group('how the platform follows')
     response.add_argument('--response', action='store_true',

@@ -54,7 +54,7 @@ class Response(NamedTuple):
 
     @property
     def phase(self) -> Array:
-        """Return the phase (F,) [rad] without jumps by whole turns, from the lowest one on."""
+        """Return the (F,) phases [rad] without jumps by whole turns, from the lowest one on."""
         phase: Array = np.angle(self.value).astype(np.float64)
         sure = np.flatnonzero(self.coherent)
         if not len(sure):

@@ -164,7 +164,7 @@ class Outputs(NamedTuple):
 
     @property
     def results(self) -> Array:
-        """Rows of results (N, RESULT); forces that are not known are nan."""
+        """Rows (N, RESULT) of results; forces that are not known are nan."""
         return self.rows[:, :RESULT]
 
     @property
@@ -262,7 +262,7 @@ class Outputs(NamedTuple):
         return Singularity.of(self.states[n].tolist())
 
     def values(self) -> dict[str, Array]:
-        """Return the values (N, 6) of the limits of the legs, those that are computed."""
+        """Return the (N, 6) values of the limits of the legs, those that are computed."""
         found = result_values(self.rows)
         if self.joint_angles.shape[1]:
             found |= {name: self.joint_angles[:, where] for name, where in ANGLES.items()}

@@ -46,7 +46,7 @@ class Cells(NamedTuple):
 
     def numbers(self, places: Sequence[int]) -> Array:
         """
-        Return the numbers (N, K) in some columns; nan where a cell is empty.
+        Return the (N, K) numbers in some columns; nan where a cell is empty.
 
         Beside other separators than commas they may have decimal commas, then all of them.
 

@@ -253,7 +253,7 @@ class NamedTable:
         return ', '.join(filter(None, self._header.cells))
 
     def times(self) -> Array:
-        """Return the times (N,), strictly increasing [s]."""
+        """Return the (N,) times [s], strictly increasing."""
         times = self.values(TIME)[:, 0]
         for n in np.flatnonzero(np.diff(times) <= 0.0)[:1] + 1:
             raise self.error(int(n), 't', 'must be more than that of the row before')

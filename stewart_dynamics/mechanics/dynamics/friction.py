@@ -66,7 +66,7 @@ class Friction(NamedTuple):
         return self._replace(viscous=np.zeros(6))
 
     def forces(self, rates: Array) -> Array:
-        """Return the forces (N, 6) that overcome the friction [N] at rates (N, 6) [m/s]."""
+        """Return the (N, 6) forces that overcome the friction [N] at rates (N, 6) [m/s]."""
         rates, forces = np.ascontiguousarray(rates), np.empty((len(rates), 6))
         function('friction_many')(*map(np.ascontiguousarray, self), len(rates), rates, forces)
         return forces

@@ -65,6 +65,17 @@ def euler_rate_matrix(angles: ArrayLike) -> Array:
     return _matrix([[cg * cb, -sg, zero], [sg * cb, cg, zero], [-sb, zero, one]])
 
 
+def euler_rates(angles: ArrayLike, angular_velocity: ArrayLike) -> Array:
+    """Return E^-1 w (..., 3): the rates of angles; not finite where the pitch is 90 degrees."""
+    _, beta, gamma = np.moveaxis(np.asarray(angles, dtype=float), -1, 0)
+    x, y, z = np.moveaxis(np.asarray(angular_velocity, dtype=float), -1, 0)
+    cg, sg = np.cos(gamma), np.sin(gamma)
+    alpha_rate = (cg * x + sg * y) / np.cos(beta)
+    found: Array = np.stack(
+        [alpha_rate, cg * y - sg * x, z + np.sin(beta) * alpha_rate], axis=-1)
+    return found
+
+
 def euler_rate_matrix_rate(angles: ArrayLike, rates: ArrayLike) -> Array:
     """Return dE/dt (..., 3, 3): angular acceleration = E angles'' + E' angles'."""
     _, beta, gamma = np.moveaxis(np.asarray(angles, dtype=float), -1, 0)
