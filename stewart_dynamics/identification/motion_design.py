@@ -147,8 +147,8 @@ def _bounds(p: Parameters) -> dict[str, Any]:
 
 
 # Samples per period of the highest harmonic: in the search, and in the final check. Intervals
-# need fewer of them than limits, in the search every fourth.
-_SAMPLES, _FINE_SAMPLES, _FOURTH = 20, 100, 4
+# need fewer of them than limits, in the search every second.
+_SAMPLES, _FINE_SAMPLES, _SECOND = 20, 100, 2
 # Number of iterations that scale a motion to its limits: in the search, and at the end.
 _SCALINGS, _LAST_SCALINGS = 2, 30
 _CLOSE = 1e-3
@@ -263,7 +263,7 @@ class _Search:
         rows = self._rows(coefficients)
         excess = self.limits.excess(rows)
         variances = np.sum(_variances(
-            self.platform, self.unknowns, rows[:, ::_FOURTH], self._options.duration,
+            self.platform, self.unknowns, rows[:, ::_SECOND], self._options.duration,
             self._options)
             / self.unknowns.deviations[self.unknowns.asked] ** 2, axis=1)
         # Information grows with the square of the amplitude; excess amplitude costs as much.
