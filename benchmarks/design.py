@@ -60,27 +60,30 @@ def main() -> None:
     options = parser.parse_args()
     parameters = Parameters.from_yaml(options.params)
     asked = DesignOptions(seed=options.seed, generations=options.generations)
-    platform_ = StewartPlatform(parameters)
-    ratios: dict[tuple[str, ...], list[float]] = {}
     lines = ['']
-    for kinds in (('platform',), asked.kinds):
-        begin = time.monotonic()
-        designed = design(parameters, asked._replace(kinds=kinds))
-        took = time.monotonic() - begin
+    for title, file in (
+            ('The file with its uncertainty:', parameters),
+            ('All but platform and friction known exactly, so that noise alone counts:',
+             parameters.replaced({f'uncertainty.{name}': 0.0 for name in (
+                 'leg_mass', 'reflected_mass', 'effort_gain', 'tilt')}))):
+        platform_ = StewartPlatform(file)
+        begin = time.process_time()
+        designed = design(file, asked)
+        took = time.process_time() - begin
         half_widths = {label: predicted_half_widths(
             platform_, designed.unknowns, sweep(platform_, asked, together), asked.duration, asked)
             for label, together in (('sweeps in turn', False), ('sweeps at once', True))}
         scales = designed.unknowns.deviations[designed.unknowns.asked]
-        ratios[kinds] = [float(np.sqrt(np.sum((each / scales) ** 2) / np.sum(
-            (designed.half_widths / scales) ** 2))) for each in half_widths.values()]
-    lines += [*compared(designed, half_widths), '']
-    lines += [f'`--identify {",".join(kinds)}`: by the root of the mean square of all intervals, '
-              f'each by the change that would matter, {in_turn:.1f} times narrower than sweeps in '
-              f'turn, {at_once:.0f} times than sweeps at once.\n'
-              for kinds, (in_turn, at_once) in ratios.items()]
+        in_turn, at_once = (float(np.sqrt(np.sum((each / scales) ** 2) / np.sum(
+            (designed.half_widths / scales) ** 2))) for each in half_widths.values())
+        lines += [title, '', *compared(designed, half_widths), '', (
+            'By the root of the mean square of all intervals, each divided by that of the file, '
+            f'{in_turn:.1f} times narrower than from sweeps in turn, {at_once:.1f} times than '
+            'from sweeps at once.'), '']
     lines += [(
         f'{asked.duration:.0f} s up to {asked.frequency:g} Hz, efforts at {asked.rate:g} Hz with '
-        f'white noise of {asked.noise:g} N. Designed in {took:.0f} s, seed {asked.seed}.'), '', (
+        f'white noise of {asked.noise:g} N. A design takes {took:.0f} s of processor time, seed '
+        f'{asked.seed}.'), '', (
         f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
         f'{platform.python_version()}.'), '']
     print('\n'.join(lines))

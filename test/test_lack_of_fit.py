@@ -7,28 +7,35 @@ from __future__ import annotations
 
 from contextlib import closing
 from pathlib import Path
+import re
 
 import estimate_cases
 from estimate_cases import (
-    braked, drawn, identified, MOTIONS, recording, rich, SENSORS, stopping, Truth, with_friction)
+    braked, drawn, FILE, identified, MOTIONS, recording, rich, SENSORS, stopping, Truth,
+    with_friction)
 from independent_hexapod import Legs, moving
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 from recorded import about, at_rest, fourier, HOME, MotionAt, Noise, Recorded, recorded
 from referees import rng
+from simulated import simulated as simulated_hexapod
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
-from stewart_dynamics.identification.identification_options import IdentificationOptions
+from stewart_dynamics.identification.identification_options import (
+    DesignOptions, IdentificationOptions)
 from stewart_dynamics.identification.identification_results import document, result_text
 from stewart_dynamics.identification.identify import Identification, Identified
 from stewart_dynamics.identification.lack_of_fit import deviations, LEFT_BY_FILTERS
+from stewart_dynamics.identification.motion_design import design
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.window_poses import pose_near
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.reference_motion.motion_functions import motion_at
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.simulator.plant import Plant
 import wrong_models
 from wrong_models import (
     Case, CAUSES, GIVEN, identify, NOISE, RATE, SECONDS, simulated, true_hexapod)
@@ -51,6 +58,11 @@ def errors_of(found: Identified) -> Array:
     return errors
 
 
+# The simulated hexapod of demo/identify.py.
+TRUE_OF_SIMULATOR = {
+    'platform__mass': 190.0, 'platform__center_of_mass': [0.06, -0.04, 0.17],
+    'platform__inertia': [16.5, 0.1, -0.8, 17.0, 0.5, 24.0],
+    'actuator__viscous_friction': 400.0, 'actuator__coulomb_friction': 50.0}
 # Errors that are within the uncertainty of the file, or change nothing else.
 SILENT = 'leg masses 10 % off', 'tilt 0.5 degrees', 'base joint 4 mm off'
 
@@ -71,12 +83,11 @@ def test_a_wrong_model_is_noticed_and_its_cause_named(cause: str) -> None:
         return  # true values do not hold for the whole recording
     off = np.abs(found.fit.values[found.unknowns.asked] - start_of(case.true))
     half = TWO_SIDED * errors_of(found)
-    narrow, given = off < half, [each['interval'] for each in result['parameters']]
-    if result['lack_of_fit']['intervals'] == 'none':
-        assert given == len(given) * [None]
-    else:
-        wide = half + found.lack_of_fit.shifts[found.unknowns.asked]
-        assert np.mean(off < wide) >= max(0.8, narrow.mean())
+    narrow, wide = off < half, half + found.lack_of_fit.shifts[found.unknowns.asked]
+    assert np.mean(off < wide) >= max(0.8, narrow.mean())
+    assert result['lack_of_fit']['intervals'] == 'widened'
+    given = np.array([each['interval'] for each in result['parameters']])
+    np.testing.assert_allclose(np.diff(given)[:, 0], 2.0 * wide)
 
 
 @pytest.mark.parametrize('cause', SILENT)
@@ -420,4 +431,42 @@ def test_masses_of_legs_are_not_named_for_a_constant_force_that_explains_the_sam
     truth = drawn(3)
     bag = estimate_cases.recorded(truth, 'roll', 3)
     efforts = bag.efforts + 40.0 * np.eye(6)[3]
-    assert identified([bag._replace(efforts=efforts)], truth).causes == ('unknown',)
+    found = identified([bag._replace(efforts=efforts)], truth)
+    assert found.causes == ('unknown',)
+    # an error that is not explained widens the intervals, and the notice says by how much
+    assert len(found.intervals) == len(found.judged)
+    assert np.mean([each.holds for each in found.intervals]) > 0.9
+    assert re.search('not explained; the largest part is in leg_. ?.*; the intervals are widened '
+                     r'by .*: .* is [\d.]+ times as wide, half of all at most [\d.]+ times; '
+                     'next: look at this part in the report', found.notices[0])
+
+
+@pytest.mark.parametrize('seed', [0, 1])
+def test_exact_recordings_of_the_simulator_have_intervals(seed: int) -> None:
+    """Whether or not the errors of filters and of held forces are significant without noise."""
+    rate, true = 500.0, TRUE_OF_SIMULATOR
+    design_ = design(GIVEN, DesignOptions(
+        duration=SECONDS, frequency=4.0, generations=5, seed=seed))
+    motion = motion_at(design_.trajectory, np.arange(round(SECONDS * rate)) / rate)
+    desired = StewartPlatform(GIVEN).inverse_dynamics(motion)
+    plant = Plant(simulated_hexapod(rate=rate, **true))
+    found = []
+    for lengths, rates, forces in zip(desired.lengths, desired.rates, desired.forces, strict=True):
+        state = plant.state
+        found.append((state.lengths, state.rates, state.forces))
+        plant.advance(tuple((forces + 4e5 * (lengths - state.lengths) + 1.6e4 * (
+            rates - state.rates)).tolist()), NO_WRENCH)
+    lengths, rates, forces = np.array(found).swapaxes(0, 1)
+    bag = Recorded(np.zeros(0), lengths - GIVEN['geometry.zero_length'], rates, forces)
+    outcome = identified([bag], FILE.changed(**true), rate=rate)
+    assert len(outcome.intervals) == len(outcome.judged) == 22
+    assert all(each.holds and each.identified for each in outcome.intervals)
+
+
+def test_a_mistake_that_was_accepted_leaves_no_intervals() -> None:
+    """Nothing can be said of the values where the recording is another one than the model's."""
+    truth = drawn(3)
+    bag = estimate_cases.recorded(truth, 'rich', 3)
+    found = identified([bag._replace(efforts=-bag.efforts)], truth)
+    assert 'sign' in found.causes
+    assert found.intervals == []

@@ -132,6 +132,10 @@ def scale(p: Parameters, random: np.random.Generator) -> Case:
     return Case(p, lambda forces, rates: 1.05 * forces)
 
 
+def far_scale(p: Parameters, random: np.random.Generator) -> Case:
+    return Case(p, lambda forces, rates: forces / 1.3)
+
+
 def saturation(p: Parameters, random: np.random.Generator) -> Case:
     part = random.uniform(0.6, 0.8)
 
@@ -157,7 +161,8 @@ CAUSES: dict[str, tuple[Callable[[Parameters, np.random.Generator], Case], tuple
     'tilt 0.5 degrees': (tilt, ('tilt',)),
     'reflected mass halved': (reflected_mass, ('reflected_mass',)),
     'gain of one leg 5 % off': (gain, ('gain',)),
-    'all efforts times 1.05': (scale, ('scale',)),
+    'all efforts times 1.05': (scale, ('effort_gain',)),
+    'all efforts divided by 1.3': (far_scale, ('effort_gain',)),
     'saturation': (saturation, ('saturation',)),
     'two payloads in two bags': (two_bags, ('payload',)),
 }

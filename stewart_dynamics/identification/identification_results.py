@@ -27,7 +27,7 @@ from stewart_dynamics.identification.extraction import Extracts
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import (
     Identification, Identified, Residuals)
-from stewart_dynamics.identification.lack_of_fit import PIECE, WHOLE
+from stewart_dynamics.identification.lack_of_fit import NEXT, PIECE, WHOLE
 from stewart_dynamics.identification.parameter_fit import residual_of, shifted_by
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import Identifiability, identifiability
@@ -99,7 +99,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
     """Return the content of identification.json, see docs/identification.md."""
     joints, u, asked = found.parameters.joints, found.unknowns, found.unknowns.asked
     lack, what, states = found.lack_of_fit, *_identifiability(found)
-    sure = lack is None or not lack.unexplained
+    sure = all(lack is not None and each.what == lack.cause for each in found.likely)
     errors, parts = _errors(found), found.fit.parts(u)
     parameters = [{**estimate(
         u.names[n], u.units[n], u.start[n], found.fit.values[n], state, errors[n], share,
@@ -134,7 +134,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
             'samples': found.validation.samples, **_residuals(joints, found.validation)},
         'tested_for_lack_of_fit': found.tested,
         'lack_of_fit': None if lack is None else {
-            'cause': lack.cause, 'text': lack.notice,
+            'cause': lack.cause, 'text': _notice(found, sure),
             'intervals': 'widened' if sure else 'none', 'residual_left': lack.left,
             'causes': [{'what': each.what, 'text': each.text, 'statistic': each.statistic,
                         'columns': each.columns, 'deviations': each.deviations}
@@ -154,14 +154,33 @@ def _identifiability(found: Identified) -> tuple[Identifiability, list[str]]:
     data = np.linalg.pinv(after, hermitian=True) - np.linalg.pinv(before, hermitian=True)
     largest = (IDENTIFIABLE ** -2 - 1.0) ** -0.5
     what = identifiability(data / np.outer(scales, scales), scales, largest_error=largest)
-    return what, [IDENTIFIED if known else NOT_IDENTIFIABLE
-                  for known in found.fit.ratios(u)[u.asked] < IDENTIFIABLE]
+    known = _errors(found)[u.asked] < IDENTIFIABLE * u.deviations[u.asked]
+    return what, [IDENTIFIED if each else NOT_IDENTIFIABLE for each in known]
 
 
 def _errors(found: Identified) -> Array:
     """Return standard errors (k,), wider where there is a lack of fit."""
     return found.fit.deviations if found.lack_of_fit is None else (
         found.fit.deviations + found.lack_of_fit.shifts / TWO_SIDED)
+
+
+def _notice(found: Identified, sure: bool) -> str:
+    """Return the notice of a lack of fit in one line; ``sure``: there are intervals."""
+    lack, asked = found.lack_of_fit, found.unknowns.asked
+    assert lack is not None
+    cause = (f'not explained; the largest part is {lack.text}' if lack.unexplained else
+             f'likely {lack.text}')
+    changes = 'no intervals are given: a possible error in the recording was accepted'
+    if sure:
+        ratios = np.divide(_errors(found), found.fit.deviations, out=np.ones(
+            len(found.written)), where=found.fit.deviations > 0.0)[asked]
+        widest = int(np.argmax(ratios))
+        changes = (
+            'the intervals are widened by the change that '
+            f'{"any of the possible causes" if lack.unexplained else "this"} would make: '
+            f'{found.unknowns.names[asked[widest]]} is {ratios[widest]:.2g} times as wide, half of '
+            f'all at most {np.median(ratios):.2g} times')
+    return f'the residuals are more than noise: {cause}; {changes}; next: {NEXT[lack.cause]}'
 
 
 def _residuals(joints: Sequence[str], residuals: Residuals) -> dict[str, Any]:
@@ -182,7 +201,7 @@ def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
         name = name.replace('first_moment', 'center_of_mass').replace('second_moment', 'inertia')
         if each['state'] == IDENTIFIED:
             text = (f'+-{TWO_SIDED * each["standard_error"]:.2g}' if each['interval'] else
-                    'no interval: lack of fit')
+                    'no interval')
             if name == 'gravity':  # the identified angle is not a value of the file
                 text = f'turned about {parts[1][-1]} by {each["value"]:.5f} {text} rad'
         else:

@@ -51,8 +51,9 @@ _ANY = 1e4
 # Significance for a notice, in standard deviations of a normal distribution: of a force that the
 # model lacks, and of a number that is more uncertain than the file says.
 _NOTICE, _UNCERTAIN = 7.0, 4.0
-# Part of the variance before the data that must be gone after it, in a direction that is judged.
-_TOLD = 0.05
+# Part of the variance before the data that must be gone after it, in a direction that is judged;
+# of the gain, which files know better than recordings.
+_KNOWN, _KNOWN_GAIN = 0.05, 0.01
 # Twice the logarithm of the likelihood ratio from which a cause is named before another.
 _CLEARLY = 2.0 * math.log(1000.0)
 # Largest statistic that a named cause leaves, relative to its own.
@@ -68,6 +69,8 @@ _SUSPICIOUS = 4.0
 _WIDENING = 1.5
 # Penalty on the statistic for each column of a cause.
 _PENALTY = 4.0
+# Parts of an error of the model that is not explained.
+_MOST_PARTS = 6
 # Rates, relative to their RMS, below which a leg reverses, and above which it is fast; ratio of
 # residuals there to all that is worth a word.
 _REVERSES, _FAST, _WORTH = 0.2, 1.3, 1.3
@@ -105,22 +108,25 @@ class LackOfFit(NamedTuple):
         """Return whether no cause is named."""
         return self.cause == UNKNOWN
 
-    @property
-    def notice(self) -> str:
-        """Return the notice in one line."""
-        if self.unexplained:
-            return ('the residuals are more than noise: not explained; the largest part is '
-                    f'{self.text}; no intervals are given')
-        kinds = 'offset in --identify' if self.cause == 'offset' else TAKEN_BY.get(self.cause)
-        return (f'the residuals are more than noise: likely {self.text}'
-                + (f'; {kinds} takes it into account' if kinds else '')
-                + '; the intervals are widened by what it changes')
 
-
-# Parameters that take into account what the recordings contradict.
-TAKEN_BY = {'tilt': 'a larger uncertainty.tilt',
-            'reflected_mass': 'a larger uncertainty.reflected_mass',
-            'leg_mass': 'a larger uncertainty.leg_mass'}
+# Kinds of numbers that may be farther from the file than their uncertainty allows.
+CONTRADICTED = 'tilt', 'reflected_mass', 'leg_mass', 'effort_gain'
+# Advice for each cause.
+_GEOMETRY = 'calibrate the geometry (stewart_calibrate)'
+NEXT = {
+    **{what: f'correct the file, or give a larger uncertainty.{what}' for what in CONTRADICTED},
+    'effort_gain': 'check the scale of the efforts (load cells, torque constant, losses), or give '
+                   'a larger uncertainty.effort_gain',
+    'offset': 'zero the load cells, or add offset to --identify',
+    'gain': 'check the load cell or the torque constant of this leg',
+    'delay': 'check stamps and filters of the efforts of this leg',
+    'saturation': 'record a slower or smaller motion',
+    'payload': 'identify the part with one payload, each bag by itself',
+    'stribeck_friction': 'record a motion that is slow for a smaller part of its time',
+    'load_friction': 'if efforts follow from motors, give drive.efficiency and --motor-torque',
+    'zero_length': _GEOMETRY, 'joint': _GEOMETRY,
+    UNKNOWN: 'look at this part in the report, and compare with a recording of another motion '
+             '(--design --seed 1)'}
 
 
 class _Explained(NamedTuple):
@@ -139,7 +145,7 @@ class _Scores(NamedTuple):
     of_noise: Array  # (m, m), the part of it that is noise of lengths and rates
     scores: Array  # (m,), without what this noise adds to them
     sizes: Array  # (m,)
-    follow: Array  # (n, m) change of the model by the columns
+    follow: Array  # (n, m) change of the model's numbers by the columns
     squares: float  # sum of squared residuals
     sums: Array  # of model, columns and residuals
     noise: Array  # the part of them that is noise of lengths and rates
@@ -159,8 +165,8 @@ class _Scores(NamedTuple):
         sizes = np.sqrt(np.diag(sums)[n:-1])
         scale = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
         normal, of_noise = (scale[:, None] * each * scale for each in (left, noise))
-        return cls(normal, of_noise, scale * scores, scale, follow, float(sums[-1, -1]), sums,
-                   sums_of_noise, at)
+        return cls(normal, of_noise, scale * scores, scale, follow * scale,
+                   float(sums[-1, -1]), sums, sums_of_noise, at)
 
     def explained(self, places: Integers) -> _Explained:
         """Return the part of the residuals that some columns explain."""
@@ -168,6 +174,10 @@ class _Scores(NamedTuple):
         amounts = inverse @ self.scores[places]
         return _Explained(self.sizes[places] * amounts, float(self.scores[places] @ amounts),
                           freedom)
+
+    def change(self, places: Integers) -> Array:
+        """Return the change (n,) of the model's numbers if some columns are added to the fit."""
+        return self.follow[:, places] @ (self._inverse(places)[0] @ self.scores[places])
 
     def model_with(self, places: Integers) -> Posterior:
         """Return the model's numbers after the data, with any amount of some columns."""
@@ -185,7 +195,8 @@ class _Scores(NamedTuple):
         projection[:, places] -= self.normal[:, places] @ self._inverse(places)[0]
         return self._replace(normal=projection @ self.normal @ projection.T,
                              of_noise=projection @ self.of_noise @ projection.T,
-                             scores=projection @ self.scores)
+                             scores=projection @ self.scores,
+                             follow=self.follow @ projection.T)
 
     def _inverse(self, places: Integers) -> tuple[Array, int]:
         """Return the inverse of the covariance of some scores, and its rank."""
@@ -230,16 +241,39 @@ def lack_of_fit(platform: StewartPlatform, extracts: Extracts, noisy: Noisy, unk
     else:  # numbers that are far from the file's
         rest, rivals = [], rivals or any(_rivals(best, of_all, scores, unknowns))
     if rivals or any(each.statistic > _LEAVES * best.statistic for each in rest):
+        shifts = np.max([_model_error(of_all, scores, unknowns), *(
+            shift for _, shift in contradicted)], axis=0)
         return LackOfFit(UNKNOWN, _largest_part(platform, _of(extracts, chosen), unknowns, fit),
-                         tuple(ranked), np.zeros(len(unknowns.start)), 1.0)
+                         tuple(ranked), shifts, 1.0)
     for each, shifts in contradicted:
         if each is best:
             return LackOfFit(best.what, best.text, tuple(ranked), shifts, 1.0)
-    explained = scores.explained(best.places)
-    shifts = np.abs(unknowns.root @ scores.follow[:len(unknowns.start), best.places]
-                    @ explained.amounts)
-    return LackOfFit(best.what, best.text, tuple(ranked), _WIDENING * shifts,
-                     math.sqrt(max(0.0, 1.0 - explained.statistic / scores.squares)))
+    return LackOfFit(
+        best.what, best.text, tuple(ranked), _WIDENING * _shifts(scores, best.places, unknowns),
+        math.sqrt(max(0.0, 1.0 - best.statistic / scores.squares)))
+
+
+def _shifts(scores: _Scores, places: Integers, unknowns: Unknowns) -> Array:
+    """Return the change (k,) of each unknown if some columns are added to the fit."""
+    shifts: Array = np.abs(unknowns.root @ scores.change(places)[:len(unknowns.start)])
+    return shifts
+
+
+def _model_error(causes: Sequence[Cause], scores: _Scores, unknowns: Unknowns) -> Array:
+    """
+    Return by how much (k,) an error of the model that is not explained may shift each unknown.
+
+    It is made of the causes: any of those that are significant may be the first part, of which
+    the largest shift counts, and so may any of those that are left beside the likeliest.
+    """
+    shifts = np.zeros(len(unknowns.start))
+    for _ in range(_MOST_PARTS):
+        ranked = _ranked(causes, scores, _SUSPICIOUS)
+        if not ranked:
+            break
+        shifts += np.max([_shifts(scores, each.places, unknowns) for each in ranked], axis=0)
+        scores = scores.without(ranked[0].places)
+    return _WIDENING * shifts
 
 
 def _contradicted(unknowns: Unknowns, fit: Fit) -> Iterator[tuple[Found, Array]]:
@@ -249,7 +283,7 @@ def _contradicted(unknowns: Unknowns, fit: Fit) -> Iterator[tuple[Found, Array]]
     If the model is right, their means after the data have the covariance 1 - C, with C the
     covariance after the data. The second is what their prior shifts each unknown by (k,).
     """
-    for what in TAKEN_BY:
+    for what in CONTRADICTED:
         found = _Contradiction.of(unknowns, what, fit.posterior)
         if found.significance > _UNCERTAIN:
             change = unknowns.root[:, found.places] @ found.true
@@ -272,7 +306,7 @@ class _Contradiction(NamedTuple):
         places = np.flatnonzero(unknowns.origins == ORIGINS.index(what))
         values, vectors = np.linalg.eigh(
             np.eye(len(places)) - after.covariance[np.ix_(places, places)])
-        known = values > _TOLD
+        known = values > (_KNOWN_GAIN if what == 'effort_gain' else _KNOWN)
         along = (vectors.T @ after.values[places])[known]
         return cls(places, vectors[:, known] @ (along / values[known]),
                    float(np.sum(along ** 2 / values[known])), int(known.sum()))
@@ -302,6 +336,8 @@ def _in_words(unknowns: Unknowns, what: str, change: Array) -> str:
         of_rotors = [f'{each:+.3g}' for each, name in zip(change, unknowns.names, strict=True)
                      if what in name]
         return f'another actuator.reflected_mass, {" ".join(of_rotors)} kg'
+    if what == 'effort_gain':
+        return f'another gain of all efforts, by about {100.0 * change[-1]:+.2g} %'
     parts = [100.0 * each / start for each, start, name in zip(
         change, unknowns.start, unknowns.names, strict=True) if 'second_moment' in name and start]
     return f'other masses of the legs, by about {np.mean(parts):+.3g} %'

@@ -203,7 +203,8 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> LegMistake
     of_motors: whether the efforts were torques or currents of the motors.
     """
     if not np.isfinite(scale) or scale == 0.0:
-        return LegMistake(ZERO, 'all efforts are zero')
+        return LegMistake(
+            ZERO, 'all efforts are zero: brakes hold the legs, or no efforts are measured')
     if scale < 0.0:
         other = '' if p.geometry.platform_side != AUTO else (
             '; or the platform is on the other side of the base: geometry.platform_side')
