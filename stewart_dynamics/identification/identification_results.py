@@ -172,14 +172,14 @@ def _notice(found: Identified, sure: bool) -> str:
              f'likely {lack.text}')
     changes = 'no intervals are given: a possible error in the recording was accepted'
     if sure:
-        ratios = np.divide(_errors(found), found.fit.deviations, out=np.ones(
-            len(found.written)), where=found.fit.deviations > 0.0)[asked]
+        errors, before = _errors(found)[asked], found.fit.deviations[asked]
+        ratios = np.divide(errors, before, out=np.ones(len(asked)), where=before > 0.0)
         widest = int(np.argmax(ratios))
         changes = (
             'the intervals are widened by the change that '
             f'{"any of the possible causes" if lack.unexplained else "this"} would make: '
-            f'{found.unknowns.names[asked[widest]]} is {ratios[widest]:.2g} times as wide, half of '
-            f'all at most {np.median(ratios):.2g} times')
+            f'{found.unknowns.names[asked[widest]]} is {ratios[widest]:.2g} times as wide, half '
+            f'of all at most {np.median(ratios):.2g} times')
     return f'the residuals are more than noise: {cause}; {changes}; next: {NEXT[lack.cause]}'
 
 
