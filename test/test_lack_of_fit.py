@@ -24,11 +24,12 @@ from simulated import simulated as simulated_hexapod
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
+from stewart_dynamics.estimation.contradiction import deviations
 from stewart_dynamics.identification.identification_options import (
     DesignOptions, IdentificationOptions)
 from stewart_dynamics.identification.identification_results import document, result_text
 from stewart_dynamics.identification.identify import Identification, Identified
-from stewart_dynamics.identification.lack_of_fit import deviations, LEFT_BY_FILTERS
+from stewart_dynamics.identification.lack_of_fit import LEFT_BY_FILTERS
 from stewart_dynamics.identification.motion_design import design
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.window_poses import pose_near

@@ -25,6 +25,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
+from stewart_dynamics.estimation.contradiction import Contradiction, UNCERTAIN
 from stewart_dynamics.estimation.posterior import IDENTIFIABLE, Posterior, posterior
 from stewart_dynamics.estimation.whitening import (
     covariance_of_scores, gram_of, spectra_of, Weights, weights_of)
@@ -48,6 +49,9 @@ class FittedBody(NamedTuple):
     known: Flags  # (10,) whether each of them is identifiable
     consistent: bool  # false: no real body has the inertia that fits best; it has the given one
     residual: float  # RMS of the efforts that remain [N]
+    gain: float
+    """Gain of the efforts that legs and rotors show, by its deviation; 0 if that is possible. The
+    intervals are widened by what it changes."""
 
 
 class LegSamples(NamedTuple):
@@ -55,7 +59,8 @@ class LegSamples(NamedTuple):
 
     columns: Array
     """(W, 6, n + 1): efforts for one deviation of each of n numbers, the platform's ten first,
-    then efforts less those of the model [N]; zeros where a window is not used"""
+    the gain of the efforts last, then efforts less those of the model [N]; zeros where a window is
+    not used"""
     change: Array  # (10, 10) of mass, first moment, inertia about the center by the first ten z
     acceleration_noise: Array  # (6, 6) covariance of the noise in the accelerations of one window
     by_acceleration: Array  # (6, 6, n + 1) derivative of the columns by each of the six
@@ -130,6 +135,10 @@ class BodyFit:
         derivative, at_start = self._derivative(change), self._derivative(np.zeros(TEN))
         half_widths, of_file = (TWO_SIDED * np.sqrt(np.maximum(np.diag(d @ c @ d.T), 0.0))
                                 for d, c in ((derivative, after), (at_start, before)))
+        contradicted, gain = Contradiction.of(found, np.array([len(found.values) - 1])), 0.0
+        if contradicted.significance > UNCERTAIN:
+            gain = float(contradicted.true[0])
+            half_widths += np.abs(derivative @ by @ contradicted.shift(found)[:TEN])
         known = half_widths < IDENTIFIABLE * of_file
         body = self._body(change)
         inertia = np.where(known[INERTIA], body.inertia, self._given.inertia)
@@ -140,7 +149,7 @@ class BodyFit:
             inertia = self._given.inertia
         center = np.where(known[FIRST_MOMENT], body.center, self._given.center)
         return FittedBody(
-            Body(body.mass, center, inertia), half_widths, known, consistent, self._residual)
+            Body(body.mass, center, inertia), half_widths, known, consistent, self._residual, gain)
 
     def _body(self, change: Array) -> Body:
         """Return the body for a change of the ten parameters about the given center."""

@@ -84,6 +84,8 @@ class Payload(NamedTuple):
     excluded: int  # measurements that were not used: with saturated efforts, or legs at their ends
     fitted: FittedBody
     given: Body  # unknown ones as in the file
+    gain: float
+    """Relative change of the gain of all efforts that contradicts the file; 0 if nothing does."""
 
 
 class PayloadOutcome(NamedTuple):
@@ -148,7 +150,8 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         yield PayloadOutcome(f'the model does not explain the measured forces: residual '
                              f'{fitted.residual:.3g} N of {samples.measured:.4g} N (RMS)')
         return
-    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, p.platform.body))
+    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, p.platform.body,
+                           p.uncertainty.effort_gain * fitted.gain))
 
 
 def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
@@ -367,6 +370,9 @@ def _words(payload: Payload) -> str:
             f'{"less" if more < 0.0 else "more"} than platform.mass; from '
             f'{payload.seconds:.1f} s')
     text += _excluded(payload.excluded)
+    if payload.gain:
+        text += (f'; likely another gain of all efforts, by about {100.0 * payload.gain:+.2g} %: '
+                 'the intervals are widened by what it changes; check the scale of the efforts')
     if not fitted.consistent:
         text += '; no real body has the inertia that fits best'
     if unknown:

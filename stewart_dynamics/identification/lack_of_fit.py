@@ -28,6 +28,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
+from stewart_dynamics.estimation.contradiction import Contradiction, deviations, UNCERTAIN
 from stewart_dynamics.estimation.posterior import Posterior, posterior
 from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
 from stewart_dynamics.identification.causes import Cause, Causes, SAME
@@ -48,12 +49,9 @@ WHOLE, PIECE = 80, 28
 LEFT_BY_FILTERS = 5e-4
 # Deviation of any amount of a cause, in terms of one that noise would hide.
 _ANY = 1e4
-# Significance for a notice, in standard deviations of a normal distribution: of a force that the
-# model lacks, and of a number that is more uncertain than the file says.
-_NOTICE, _UNCERTAIN = 7.0, 4.0
-# Part of the variance before the data that must be gone after it, in a direction that is judged;
-# of the gain, which files know better than recordings.
-_KNOWN, _KNOWN_GAIN = 0.05, 0.01
+# Significance for a notice of a force that the model lacks, in standard deviations of a normal
+# distribution.
+_NOTICE = 7.0
 # Twice the logarithm of the likelihood ratio from which a cause is named before another.
 _CLEARLY = 2.0 * math.log(1000.0)
 # Largest statistic that a named cause leaves, relative to its own.
@@ -280,52 +278,33 @@ def _contradicted(unknowns: Unknowns, fit: Fit) -> Iterator[tuple[Found, Array]]
     """
     Yield kinds of numbers that are farther from the file than their uncertainty allows.
 
-    If the model is right, their means after the data have the covariance 1 - C, with C the
-    covariance after the data. The second is what their prior shifts each unknown by (k,).
+    The second is what their prior shifts each unknown by (k,).
     """
     for what in CONTRADICTED:
-        found = _Contradiction.of(unknowns, what, fit.posterior)
-        if found.significance > _UNCERTAIN:
+        found = Contradiction.of(fit.posterior, _places_of(unknowns, what))
+        if found.significance > UNCERTAIN:
             change = unknowns.root[:, found.places] @ found.true
-            shift = fit.posterior.covariance[:len(unknowns.start), found.places] @ found.true
+            shift = found.shift(fit.posterior)[:len(unknowns.start)]
             yield Found(what, _in_words(unknowns, what, change), found.statistic, found.freedom,
                         found.significance, _NONE), np.abs(unknowns.root @ shift)
-
-
-class _Contradiction(NamedTuple):
-    """How far a kind of numbers is from the file's."""
-
-    places: Integers  # (p,) of the numbers
-    true: Array  # (p,) what they are, in terms of their deviations before the data
-    statistic: float
-    freedom: int
-
-    @classmethod
-    def of(cls, unknowns: Unknowns, what: str, after: Posterior) -> _Contradiction:
-        """Return it for numbers after the data."""
-        places = np.flatnonzero(unknowns.origins == ORIGINS.index(what))
-        values, vectors = np.linalg.eigh(
-            np.eye(len(places)) - after.covariance[np.ix_(places, places)])
-        known = values > (_KNOWN_GAIN if what == 'effort_gain' else _KNOWN)
-        along = (vectors.T @ after.values[places])[known]
-        return cls(places, vectors[:, known] @ (along / values[known]),
-                   float(np.sum(along ** 2 / values[known])), int(known.sum()))
-
-    @property
-    def significance(self) -> float:
-        """Return it as standard deviations of a normal distribution."""
-        return deviations(self.statistic, self.freedom) if self.freedom else 0.0
 
 
 def _rivals(best: Found, causes: Iterable[Cause], scores: _Scores, unknowns: Unknowns,
             ) -> Iterator[Cause]:
     """Yield causes that, too, explain why a kind of numbers is far from the file's."""
-    statistic = _Contradiction.of(unknowns, best.what, scores.model_with(_NONE)).statistic
+    places = _places_of(unknowns, best.what)
+    statistic = Contradiction.of(scores.model_with(_NONE), places).statistic
     for cause in causes:
-        left = _Contradiction.of(unknowns, best.what, scores.model_with(cause.places))
+        left = Contradiction.of(scores.model_with(cause.places), places)
         gain = statistic - left.statistic - _PENALTY * len(cause.places)
-        if left.significance < _UNCERTAIN and best.gain - gain < _CLEARLY:
+        if left.significance < UNCERTAIN and best.gain - gain < _CLEARLY:
             yield cause
+
+
+def _places_of(unknowns: Unknowns, what: str) -> Integers:
+    """Return the indices of the numbers z of an origin."""
+    places: Integers = np.flatnonzero(unknowns.origins == ORIGINS.index(what))
+    return places
 
 
 def _in_words(unknowns: Unknowns, what: str, change: Array) -> str:
@@ -369,16 +348,6 @@ def _largest_part(platform: StewartPlatform, extracts: Iterable[Extract], unknow
     word = max(parts, key=lambda each: parts[each], default='')
     return f'in {platform.parameters.joints[leg]}' + (
         f' {word}' if parts.get(word, 0.0) > _WORTH else '')
-
-
-def deviations(statistic: float, freedom: int) -> float:
-    """
-    Return a chi-squared value as standard deviations of a normal distribution.
-
-    Uses the cube-root approximation (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
-    """
-    part = 2.0 / (9.0 * freedom)
-    return float((np.cbrt(statistic / freedom) - 1.0 + part) / math.sqrt(part))
 
 
 def long_pieces(extracts: Extracts) -> list[int]:
