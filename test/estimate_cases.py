@@ -421,4 +421,5 @@ def payload(truth: Truth, motion: str, seed: int, sensors: Noise = PAYLOAD_SENSO
     fitted = outcome.payload.fitted
     return Outcome(tuple(
         Judged(name, value, half if known else np.nan, known, truth.values()[name])
-        for name, (_, _, value, half, known) in zip(PLATFORM, rows_of(fitted), strict=True)))
+        for name, (_, _, value, half, known) in zip(PLATFORM, rows_of(fitted), strict=True)),
+        ('effort_gain',) if fitted.gain else ())

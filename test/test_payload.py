@@ -152,6 +152,20 @@ def test_mass_center_and_inertia_are_those_of_pinocchio() -> None:
     assert payload.seconds == pytest.approx((many - 1) / rate)
 
 
+@pytest.mark.parametrize('motion', ['rich', 'heave'])
+def test_another_gain_of_all_efforts_is_named_and_widens_the_intervals(motion: str) -> None:
+    """Legs and rotors, which the file knows, do not have the mass that such efforts would need."""
+    for seed in (1, 2):
+        right = judged_payload(drawn(seed), motion, seed)
+        assert right.causes == ()
+        low = judged_payload(drawn(seed)._replace(gain=1.0 / 1.3), motion, seed)
+        assert low.causes == ('effort_gain',)
+        off, wide = (each.of('platform.mass') for each in (right, low))
+        assert off.holds and wide.holds and wide.half > 8.0 * off.half
+    high = judged_payload(drawn(1)._replace(gain=1.3), motion, 1)
+    assert 'likely another gain of all efforts, by about +' in high.notices[0]
+
+
 def test_a_body_is_moved_to_the_origin() -> None:
     center, mass, offset = np.array([0.1, -0.2, 0.3]), 7.0, np.array([0.05, 0.02, -0.1])
     inertia = np.array([1.0, 0.1, 0.2, 1.5, -0.1, 2.0])

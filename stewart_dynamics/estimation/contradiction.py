@@ -23,6 +23,8 @@ from stewart_dynamics.estimation.posterior import Posterior
 
 UNCERTAIN = 4.0
 """Standard deviations of a normal distribution from which numbers contradict the file."""
+WIDENING = 1.5
+"""Multiple of a shift by which intervals are widened: causes are known roughly."""
 # Part of the variance before the data that must be gone after it, in a direction that is judged;
 # of a single number less.
 _KNOWN, _KNOWN_ALONE = 0.05, 0.01

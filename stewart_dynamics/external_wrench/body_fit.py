@@ -25,7 +25,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
-from stewart_dynamics.estimation.contradiction import Contradiction, UNCERTAIN
+from stewart_dynamics.estimation.contradiction import Contradiction, UNCERTAIN, WIDENING
 from stewart_dynamics.estimation.posterior import IDENTIFIABLE, Posterior, posterior
 from stewart_dynamics.estimation.whitening import (
     covariance_of_scores, gram_of, spectra_of, Weights, weights_of)
@@ -50,8 +50,8 @@ class FittedBody(NamedTuple):
     consistent: bool  # false: no real body has the inertia that fits best; it has the given one
     residual: float  # RMS of the efforts that remain [N]
     gain: float
-    """Gain of the efforts that legs and rotors show, by its deviation; 0 if that is possible. The
-    intervals are widened by what it changes."""
+    """Relative change of the gain of all efforts that legs and rotors show, if it is farther from
+    the file than possible, by which the intervals are widened; else 0"""
 
 
 class LegSamples(NamedTuple):
@@ -65,6 +65,7 @@ class LegSamples(NamedTuple):
     acceleration_noise: Array  # (6, 6) covariance of the noise in the accelerations of one window
     by_acceleration: Array  # (6, 6, n + 1) derivative of the columns by each of the six
     measured: float  # RMS of the efforts [N]
+    gain: float  # deviation of the gain
 
 
 class BodyFit:
@@ -137,8 +138,10 @@ class BodyFit:
                                 for d, c in ((derivative, after), (at_start, before)))
         contradicted, gain = Contradiction.of(found, np.array([len(found.values) - 1])), 0.0
         if contradicted.significance > UNCERTAIN:
-            gain = float(contradicted.true[0])
-            half_widths += np.abs(derivative @ by @ contradicted.shift(found)[:TEN])
+            gain = self._samples.gain * float(contradicted.true[0])
+            # efforts are linear in z: the gain of the change itself is not in the shift
+            half_widths += WIDENING * np.abs(
+                derivative @ (by @ contradicted.shift(found)[:TEN] - gain * change))
         known = half_widths < IDENTIFIABLE * of_file
         body = self._body(change)
         inertia = np.where(known[INERTIA], body.inertia, self._given.inertia)

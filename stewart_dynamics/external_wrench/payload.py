@@ -84,8 +84,6 @@ class Payload(NamedTuple):
     excluded: int  # measurements that were not used: with saturated efforts, or legs at their ends
     fitted: FittedBody
     given: Body  # unknown ones as in the file
-    gain: float
-    """Relative change of the gain of all efforts that contradicts the file; 0 if nothing does."""
 
 
 class PayloadOutcome(NamedTuple):
@@ -150,8 +148,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         yield PayloadOutcome(f'the model does not explain the measured forces: residual '
                              f'{fitted.residual:.3g} N of {samples.measured:.4g} N (RMS)')
         return
-    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, p.platform.body,
-                           p.uncertainty.effort_gain * fitted.gain))
+    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, p.platform.body))
 
 
 def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
@@ -327,7 +324,8 @@ class _Windows:
             motions[middle], bases[middle:middle + 1], root)
         measured = float(np.sqrt(np.mean((differences + modelled) ** 2)))
         return LegSamples(
-            columns, change, self._noise_gain * self._noise, by_acceleration, measured)
+            columns, change, self._noise_gain * self._noise, by_acceleration, measured,
+            p.uncertainty.effort_gain)
 
     def _by_tilt(self, motions: Array, bases: Array) -> Array:
         """Return the forces (N, 6, 2) by turns of gravity about two base axes [N/rad]."""
@@ -355,7 +353,7 @@ def _outcome(payload: Payload) -> PayloadOutcome:
         return PayloadOutcome(f'the mass that fits best is {mass:.6g} kg: must be more than 0')
     if not fitted.known[0]:
         return PayloadOutcome('the mass is not identifiable from the measured forces: residual '
-                              f'{fitted.residual:.3g} N (RMS)')
+                              f'{fitted.residual:.3g} N (RMS){_of_gain(fitted)}')
     return PayloadOutcome(_words(payload), payload)
 
 
@@ -370,9 +368,7 @@ def _words(payload: Payload) -> str:
             f'{"less" if more < 0.0 else "more"} than platform.mass; from '
             f'{payload.seconds:.1f} s')
     text += _excluded(payload.excluded)
-    if payload.gain:
-        text += (f'; likely another gain of all efforts, by about {100.0 * payload.gain:+.2g} %: '
-                 'the intervals are widened by what it changes; check the scale of the efforts')
+    text += _of_gain(fitted)
     if not fitted.consistent:
         text += '; no real body has the inertia that fits best'
     if unknown:
@@ -403,6 +399,13 @@ def carried_payload(payload: Payload) -> Body | str:
     moments, axes = np.linalg.eigh(table.inertia_matrix(rest.inertia))
     inertia = (axes * np.maximum(moments, 0.0)) @ axes.T
     return rest._replace(inertia=inertia[np.triu_indices(3)])
+
+
+def _of_gain(fitted: FittedBody) -> str:
+    """Return the words on a gain of the efforts that is farther from the file than possible."""
+    return '' if not fitted.gain else (
+        f'; likely another gain of all efforts, by about {100.0 * fitted.gain:+.2g} %, which '
+        'widens the intervals: check the scale of the efforts')
 
 
 def _excluded(count: int) -> str:

@@ -28,7 +28,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
-from stewart_dynamics.estimation.contradiction import Contradiction, deviations, UNCERTAIN
+from stewart_dynamics.estimation.contradiction import (
+    Contradiction, deviations, UNCERTAIN, WIDENING)
 from stewart_dynamics.estimation.posterior import Posterior, posterior
 from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
 from stewart_dynamics.identification.causes import Cause, Causes, SAME
@@ -62,9 +63,6 @@ _IN_THE_FIT = 1e-3
 _NOISE = 0.5
 # Standard deviations above which the slower causes are tested as well.
 _SUSPICIOUS = 4.0
-# The form of a cause, as that of Stribeck's curve, is known less well than its amount: intervals
-# are widened by this multiple of the change of each unknown.
-_WIDENING = 1.5
 # Penalty on the statistic for each column of a cause.
 _PENALTY = 4.0
 # Parts of an error of the model that is not explained.
@@ -98,7 +96,8 @@ class LackOfFit(NamedTuple):
     cause: str  # keyword of the cause; UNKNOWN if no cause is clearly likeliest
     text: str  # the cause in words, or where the residuals are largest
     ranked: tuple[Found, ...]  # significant causes, the likeliest first
-    shifts: Array  # (k,) amount by which the interval of each unknown is widened on both sides
+    shifts: Array
+    """(k,) WIDENING times the change of each unknown: its interval is widened on both sides."""
     left: float  # fraction of the residual RMS that remains with the cause
 
     @property
@@ -242,12 +241,12 @@ def lack_of_fit(platform: StewartPlatform, extracts: Extracts, noisy: Noisy, unk
         shifts = np.max([_model_error(of_all, scores, unknowns), *(
             shift for _, shift in contradicted)], axis=0)
         return LackOfFit(UNKNOWN, _largest_part(platform, _of(extracts, chosen), unknowns, fit),
-                         tuple(ranked), shifts, 1.0)
+                         tuple(ranked), WIDENING * shifts, 1.0)
     for each, shifts in contradicted:
         if each is best:
-            return LackOfFit(best.what, best.text, tuple(ranked), shifts, 1.0)
+            return LackOfFit(best.what, best.text, tuple(ranked), WIDENING * shifts, 1.0)
     return LackOfFit(
-        best.what, best.text, tuple(ranked), _WIDENING * _shifts(scores, best.places, unknowns),
+        best.what, best.text, tuple(ranked), WIDENING * _shifts(scores, best.places, unknowns),
         math.sqrt(max(0.0, 1.0 - best.statistic / scores.squares)))
 
 
@@ -259,7 +258,7 @@ def _shifts(scores: _Scores, places: Integers, unknowns: Unknowns) -> Array:
 
 def _model_error(causes: Sequence[Cause], scores: _Scores, unknowns: Unknowns) -> Array:
     """
-    Return by how much (k,) an error of the model that is not explained may shift each unknown.
+    Return the change (k,) of each unknown by an error of the model that is not explained.
 
     It is made of the causes: any of those that are significant may be the first part, of which
     the largest shift counts, and so may any of those that are left beside the likeliest.
@@ -271,7 +270,7 @@ def _model_error(causes: Sequence[Cause], scores: _Scores, unknowns: Unknowns) -
             break
         shifts += np.max([_shifts(scores, each.places, unknowns) for each in ranked], axis=0)
         scores = scores.without(ranked[0].places)
-    return _WIDENING * shifts
+    return shifts
 
 
 def _contradicted(unknowns: Unknowns, fit: Fit) -> Iterator[tuple[Found, Array]]:
