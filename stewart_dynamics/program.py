@@ -40,6 +40,7 @@ class Program:
 
     def __init__(self, name: str, bad: str, strict: str = '', partly: bool = False) -> None:
         self.name = name
+        self._unwritten = False  # a part of the standard output is lost
         self._bad, self._strict, self._partly = bad, strict, partly
 
     def parser(self, description: str, files: str, more: str = '') -> argparse.ArgumentParser:
@@ -51,7 +52,7 @@ class Program:
         if self._partly:
             codes[PARTLY_READ] = 'part of a bag could not be read, the rest is done'
         lines = [f'  {code:3} {what}' for code, what in sorted(codes.items())]
-        parser = argparse.ArgumentParser(
+        parser = _Parser(
             prog=self.name, description=description,
             epilog='\n'.join([files, '', 'exit codes:', *lines]),
             formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -83,8 +84,10 @@ class Program:
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):  # names in bags may not be encodable
                 stream.reconfigure(errors='backslashreplace')
+        self._unwritten = False
         try:
-            return run()
+            code = run()
+            return BAD_INPUT if self._unwritten else code
         except StewartError as exc:
             self.complain(exc)
             return BAD_INPUT
@@ -114,19 +117,36 @@ class Program:
 
     def say(self, text: str) -> None:
         """Print on stdout."""
-        if fault := _written(_printable(text), sys.stdout):
-            self.complain(f'standard output: cannot be written: {fault}')
+        if fault := written(_printable(text), sys.stdout):
+            self._unwritten = True
+            self.complain(unwritten(fault))
 
     def complain(self, what: object) -> None:
         """Print one line on stderr."""
-        _written(f'{self.name}: {_printable(one_line(what))}', sys.stderr)
+        written(f'{self.name}: {_printable(one_line(what))}', sys.stderr)
 
 
-def _written(text: str, stream: TextIO) -> str:
+class _Parser(argparse.ArgumentParser):
+    """A parser whose help and version are written, or an error."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print a message; exit if the standard output cannot be written."""
+        fault = written(message.removesuffix('\n'), file or sys.stderr) if message else ''
+        if fault and file is not sys.stderr:
+            written(f'{self.prog}: {unwritten(fault)}', sys.stderr)
+            sys.exit(BAD_INPUT)
+
+
+def unwritten(fault: str) -> str:
+    """Return that the standard output cannot be written."""
+    return f'standard output: cannot be written: {fault}'
+
+
+def written(text: str, stream: TextIO) -> str:
     """
     Print text at once; return why it cannot be written, empty if it is or nobody reads it.
 
-    Such a stream is discarded from then on, so that results and exit code do not depend on it.
+    Such a stream is discarded from then on, so that results do not depend on it.
     """
     try:
         print(text, file=stream, flush=True)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Output that cannot be written changes neither results nor exit codes."""
+"""Output that nobody reads changes neither results nor exit codes; a full disk is an error."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import sys
 from typing import TextIO
 
 import pytest
+from referees import ROOT
 
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import StewartError
@@ -65,9 +66,37 @@ def test_a_full_disk_is_reported_once(monkeypatch: pytest.MonkeyPatch,
                                       capsys: pytest.CaptureFixture[str]) -> None:
     with open('/dev/full', 'w', encoding='utf-8') as out, monkeypatch.context() as patched:
         patched.setattr(sys, 'stdout', out)
-        assert PROGRAM.exit_code(found) == STRICT
+        assert PROGRAM.exit_code(found) == BAD_INPUT
+    assert PROGRAM.exit_code(found) == STRICT  # on another stream
     assert capsys.readouterr().err == (
         'some_program: standard output: cannot be written: No space left on device\n')
+
+
+@pytest.mark.skipif(not Path('/dev/full').exists(), reason='needs /dev/full')
+@pytest.mark.parametrize('option', ['--help', '--version'])
+@pytest.mark.parametrize(('program', 'code'), [
+    *((f'stewart_{name}', BAD_INPUT) for name in (
+        'calibrate', 'capability', 'cueing_report', 'describe', 'export', 'identify', 'replay')),
+    *((f'stewart_{name}', 1) for name in ('cueing', 'dynamics', 'simulator', 'trajectory'))])
+def test_all_programs_say_that_the_disk_is_full(program: str, code: int, option: str) -> None:
+    with open('/dev/full', 'w', encoding='utf-8') as out:
+        done = subprocess.run(
+            [Path(sys.executable).with_name(program), option], stdout=out,
+            stderr=subprocess.PIPE, text=True, timeout=300, check=False)
+    assert done.returncode == code
+    assert done.stderr == (
+        f'{program}: standard output: cannot be written: No space left on device\n')
+
+
+@pytest.mark.skipif(not Path('/dev/full').exists(), reason='needs /dev/full')
+def test_results_are_complete_though_the_disk_of_the_output_is_full(tmp_path: Path) -> None:
+    with open('/dev/full', 'w', encoding='utf-8') as out:
+        done = subprocess.run(
+            [Path(sys.executable).with_name('stewart_replay'), ROOT / 'bags' / 'clear',
+             '--params', ROOT / 'config' / 'platform.yaml', '--output', tmp_path, '--no-report'],
+            stdout=out, stderr=subprocess.PIPE, text=True, timeout=300, check=False)
+    assert done.returncode == BAD_INPUT and 'cannot be written' in done.stderr
+    assert (tmp_path / 'clear' / 'summary.json').exists()
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

@@ -110,15 +110,15 @@ def _run(module: str, name: str, node: str) -> int:
     """Run the node of a module, with the parameters of another one; return its exit code."""
     SIGNALS.watch(end_at_once=True)  # until it is imported: run has its own way
     from stewart_dynamics.errors import ParameterError
-    from stewart_dynamics.program import SOFTWARE
+    from stewart_dynamics.program import SOFTWARE, unwritten, written
 
     kind: type[ParameterSet] = getattr(_imported(module), name)
-    if {'-h', '--help'} & set(sys.argv[1:]):
-        print(usage(kind))
-        return 0
-    if '--version' in sys.argv[1:]:
-        print(SOFTWARE)
-        return 0
+    if {'-h', '--help', '--version'} & set(sys.argv[1:]):
+        fault = written(usage(kind) if {'-h', '--help'} & set(sys.argv[1:]) else SOFTWARE,
+                        sys.stdout)
+        if fault:
+            print(f'{kind.node}: {unwritten(fault)}', file=sys.stderr)
+        return 1 if fault else 0
     try:
         check_arguments(sys.argv, kind)
         program = _imported(node)
