@@ -233,6 +233,18 @@ def test_the_step_reports_a_clearance_below_its_limit_for_one_and_for_many() -> 
     assert not without.exceeding.any()
 
 
+@pytest.mark.parametrize('size', [1e-300, 1e-160, 1e160, 1e200, 1e300])
+def test_the_rules_of_a_plate_do_not_depend_on_its_size(size: float) -> None:
+    for corners, is_plate in (([0, 0, 0, 1, 0, 0, 1, 1, 0], True), ([0, 0, 0, 1, 0, 0, 2, 0, 0], False),
+                              ([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 1], False)):
+        values = {'geometry.base_outline': [size * each for each in corners]}
+        if is_plate:
+            assert SYMMETRIC.replaced(values)['geometry.base_outline'].max() == size
+        else:
+            with pytest.raises(ParameterError):
+                SYMMETRIC.replaced(values)
+
+
 def test_a_corner_of_a_plate_between_two_points_of_a_trajectory_is_found() -> None:
     # Tilted to and fro between two points: the corners move farther than the joints.
     corners = [2.0, 0.2, 0.0, -2.0, 0.2, 0.0, -2.0, -0.2, 0.0, 2.0, -0.2, 0.0]

@@ -188,6 +188,77 @@ def test_a_known_drive_is_found_from_measured_poses(followed: Path, tmp_path: Pa
         check(response[name], DRIVE)
 
 
+def table_of(path: Path, rows: Array, times: Array) -> Path:
+    """Write achieved poses as a table, whose frames of half a second are lost."""
+    lines = ['Time (Seconds),x (mm),y (mm),z (mm),qx,qy,qz,qw']
+    scaled = np.hstack([1e3 * rows[:, :3], rows[:, 3:]])
+    for time, row in zip(times.tolist(), scaled.tolist(), strict=True):
+        lost = 20.0 < time - times[0] < 20.5
+        lines.append(','.join([f'{time:.6f}', *([''] * 7 if lost else map(repr, row))]))
+    path.write_text('\n'.join(lines))
+    return path
+
+
+def seen_by_a_tracker(motion: Motion) -> tuple[Array, Array]:
+    """Return times [s] and achieved poses (N, 7) of the drive, exactly."""
+    end = sample_times(MOTION)[-1] * 1e-9
+    fine = DRIVE.moved(offsets(motion_at(MOTION, np.arange(0.0, end, 1e-3))), 1000.0)
+    tracked = poses(fine[::8])
+    return np.arange(0.0, end, 1e-3)[::8], np.hstack([
+        tracked.position + [0.1, 0.0, 0.3], to_quaternion(tracked.rotation)])
+
+
+def test_a_known_drive_is_found_from_a_table_of_a_tracker(
+        commanded: tuple[Array, Motion], tmp_path: Path) -> None:
+    times, motion = commanded
+    at, rows = seen_by_a_tracker(motion)
+    bag = write_bag(tmp_path / 'moved', motion, times, {})
+    # Its clock is the one of the setpoints.
+    table = table_of(tmp_path / 'tracker.csv', rows, START * 1e-9 + at)
+    summary = replayed(bag, tmp_path / 'same', '--measured-pose', str(table), '--no-report')
+    assert summary['complete'] and summary['response']['topic'] == str(table)
+    for name in AXES:
+        check(summary['response'][name], DRIVE)
+    # Another clock: gains are known, delays are not.
+    table_of(tmp_path / 'tracker.csv', rows, 77.0 + at)
+    other = replayed(bag, tmp_path / 'other', '--measured-pose', str(table), '--no-report')
+    assert any('has another clock' in notice for notice in other['notices'])
+    for name in AXES:
+        one = other['response'][name]
+        assert one['delay'] is None
+        assert one['bandwidth_3db'] == pytest.approx(
+            summary['response'][name]['bandwidth_3db'], rel=0.01)
+
+
+def test_setpoints_and_achieved_poses_in_tables_share_a_clock(
+        commanded: tuple[Array, Motion], tmp_path: Path) -> None:
+    times, motion = commanded
+    at, rows = seen_by_a_tracker(motion)
+    for begin, name in ((0.0, 'zero'), (3.0, 'later')):
+        given = np.column_stack([begin + times, motion.position, to_quaternion(motion.rotation),
+                                 motion.rows[:, 12:]])
+        path = tmp_path / f'{name}.csv'
+        np.savetxt(path, given, '%.12g', ',', comments='', header='t,x,y,z,qx,qy,qz,qw,vx,vy,vz,'
+                   'wx,wy,wz,ax,ay,az,alx,aly,alz')
+        table = table_of(tmp_path / f'{name}.txt', rows[40:], begin + at[40:])
+        assert main([str(path), '--params', str(PARAMS), '--response', '--measured-pose',
+                     str(table), '--output', str(tmp_path / 'r'), '--no-report']) == 0
+        found = json.loads((tmp_path / 'r' / name / 'summary.json').read_text())['response']
+        for axis in AXES:
+            assert abs(found[axis]['delay'] - DRIVE.late) < 1e-4
+
+
+def test_another_motion_is_not_aligned(
+        commanded: tuple[Array, Motion], tmp_path: Path) -> None:
+    times, motion = commanded
+    at, rows = seen_by_a_tracker(motion)
+    rows[:, :3] = np.random.default_rng(1).normal(size=(len(rows), 3))
+    bag = write_bag(tmp_path / 'moved', motion, times, {})
+    table = table_of(tmp_path / 'tracker.tsv', rows, at)
+    summary = replayed(bag, tmp_path / 'r', '--measured-pose', str(table), '--no-report', code=3)
+    assert 'and another motion' in summary['missing'][0]
+
+
 def test_legs_without_efforts_are_compared_only_by_position(
         followed: Path, tmp_path: Path) -> None:
     summary = replayed(followed, tmp_path, '--measured', LEGS, '--no-report')

@@ -45,6 +45,7 @@ class CsvMotion:
 
     Raises BagError, with file, row, column, value and rule, if the file breaks one.
 
+    begin: time that the file gives its first sample [s].
     unknown_angles: poses of the file by angles without a unit; empty if the unit is known.
     """
 
@@ -57,6 +58,12 @@ class CsvMotion:
         self.notices = self._table.notices
         self.stamps = self._stamps(self._table)
         self._values = self._read(self._table, home)
+
+    @property
+    def poses(self) -> Array:
+        """Return position and rotation of each pose (N, 12)."""
+        found = Pose.from_quaternion(*np.split(self._values['pose'], [3], axis=1))
+        return np.hstack([found.position, found.rotation.reshape(-1, 9)])
 
     @property
     def topics(self) -> dict[str, str]:
@@ -92,6 +99,7 @@ class CsvMotion:
 
     def _stamps(self, table: NamedTable) -> Stamps:
         times = table.times()
+        self.begin = float(times[0])
         if times[0] <= 0.0:  # a stamp of zero means: not known
             times = times - times[0] + 1.0
         if times.max() * SECOND >= STAMPS_END:

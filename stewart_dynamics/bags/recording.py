@@ -67,6 +67,7 @@ class Recording:
         self.missing: list[str] = []
         self.notices: list[str] = []
         self.unknown_angles: tuple[PoseByAngles, ...] = ()
+        self.table: CsvMotion | None = None  # the file, if it is a table
         self._sources: list[tuple[Path, Source]] = []
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         faults = []
@@ -199,7 +200,7 @@ class Recording:
         if is_table(file):
             motion = CsvMotion(file, self._reading, self._home)
             self.notices += motion.notices
-            self.unknown_angles = motion.unknown_angles
+            self.unknown_angles, self.table = motion.unknown_angles, motion
             return motion
         try:
             unpacked = file

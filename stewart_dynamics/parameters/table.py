@@ -738,18 +738,23 @@ def _broken_rule_of_plate(corners: Array) -> str:
     """Return the rule that corners (M, 3) of a plate break; empty if they break none."""
     if len(corners) < 3:
         return 'must have three corners or more'
+    # The rules do not depend on the size; that of a plate of any size is one from here on.
+    corners = corners / max(float(np.abs(corners).max()), np.finfo(float).tiny)
     arms = corners - corners[0]
-    area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
     size = float(np.abs(arms).max())
-    if np.linalg.norm(area) <= _FLAT * size ** 2:
+    if size == 0.0:
+        return 'the corners are on one line'
+    corners, arms = corners / size, arms / size
+    area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
+    if np.linalg.norm(area) <= _FLAT:
         return 'the corners are on one line'
     normal = area / np.linalg.norm(area)
-    if np.abs(arms @ normal).max() > _FLAT * size:
+    if np.abs(arms @ normal).max() > _FLAT:
         return f'the corners must be in one plane, to {_FLAT:g} of its size'
     edges = np.roll(corners, -1, axis=0) - corners
     turns = np.cross(edges, np.roll(edges, -1, axis=0)) @ normal
     around = np.arctan2(turns, np.sum(edges * np.roll(edges, -1, axis=0), axis=1)).sum()
-    if turns.min() < -_FLAT * size ** 2 or around > 3.0 * math.pi:
+    if turns.min() < -_FLAT or around > 3.0 * math.pi:
         return 'must be convex, its corners in order around it'
     return ''
 

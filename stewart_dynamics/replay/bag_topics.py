@@ -49,6 +49,8 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
     # A WrenchStamped found by its type could be anything: a load cell, an estimate.
     if load := _named(recording, inputs.WRENCH, options, ending=False):
         found[inputs.WRENCH] = load
+    if options.measured_table is not None:
+        return found
     if options.measured_pose:
         found[MEASURED_POSE] = recording.checked_topic(
             options.measured_pose, type_names.POSE_STAMPED)

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
+from stewart_dynamics.bags.csv_motion import CsvMotion
 from stewart_dynamics.bags.find import bytes_of, RESULT
 from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.errors import StewartError
@@ -88,7 +89,7 @@ def replay(
     made_of = fingerprint(bag, parameters, options)
     parameters = options.applied_to(parameters, bag)
     with closing(Recording(
-            bag, options.reading, parameters.platform_frame,
+            bag, options.reading_of_bag, parameters.platform_frame,
             lambda: StewartPlatform(parameters).home_pose().position)) as recording:
         topics = find_topics(recording, parameters, options)
         notices = notices_of(recording, topics, parameters, options)
@@ -99,6 +100,8 @@ def replay(
                 answered = run.take(messages)
                 if progress is not None:
                     progress(size, answered)
+            if options.measured_table is not None:
+                run.take_table(CsvMotion(options.measured_table, options.reading, None))
             run.end()
             summary = run.summary() | {'fingerprint': made_of}
             write_json(partial / RESULT, summary)
@@ -117,7 +120,8 @@ def fingerprint(bag: Path, parameters: Parameters, options: Options) -> str:
     """
     try:
         files = [[file.name, found.st_size, found.st_mtime_ns]
-                 for file in (sorted(bag.iterdir()) if bag.is_dir() else [bag])
+                 for file in (*(sorted(bag.iterdir()) if bag.is_dir() else [bag]),
+                              *([options.measured_table] if options.measured_table else []))
                  if (found := file.stat())]
     except OSError:  # reported when the bag is opened
         return ''
@@ -168,7 +172,9 @@ class _Run:
             parameters, self._per_effort is not None)
         self._efforts = Efforts(parameters.joints)
         self._response = RecordedResponse(
-            parameters, topics, self._setpoints.reject) if options.response else None
+            parameters, topics if options.measured_table is None else {
+                MEASURED_POSE: str(options.measured_table)}, self._setpoints.reject,
+        ) if options.response else None
         self.followed: Followed | None = None
         self._response_missing = ''
         self._first_measured = True
@@ -194,6 +200,16 @@ class _Run:
         if self._differentiator is not None:
             setpoints = self._differentiator.add(setpoints)
         return self._answer(setpoints)
+
+    def take_table(self, table: CsvMotion) -> None:
+        """Process achieved poses of a table; with setpoints of a table they share a clock."""
+        assert self._response is not None
+        commanded, shift = self._recording.table, 0
+        if commanded is not None:  # each of them may have been shifted, if it begins at zero
+            begins = [each.begin - each.stamps[0] * NANOSECOND for each in (table, commanded)]
+            shift = round((begins[0] - begins[1]) * SECOND)
+        self._response.take_poses(table.stamps + shift, table.poses)
+        self.notices += table.notices
 
     def end(self) -> None:
         """Process the end of the bag, and complete the files."""

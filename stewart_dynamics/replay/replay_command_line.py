@@ -80,7 +80,9 @@ def _arguments() -> argparse.ArgumentParser:
                           help='frequency responses, delays and bandwidths from commanded and '
                                'achieved poses; those of the measured legs by default')
     response.add_argument('--measured-pose', metavar='TOPIC',
-                          help='topic of the achieved poses in the base frame')
+                          help='topic of the achieved poses in the base frame, or a table of '
+                               'them, as a tracker writes; the options for recordings of other '
+                               'sources are then those of the table')
     add_reading(parser)
     poses = parser.add_argument_group('bags that have only poses')
     poses.add_argument('--differentiate', action='store_true',

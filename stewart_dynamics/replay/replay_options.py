@@ -36,7 +36,7 @@ class Options(NamedTuple):
     measured: str | None = None  # topic of a sensor_msgs/JointState with the measured efforts
     response: bool = False  # analyze how the platform follows its setpoints
     measured_pose: str | None = None
-    """Topic of the achieved poses for the response; None: those of the measured legs."""
+    """Topic or table of the achieved poses; None: those of the measured legs."""
     motor_torque: bool = False  # measured efforts are motor torques [N m]
     motor_current: bool = False  # measured efforts are motor currents [A]
     parquet: bool = False  # write legs.parquet in place of legs.csv
@@ -45,6 +45,17 @@ class Options(NamedTuple):
     """The file of plotly.js that the reports share; None: it is in each report."""
     force: bool = False  # replace existing results
     run: str = ''  # identifier of a run over many bags, written to summary.json
+
+    @property
+    def measured_table(self) -> Path | None:
+        """Return the table of the achieved poses; None if they are in the bag."""
+        path = Path(self.measured_pose or '')
+        return path if is_table(path) else None
+
+    @property
+    def reading_of_bag(self) -> Reading:
+        """Return how the bag is read: with a table of achieved poses the options are its own."""
+        return self.reading if self.measured_table is None else Reading()
 
     def applied_to(self, parameters: Parameters, bag: Path) -> Parameters:
         """Return the parameters with the source of setpoints that options and bag demand."""

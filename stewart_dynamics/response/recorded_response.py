@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Integers, Records
+from stewart_dynamics.arrays import Array, Integers, Records, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_rotation_vector
@@ -28,6 +28,7 @@ from stewart_dynamics.messages.joint_state import JointStateReader, NUMBERS_END
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.response.axes_response import AXES, axes_response, legs_response
+from stewart_dynamics.response.clock_alignment import aligned, overlaps
 from stewart_dynamics.response.even_samples import (
     at_even_times, check_overlap, clock_notices, Runs, Track, Tracks)
 from stewart_dynamics.response.frequency_response import signal_module
@@ -71,6 +72,7 @@ class RecordedResponse:
         self._commanded = Tracks(12)
         self._measured = Tracks(6 if self.key == MEASURED else 12)
         self.notices: list[str] = []
+        self._own_clock = False
 
     def add(self, setpoints: Batch) -> None:
         """Add setpoints."""
@@ -118,6 +120,11 @@ class RecordedResponse:
             if (one := self._poses.read(data)) is not None:
                 self._measured.add(np.array([one[0]]), np.array([one[1]]), np.array([time]))
 
+    def take_poses(self, stamps: Stamps, poses: Array) -> None:
+        """Add achieved poses (N, 12) of a file, whose clock may be another one."""
+        self._own_clock = True
+        self._measured.add(stamps, poses, stamps)
+
     def finish(self) -> Followed:
         """
         Return the response.
@@ -131,6 +138,14 @@ class RecordedResponse:
             if tracks.left_out:
                 self.notices.append(f'response: {tracks.left_out} samples of {name} are left out: '
                                     'their stamps do not increase')
+        shift = None
+        if self._own_clock and min(len(each.stamps) for each in (commanded, measured)) > 1 and (
+                not overlaps(commanded, measured)):
+            measured, shift = aligned(commanded, measured, self._topic)
+            self.notices.append(
+                f'{self._topic}: has another clock than the setpoints: its times are shifted by '
+                f'{shift:.6g} s, where the speeds correlate best: delays are not known, phases '
+                'and bandwidths at 90 degrees are those without the mean delay')
         check_overlap(commanded, measured, self._topic)
         timeout = self._parameters.setpoint.timeout
         legs: dict[str, Any] = {'legs': {}, 'leg_balance': None}
@@ -156,6 +171,9 @@ class RecordedResponse:
                                'in common that is long enough')
         size = self._parameters.singularity.characteristic_length
         axes = axes_response(samples, size)
+        if shift is not None:
+            for name in AXES:
+                axes[name]['delay'] = None
         self.notices += clock_notices(commanded, measured, self._topic, [
             axes[name]['delay'] for name in AXES if axes[name]['delay'] is not None],
             axes['clock_drift'])
