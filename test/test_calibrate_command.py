@@ -31,12 +31,14 @@ from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.one_run import CalibrationOptions, run
 from stewart_dynamics.calibration.pose_design import design_poses, NOISE
 from stewart_dynamics.calibration.recorded_poses import read_bag
+from stewart_dynamics.calibration.tracked_poses import read_tracked
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.reporting.estimates import (
     estimate, page_values, rounded, table_lines)
+from stewart_dynamics.tables.reading import Reading
 from test_calibration import HEXAPOD, measured, random_poses, true_values, UNIVERSAL
 
 PROGRAM = 'stewart_calibrate'
@@ -90,6 +92,58 @@ def test_files_and_page(
     snapshot(capsys.readouterr().err)
     assert main([*arguments, '--force', '--fixed', 'zero_length']) == 0
     assert (output / 'report.html').read_text().count('<td class="none">fixed</td>') == 6
+
+
+def tracked(path: Path, poses: Pose, home: bool, noise: float = 1e-6) -> Path:
+    """Write the file of a tracker that sees each pose for a second, with moves between them."""
+    rng = np.random.default_rng(3)
+    stops = [*([np.eye(4)] if home else []), *(np.block([
+        [rotation, position[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
+        for rotation, position in zip(poses.rotation, poses.position, strict=True))]
+    quaternions = Pose([each[:3, 3] for each in stops], [each[:3, :3] for each in stops]).quaternion
+    rows = [np.append(stops[0][:3, 3], quaternions[0])]
+    for stop, quaternion in zip(stops, quaternions, strict=True):
+        there = np.append(stop[:3, 3], quaternion)
+        move = np.linspace(0.0, 1.0, 50)[1:, None]
+        rows += [*(rows[-1] * (1.0 - move) + there * move), *([there] * 100)]
+    seen = np.array(rows)
+    seen[:, :3] = 1e3 * (seen[:, :3] + noise * rng.normal(size=(len(seen), 3)))
+    seen[:, 3:] /= np.linalg.norm(seen[:, 3:], axis=1, keepdims=True)
+    lines = ['Time (Seconds),x (mm),y (mm),z (mm),qx,qy,qz,qw', *(
+        f'{0.01 * n:.2f},' + (','.join(map(repr, row)) if n % 97 else ',' * 6)
+        for n, row in enumerate(seen.tolist()))]
+    path.write_text('\n'.join(lines))
+    return path
+
+
+@pytest.mark.parametrize('home', [False, True])
+def test_poses_come_from_the_file_of_a_tracker(
+        home: bool, table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = read_poses(table, JOINTS)
+    path = tracked(tmp_path / 'tracker.csv', given.poses, home)
+    legs = tmp_path / 'legs.tsv'
+    legs.write_text('\n'.join(['\t'.join(f'{name}_mm' for name in JOINTS), *(
+        '\t'.join(map(repr, row)) for row in (1e3 * given.lengths).tolist())]))
+    found = read_tracked(legs, path, HEXAPOD.parameters, False, Reading())
+    np.testing.assert_allclose(found.poses.position, given.poses.position, atol=1e-6)
+    np.testing.assert_allclose(found.poses.rotation, given.poses.rotation, atol=1e-9)
+    np.testing.assert_allclose(found.lengths, given.lengths, atol=1e-15)
+    output = tmp_path / 'out'
+    arguments = [str(legs), '--pose', str(path), '--params', str(PLATFORM)]
+    assert main([*arguments, '--output', str(output)]) == 0
+    assert 'row 5, t = ' in capsys.readouterr().out  # the outlier
+    result = json.loads((output / 'calibration.json').read_text())
+    assert result['poses']['pose'] == str(path)
+    assert result['validation']['after']['position_rms_m'] < 3e-5
+
+
+def test_rests_and_rows_must_be_as_many(
+        table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        snapshot: Snapshot) -> None:
+    given = read_poses(table, JOINTS)
+    path = tracked(tmp_path / 'tracker.csv', given.poses[:-1], False)
+    assert main([str(table), '--pose', str(path), '--params', str(PLATFORM)]) == 2
+    snapshot(capsys.readouterr().err)
 
 
 def test_units_and_angles(table: Path, tmp_path: Path) -> None:

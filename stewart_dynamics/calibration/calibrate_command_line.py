@@ -53,7 +53,10 @@ def _arguments() -> argparse.ArgumentParser:
     data.add_argument('--measured', metavar='TOPIC,...',
                       help='of a bag: JointState of the legs; several topics where each has some '
                            'of them')
-    data.add_argument('--pose', metavar='TOPIC', help='of a bag: PoseStamped of the device')
+    data.add_argument('--pose', metavar='TOPIC',
+                      help='of a bag: PoseStamped of the device; with a CSV file of the legs: the '
+                           'file that the device wrote, one row for each pose or the whole time, '
+                           'with rests in the order of the poses')
     data.add_argument('--mm', action='store_true',
                       help='x, y, z and the leg positions are in mm, not in m')
     data.add_argument('--degrees', action='store_true', help='angles are in degrees, not in rad')
@@ -91,8 +94,10 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.calibration.noise import Noise
     from stewart_dynamics.calibration.one_run import CalibrationOptions, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
+    from stewart_dynamics.calibration.tracked_poses import read_tracked
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
+    from stewart_dynamics.tables.named_table import is_table
 
     interrupt_on_signals()
     options = CalibrationOptions(
@@ -108,6 +113,9 @@ def _run(given: argparse.Namespace) -> int:
         measured, missing = read_bag(
             given.poses, parameters, given.node, given.measured, given.pose,
             Reading.given(given))
+    elif given.pose and is_table(Path(given.pose)):
+        measured = read_tracked(
+            given.poses, Path(given.pose), parameters, given.mm, Reading.given(given))
     else:
         measured = read_poses(given.poses, parameters.joints, given.mm, given.degrees,
                               Reading.given(given))

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Poses that a device measured into a file of its own, joined with the legs of another one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.calibration.measured_poses import MeasuredPoses
+from stewart_dynamics.errors import BagError, StewartError
+from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.tables.column_names import leg_positions, POSITION, ROTATIONS, TIME
+from stewart_dynamics.tables.named_table import NamedTable
+from stewart_dynamics.tables.reading import Reading
+
+# A device sees the platform at rest while no coordinate changes by more than this part of the
+# characteristic length, for at least this time [s], of which this part at each end is left out.
+_STILL, _SHORTEST, _SETTLING = 2e-3, 0.5, 0.2
+
+
+def read_tracked(path: Path, tracked: Path, parameters: Parameters, millimeters: bool,
+                 reading: Reading) -> MeasuredPoses:
+    """
+    Return the legs of a table, one pose in each row, with the poses of the file of a device.
+
+    The file has one row for each pose, or all of the time: then the means while the platform was
+    at rest are the poses, in the order of the rows. A first rest more is at home, where designed
+    poses begin.
+
+    path: of the legs. tracked: of the poses. reading: of the poses; names of legs are of the legs.
+
+    Raises StewartError: a file cannot be read, or the numbers of rests and rows differ.
+    """
+    legs = leg_positions(parameters.joints)
+    own = {name: text for name, text in reading.columns.items() if name in parameters.joints}
+    table = NamedTable(path, (legs,), Reading(columns=own), {
+        legs.columns: 1e-3 if millimeters else 1.0})
+    lengths = table.values(legs)
+    poses = NamedTable(tracked, (TIME, POSITION, *ROTATIONS), reading._replace(columns={
+        name: text for name, text in reading.columns.items() if name not in own}))
+    rotations = poses.rotations()
+    if rotations is None:
+        raise BagError(f'{tracked}: row {poses.header_line}: has no columns of the rotation; it '
+                       f'has {poses.headings}')
+    rows = poses.in_base_axes(np.hstack([poses.values(POSITION), rotations.quaternions]), 'vq')
+    names = [f'row {line}' for line in table.lines]
+    if len(rows) != len(lengths):
+        times = poses.times()
+        size = parameters.singularity.characteristic_length
+        rests = list(_rests(times, rows, _STILL * size))
+        extra = len(rests) - len(lengths)
+        if extra not in (0, 1):
+            raise StewartError(
+                f'{tracked}: the platform is at rest {len(rests)} times for {_SHORTEST:g} s or '
+                f'more, {path} has {len(lengths)} rows: they must be equal, or one rest more, at '
+                'home before the first pose')
+        rows = np.array([_mean(rows[rest]) for rest in rests[extra:]])
+        names = [f'{name}, t = {times[rest.start]:.1f} s'
+                 for name, rest in zip(names, rests[extra:], strict=True)]
+    return MeasuredPoses(
+        lengths, Pose.from_quaternion(rows[:, :3], rows[:, 3:]), tuple(names),
+        topics=(str(path), str(tracked)), notices=tuple(poses.notices))
+
+
+def _rests(times: Array, rows: Array, tolerance: float) -> Iterator[slice]:
+    """Yield the samples of each time at rest, without the margins in which it settles."""
+    size = tolerance / _STILL
+    signs = np.sign(np.sum(rows[:, 3:] * rows[:1, 3:], axis=1))[:, None]
+    values = np.hstack([rows[:, :3], size * (signs * rows[:, 3:])])
+    first, low, high = 0, values[0], values[0]
+    for n in range(1, len(values) + 1):
+        if n < len(values):
+            lower, upper = np.minimum(low, values[n]), np.maximum(high, values[n])
+            if np.all(upper - lower <= tolerance):
+                low, high = lower, upper
+                continue
+        if times[n - 1] - times[first] >= _SHORTEST:
+            margin = _SETTLING * (times[n - 1] - times[first])
+            begin, end = np.searchsorted(times, [times[first] + margin, times[n - 1] - margin])
+            yield slice(int(begin), max(int(end), int(begin) + 1))
+        if n < len(values):
+            first, low, high = n, values[n], values[n]
+
+
+def _mean(rows: Array) -> Array:
+    """Return the mean of poses (N, 7) that differ by little."""
+    turns = rows[:, 3:] * np.sign(rows[:, 3:] @ rows[0, 3:])[:, None]
+    mean = turns.mean(axis=0)
+    return np.concatenate([rows[:, :3].mean(axis=0), mean / np.linalg.norm(mean)])
