@@ -100,7 +100,8 @@ def tracked(path: Path, poses: Pose, home: bool, noise: float = 1e-6) -> Path:
     stops = [*([np.eye(4)] if home else []), *(np.block([
         [rotation, position[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
         for rotation, position in zip(poses.rotation, poses.position, strict=True))]
-    quaternions = Pose([each[:3, 3] for each in stops], [each[:3, :3] for each in stops]).quaternion
+    quaternions = Pose([each[:3, 3] for each in stops],
+                       [each[:3, :3] for each in stops]).quaternion
     rows = [np.append(stops[0][:3, 3], quaternions[0])]
     for stop, quaternion in zip(stops, quaternions, strict=True):
         there = np.append(stop[:3, 3], quaternion)

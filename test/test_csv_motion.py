@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import csv
+import html
 import io
 from itertools import count
 import json
@@ -253,6 +254,26 @@ def test_a_record_with_a_gap_is_not_integrated(tmp_path: Path, snapshot: Snapsho
             continue
         with snapshot.raises(BagError):
             read_setpoints(path, PLATFORM)
+
+
+# -- advice ---------------------------------------------------------------------------------------
+
+def test_the_command_of_a_report_runs_as_printed(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    table = {f'{name} "it\'s"': values for name, values in ship(5.0).items()}
+    path = write(tmp_path / "the ship's motion <1>.csv", table)
+    params = tmp_path / 'my $HOME.yaml'
+    params.write_text(PARAMS.read_text())
+    columns = ','.join(f'{name}={name} "it\'s"' + (' [deg]' if name in (
+        'roll', 'pitch', 'yaw') else '') for name in ship(5.0))
+    assert replay([str(path), '--params', str(params), '--columns', columns, '--output',
+                   str(tmp_path / 'r'), '--differentiate', '--cutoff', '8', '--strict']) == 0
+    page = (tmp_path / 'r' / path.stem / 'report.html').read_text()
+    command = html.unescape(page.partition('<code>stewart_capability ')[2].partition('</code>')[0])
+    monkeypatch.chdir(tmp_path)
+    assert capability(shlex.split(command)) == 0
+    assert 'motion possible' in capsys.readouterr().out
 
 
 # -- angles in degrees ----------------------------------------------------------------------------

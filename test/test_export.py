@@ -28,6 +28,7 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.export import main
 from stewart_dynamics.export.c_project import (
     c_project, check_name, digest, exported_values, SOURCES)
+from stewart_dynamics.export.golden_vectors import WHOLE
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
 from stewart_dynamics.mechanics.frames.motion import ORTHOGONALITY
@@ -482,8 +483,9 @@ def test_cmake_builds_tests_and_installs(exported: Path, tmp_path: Path) -> None
 def test_golden_csv_is_read_as_it_was_computed(exported: Path) -> None:
     """Inputs read from it give the library the results in it."""
     with (exported / 'golden.csv').open() as file:
-        rows = [{name: float(text) for name, text in row.items()}
-                for row in csv.DictReader(file)]
+        texts = list(csv.DictReader(file))
+    assert all(row[name].isdecimal() for row in texts for name in WHOLE)
+    rows = [{name: float(text) for name, text in row.items()} for row in texts]
     names = list(rows[0])
     step, state = Step(Parameters.from_yaml(PLATFORM_FILE)), FIRST
     for row in rows:

@@ -235,7 +235,8 @@ def test_the_step_reports_a_clearance_below_its_limit_for_one_and_for_many() -> 
 
 @pytest.mark.parametrize('size', [1e-300, 1e-160, 1e160, 1e200, 1e300])
 def test_the_rules_of_a_plate_do_not_depend_on_its_size(size: float) -> None:
-    for corners, is_plate in (([0, 0, 0, 1, 0, 0, 1, 1, 0], True), ([0, 0, 0, 1, 0, 0, 2, 0, 0], False),
+    for corners, is_plate in (([0, 0, 0, 1, 0, 0, 1, 1, 0], True),
+                              ([0, 0, 0, 1, 0, 0, 2, 0, 0], False),
                               ([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 1], False)):
         values = {'geometry.base_outline': [size * each for each in corners]}
         if is_plate:

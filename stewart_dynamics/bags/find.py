@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 import os
 from pathlib import Path
 import re
+import shlex
 
 from stewart_dynamics.errors import BagError, ParameterError
 from stewart_dynamics.parameters.yaml_file import read_document
@@ -131,7 +132,7 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
                 numbered = _NUMBERED.fullmatch(file.name)
                 (missing if numbered and numbered['name'] in names else notices).append(
                     f'{file.name} is in the folder but not in metadata.yaml: it is not read '
-                    '(ros2 bag reindex lists it)')
+                    f'(ros2 bag reindex {shlex.quote(str(bag))} lists it)')
         return there
     if not found:
         raise BagError(f'{bag}: not a bag that can be read: {why}')

@@ -17,7 +17,7 @@ import numpy as np
 from stewart_dynamics import __version__
 from stewart_dynamics.core.binding import header
 from stewart_dynamics.errors import ParameterError, shown, StewartError
-from stewart_dynamics.export.golden_vectors import COLUMNS, golden_vectors, PARTS
+from stewart_dynamics.export.golden_vectors import COLUMNS, golden_vectors, PARTS, WHOLE
 from stewart_dynamics.mechanics.hexapod_structure import (
     field_values, FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
@@ -80,7 +80,9 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
     def filled(file: str) -> str:
         return re.sub('@[A-Z]+@', lambda found: texts[found[0]], source(f'{file}.in'))
 
-    csv = '\n'.join([','.join(COLUMNS), *(','.join(map(repr, row)) for row in rows), ''])
+    csv = '\n'.join([','.join(COLUMNS), *(','.join(
+        repr(int(value) if column in WHOLE else value)
+        for column, value in zip(COLUMNS, row, strict=True)) for row in rows), ''])
     return {**{each: source(each) for each in SOURCES}, f'{name}.h': filled('hexapod.h'),
             f'{name}.c': filled('hexapod.c'), 'golden.csv': csv,
             'test_golden.c': filled('test_golden.c'), 'CMakeLists.txt': filled('CMakeLists.txt')}

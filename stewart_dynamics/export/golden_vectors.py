@@ -69,6 +69,9 @@ Names of the columns: stamp [ns], SI units otherwise, base axes; torques are tho
 forces; ``found`` is the pose that the forward kinematics find for the lengths, from the last one.
 """
 COLUMNS = [name for names in PARTS.values() for name in names]
+# Columns of whole numbers: stamps, flags, codes, bits of limits.
+WHOLE = {name for part in ('STAMP', 'HAS_BASE', 'CODE', 'EXCEEDED', 'WARNING', 'MOTOR_CODE',
+                           'FOUND_CODE') for name in PARTS[part]}
 
 
 def golden_vectors(parameters: Parameters) -> Array:

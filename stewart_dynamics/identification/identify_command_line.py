@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+import shlex
 import time
 from typing import TYPE_CHECKING
 
@@ -189,8 +190,8 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
             f'Designed to identify {", ".join(asked.kinds)}, seed {asked.seed}.', *lines))
         write_yaml(path, given_values, {
             name: designed.trajectory.table[name].unit for name in given_values}, head)
-    _PROGRAM.say('\n'.join([*lines, '', f'motion: {folder / DESIGNED_MOTION}, '
-                            'for stewart_trajectory --ros-args --params-file']))
+    _PROGRAM.say('\n'.join([*lines, '', 'motion: ' + shlex.join([
+        'stewart_trajectory', '--ros-args', '--params-file', str(folder / DESIGNED_MOTION)])]))
 
 
 def _design_lines(designed: Design, asked: DesignOptions) -> Iterator[str]:

@@ -131,19 +131,19 @@ class Report:
             'external_force': wrench[:, :3], 'external_moment': wrench[:, 3:]})
 
     def write(self, path: Path, summary: Mapping[str, Any], plotly: Path | None = None,
-              followed: Followed | None = None) -> None:
+              followed: Followed | None = None, command: str = '') -> None:
         """
         Write the report, from summary.json; a file that exists is overwritten.
 
         ``plotly`` is the file of plotly.js that several reports share; by default it is in the
-        report. Raises StewartError if plotly is not installed.
+        report. ``command`` rates the motion. Raises StewartError if plotly is not installed.
         """
         script = plotly_script() if plotly is None else ''
         known = not summary['quasi_static']
         text = page(
             FOLDER, 'report', [script] if script else [], plotly is not None, True, s=summary,
             p=self._parameters, legs=list(self._legs),
-            name=Path(summary['bag']).name or summary['bag'], plotly=script,
+            name=Path(summary['bag']).name or summary['bag'], plotly=script, command=command,
             plotly_file=None if plotly is None else link(path, plotly),
             datasheet=link_to_other(
                 path, [Path(DATASHEET_PAGE), Path(DATASHEETS, DATASHEET_PAGE)], DATASHEET,

@@ -107,7 +107,8 @@ def replay(
             write_json(partial / RESULT, summary)
             if run.report is not None:
                 run.report.write(
-                    partial / REPORT_PAGE, summary, options.plotly, run.followed)
+                    partial / REPORT_PAGE, summary, options.plotly, run.followed,
+                    options.capability_command(bag))
     return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
 
 
@@ -128,7 +129,8 @@ def fingerprint(bag: Path, parameters: Parameters, options: Options) -> str:
     about = {
         'program': [SOFTWARE, VERSION], 'files': files, 'parameters': parameters.plain(),
         'options': [[name, dict(value) if name == 'topics' else value]
-                    for name, value in options._asdict().items() if name not in ('force', 'run')]}
+                    for name, value in options._asdict().items()
+                    if name not in ('force', 'run', 'params')]}
     text = json.dumps(about, sort_keys=True, default=str)
     return hashlib.sha256(text.encode('utf-8', 'backslashreplace')).hexdigest()
 

@@ -114,7 +114,7 @@ def _options(given: argparse.Namespace) -> Options:
         measured=given.measured or None, response=given.response,
         measured_pose=given.measured_pose or None,
         motor_torque=given.motor_torque, motor_current=given.motor_current,
-        parquet=given.parquet, report=given.report, force=given.force)
+        parquet=given.parquet, report=given.report, force=given.force, params=str(given.params))
 
 
 def _run(given: argparse.Namespace, options: Options) -> int:

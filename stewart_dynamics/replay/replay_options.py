@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+import shlex
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from stewart_dynamics.program import DONE, NODE, PARTLY_READ, STRICT
@@ -44,6 +45,7 @@ class Options(NamedTuple):
     plotly: Path | None = None
     """The file of plotly.js that the reports share; None: it is in each report."""
     force: bool = False  # replace existing results
+    params: str = ''  # the parameter file, as advice names it
     run: str = ''  # identifier of a run over many bags, written to summary.json
 
     @property
@@ -56,6 +58,18 @@ class Options(NamedTuple):
     def reading_of_bag(self) -> Reading:
         """Return how the bag is read: with a table of achieved poses the options are its own."""
         return self.reading if self.measured_table is None else Reading()
+
+    def capability_command(self, bag: Path) -> str:
+        """Return the command that rates the motion of a bag; empty if it cannot read it so."""
+        if set(self.topics) - {'combined'}:
+            return ''
+        words = ['stewart_capability', '--motion', str(bag), '--params', self.params or 'FILE']
+        for option, value in (
+                ('--node', self.node if self.node != NODE else None),
+                ('--combined', self.topics.get('combined')),
+                ('--differentiate', self.cutoff and f'{self.cutoff:g}')):
+            words += [option, value] if value else []
+        return shlex.join([*words, *self.reading_of_bag.arguments()])
 
     def applied_to(self, parameters: Parameters, bag: Path) -> Parameters:
         """Return the parameters with the source of setpoints that options and bag demand."""

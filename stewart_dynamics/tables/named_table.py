@@ -182,7 +182,7 @@ class NamedTable:
             raise BagError(
                 f'{self._where}: has no columns of the rotation that are known, but '
                 f'{", ".join(map(shown_name, likely[:_LISTED]))}: --columns selects them, as in '
-                f"--columns 'roll={shown_name(likely[0])}'")
+                f'--columns {shlex.quote(f"roll={shown_name(likely[0])}")}')
 
     @cached_property
     def _numbers(self) -> tuple[dict[str, Array], list[Row]]:

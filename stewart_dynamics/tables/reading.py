@@ -35,6 +35,13 @@ class Reading(NamedTuple):
         """Return the options that ``program.add_reading`` has added."""
         return cls(arguments.child, arguments.euler, arguments.axes, arguments.columns)
 
+    def arguments(self) -> list[str]:
+        """Return the options of a command line that give this."""
+        columns = ','.join(f'{name}={heading}' for name, heading in self.columns.items())
+        return [f'--{name}={value}' for name, value in (
+            *((name, getattr(self, name)) for name in ('child', 'euler', 'axes')),
+            ('columns', columns)) if value]
+
     @property
     def axes_of_bag(self) -> str:
         """Return the axes of messages, which do not name any."""
