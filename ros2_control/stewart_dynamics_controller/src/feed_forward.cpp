@@ -44,8 +44,9 @@ std::array<double, 9> rotation_of_euler(double alpha, double beta, double gamma)
 }
 
 FeedForward::FeedForward(
-  const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout)
-: hexapod_(hexapod), guess_(guess), timeout_(timeout)
+  const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout,
+  std::int64_t period)
+: hexapod_(hexapod), guess_(guess), timeout_(timeout), period_(period)
 {
   start();
 }
@@ -54,7 +55,7 @@ void FeedForward::start()
 {
   std::copy_n(guess_.position, 3, held_.position);
   std::copy_n(guess_.rotation, 9, held_.rotation);
-  started_ = false;
+  started_ = catching_up_ = false;
   rejection_ = nullptr;
   rejected_leg_ = 0;
   state_ = stewart_state{};
@@ -80,6 +81,10 @@ int FeedForward::answer(
   const Reference & reference, const Six & wrench, const Six & feedback, std::int64_t now,
   Command & command)
 {
+  if (rejection_ || is_gap(updated_at_, now)) {
+    catch_up();
+  }
+  updated_at_ = now;
   stewart_motion motion;
   int code = motion_of(reference, motion);
   code = code == STEWART_OK ? follow(motion, wrench, feedback, now, command) :
@@ -144,15 +149,23 @@ int FeedForward::follow(
   if (code != STEWART_OK) {
     return code;
   }
+  bool reached = true;
   for (std::size_t n = 0; n < 6; ++n) {
     const stewart_leg & leg = hexapod_.legs[n];
     const double rate = output_.result.rates[n];
-    command.positions[n] = output_.result.lengths[n] - leg.zero_length;
+    double length = output_.result.lengths[n];
+    if (started_ && catching_up_) {
+      const double step = leg.velocity_max * (1e-9 * static_cast<double>(period_));
+      length = std::clamp(length, held_lengths_[n] - step, held_lengths_[n] + step);
+      reached = reached && length == output_.result.lengths[n];
+    }
+    command.positions[n] = length - leg.zero_length;
     command.velocities[n] = std::clamp(rate, -leg.velocity_max, leg.velocity_max);
     command.efforts[n] =
       std::clamp(output_.forces[n] + feedback[n], -leg.force_max, leg.force_max);
-    held_lengths_[n] = output_.result.lengths[n];
+    held_lengths_[n] = length;
   }
+  catching_up_ = catching_up_ && !reached;
   held_ = stewart_motion{};
   std::copy_n(motion.position, 3, held_.position);
   std::copy_n(motion.rotation, 9, held_.rotation);

@@ -58,8 +58,10 @@ CallbackReturn StewartDynamicsController::on_configure(const rclcpp_lifecycle::S
     if (!of_platform()) {
       guess = initial_pose_of(parameters_);
     }
+    const unsigned int rate = get_update_rate();
     feed_forward_.emplace(
-      hexapod_of(parameters_), guess, static_cast<std::int64_t>(parameters_.setpoint.timeout * 1e9));
+      hexapod_of(parameters_), guess, static_cast<std::int64_t>(parameters_.setpoint.timeout * 1e9),
+      rate > 0 ? static_cast<std::int64_t>(1e9 / rate) : 0);
   } catch (const std::exception & error) {
     RCLCPP_ERROR(get_node()->get_logger(), "%s", error.what());
     return CallbackReturn::ERROR;
@@ -222,6 +224,9 @@ return_type StewartDynamicsController::update_reference_from_subscribers(
   std::optional<PlatformNumbers> setpoint;
   received_.try_set([&](auto & received) {received.swap(setpoint);});
   if (setpoint) {
+    if (received_at_ >= 0 && feed_forward_->is_gap(received_at_, time.nanoseconds())) {
+      feed_forward_->catch_up();
+    }
     received_at_ = time.nanoseconds();
     for (std::size_t n = 0; n < setpoint->size(); ++n) {
       (void)ordered_exported_reference_interfaces_[n]->set_value((*setpoint)[n]);

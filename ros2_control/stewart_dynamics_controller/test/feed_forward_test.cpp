@@ -410,6 +410,55 @@ void test_no_false_hold()
   CHECK(close(command.velocities, {0.5, 0.5, 0.5, 0.5, 0.5, 0.5}, 0.0));
 }
 
+/// After a gap positions go to the reference with at most velocity_max in each cycle; without one
+/// a step is followed at once.
+void test_after_a_gap()
+{
+  stewart_platform p = hexapod();
+  for (stewart_leg & leg : p.legs) {
+    leg.velocity_max = 0.5;
+  }
+  PlatformReference higher = home(), bad = home();
+  higher.position[2] += 0.03;
+  bad.position[0] = kNaN;
+  const auto far_apart = [](const Six & a, const Six & b) {
+      double most = 0.0;
+      for (std::size_t n = 0; n < 6; ++n) {
+        most = std::max(most, std::fabs(a[n] - b[n]));
+      }
+      return most;
+    };
+  for (const int gap : {0, 1, 2, 3}) {  // none, of cycles, of references, a hold
+    FeedForward feed_forward(p, guess(), kTimeout, kCycle);
+    Command first, last, command, target;
+    std::int64_t now = 0;
+    CHECK(feed_forward.update(higher, {}, {}, now, target) == STEWART_OK);
+    feed_forward.start();
+    CHECK(feed_forward.update(home(), {}, {}, now += kCycle, first) == STEWART_OK);
+    last = first;
+    if (gap == 1) {
+      now += 50 * kCycle;
+    } else if (gap == 2) {
+      feed_forward.catch_up();
+    } else if (gap == 3) {
+      CHECK(feed_forward.update(bad, {}, {}, now += kCycle, command) == STEWART_NOT_FINITE);
+    }
+    int cycles = 0;
+    do {
+      CHECK(feed_forward.update(higher, {}, {}, now += kCycle, command) == STEWART_OK);
+      CHECK(gap == 0 || far_apart(command.positions, last.positions) <= 0.5e-3 * (1.0 + 1e-9));
+      CHECK(close(command.efforts, target.efforts, 0.0));
+      last = command;
+      ++cycles;
+    } while (far_apart(command.positions, target.positions) > 0.0 && cycles < 1000);
+    const double way = far_apart(first.positions, target.positions);
+    CHECK(cycles == (gap == 0 ? 1 : static_cast<int>(std::ceil(way / 0.5e-3))));
+    // Reached: steps are followed at once again.
+    CHECK(feed_forward.update(home(), {}, {}, now += kCycle, command) == STEWART_OK);
+    CHECK(close(command.positions, first.positions, 0.0));
+  }
+}
+
 /// Legs: the same hold; the next pose is found from the one that is held.
 void test_hold_of_legs()
 {
@@ -465,6 +514,7 @@ int main()
   test_hold();
   test_effort_of_hold();
   test_no_false_hold();
+  test_after_a_gap();
   test_hold_of_legs();
   test_rotation();
   std::printf("all checks passed\n");

@@ -12,6 +12,9 @@
  * zero, and efforts what keeps the platform at rest there, under the wrench of that reference.
  * So position and effort always belong together, and no effort is kept from a motion that has
  * ended. The caller ends it after the timeout.
+ *
+ * After a gap (cycles that did not come, references that did not, a hold) the reference has gone
+ * on: positions go from the last command to it with at most limits.velocity_max in each cycle.
  */
 
 #ifndef STEWART_DYNAMICS_CONTROLLER__FEED_FORWARD_HPP_
@@ -57,9 +60,10 @@ class FeedForward
 {
 public:
   /// hexapod: checked parameters; guess: the pose near which the legs' first reference is;
-  /// timeout: [ns].
+  /// timeout, and period of the cycles: [ns]; period 0: positions are not bounded after a gap.
   FeedForward(
-    const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout);
+    const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout,
+    std::int64_t period = 0);
 
   /// Forget earlier references: the singularity warning and the last pose.
   void start();
@@ -78,6 +82,15 @@ public:
     const LegReference & reference, const Six & wrench, const Six & feedback,
     std::int64_t now, Command & command);
 
+  /// Return whether the time from one event to the next is a gap [ns].
+  bool is_gap(std::int64_t since, std::int64_t now) const
+  {
+    return period_ > 0 && now - since > kGap * period_;
+  }
+
+  /// Bound the steps of the positions until the reference is reached: it comes after a gap.
+  void catch_up() {catching_up_ = period_ > 0;}
+
   /// Return whether a reference was followed since start: there is a command.
   bool started() const {return started_;}
 
@@ -95,6 +108,8 @@ public:
   bool warning() const {return state_.warning != STEWART_NO_WARNING;}
 
 private:
+  static constexpr std::int64_t kGap = 10;  // cycles
+
   int motion_of(const PlatformReference & reference, stewart_motion & motion) const;
   int motion_of(const LegReference & reference, stewart_motion & motion) const;
   template<typename Reference>
@@ -110,10 +125,10 @@ private:
 
   stewart_platform hexapod_;
   stewart_pose guess_;
-  std::int64_t timeout_, followed_at_ = 0;
-  bool started_ = false;
+  std::int64_t timeout_, period_, updated_at_ = 0, followed_at_ = 0;
+  bool started_ = false, catching_up_ = false;
   stewart_motion held_{};  // the last reference that was followed, at rest
-  Six held_lengths_{}, held_wrench_{};
+  Six held_lengths_{}, held_wrench_{};  // lengths of the last command
   const char * rejection_ = nullptr;
   int rejected_leg_ = 0;
   stewart_state state_{};
