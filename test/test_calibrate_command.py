@@ -18,8 +18,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from snapshot import Snapshot
 from stewart_dynamics import (
-    check_planned_trajectory, Motion, ParameterError, Parameters, Pose, StewartError,
-    StewartPlatform)
+    check_planned_trajectory, Motion, ParameterError, Parameters, Pose, read_setpoints,
+    StewartError, StewartPlatform)
 from stewart_dynamics.calibration import main
 from stewart_dynamics.calibration.calibrate import calibrate
 from stewart_dynamics.calibration.calibration_report import _arrow_scale, _view
@@ -474,6 +474,9 @@ def test_a_design_identifies_better_than_random_poses(
     table = np.loadtxt(tmp_path / 'calibrated' / 'trajectory.csv', delimiter=',', skiprows=1)
     motion = Motion(table[:, 1:4], Pose.from_quaternion(table[:, 1:4], table[:, 4:8]).rotation,
                     *(table[:, n:n + 3] for n in range(8, 20, 3)))
+    np.testing.assert_allclose(
+        read_setpoints(tmp_path / 'calibrated' / 'trajectory.csv').motion.rows, motion.rows,
+        atol=1e-12)
     result = check_planned_trajectory(HEXAPOD, table[:, 0], motion)
     assert result.accepted, result.message
     for position in poses.poses.position:

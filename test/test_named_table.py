@@ -162,6 +162,24 @@ def test_columns_that_may_be_a_rotation_are_not_ignored(
         read(tmp_path / 'a.csv', f't,x,y,z,{names}\n0,1,2,3,0,0,0\n')
 
 
+@pytest.mark.parametrize('names', ['gyrX,gyrY,gyrZ', 'RollRate,PitchRate,YawRate'])
+def test_rates_of_a_vehicle_are_not_ignored(
+        names: str, tmp_path: Path, snapshot: Snapshot) -> None:
+    path = tmp_path / 'a.csv'
+    path.write_text(f't,ax,ay,az,{names}\n0,0,0,9.8,1,2,3\n1,0,0,9.8,1,2,3\n')
+    with snapshot.raises(BagError):
+        read_vehicle(path, None)
+
+
+def test_times_in_ms_without_a_unit_are_noticed(tmp_path: Path, snapshot: Snapshot) -> None:
+    text = 'Time,x,y,z\n' + ''.join(f'{10 * n},0,0,1\n' for n in range(20))
+    table = read(tmp_path / 'a.csv', text)
+    assert table.times()[1] == 10.0
+    snapshot(table.notices[0])
+    table = read(tmp_path / 'a.csv', text, columns={'t': 'Time [ms]'})
+    assert table.times()[1] == 0.01 and not table.notices
+
+
 def test_all_programs_take_the_same_options(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for program in (replay, capability, calibrate, report):

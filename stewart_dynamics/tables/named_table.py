@@ -28,8 +28,8 @@ from stewart_dynamics.parameters.tolerances import (
 from stewart_dynamics.program import AXES
 from stewart_dynamics.tables.cells import Cells, find_table, Row, text_of
 from stewart_dynamics.tables.column_names import (
-    ANGLES, Heading, MATRIX, Names, Quantity, QUATERNION, ROTATION_VECTOR, ROTATIONS, si_factor,
-    split, TIME, U_V_W, unit_rule)
+    ANGLES, ANGULAR_VELOCITY, Heading, MATRIX, Names, Quantity, QUATERNION, ROTATION_VECTOR,
+    ROTATIONS, si_factor, split, TIME, U_V_W, unit_rule)
 from stewart_dynamics.tables.reading import Reading
 from stewart_dynamics.tables.source_axes import axes_matrix, turned
 from stewart_dynamics.tables.tracker_exports import Export, find_export
@@ -39,9 +39,12 @@ TABLES = ('.csv', '.tsv', '.txt')
 _LARGEST = 1 << 28  # of a file [bytes]
 # Columns that are not read are listed up to this number.
 _LISTED = 8
-# Parts of names that a rotation may have.
+# Seconds between rows from which on a time without a unit may be in ms, and the fewest rows.
+_SLOW, _SEVERAL = 1.0, 10
+# Parts of names that a rotation, or a rotation rate, may have.
 _OF_ROTATION = ('roll', 'pitch', 'yaw', 'rot', 'quat', 'angle', 'euler', 'heading', 'orient',
                 'alpha', 'beta', 'gamma')
+_OF_TURNING = ('gyr', 'rate', 'omega', 'angular', 'roll', 'pitch', 'yaw', 'spin')
 
 
 def is_table(path: Path) -> bool:
@@ -138,7 +141,11 @@ class NamedTable:
         used = {each.place for each in found.values()}
         others = [cell for place, cell in enumerate(cells.header.cells)
                   if cell and place not in used]
-        self._check_rotation(found, others)
+        if 'x' in found:
+            self._check_unread(found, others, 'the rotation', ROTATIONS, _OF_ROTATION)
+        elif 'ax' in found and 'x' not in self._names.quantity:
+            self._check_unread(found, others, 'the angular velocity', (ANGULAR_VELOCITY,),
+                               _OF_TURNING)
         if others:
             more = f' and {len(others) - _LISTED} more' if len(others) > _LISTED else ''
             self.notices.append('columns that are not read: '
@@ -172,17 +179,18 @@ class NamedTable:
             found[places[0]] = Heading(name, own, 0)
         return found
 
-    def _check_rotation(self, found: Mapping[str, _Place], others: list[str]) -> None:
-        """Raise BagError if columns of a rotation are there, but not read."""
-        wanted = {name for quantity in ROTATIONS for name in quantity.columns}
-        if 'x' not in found or wanted & set(found) or not wanted & set(self._names.quantity):
-            return
-        likely = [cell for cell in others if any(part in cell.lower() for part in _OF_ROTATION)]
-        if likely:
+    def _check_unread(self, found: Mapping[str, _Place], others: list[str], kind: str,
+                      quantities: Iterable[Quantity], parts: tuple[str, ...]) -> None:
+        """Raise BagError if no column of quantities is read, but others may be theirs."""
+        wanted = [name for quantity in quantities for name in quantity.columns
+                  if name in self._names.quantity]
+        likely = [cell for cell in others if any(part in cell.lower() for part in parts)]
+        if wanted and likely and not set(wanted) & set(found):
+            name = 'roll' if 'roll' in wanted else wanted[0]
             raise BagError(
-                f'{self._where}: has no columns of the rotation that are known, but '
+                f'{self._where}: has no columns of {kind} that are known, but '
                 f'{", ".join(map(shown_name, likely[:_LISTED]))}: --columns selects them, as in '
-                f'--columns {shlex.quote(f"roll={shown_name(likely[0])}")}')
+                f'--columns {shlex.quote(f"{name}={shown_name(likely[0])}")}')
 
     @cached_property
     def _numbers(self) -> tuple[dict[str, Array], list[Row]]:
@@ -259,6 +267,10 @@ class NamedTable:
             raise self.error(int(n), 't', 'must be more than that of the row before')
         if len(times) < 2:
             raise BagError(f'{self.path}: {len(times)} rows of numbers: must be at least 2')
+        step = float(np.median(np.diff(times)))
+        if step >= _SLOW and len(times) >= _SEVERAL and not self._places['t'].has_unit:
+            self.notices.append(f'rows are {step:g} s apart, as t has no unit: in ms? '
+                                f'{self._with_unit(("t",), "ms")} reads milliseconds')
         return times
 
     def error(self, row: int, name: str, rule: str) -> BagError:
@@ -294,11 +306,14 @@ class NamedTable:
     @property
     def degrees(self) -> str:
         """Return the option by which the angles of the file are read in degrees."""
+        return self._with_unit([name for quantity in (ANGLES, U_V_W) if self.has(quantity)
+                                for name in quantity.columns], 'deg')
+
+    def _with_unit(self, names: Iterable[str], unit: str) -> str:
         headings = {name: split(self._header.cells[self._places[name].place])[0]
-                    for quantity in (ANGLES, U_V_W) if self.has(quantity)
-                    for name in quantity.columns}
+                    for name in names}
         return '--columns ' + shlex.quote(','.join(
-            f'{name}={heading} [deg]' for name, heading in headings.items()))
+            f'{name}={heading} [{unit}]' for name, heading in headings.items()))
 
     def _of_matrices(self, matrices: Array) -> Array:
         left, sizes, right = np.linalg.svd(matrices)
