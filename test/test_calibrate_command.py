@@ -26,7 +26,7 @@ from stewart_dynamics.calibration.calibration_report import _arrow_scale, _view
 from stewart_dynamics.calibration.equations import (
     BASE, Equations, PLATFORM as PLATFORM_JOINTS, values_of)
 from stewart_dynamics.calibration.geometry_fit import fit, Unknowns
-from stewart_dynamics.calibration.measured_poses import poses_csv, read_poses
+from stewart_dynamics.calibration.measured_poses import METERS, Millimeters, poses_csv, read_poses
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.one_run import CalibrationOptions, run
 from stewart_dynamics.calibration.pose_design import design_poses, NOISE
@@ -125,7 +125,7 @@ def test_poses_come_from_the_file_of_a_tracker(
     legs = tmp_path / 'legs.tsv'
     legs.write_text('\n'.join(['\t'.join(f'{name}_mm' for name in JOINTS), *(
         '\t'.join(map(repr, row)) for row in (1e3 * given.lengths).tolist())]))
-    found = read_tracked(legs, path, HEXAPOD.parameters, False, Reading())
+    found = read_tracked(legs, path, HEXAPOD.parameters, METERS, Reading())
     np.testing.assert_allclose(found.poses.position, given.poses.position, atol=1e-6)
     np.testing.assert_allclose(found.poses.rotation, given.poses.rotation, atol=1e-9)
     np.testing.assert_allclose(found.lengths, given.lengths, atol=1e-15)
@@ -157,7 +157,7 @@ def test_units_and_angles(table: Path, tmp_path: Path) -> None:
         lines.append(';'.join(['a b', *map(repr, map(float, (
             *lengths[::-1], *position[::-1], turn[2], turn[0], turn[1])))]))
     path.write_text('\ufeff' + '\r\n'.join(lines) + '\r\n\r\n')
-    found = read_poses(path, JOINTS, millimeters=True, degrees=True)
+    found = read_poses(path, JOINTS, millimeters=Millimeters(True, True), degrees=True)
     np.testing.assert_allclose(found.lengths, given.lengths, atol=1e-15)
     np.testing.assert_allclose(found.poses.position, given.poses.position, atol=1e-15)
     np.testing.assert_allclose(found.poses.rotation, from_euler(angles), atol=1e-15)
@@ -165,7 +165,8 @@ def test_units_and_angles(table: Path, tmp_path: Path) -> None:
     # Lines can end in any way.
     path.write_bytes(path.read_bytes().replace(b'\r\n', b'\r'))
     np.testing.assert_array_equal(
-        read_poses(path, JOINTS, millimeters=True, degrees=True).lengths, found.lengths)
+        read_poses(path, JOINTS, millimeters=Millimeters(True, True), degrees=True).lengths,
+        found.lengths)
 
 
 @pytest.mark.parametrize('separator', [';', '\t'])
@@ -282,6 +283,45 @@ def test_other_bad_input(
     snapshot(capsys.readouterr().err)
     assert main([str(table), '--params', str(PLATFORM), '--mm']) == 2
     snapshot(capsys.readouterr().err)
+
+
+@pytest.mark.parametrize('in_mm', [(False, False), (True, False), (False, True), (True, True)])
+@pytest.mark.parametrize('given', [[], ['--mm'], ['--mm-positions'], ['--mm-legs']])
+def test_the_advice_on_units_leads_to_a_result(
+        in_mm: tuple[bool, bool], given: list[str], table: Path, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    """A tracker in mm with legs in m, and all others: the named option is the right one."""
+    measured = read_poses(table, JOINTS)
+    positions, lengths = (1e3 * each if mm else each for each, mm in zip(
+        (measured.poses.position, measured.lengths), in_mm, strict=True))
+    path = tmp_path / 'poses.csv'
+    path.write_text(poses_csv(JOINTS, lengths, Pose(positions, measured.poses.rotation)))
+    arguments = [str(path), '--params', str(PLATFORM), '--output', str(tmp_path / 'out'),
+                 '--no-report']
+    right = {(False, False): [], (True, True): ['--mm'], (True, False): ['--mm-positions'],
+             (False, True): ['--mm-legs']}[in_mm]
+    code = main([*arguments, *given])
+    error = capsys.readouterr().err
+    assert code == (0 if given == right else 2)
+    if code:
+        advice = error.split(': ')[-1]
+        assert advice.startswith(f'without {given[0]} ' if not right else right[0] + (
+            ' in place of ' if given else ' reads them so')), error
+        assert main([*arguments, *right]) == 0
+    assert json.loads((tmp_path / 'out' / 'calibration.json').read_text())['options'][
+        'millimeters'] == {'positions': in_mm[0], 'legs': in_mm[1]}
+
+
+def test_a_bag_in_mm_is_read_so(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    values, poses = true_values(rng), random_poses(rng, 12)
+    lengths, seen = measured(rng, values, poses)
+    folder = write_bag(tmp_path / 'bag', rng, lengths, Pose(
+        1e3 * seen.position, seen.rotation), '/joint_states')
+    arguments = [str(folder), '--params', str(PLATFORM), '--output', str(tmp_path / 'out'),
+                 '--no-report']
+    assert main(arguments) == 2
+    assert main([*arguments, '--mm-positions']) == 0
 
 
 def test_positions_of_drives_are_an_option(table: Path, tmp_path: Path,

@@ -17,6 +17,7 @@ from stewart_dynamics.calibration.equations import (
     ALL, Equations, Frames, GEOMETRY, inverse, product, values_of, with_geometry)
 from stewart_dynamics.calibration.frames import find_frames
 from stewart_dynamics.calibration.geometry_fit import fit, Unknowns
+from stewart_dynamics.calibration.measured_poses import Millimeters
 from stewart_dynamics.calibration.noise import covariances, Noise
 from stewart_dynamics.mechanics.drives.turning_screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.rotation import from_euler
@@ -285,16 +286,16 @@ def test_outliers_do_not_hide_one_another(seed: int) -> None:
 
 
 @pytest.mark.parametrize(('what', 'words'), [
-    ('positions in mm', 'positions are in mm, not in m: --mm'),
-    ('legs in mm', 'leg positions are in mm, not in m'),
-    ('all in mm', 'positions and leg positions are in mm, not in m'),
+    ('positions in mm', 'positions are in mm, not in m: --mm-positions reads them so'),
+    ('legs in mm', 'leg positions are in mm, not in m: --mm-legs reads them so'),
+    ('all in mm', 'positions and leg positions are in mm, not in m: --mm reads them so'),
     ('swapped', 'leg_2 and leg_5 are swapped'),
     ('another order', 'the legs are in another order: leg_6, leg_1'),
     ('degrees', 'the angles are in degrees, not in radians: --degrees'),
     ('all in mm and degrees', 'positions and leg positions are in mm, not in m: --mm reads '
-     'millimeters; the angles are in degrees, not in radians: --degrees'),
+     'them so; the angles are in degrees, not in radians: --degrees'),
     ('read as mm and degrees', 'positions and leg positions are in m, not in mm: without --mm '
-     'they are in m; the angles are in radians, not in degrees: without --degrees'),
+     'they are read so; the angles are in radians, not in degrees: without --degrees'),
     ('outliers', '20 of 40 poses do not fit the geometry that fits all others'),
     ('inverse', 'the inverse is needed'), ('transposed', 'the rotations are those of the base'),
     ('sign', 'leg positions have the opposite sign'),
@@ -345,7 +346,8 @@ def test_likely_mistakes_are_named(what: str, words: str) -> None:
     if what == 'frames':
         pose = Equations(lengths, pose).as_measured(pose, FRAMES)
     with pytest.raises(StewartError) as caught:
-        calibrate(HEXAPOD, lengths, pose, angles=given, degrees=what.startswith('read'))
+        calibrate(HEXAPOD, lengths, pose, angles=given, degrees=what.startswith('read'),
+                  millimeters=Millimeters(*2 * [what.startswith('read')]))
     assert words in str(caught.value) and 'nothing is calibrated' in str(caught.value)
 
 
@@ -388,6 +390,10 @@ def test_all_poses_are_used_where_none_is_held_out_and_some_noise_is_needed(
     ('deflection', 'residuals follow the static forces of the legs, from deflection: all legs'),
     ('drift', 'residuals drift from the first pose to the last: leg_3'),
     ('scale', 'positions off by scale, from the lead of the screw or the encoder: leg_3 (+0.2'),
+    ('scale of all legs', 'positions off by scale, from the lead of the screw or the encoder: all '
+     'legs alike (+0.99%)'),
+    ('scale of the device', 'positions of the device off by scale, from its calibration or its '
+     'target: all legs alike (+0.99%)'),
     ('fixed', 'the fixed values are not those of the hexapod: '),
     ('noise', 'times the noise that was given')])
 def test_a_lack_of_fit_is_named(what: str, words: str) -> None:
@@ -398,13 +404,43 @@ def test_a_lack_of_fit_is_named(what: str, words: str) -> None:
         lengths[:, 2] += np.where(rng.random(60) < 0.5, 1e-4, -1e-4)
     if what == 'scale':
         lengths[:, 2] *= 1.002
+    if what == 'scale of all legs':
+        lengths *= 1.01
+    if what == 'scale of the device':
+        seen = Pose(1.01 * seen.position, seen.rotation)
     if what == 'deflection':
         lengths += HEXAPOD.inverse_dynamics(Motion.from_pose(seen)).forces / 4e6
     if what == 'drift':
         lengths[:, 2] += np.linspace(0.0, 1e-4, 60)
     found = calibrate(HEXAPOD, lengths, seen, fixed=['zero_length'] if what == 'fixed' else [],
-                      noise=Noise(1e-6, 5e-6, 5e-6) if what == 'noise' else None)
+                      noise=Noise(1e-6, 5e-6, 5e-6) if what == 'noise' else None,
+                      accept_mistakes='scale of' in what)
     assert words in found.lack_of_fit[0].text
+
+
+@pytest.mark.parametrize('frames', ['known', 'unknown'])
+@pytest.mark.parametrize('scale', [1.05, 0.99])
+@pytest.mark.parametrize('of_device', [True, False])
+def test_the_scale_of_the_device_is_not_blamed_on_the_legs(
+        of_device: bool, scale: float, frames: str) -> None:
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        lengths, seen = measured(rng, true_values(rng), random_poses(rng, 40),
+                                 Noise(2e-6, 1e-5, 1e-5))
+        if frames == 'unknown':
+            seen = Equations(lengths, seen).as_measured(seen, FRAMES)
+        if of_device:
+            seen = Pose(scale * seen.position, seen.rotation)
+        else:
+            lengths = scale * lengths
+        found = calibrate(HEXAPOD, lengths, seen, frames=frames, accept_mistakes=True)
+        named = {each.what for each in (*found.likely, *found.lack_of_fit)}
+        assert named - {'identifiable', 'worse', 'misfit'} == {'device' if of_device else 'scale'}
+    # A difference that errors of the joints can explain as well is not attributed to either.
+    found = calibrate(HEXAPOD, (1.0 if of_device else 1.0005) * lengths / (
+        1.0 if of_device else scale), Pose(seen.position * (
+            1.0005 / scale if of_device else 1.0), seen.rotation), frames=frames)
+    assert found.lack_of_fit[0].what == 'scale_or_device'
 
 
 def with_play(rng: np.random.Generator, count: int, play: float, side: str) -> tuple[

@@ -24,7 +24,7 @@ from stewart_dynamics.calibration.equations import (
     chosen, Equations, Frames, GEOMETRY, GUIDED, names_of, SAME, values_of, with_geometry)
 from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
 from stewart_dynamics.calibration.geometry_fit import Fit, fit, minimum, Unknowns
-from stewart_dynamics.calibration.measured_poses import FEWEST
+from stewart_dynamics.calibration.measured_poses import FEWEST, METERS, Millimeters
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.outliers import MOST_OUTLIERS, outliers
 from stewart_dynamics.calibration.residual_causes import lack_of_fit
@@ -101,7 +101,8 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
               fixed: Sequence[str] = (), frames: str = 'known',
               noise: tuple[float, float, float] | None = None,
               hold_out: float = HOLD_OUT,
-              angles: Array | None = None, degrees: bool = False, drive_positions: bool = False,
+              angles: Array | None = None, degrees: bool = False,
+              millimeters: Millimeters = METERS, drive_positions: bool = False,
               accept_mistakes: bool = False) -> Calibration:
     """
     Return the geometry that explains measured poses.
@@ -129,6 +130,8 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         The angles of which the poses were made, to find angles in another unit.
     degrees : bool
         They were read as degrees.
+    millimeters : Millimeters
+        The numbers that were read as mm, to name the option for those in another unit.
     drive_positions : bool
         ``lengths`` are positions of drives whose screws turn with their legs: motor angles times
         lead / (2 pi gear_ratio).
@@ -161,7 +164,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
             raise StewartError(
                 f'{likely[0].text}; nothing is calibrated (--accept-mistakes does)')
 
-    refuse(mistakes_of_input(p, measured, unknown, angles, degrees))
+    refuse(mistakes_of_input(p, measured, unknown, angles, degrees, millimeters))
     known = find_frames(p, measured) if unknown else SAME
     measured = measured._replace(frames=known)
     size = p.singularity.characteristic_length

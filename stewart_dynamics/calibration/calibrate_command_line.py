@@ -59,6 +59,8 @@ def _arguments() -> argparse.ArgumentParser:
                            'with rests in the order of the poses')
     data.add_argument('--mm', action='store_true',
                       help='x, y, z and the leg positions are in mm, not in m')
+    data.add_argument('--mm-positions', action='store_true', help='only x, y, z are in mm')
+    data.add_argument('--mm-legs', action='store_true', help='only the leg positions are in mm')
     data.add_argument('--degrees', action='store_true', help='angles are in degrees, not in rad')
     data.add_argument('--drive-positions', action='store_true',
                       help='leg positions are those of drives whose screws turn with their legs '
@@ -90,7 +92,7 @@ def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import is_bag_file
     from stewart_dynamics.calibration.calibration_results import result_text
-    from stewart_dynamics.calibration.measured_poses import read_poses
+    from stewart_dynamics.calibration.measured_poses import Millimeters, read_poses
     from stewart_dynamics.calibration.noise import Noise
     from stewart_dynamics.calibration.one_run import CalibrationOptions, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
@@ -100,9 +102,11 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.tables.named_table import is_table
 
     interrupt_on_signals()
+    millimeters = Millimeters(given.mm or given.mm_positions, given.mm or given.mm_legs)
     options = CalibrationOptions(
-        given.fixed, given.frames, given.noise and Noise(*given.noise), given.hold_out, given.mm,
-        given.degrees, given.drive_positions, given.accept_mistakes, given.report, given.force)
+        given.fixed, given.frames, given.noise and Noise(*given.noise), given.hold_out,
+        millimeters, given.degrees, given.drive_positions, given.accept_mistakes, given.report,
+        given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
     if given.design is not None:
         _PROGRAM.say(design_command.run(given, parameters, given.output or Path(DESIGNED)))
@@ -112,12 +116,12 @@ def _run(given: argparse.Namespace) -> int:
     if given.poses.is_dir() or is_bag_file(given.poses):
         measured, missing = read_bag(
             given.poses, parameters, given.node, given.measured, given.pose,
-            Reading.given(given))
+            Reading.given(given), millimeters)
     elif given.pose and is_table(Path(given.pose)):
         measured = read_tracked(
-            given.poses, Path(given.pose), parameters, given.mm, Reading.given(given))
+            given.poses, Path(given.pose), parameters, millimeters, Reading.given(given))
     else:
-        measured = read_poses(given.poses, parameters.joints, given.mm, given.degrees,
+        measured = read_poses(given.poses, parameters.joints, millimeters, given.degrees,
                               Reading.given(given))
     _PROGRAM.prepare(likely_mistakes(parameters))
     result = run(measured, str(given.poses), parameters, output, options)

@@ -11,7 +11,7 @@ times better without it: a real error of the geometry does not do that.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from itertools import combinations, product
 import math
 
 import numpy as np
@@ -20,6 +20,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.equations import (
     BASE, Equations, GEOMETRY, inverse, PLATFORM, SAME, values_of, ZERO)
 from stewart_dynamics.calibration.frames import find_frames
+from stewart_dynamics.calibration.measured_poses import Millimeters
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
@@ -32,6 +33,9 @@ from stewart_dynamics.reporting.estimates import LikelyMistake
 _BETTER = 0.25
 # Mistakes explain the poses alike if their misfits differ by this factor, or are below this value.
 _ALIKE, _EXACT = 2.0, 1e-3
+# Largest scale of positions that is tried and how near, logarithms; a misfit above all others.
+_LARGEST_SCALE, _SCALE_STEP, _WORST = math.log(2.0), 1e-3, 1e3
+DEVICE_SCALE, LEG_SCALE = 'device', 'scale'
 # A joint that moves by a larger part of the characteristic length is not of this hexapod.
 _FARTHEST = 0.3
 # Residuals above this part of it mean that the model does not describe the poses.
@@ -41,10 +45,11 @@ _WHOLE = 0.1
 
 
 def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_frames: bool,
-                      angles: Array | None, degrees: bool) -> Iterator[LikelyMistake]:
+                      angles: Array | None, degrees: bool, millimeters: Millimeters,
+                      ) -> Iterator[LikelyMistake]:
     """Yield the likeliest mistake in lengths, poses or their angles (N, 3), if one is likely."""
     given = _misfit(parameters, equations, unknown_frames)
-    without = list(_without_mistakes(parameters, equations))
+    without = list(_without_mistakes(parameters, equations, millimeters))
     if angles is not None:
         rotation = from_euler(angles if degrees else np.radians(angles))
         text = ('the angles are in radians, not in degrees: without --degrees they are read so'
@@ -61,6 +66,9 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
             'frames', 'the poses are not those of the platform frame in the base frame, but of '
             'other frames: --frames unknown calibrates them as well')))
     best, mistake = min(tried, key=lambda each: each[0])
+    if best >= _BETTER * given:
+        tried = list(_of_scale(parameters, equations, unknown_frames))
+        best, mistake = min(tried, key=lambda each: each[0])
     if best < _BETTER * given:
         # Symmetric hexapods: a mirrored frame is another order of the legs.
         texts = [each.text for misfit, each in tried if misfit <= max(_ALIKE * best, _EXACT)]
@@ -68,6 +76,27 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
                                + (f' instead of {given:.2g})' if given < math.inf else ')'))
     else:
         yield from _on_other_side(parameters, equations, unknown_frames)
+
+
+def _of_scale(parameters: Parameters, equations: Equations, unknown_frames: bool,
+              ) -> Iterator[tuple[float, LikelyMistake]]:
+    """Yield the smallest misfit of positions, or leg positions, of any scale, and the mistake."""
+    from scipy.optimize import minimize_scalar
+
+    lengths, pose = equations.lengths, equations.pose
+    for what, words, scaled in (
+            (DEVICE_SCALE, 'positions of the device are {:.3g} times as large as they are by the '
+             'legs: its calibration, or its target', lambda factor: equations._replace(
+                 pose=Pose(pose.position / factor, pose.rotation))),
+            (LEG_SCALE, 'leg positions are {:.3g} times as large as they are by the device: lead '
+             'of the screw, gear or encoder', lambda factor: equations._replace(
+                 lengths=lengths / factor))):
+        found = minimize_scalar(
+            lambda logarithm, scaled=scaled: min(_misfit(
+                parameters, scaled(math.exp(logarithm)), unknown_frames), _WORST),
+            bounds=(-_LARGEST_SCALE, _LARGEST_SCALE), method='bounded',
+            options={'xatol': _SCALE_STEP})
+        yield float(found.fun), LikelyMistake(what, words.format(math.exp(found.x)))
 
 
 def _on_other_side(parameters: Parameters, equations: Equations, unknown_frames: bool,
@@ -117,19 +146,16 @@ def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, 
             'relative to home, or to another length?')
 
 
-def _without_mistakes(parameters: Parameters, given: Equations,
+def _without_mistakes(parameters: Parameters, given: Equations, millimeters: Millimeters,
                       ) -> Iterator[tuple[LikelyMistake, Equations]]:
     """Yield mistakes, each with the measurements as they were without it."""
     lengths, pose = given.lengths, given.pose
-    for factor, wrong, right in ((1e-3, 'mm', 'm'), (1e3, 'm', 'mm')):
-        moved = Pose(factor * pose.position, pose.rotation)
-        hint = '--mm reads millimeters' if wrong == 'mm' else 'without --mm they are in m'
-        text = f'are in {wrong}, not in {right}: {hint}'
-        yield LikelyMistake('unit', f'positions {text}'), given._replace(pose=moved)
-        yield LikelyMistake('unit', f'leg positions {text}'), given._replace(
-            lengths=factor * lengths)
-        yield LikelyMistake('unit', f'positions and leg positions {text}'), given._replace(
-            lengths=factor * lengths, pose=moved)
+    for of_positions, of_legs in product((1.0, 1e-3, 1e3), repeat=2):
+        if (of_positions, of_legs) != (1.0, 1.0):
+            words = _unit_words((of_positions, of_legs), millimeters)
+            yield LikelyMistake('unit', words), given._replace(
+                lengths=of_legs * lengths,
+                pose=Pose(of_positions * pose.position, pose.rotation))
     for axis, name in enumerate('xyz'):
         mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
         yield LikelyMistake(
@@ -158,6 +184,33 @@ def _without_mistakes(parameters: Parameters, given: Equations,
             names = ', '.join(joints[n] for n in order)
             yield LikelyMistake('swapped', f'the legs are in another order: {names}'), (
                 given._replace(lengths=lengths[:, order]))
+
+
+def _unit_words(factors: tuple[float, float], given: Millimeters) -> str:
+    """
+    Return the units of positions and leg positions that are wrong, and the option that mends all.
+
+    factors: by which both must be multiplied.
+    """
+    wrong: dict[str, list[str]] = {}
+    fitting = list(given)
+    for n, (factor, name) in enumerate(zip(factors, ('positions', 'leg positions'), strict=True)):
+        if factor != 1.0:
+            in_mm = factor < 1.0
+            text = ('are in mm, not in m' if in_mm and not given[n] else
+                    'are in m, not in mm' if given[n] and not in_mm else
+                    'are a thousand times too large' if in_mm else
+                    'are a thousand times too small')
+            wrong.setdefault(text, []).append(name)
+            fitting[n] = in_mm
+    option, now = Millimeters(*fitting).option, given.option
+    if any('thousand' in text for text in wrong):
+        hint = ''
+    elif not option:
+        hint = f': without {now} they are read so'
+    else:
+        hint = f': {option} reads them so' if not now else f': {option} in place of {now}'
+    return '; '.join(f'{" and ".join(names)} {text}' for text, names in wrong.items()) + hint
 
 
 def _misfit(parameters: Parameters, equations: Equations, unknown_frames: bool) -> float:

@@ -38,7 +38,28 @@ class MeasuredPoses(NamedTuple):
     notices: tuple[str, ...] = ()
 
 
-def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
+class Millimeters(NamedTuple):
+    """The numbers that are in mm, not in m, where no heading gives their unit."""
+
+    positions: bool = False
+    legs: bool = False
+
+    @property
+    def option(self) -> str:
+        """Return the option of the program; empty if all are in m."""
+        return {(True, True): '--mm', (True, False): '--mm-positions',
+                (False, True): '--mm-legs'}.get(self, '')
+
+    @property
+    def units(self) -> tuple[float, float]:
+        """Return the units of positions and of leg positions [m]."""
+        return (_MILLIMETER if self.positions else 1.0, _MILLIMETER if self.legs else 1.0)
+
+
+METERS = Millimeters()
+
+
+def read_poses(path: Path, joints: tuple[str, ...], millimeters: Millimeters = METERS,
                degrees: bool = False, reading: Reading | None = None) -> MeasuredPoses:
     """
     Return the poses of a file with the columns of ``joints``, x, y, z and a rotation.
@@ -48,10 +69,10 @@ def read_poses(path: Path, joints: tuple[str, ...], millimeters: bool = False,
     Raises BagError if the file cannot be read, lacks a column, or has a value that is not a
     number.
     """
-    legs, meter = leg_positions(joints), _MILLIMETER if millimeters else 1.0
+    legs, (of_positions, of_legs) = leg_positions(joints), millimeters.units
     radian = _DEGREE if degrees else 1.0
     table = NamedTable(path, (legs, TIME, POSITION, *ROTATIONS), reading, {
-        joints: meter, POSITION.columns: meter, **dict.fromkeys(
+        joints: of_legs, POSITION.columns: of_positions, **dict.fromkeys(
             (ANGLES.columns, U_V_W.columns, ROTATION_VECTOR.columns), radian)})
     lengths, positions, rotations = (
         table.values(legs), table.values(POSITION), table.rotations())

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from stewart_dynamics.calibration.calibrate import calibrate
 from stewart_dynamics.calibration.calibration_report import write_report
 from stewart_dynamics.calibration.calibration_results import comments, document
-from stewart_dynamics.calibration.measured_poses import MeasuredPoses
+from stewart_dynamics.calibration.measured_poses import MeasuredPoses, METERS, Millimeters
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
@@ -28,7 +28,7 @@ class CalibrationOptions(NamedTuple):
     frames: str = 'known'
     noise: Noise | None = None
     hold_out: float = HOLD_OUT
-    millimeters: bool = False
+    millimeters: Millimeters = METERS
     degrees: bool = False
     drive_positions: bool = False
     accept_mistakes: bool = False
@@ -38,8 +38,9 @@ class CalibrationOptions(NamedTuple):
 
     def shown(self) -> dict[str, Any]:
         """Return the options of the calibration for JSON."""
-        return {name: value for name, value in self._asdict().items()
-                if name not in ('noise', 'report', 'force', 'run')}
+        shown = {name: value for name, value in self._asdict().items()
+                 if name not in ('noise', 'report', 'force', 'run')}
+        return shown | {'millimeters': self.millimeters._asdict()}
 
 
 def run(measured: MeasuredPoses, source: str, parameters: Parameters, folder: Path,
@@ -55,7 +56,7 @@ def run(measured: MeasuredPoses, source: str, parameters: Parameters, folder: Pa
     found = calibrate(
         StewartPlatform(parameters), measured.lengths, measured.poses, fixed=options.fixed,
         frames=options.frames, noise=options.noise, hold_out=options.hold_out,
-        angles=measured.angles, degrees=options.degrees,
+        angles=measured.angles, degrees=options.degrees, millimeters=options.millimeters,
         drive_positions=options.drive_positions, accept_mistakes=options.accept_mistakes)
     result = document(found, measured, source, options.shown())
     with whole_folder(folder, options, CALIBRATION, before) as partial:

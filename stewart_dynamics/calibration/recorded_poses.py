@@ -14,7 +14,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.calibration.measured_poses import MeasuredPoses
+from stewart_dynamics.calibration.measured_poses import MeasuredPoses, METERS, Millimeters
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.messages import setpoint, type_names
@@ -38,7 +38,8 @@ class RecordedPoses(NamedTuple):
 
 
 def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None,
-             pose: str | None, reading: Reading | None = None) -> RecordedPoses:
+             pose: str | None, reading: Reading | None = None,
+             millimeters: Millimeters = METERS) -> RecordedPoses:
     """
     Return the poses at rest of a bag, joined by the stamps of the messages' headers.
 
@@ -79,10 +80,12 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
         raise BagError(f'{path}: {" and ".join(topics)}: no valid message of the '
                        f'{"poses" if len(stamps) else "legs"}')
     order = np.argsort(stamps, kind='stable')
-    stamps, lengths = stamps[order], np.concatenate(leg_values)[order]
+    of_positions, of_legs = millimeters.units
+    stamps, lengths = stamps[order], of_legs * np.concatenate(leg_values)[order]
     poses.sort()
     at = np.array([stamp for stamp, _ in poses])
     seen = np.array([values for _, values in poses])
+    seen[:, :3] *= of_positions
     rows, names = [], []
     for first, last in _rests(stamps, lengths,
                               _STILL * parameters.singularity.characteristic_length):

@@ -28,7 +28,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.calibration.equations import Equations, GEOMETRY
+from stewart_dynamics.calibration.calibration_mistakes import DEVICE_SCALE, LEG_SCALE
+from stewart_dynamics.calibration.equations import Equations, GEOMETRY, PLATFORM
 from stewart_dynamics.calibration.geometry_fit import Fit, Unknowns
 from stewart_dynamics.calibration.noise import covariances, whitening
 from stewart_dynamics.mechanics.frames.motion import Motion
@@ -52,11 +53,19 @@ _SEEN, _MOVE = 1e-6, 10.0
 _FEWEST, _SPLITS = 2, 19
 _OF_A_LEG = 7  # unknowns
 _ALL = 'all legs'
-_FIXED, _SCALE, _TURNS, _DEFLECTION, _POSE, _DRIFT, _PLAY, _NOISE, _UNEXPLAINED = (
-    'fixed', 'scale', 'turns', 'deflection', 'pose', 'drift', 'play', 'noise', 'unexplained')
+_ALIKE = f'{_ALL} alike'
+# The joints decide between the scales of legs and of the device if they move by half as much.
+_NEARER = 0.5
+_SCALE, _DEVICE = LEG_SCALE, DEVICE_SCALE
+_FIXED, _EITHER, _TURNS, _DEFLECTION, _POSE, _DRIFT, _PLAY, _NOISE = (
+    'fixed', 'scale_or_device', 'turns', 'deflection', 'pose', 'drift', 'play', 'noise')
+_UNEXPLAINED = 'unexplained'
 _LACKS = {
     _FIXED: 'the fixed values are not those of the hexapod',
     _SCALE: 'positions off by scale, from the lead of the screw or the encoder',
+    _DEVICE: 'positions of the device off by scale, from its calibration or its target',
+    _EITHER: 'the scale of all legs, from lead or encoder, or that of the device: the joints of '
+             'the file do not decide which',
     _TURNS: 'positions follow the turns of the legs about their axes, as those of drives whose '
             'screws turn with the legs (--drive-positions, drive.*)',
     _DEFLECTION: 'residuals follow the static forces of the legs, from deflection',
@@ -179,6 +188,7 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
             equations.lengths.std(axis=0).max() < _MOVE * deviation):
         return ()  # rounding errors, or one and the same pose
     terms, sides = _terms(platform, equations, found, fixed)
+    scales = _scales(equations, found, unknowns)
     names = platform.parameters.joints
     rms = 1e6 * np.sqrt(np.mean(found.lin.residuals ** 2, axis=0))  # [um]
     scatter = [f'{name} (residuals of {each:.3g} um, {np.median(rms):.3g} um in the median leg)'
@@ -188,14 +198,20 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
         residuals = _Residuals.of(found, unknowns, legs)
         if residuals.freedom < 1:
             break
-        tried = sorted(_causes(residuals, legs, terms, sides, names, scatter), reverse=True)
+        tried = sorted([*_causes(residuals, legs, terms, sides, names, scatter), *(
+            _Cause(residuals.of_terms(each[:, legs]), what, tuple(legs), (
+                f'{_ALIKE} ({-residuals.of_each(each[:, legs])[1][0]:+.2%})'))
+            for what, each in scales.items())], reverse=True)
         best = tried[0]
         if best.evidence < _NAMED:
             break
         likely = dict.fromkeys(
             each.what for each in tried if each.evidence > best.evidence - _CLEARLY)
-        causes.append((best.what, best.text) if len(likely) == 1 else (
-            _UNEXPLAINED, f'{best.text}, {" or ".join(likely)}'))
+        if likely.keys() == {_SCALE, _DEVICE}:
+            causes.append((_EITHER, best.text))
+        else:
+            causes.append((best.what, best.text) if len(likely) == 1 else (
+                _UNEXPLAINED, f'{best.text}, {" or ".join(likely)}'))
         legs = [leg for leg in legs if leg not in best.legs]
     lacks = [LikelyMistake(what, f'{_LACKS[what]}: ' + ', '.join(
         text for each, text in causes if each == what))
@@ -208,6 +224,29 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
                                        f'{math.sqrt(square / rest):.2g} times the noise that was '
                                        'given'))
     return tuple(lacks)
+
+
+def _scales(equations: Equations, found: Fit, unknowns: Unknowns) -> dict[str, Array]:
+    """
+    Return the terms (N, 6, 1) of the scale of all legs alike, and of that of the device.
+
+    With all joints free both are the same: a device of another scale measures a hexapod of another
+    size. The one that leaves the joints much nearer to the file is kept, or both.
+    """
+    pose = equations.pose.position @ equations.frames_at(found.values).device.rotation.T
+    terms = {_SCALE: equations.lengths[..., None],
+             _DEVICE: -np.sum(found.lin.position * pose[:, None], axis=-1)[..., None]}
+    rows = found.lin.derivatives.reshape(-1, len(unknowns.scales)) @ (
+        unknowns.scales[:, None] * unknowns.basis)
+    moved = {}
+    for what, term in terms.items():
+        size = max(float(np.abs(term).max()), 1e-300)
+        change, *_ = np.linalg.lstsq(np.column_stack([rows, term.ravel() / size]),
+                                     -found.lin.residuals.ravel(), rcond=None)
+        values = found.values + unknowns.scales * (unknowns.basis @ change[:-1])
+        moved[what] = float(np.linalg.norm((values - unknowns.start)[:PLATFORM.stop]))
+    return {what: term for what, term in terms.items()
+            if _NEARER * moved[what] <= min(moved.values())}
 
 
 def _terms(platform: StewartPlatform, equations: Equations, found: Fit, fixed: Flags,

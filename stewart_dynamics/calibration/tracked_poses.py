@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.calibration.measured_poses import MeasuredPoses
+from stewart_dynamics.calibration.measured_poses import MeasuredPoses, Millimeters
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.parameters.table import Parameters
@@ -24,7 +24,7 @@ from stewart_dynamics.tables.reading import Reading
 _STILL, _SHORTEST, _SETTLING = 2e-3, 0.5, 0.2
 
 
-def read_tracked(path: Path, tracked: Path, parameters: Parameters, millimeters: bool,
+def read_tracked(path: Path, tracked: Path, parameters: Parameters, millimeters: Millimeters,
                  reading: Reading) -> MeasuredPoses:
     """
     Return the legs of a table, one pose in each row, with the poses of the file of a device.
@@ -37,13 +37,13 @@ def read_tracked(path: Path, tracked: Path, parameters: Parameters, millimeters:
 
     Raises StewartError: a file cannot be read, or the numbers of rests and rows differ.
     """
-    legs = leg_positions(parameters.joints)
+    legs, (of_positions, of_legs) = leg_positions(parameters.joints), millimeters.units
     own = {name: text for name, text in reading.columns.items() if name in parameters.joints}
-    table = NamedTable(path, (legs,), Reading(columns=own), {
-        legs.columns: 1e-3 if millimeters else 1.0})
+    table = NamedTable(path, (legs,), Reading(columns=own), {legs.columns: of_legs})
     lengths = table.values(legs)
     poses = NamedTable(tracked, (TIME, POSITION, *ROTATIONS), reading._replace(columns={
-        name: text for name, text in reading.columns.items() if name not in own}))
+        name: text for name, text in reading.columns.items() if name not in own}), {
+            POSITION.columns: of_positions})
     rotations = poses.rotations()
     if rotations is None:
         raise BagError(f'{tracked}: row {poses.header_line}: has no columns of the rotation; it '
