@@ -173,7 +173,7 @@ class _Scores(NamedTuple):
                           freedom)
 
     def change(self, places: Integers) -> Array:
-        """Return the change (n,) of the model's numbers if some columns are added to the fit."""
+        """Return the (n,) change of the model's numbers if some columns are added to the fit."""
         return self.follow[:, places] @ (self._inverse(places)[0] @ self.scores[places])
 
     def model_with(self, places: Integers) -> Posterior:
