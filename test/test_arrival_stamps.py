@@ -23,7 +23,7 @@ RATES = (50.0, 100.0, 200.0, 1000.0)
 
 
 def readings(rate: float, noise: float = 0.0, seconds: float = 6.0) -> tuple[Array, Array]:
-    """Return even times (N,) [s] and what six legs measure there (N, 6) [m]."""
+    """Return even times (N,) [s] and readings of six legs (N, 6) [m]."""
     t = np.arange(0.0, seconds, 1.0 / rate)
     w = 2.0 * np.pi * np.array([0.3, 0.4, 0.5, 0.35, 0.45, 0.55])
     return t, 0.05 * np.sin(w * t[:, None]) + noise * rng(1).normal(size=(len(t), 6))
@@ -55,7 +55,7 @@ def found(stamps: Stamps, values: Array) -> str:
 @pytest.mark.parametrize('noise', [0.0, 1e-5])
 def test_bursts_are_found(rate: float, noise: float) -> None:
     t, values = readings(rate, noise)
-    for milliseconds in (8.0, 20.0, 80.0):
+    for milliseconds in (10.0, 20.0, 80.0):
         size = max(2, round(milliseconds * 1e-3 * rate))
         words = found(in_bursts(t, size), values)
         off = 1e3 / rate * np.sqrt((size ** 2 - 1) / 12.0)

@@ -188,7 +188,7 @@ def _without_mistakes(parameters: Parameters, given: Equations, millimeters: Mil
 
 def _unit_words(factors: tuple[float, float], given: Millimeters) -> str:
     """
-    Return the units of positions and leg positions that are wrong, and the option that mends all.
+    Return the wrong units of positions and leg positions, and the option that reads all of them.
 
     factors: by which both must be multiplied.
     """
