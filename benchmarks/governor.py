@@ -5,8 +5,9 @@
 Governed streams of random hexapods: which setpoints exceed a limit, by independent equations.
 
 Each limit alone, and all together; demands that jump, pause, are lost, are enormous, or have rates
-that do not belong to their poses. Setpoints that leave are checked by ``test/independent_limits.py``, and by
-the differences between setpoints: no leg moves faster than its limit. Then the speed.
+that do not belong to their poses. Setpoints that leave are checked by
+``test/independent_limits.py``, and by the differences between them: no leg moves faster than its
+limit. Then the speed.
 """
 
 from __future__ import annotations

@@ -168,8 +168,8 @@ def exceedances(p: Parameters, motion: Motion, axes: Array) -> dict[str, Flags]:
     def most(name: str, values: Array, bound: float | Array | None = None) -> None:
         bounds = p[name] if bound is None else bound
         if bounds is not None:
-            found[name] = ~(np.abs(values) <= np.asarray(bounds) * (1.0 + TOLERANCE)
-                            ).reshape(len(motion), -1).all(axis=1)
+            within: Flags = np.abs(values) <= np.asarray(bounds) * (1.0 + TOLERANCE)
+            found[name] = np.any(~within.reshape(len(motion), -1), axis=1)
 
     legs = moving(p, motion)
     geometry = _legs(p, motion)
@@ -179,7 +179,7 @@ def exceedances(p: Parameters, motion: Motion, axes: Array) -> dict[str, Flags]:
     most('limits.velocity_max', rates)
     if p['limits.length_min'] is not None:
         short: Flags = geometry.lengths < p['limits.length_min'] * (1.0 - TOLERANCE)
-        found['limits.length_min'] = short.any(axis=1)
+        found['limits.length_min'] = np.any(short, axis=1)
     most('limits.force_max', legs.forces)
     mass, viscous, coulomb, near = (np.broadcast_to(p[f'actuator.{name}'], 6) for name in (
         'reflected_mass', 'viscous_friction', 'coulomb_friction', 'coulomb_velocity'))

@@ -182,3 +182,31 @@ def test_strict_ends_with_1_where_limits_hold_back(tmp_path: Path, capsys: Any) 
                header='t,ax,ay,az')
     assert main([*arguments, '--force']) == 0
     assert 'in g, must be in m/s^2' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('wrong', [True, False])
+def test_gains_are_not_proposed_from_a_recording_with_a_possible_error(
+        tmp_path: Path, wrong: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    """A vehicle in motion from the first sample on, without gravity."""
+    times = np.arange(0.0, 30.0, 1.0 / 60.0)
+    rows = np.column_stack([
+        times, 2.0 * np.sin(0.8 * times), 3.0 * np.sin(0.5 * times),
+        GRAVITY * (not wrong) + 0.5 * np.sin(3.0 * times)])
+    np.savetxt(tmp_path / 'drive.csv', rows, delimiter=',', header='t,ax,ay,az', comments='')
+    code = main([str(tmp_path / 'drive.csv'), '--params', str(PLATFORM), '--tune', '--strict',
+                 '--no-report', '--output', str(tmp_path / 'out')])
+    found = result_of(tmp_path / 'out')
+    assert code == int(wrong) and bool(found['tuned']) != wrong
+    assert ('without gravity' in found['likely_mistake']) == wrong
+    assert ('no gains are proposed' in capsys.readouterr().err) == wrong
+
+
+@pytest.mark.parametrize('times, text', [
+    ([0.0, 0.1, 500.1, 500.2], '500 s without a sample, 0.1 s after the first one'),
+    (5.0 * np.arange(10), '0.2 samples a second: must be at least 1')])
+def test_recordings_with_long_gaps_are_rejected(
+        tmp_path: Path, times: Any, text: str) -> None:
+    rows = np.column_stack([times, np.zeros((len(times), 2)), np.full(len(times), GRAVITY)])
+    np.savetxt(tmp_path / 'gaps.csv', rows, delimiter=',', header='t,ax,ay,az', comments='')
+    with pytest.raises(StewartError, match=text):
+        read_vehicle(tmp_path / 'gaps.csv', None)

@@ -257,7 +257,7 @@ class CueingStream:
             raise MotionError(f'times[{n}]: {array[n]:.9g} s: must be after {before[n]:.9g} s')
         check_gaps(array, before)
         rows = self.cueing.advance(np.ascontiguousarray(array, dtype=float), inputs, self._state)
-        self.row[:] = rows[-1]
+        self.row[:] = rows[-1] if len(rows) else self.row
         return Motion.of_rows(rows)
 
     def use(self, cueing: MotionCueing) -> None:

@@ -22,6 +22,9 @@ from stewart_dynamics.tables.named_table import is_table, NamedTable
 from stewart_dynamics.tables.reading import Reading
 from stewart_dynamics.tables.source_axes import axes_matrix, turned
 
+# A motion between samples farther apart is not known, and takes long to compute [s, Hz].
+_LONGEST_GAP, _LEAST_RATE = 10.0, 1.0
+
 
 class RecordedVehicle(NamedTuple):
     """The motion of a vehicle at N times."""
@@ -43,12 +46,22 @@ def read_vehicle(path: Path, topic: str | None, reading: Reading | None = None,
     reading: axes and names of columns.
 
     Raises StewartError for a file that cannot be read, or whose times are not strictly
-    increasing.
+    increasing, or too far apart.
     """
     reading = reading or Reading()
     found = _read_table(path, reading) if is_table(path) else _read_bag(path, topic, reading)
     if len(found.times) < 2:
         raise StewartError(f'{path}: {len(found.times)} samples: must be at least 2')
+    gaps = np.diff(found.times)
+    if (longest := float(gaps.max())) > _LONGEST_GAP:
+        raise StewartError(
+            f'{path}: {longest:.4g} s without a sample, '
+            f'{found.times[np.argmax(gaps > _LONGEST_GAP)] - found.times[0]:.9g} s after '
+            f'the first one: must be at most {_LONGEST_GAP:g} s: record each drive by itself')
+    rate = len(gaps) / float(gaps.sum())
+    if rate < _LEAST_RATE:
+        raise StewartError(f'{path}: {rate:.2g} samples a second: must be at least '
+                           f'{_LEAST_RATE:g}, better 60')
     return found._replace(times=found.times - found.times[0])
 
 

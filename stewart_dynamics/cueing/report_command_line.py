@@ -17,7 +17,8 @@ from stewart_dynamics.tables.reading import Reading
 
 CUEING_FOLDER = 'cueing'
 _PROGRAM = Program('stewart_cueing_report', 'parameters or recording: nothing is written',
-                   'a limit holds the demand back', partly=True)
+                   'a limit holds the demand back, or the recording has a possible error',
+                   partly=True)
 
 
 class _Writing(NamedTuple):
@@ -75,14 +76,15 @@ def _run(given: argparse.Namespace) -> int:
     parameters = Parameters.from_yaml(given.params, given.node)
     vehicle = read_vehicle(given.vehicle, given.topic, Reading.given(given))
     _PROGRAM.prepare(likely_mistakes(parameters))
-    first = vehicle.times <= 2.0
-    mistake = vehicle_mistake(vehicle.times[first], vehicle.forces[first], vehicle.rates[first],
+    mistake = vehicle_mistake(vehicle.times, vehicle.forces, vehicle.rates,
                               parameters.cueing.input)
     for text in (*vehicle.notices, *([f'vehicle: {mistake}'] if mistake else ())):
         _PROGRAM.complain(f'warning: {text}')
     gains: list[report.Gain] = []
     chosen = parameters
-    if given.tune:
+    if given.tune and mistake:
+        _PROGRAM.complain('warning: no gains are proposed from such a recording')
+    elif given.tune:
         chosen, gains = report.tuned(parameters, vehicle)
     cueing = MotionCueing(chosen)
     found = report.cued(cueing, vehicle)
@@ -102,7 +104,8 @@ def _run(given: argparse.Namespace) -> int:
             write_page(partial / REPORT_PAGE, result, vehicle.times, found, used)
     _PROGRAM.say(_text(result))
     held = bool(result['held_back_s'])
-    code = _PROGRAM.end(given.output, {given.vehicle: vehicle.missing}, given.strict and held)
+    code = _PROGRAM.end(given.output, {given.vehicle: vehicle.missing}, given.strict and (
+        held or bool(mistake)))
     assert code in (DONE, 1, PARTLY_READ)
     return code
 
