@@ -62,6 +62,7 @@ class LegDescription(NamedTuple):
 
     name: str
     cross: str  # name of the massless body between the joints of the universal joint
+    bearing: str  # name of the body fixed to the base that has the axes of the mount, in MJCF
     universal: tuple[str, str]  # names of these joints
     ball: str  # name of the joint at the platform, and of the frame on the platform where it is
     tip: str  # name of the end of the leg there
@@ -119,7 +120,8 @@ class Hexapod:
         """Raise ParameterError where a name is taken; some formats have one list for all."""
         names = [WORLD, self.base_body, self.platform, *self.joints]
         for leg in self.legs:
-            names += [leg.cross, leg.cylinder.name, leg.piston.name, leg.ball, leg.tip]
+            names += [leg.cross, leg.bearing, leg.cylinder.name, leg.piston.name, leg.ball,
+                      leg.tip]
         twice = [name for n, name in enumerate(names) if name in names[:n]]
         if twice:
             raise ParameterError(
@@ -133,7 +135,7 @@ class Hexapod:
         base, platform = p.geometry.base_joints[n], p.geometry.platform_joints[n]
         length = float(np.linalg.norm(self.position + self.rotation @ platform - base))
         return LegDescription(
-            name, f'{name}_cross', (first, second),
+            name, f'{name}_cross', f'{name}_mount', (first, second),
             f'{name}_platform_joint', f'{name}_tip', base, platform, mount,
             float(p.geometry.zero_length[n]), length,
             self._part(n, 'cylinder', 1.0), self._part(n, 'piston', -1.0),

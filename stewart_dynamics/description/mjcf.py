@@ -9,8 +9,8 @@ Coordinates at the start are those of the home pose. A slide joint has the name 
 leg; ``ctrl`` is the force of each leg in the order of ``joints`` [N]. The world's axes are base
 axes, in which gravity is given: a base that is tilted has a tilted gravity.
 
-Constraints are soft in MuJoCo: at a platform joint they act as springs with a time constant of two
-steps, and leave gaps of micrometres under load. Coulomb friction is such a constraint, too.
+Constraints are soft in MuJoCo: at a platform joint they act as springs, and leave gaps of
+micrometres in motion. Coulomb friction is such a constraint, too.
 """
 
 from __future__ import annotations
@@ -34,7 +34,10 @@ _TIMESTEP = 0.0005  # [s]
 # Constraints: time constant [s] and damping ratio; impedance, 1 for a rigid one, at no gap and
 # at one of the third number [m].
 _SOLREF = (2.0 * _TIMESTEP, 1.0)
-_SOLIMP = (0.9999, 0.9999, 0.001)
+# Of the loops: the accelerations that close a gap are the gap by the square of the time constant.
+# With that of above the rounding errors of single precision, 0.1 um, would give 0.1 m/s^2.
+SOLREF_LOOP = (0.01, 1.0)
+SOLIMP = (0.9999, 0.9999, 0.001)
 _TOLERANCE = 1e-12
 _CLASS, _VISUAL, _COLLISION = 'hexapod', 'visual', 'collision'  # defaults
 _NOT_IN_MJCF = ('limits.velocity_max',)
@@ -114,8 +117,11 @@ def _home(hexapod: Hexapod) -> list[Array]:
 def _leg(base: ET.Element, hexapod: Hexapod, leg: LegDescription,
          looks: dict[str, tuple[VisualShape, ...]]) -> None:
     add(base, 'site', name=f'{leg.name}_base_joint', pos=numbers(leg.base_joint))
-    cylinder = add(base, 'body', name=leg.cylinder.name, pos=numbers(leg.base_joint),
-                   quat=_quaternion(leg.mount))
+    # A body of its own has the turn of the mount: Drake takes the first of two joints of a body in
+    # axes of the body's parent.
+    mount = add(base, 'body', name=leg.bearing, pos=numbers(leg.base_joint),
+                quat=_quaternion(leg.mount))
+    cylinder = add(mount, 'body', name=leg.cylinder.name)
     for joint, axis in zip(leg.universal, ('1 0 0', '0 1 0'), strict=True):
         add(cylinder, 'joint', name=joint, type='hinge', axis=axis)
     _inertial(cylinder, hexapod.solid(leg.cylinder, leg))
@@ -125,7 +131,7 @@ def _leg(base: ET.Element, hexapod: Hexapod, leg: LegDescription,
                 ref=numbers(leg.home_length - leg.zero_length),
                 armature=numbers(leg.reflected_mass), damping=numbers(leg.viscous_friction),
                 frictionloss=numbers(leg.coulomb_friction), solreffriction=numbers(_SOLREF),
-                solimpfriction=numbers(_SOLIMP), solreflimit=numbers(_SOLREF))
+                solimpfriction=numbers(SOLIMP), solreflimit=numbers(_SOLREF))
     if leg.limits.length_min is not None or leg.limits.length_max is not None:
         slide.set('range', numbers(
             np.subtract(leg.limits.lengths(leg.home_length), leg.zero_length)))
@@ -148,8 +154,10 @@ def _loops(root: ET.Element, hexapod: Hexapod) -> None:
     equality = add(root, 'equality')
     tendons = add(root, 'tendon')
     for leg in hexapod.legs:
-        add(equality, 'connect', name=leg.ball, site1=leg.tip, site2=leg.ball,
-            solref=numbers(_SOLREF), solimp=numbers(_SOLIMP))
+        # By bodies, as all readers know it, not by sites; on the platform the point is where it is
+        # in the pose of the file.
+        add(equality, 'connect', name=leg.ball, body1=leg.piston.name, body2=hexapod.platform,
+            anchor=numbers(np.zeros(3)), solref=numbers(SOLREF_LOOP), solimp=numbers(SOLIMP))
         # It has no stiffness: it measures the length from joint to joint.
         length = add(tendons, 'spatial', name=leg.name, rgba='0 0 0 0')
         add(length, 'site', site=f'{leg.name}_base_joint')

@@ -18,10 +18,12 @@ from stewart_dynamics.description.mechanism import (
     SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.description.read_urdf import (
     body_of, carried_of, numbers_of, shapes_of, unit)
+from stewart_dynamics.description.sdf import DRAKE
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import INERTIA
 
+_DRAKE = f'{{{DRAKE}}}'
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL}
 _MODEL = '__model__'
@@ -45,8 +47,11 @@ def read_sdf(root: ET.Element, source: Path) -> Mechanism:
         joint.get('type') == 'prismatic' for joint in each.findall('joint')))
     reader = _Model(model, _version(root), source)
     joints = [made for joint in model.findall('joint') for made in [reader.joint(joint)] if made]
-    joints += [made for plugin in model.findall('plugin') for made in [reader.fixed(plugin)]
-               if made]
+    fixed = [made for plugin in model.findall('plugin') for made in [reader.fixed(plugin)]
+             if made]
+    # Both close the same loops in files of stewart_describe.
+    joints += fixed or [reader.constraint(each)
+                        for each in model.findall(f'{_DRAKE}ball_constraint')]
     mechanism = Mechanism(
         str(source), model.get('name', source.stem),
         {link.get('name', ''): reader.part(link) for link in model.findall('link')}, joints)
@@ -144,6 +149,8 @@ class _Model:
                 raise DescriptionError(f'{self._source}: joint {name!r}: no link {end!r}')
         made = Joint(name, _KINDS.get(joint.get('type', ''), OTHER), parent, child,
                      self.place(name).position)
+        gear = self._number(joint, f'{_DRAKE}gear_ratio', name, 1.0)
+        made.armature = gear ** 2 * self._number(joint, f'{_DRAKE}rotor_inertia', name, 0.0)
         made.axes = [self._axis(joint, axis) for axis in (
             joint.find('axis'), joint.find('axis2')) if axis is not None]
         for tag in ('axis', 'axis2'):
@@ -181,6 +188,20 @@ class _Model:
             if end not in self._links:
                 raise DescriptionError(f'{self._source}: DetachableJoint: no link {end!r}')
         return Joint(f'{child} to {parent}', FIXED, parent, child, self.place(child).position)
+
+    def constraint(self, element: ET.Element) -> Joint:
+        """Return the ball joint of a constraint of Drake."""
+        ends, points = [], []
+        for body, point in (('body_A', 'p_AP'), ('body_B', 'p_BQ')):
+            key = f'{_DRAKE}ball_constraint_'
+            link = (element.findtext(f'{key}{body}') or '').strip()
+            if link not in self._links:
+                raise DescriptionError(f'{self._source}: drake:ball_constraint: no link {link!r}')
+            at = numbers_of(element.findtext(f'{key}{point}'), 3, self._source, point)
+            ends.append(link)
+            points.append(self.place(link).point(at))
+        return Joint(f'{ends[0]} to {ends[1]}', BALL, ends[0], ends[1], points[0],
+                     child_anchor=points[1])
 
     def _axis(self, joint: ET.Element, axis: ET.Element) -> Array:
         name, xyz = joint.get('name', ''), axis.find('xyz')

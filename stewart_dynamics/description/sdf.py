@@ -8,7 +8,8 @@ A hexapod as SDFormat, with closed loops, for Gazebo.
 A universal joint at the base and a ball joint at the platform close each loop. The physics engines
 of Gazebo take trees alone (https://github.com/gazebosim/gz-physics/issues/25), but fix two links
 to each other while they run: each ball joint leads to a tip, a link of its own, which Gazebo's
-system DetachableJoint fixes to the platform.
+system DetachableJoint fixes to the platform. Drake closes the loops by constraints, elements with
+the prefix ``drake``, as the reflected masses.
 
 SDFormat counts the positions of joints from the poses in the file, those of the home pose: the
 position of a leg's joint is its length less that at home, and its limits are counted from there,
@@ -36,14 +37,16 @@ from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
 _VERSION = '1.9'
+DRAKE = 'http://drake.mit.edu'
 _NAMESPACE = 'https://stewart-dynamics.example/sdf'
-_NOT_IN_SDF = ('geometry.zero_length', 'actuator.reflected_mass')
+_NOT_IN_SDF = ('geometry.zero_length',)
 _COMMENT = 'Positions of joints are counted from the home pose.'
 
 
 def sdf(hexapod: Hexapod, name: str) -> str:
     """Return a hexapod as SDFormat; ``name`` is that of the model."""
-    root = ET.Element('sdf', {'version': _VERSION, f'xmlns:{CARRIED}': _NAMESPACE})
+    root = ET.Element('sdf', {'version': _VERSION, f'xmlns:{CARRIED}': _NAMESPACE,
+                              'xmlns:drake': DRAKE})
     model = add(root, 'model', name=name, canonical_link=hexapod.base_body)
     p = hexapod.parameters
     _pose(model, np.zeros(3), upright(p.gravity))
@@ -95,7 +98,10 @@ def _leg(model: ET.Element, hexapod: Hexapod, leg: LegDescription,
                    np.array([0.0, 0.0, leg.home_length]), np.eye(3))
     _inertial(piston, hexapod.solid(leg.piston, leg))
     _shapes(piston, looks[leg.piston.name])
-    axis = add(_joint(model, leg.name, 'prismatic', leg.cylinder.name, leg.piston.name), 'axis')
+    slide = _joint(model, leg.name, 'prismatic', leg.cylinder.name, leg.piston.name)
+    add(slide, 'drake:rotor_inertia', numbers(leg.reflected_mass))
+    add(slide, 'drake:gear_ratio', numbers(1.0))
+    axis = add(slide, 'axis')
     add(axis, 'xyz', numbers([0, 0, 1]))
     limits, limit = leg.limits, add(axis, 'limit')
     for tag, value in (('lower', limits.length_min), ('upper', limits.length_max)):
@@ -119,6 +125,10 @@ def _tip(model: ET.Element, hexapod: Hexapod, leg: LegDescription) -> None:
     add(fixes, 'parent_link', hexapod.platform)
     add(fixes, 'child_model', '__model__')
     add(fixes, 'child_link', leg.tip)
+    closing = add(model, 'drake:ball_constraint')
+    for key, value in (('body_A', leg.piston.name), ('body_B', hexapod.platform),
+                       ('p_AP', numbers(np.zeros(3))), ('p_BQ', numbers(leg.platform_joint))):
+        add(closing, f'drake:ball_constraint_{key}', value)
 
 
 def _link(model: ET.Element, name: str, relative_to: str, position: Array, rotation: Array,

@@ -27,6 +27,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
     COLORS, Hexapod, LegDescription, massless, RigidBody, shapes, VisualShape)
 from stewart_dynamics.description.mechanism import OF_SLIDE
+from stewart_dynamics.description.mjcf import SOLIMP, SOLREF_LOOP
 from stewart_dynamics.description.xml_text import CARRIED, carried, solid_elements
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
@@ -35,6 +36,7 @@ from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
 if TYPE_CHECKING:
     from pxr import Usd
 
+_FREE = 179.0  # degrees; PhysX takes less than half a turn
 _LOCKED = 1.0, -1.0  # a lower limit above the upper one locks an axis
 # Attributes of a leg's joint, those of Newton and of PhysX, and the schemas that they belong to.
 ARMATURE = 'newton:armature', 'physxJointAxis:linear:armature', 'physxJoint:armature'
@@ -42,6 +44,9 @@ COULOMB_FRICTION = ('newton:friction', 'physxJointAxis:linear:staticFrictionEffo
                     'physxJointAxis:linear:dynamicFrictionEffort')
 RATE_LIMIT = ('newton:velocityLimit', 'physxJointAxis:linear:maxJointVelocity',
               'physxJoint:maxJointVelocity')
+# Those of MuJoCo by default; its schema needs all five numbers.
+_MIDPOINT_POWER = 0.5, 2.0
+_EQUALITY = 'MjcEqualityConnectAPI'
 _SCHEMAS = 'NewtonJointAPI', 'PhysxJointAPI', 'PhysxJointAxisAPI:linear'
 # Attributes of the model with a parameter, and with the value that its own attributes have.
 VALUE, ELEMENT = f'{CARRIED}:value', f'{CARRIED}:element'
@@ -123,6 +128,8 @@ def _leg(writer: _Writer, hexapod: Hexapod, leg: LegDescription,
                              leg.base_joint, leg.mount, np.zeros(3))
     for axis in ('transX', 'transY', 'transZ', 'rotZ'):
         writer.limit(universal, axis, *_LOCKED)
+    for axis in ('rotX', 'rotY'):  # free in UsdPhysics, but locked in Newton without limits
+        writer.limit(universal, axis, -_FREE, _FREE)
     slide = writer.joint('Prismatic', leg.name, leg.cylinder.name, leg.piston.name,
                          np.array([0.0, 0.0, leg.home_length]), np.eye(3), np.zeros(3))
     slide.CreateAxisAttr('Z')
@@ -134,6 +141,8 @@ def _leg(writer: _Writer, hexapod: Hexapod, leg: LegDescription,
     ball = writer.joint('Spherical', leg.ball, leg.piston.name, hexapod.platform, np.zeros(3),
                         leg.mount.T @ hexapod.rotation, leg.platform_joint)
     ball.CreateExcludeFromArticulationAttr(excluded)
+    if excluded:
+        writer.stiff(ball)
 
 
 def _prim(name: str) -> str:
@@ -213,6 +222,16 @@ class _Writer:
                 if value is not None:
                     slide.GetPrim().CreateAttribute(
                         key, Sdf.ValueTypeNames.Float, custom=False).Set(value)
+
+    def stiff(self, ball: Any) -> None:
+        """Make a joint that closes a loop as stiff in MuJoCo and Newton as it is in the MJCF."""
+        from pxr import Sdf
+
+        ball.GetPrim().AddAppliedSchema(_EQUALITY)
+        for key, values in (('mjc:solref', SOLREF_LOOP),
+                            ('mjc:solimp', (*SOLIMP, *_MIDPOINT_POWER))):
+            ball.GetPrim().CreateAttribute(
+                key, Sdf.ValueTypeNames.DoubleArray, custom=False).Set([*values])
 
     def _path(self, name: str) -> str:
         return f'{self._root}/{_prim(name)}'
