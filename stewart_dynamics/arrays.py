@@ -24,7 +24,6 @@ Six = tuple[float, float, float, float, float, float]
 NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 SECOND = 1_000_000_000  # a second in the unit of stamps [ns]
-STAMPS_END = 2 ** 31 * SECOND  # stamps are less, and not less than its negative [ns]
 RPM = 30.0 / math.pi  # turns in a minute, of 1 rad/s
 NANOSECOND = 1e-9  # the unit of stamps [s]
 

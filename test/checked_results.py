@@ -5,19 +5,33 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics import Parameters
+from stewart_dynamics.arrays import Records
 from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
-from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import MOTION, NO_BASE, RESULT
 from stewart_dynamics.mechanics.singularity_warning import Singularity
 from stewart_dynamics.setpoints.step import Batch, FIRST, OUTPUT, WARNING_STATE
 
-EXCEEDING = places('setpoint_output')['exceeding']
+EXCEEDING = places('stewart_output')['exceeding']
+
+
+def state_of(singularity: Singularity, **fields: Any) -> Records:
+    """Return a state of the step: a singularity warning, and other fields."""
+    state = FIRST.copy()
+    for field, value in fields.items():
+        state[field] = value
+    for field, value in zip(
+            ('warning', 'stopped', 'determinant', 'time_to_crossing', 'crossings'), singularity,
+            strict=True):
+        state[field] = value
+    return state
 
 
 def checked(parameters: Parameters, result: NDArray[np.float64],
@@ -25,13 +39,10 @@ def checked(parameters: Parameters, result: NDArray[np.float64],
             ) -> tuple[Singularity, bool]:
     """Return the state of the warning after a result, and whether it exceeds a limit."""
     setpoint = Batch.of(1, np.zeros(MOTION), bases=None if base_known else NO_BASE)
-    before, output = FIRST.copy(), np.zeros((1, OUTPUT))
-    before[places('step_state')['warning']] = state or Singularity()
-    output[0, :RESULT] = result
-    none: NDArray[np.float64] = np.empty((1, 0))
+    before, output = state_of(state or Singularity()), np.zeros((1, OUTPUT))
     # Limits of joints, clearance and motors are not in a result.
-    unchecked = parameters.replaced(dict.fromkeys((*OF_JOINTS, CLEARANCE_MIN)))
-    function('check_setpoints')(
-        hexapod_structure(parameters), *PoseLimits(unchecked).arguments, np.zeros(6), 0.0, 0.0, 1,
-        1, setpoint.stamps, setpoint.rows, none, none, before, output, none)
+    hexapod = hexapod_structure(parameters.replaced(dict.fromkeys((*OF_JOINTS, CLEARANCE_MIN))))
+    output[0, :RESULT] = result
+    function('complete_outputs')(hexapod, 1, setpoint.rows, output)
+    function('step_setpoints')(hexapod, 1, 1, setpoint.stamps, setpoint.rows, before, output)
     return Singularity.of(output[0, WARNING_STATE].tolist()), bool(output[0, EXCEEDING])

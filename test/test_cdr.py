@@ -24,7 +24,6 @@ from running import Sample, wrench_message
 from sensor_msgs.msg import JointState
 from snapshot import Snapshot
 from std_msgs.msg import Bool, Float64, Float64MultiArray, MultiArrayDimension
-from stewart_dynamics.arrays import STAMPS_END
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import (
     JointStateError, JointStateReader, JointStateWriter)
@@ -32,6 +31,7 @@ from stewart_dynamics.messages.setpoint import (
     combined, layout_of, pose, StampedWriter, twist)
 from stewart_dynamics.messages.standard import (
     boolean, clock, float64, float64_array, float64_values)
+from stewart_dynamics.parameters.tolerances import STAMPS_END
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 PROGRAM = 'stewart_dynamics'

@@ -29,7 +29,7 @@ from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
 PROGRAM = 'stewart_dynamics'
-OUTPUT = places('setpoint_output')
+OUTPUT = places('stewart_output')
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)
@@ -530,7 +530,7 @@ def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
     assert outputs.answered[0]
     diagnostics = begun(limits__action=action, **limits)
     answered(diagnostics, BEGIN, outputs, setpoint=high,
-             exceedances=step.exceedances(high.motions, outputs))
+             exceedances=step.exceedances(outputs))
     lines = [line.text for line in diagnostics.report(BEGIN)[1]]
     of = status(diagnostics, 'limits', BEGIN)
     assert of.level == ERROR
@@ -681,7 +681,7 @@ def test_every_value_is_finite_and_every_key_has_its_unit(
         state = outputs.state
         if outputs.answered[0]:
             answered(diagnostics, now, outputs,
-                     exceedances=step.exceedances(setpoint.motions, outputs))
+                     exceedances=step.exceedances(outputs))
         else:
             diagnostics.rejected(Rejection('setpoint', 'out of range'), '', now)
         diagnostics.setpoints.found({POSE: 2}, {'leg_states': 1}, '')

@@ -17,8 +17,8 @@ from snapshot import Snapshot
 
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.kinematics.joint_angles import (
-    AXES, BASE_AXES, JointAngles, PLATFORM_AXES)
+from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
+from stewart_dynamics.mechanics.kinematics.joint_axes import AXES, BASE_AXES, PLATFORM_AXES
 from stewart_dynamics.mechanics.limits import BASE_ANGLE_MAX, OF_JOINTS, PLATFORM_ANGLE_MAX
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.planned.checks import LIMIT

@@ -183,7 +183,7 @@ def test_a_message_names_what_a_leg_is_near_to() -> None:
     for changes, other in (({}, 'leg_2'), ({OUTLINES[1]: square}, OUTLINES[1])):
         p = SYMMETRIC.replaced({CLEARANCE_MIN: 1.0, **changes})
         step, setpoint = Step(p), Batch.of(0, row)
-        found = step.exceedances(setpoint.motions, step(setpoint))
+        found = step.exceedances(step(setpoint))
         assert f'leg_1: clearance to {other}, ' in found[0].words(p['joints'])
         result = check_planned_trajectory(
             StewartPlatform(p), [0.0, 1.0], Motion.of_rows(np.stack([row, row])))

@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity_warning import CAUSE
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
 from stewart_dynamics.setpoints.step import (
-    FIRST, OUTPUT, Outputs, PUBLISHED_FORCES, WARNING_STATE)
+    Computed, FIRST, OUTPUT, Outputs, PUBLISHED_FORCES, WARNING_STATE)
 from test_output_bag import answered, base_wrenches_of, LEGS, turning
 
 RESULTS = 27
@@ -40,10 +40,11 @@ def motions_of(number: int) -> NDArray[np.float64]:
 
 def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
                stamps: NDArray[np.int64], warnings: NDArray[np.bool_]) -> Outputs:
-    rows, none = np.zeros((len(stamps), OUTPUT)), np.empty((len(stamps), 0))
+    rows = np.zeros((len(stamps), OUTPUT))
     rows[:, :RESULTS], rows[:, PUBLISHED_FORCES] = results, forces
     rows[:, WARNING_STATE][:, CAUSE] = warnings
-    return Outputs(np.ones(len(stamps), dtype=bool), stamps, rows, none, none, none, FIRST)
+    return Outputs(np.ones(len(stamps), dtype=bool), stamps, rows, Computed(False, False, False),
+                   FIRST)
 
 
 def bits(values: Any) -> list[int]:

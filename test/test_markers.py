@@ -55,7 +55,7 @@ def written(writer: Markers, step: Step, to: Batch, forces: Any = None) -> bytes
     assert outputs.answered[0]
     if forces is not None:
         outputs.rows[:, PUBLISHED_FORCES] = forces
-    return writer.write(to, outputs, step.exceedances(to.motions, outputs))
+    return writer.write(to, outputs, step.exceedances(outputs))
 
 
 def picture(parameters: Parameters, to: Batch, forces: Any = None) -> dict[tuple[str, int], Any]:

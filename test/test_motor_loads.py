@@ -18,6 +18,8 @@ from scipy.integrate import trapezoid
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
+from stewart_dynamics.mechanics.drives.motors import (
+    BREAKAWAY_TORQUES, Motors, MOTORS, SPEEDS)
 from stewart_dynamics.mechanics.limits import OF_LEGS
 from stewart_dynamics.replay.index import row_of, write_fleet
 from stewart_dynamics.replay.motor_charts import Deliverable, motor_charts, OperatingPoints
@@ -25,7 +27,6 @@ from stewart_dynamics.replay.motor_loads import MARGIN, needed
 from stewart_dynamics.replay.statements import Card, cards, motion_statements
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
-from stewart_dynamics.setpoints.motor_row import DEMANDED_TORQUES, MOTOR_ROW, SPEEDS
 from stewart_dynamics.setpoints.step import Batch, FIRST, Step
 from stewart_dynamics.whole_file import to_json
 
@@ -171,9 +172,9 @@ def test_the_card_of_the_motors_says_whether_their_limits_are_held() -> None:
 
 
 def rows_of(speeds: Array, torques: Array) -> Array:
-    """Return rows of motors."""
-    rows = np.zeros((len(speeds), MOTOR_ROW))
-    rows[:, SPEEDS], rows[:, DEMANDED_TORQUES] = speeds, torques
+    """Return rows of motors with these speeds and demanded torques."""
+    rows = np.zeros((len(speeds), MOTORS))
+    rows[:, SPEEDS], rows[:, BREAKAWAY_TORQUES] = speeds, torques
     return rows
 
 
@@ -186,9 +187,9 @@ def test_operating_points_are_counted_where_they_are_however_they_are_given(seed
     torques[random.random((40, 6)) < 0.1] = np.nan
     rows = rows_of(speeds, torques)
     whole, parts = OperatingPoints(), OperatingPoints()
-    whole.add(rows)
+    whole.add(Motors.of_rows(rows))
     for row in rows:
-        parts.add(row[None])
+        parts.add(Motors.of_rows(row[None]))
     for leg in range(6):
         known = np.isfinite(torques[:, leg])
         speed, torque = np.abs(speeds[known, leg]), torques[known, leg]
@@ -218,7 +219,7 @@ def test_a_bound_far_above_all_loads_is_stated_and_does_not_set_the_scale(
     p = P.replaced({'drive.torque_max': bound, 'drive.speed_max': 4.0 * bound,
                     'drive.torque_speed': None, 'drive.torque_continuous': bound})
     points = OperatingPoints()
-    points.add(rows_of(np.full((1, 6), 9.0), np.full((1, 6), -2.0)))
+    points.add(Motors.of_rows(rows_of(np.full((1, 6), 9.0), np.full((1, 6), -2.0))))
     load = {'speed_mean_rad_s': 4.0, 'torque_rms_n_m': 1.0}
     charts = motor_charts(points, p, dict.fromkeys(p['joints'], load))
     for chart in charts.values():

@@ -15,14 +15,14 @@ from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
+from stewart_dynamics.mechanics.drives.motors import ANGLES, BREAKAWAY_TORQUES, COMMANDS
 from stewart_dynamics.mechanics.limits import (
     Exceedance, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
-from stewart_dynamics.setpoints.motor_row import ANGLES, DEMANDED_TORQUES, RISES, SOUND, TORQUES
 from stewart_dynamics.setpoints.output_messages import OutputMessages
-from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, FINITE_MOTORS, FIRST, Outputs, Step
 from test_drives import driven, HEXAPOD, PUBLISHED
 from test_output_messages import written
-from test_step import answered, bits, singles, STATE
+from test_step import answered, bits, singles
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 STAMP = 1_700_000_000 * 10 ** 9
@@ -49,8 +49,8 @@ def answers(p: Parameters, motion: Motion, restarts: Any = ()) -> Answers:
         state = output.state
         assert bits(output) == bits(outputs, n)
         assert written(by, output) == written(by, outputs, n)
-        exceedances = step.exceedances(setpoint.motions, output)
-        assert exceedances == step.exceedances(motion.rows, outputs, n)
+        exceedances = step.exceedances(output)
+        assert exceedances == step.exceedances(outputs, n)
         assert bool(exceedances) == outputs.exceeding[n]
         found.states.append(state)
         found.exceedances.append(exceedances)
@@ -72,10 +72,10 @@ def test_motors_are_those_of_the_library() -> None:
     motion = random_motion(p, random, 20)
     motors = StewartPlatform(p).motors(motion)
     rises = temperature_rises(p, 0.1 * np.arange(20), motors.copper_heat)
-    found = answers(p, motion).outputs.motors
-    assert np.array_equal(found[:, TORQUES], motors.torques)
-    assert np.array_equal(found[:, ANGLES], motors.angles)
-    assert found[:, RISES] == pytest.approx(rises, rel=1e-9)
+    outputs = answers(p, motion).outputs
+    assert np.array_equal(outputs.motors[:, COMMANDS], motors.torques)
+    assert np.array_equal(outputs.motors[:, ANGLES], motors.angles)
+    assert outputs.rises == pytest.approx(rises, rel=1e-9)
 
 
 def test_torques_are_clipped_to_the_curve_and_limits_name_each_motor() -> None:
@@ -89,7 +89,7 @@ def test_torques_are_clipped_to_the_curve_and_limits_name_each_motor() -> None:
     outputs, _, exceedances = answers(p, motion)
     for n, found in enumerate(exceedances):
         most = motors.available_torques[n]
-        assert np.array_equal(outputs.motors[n, TORQUES], np.clip(motors.torques[n], -most, most))
+        assert np.array_equal(outputs.motors[n, COMMANDS], np.clip(motors.torques[n], -most, most))
         wanted = {(TORQUE_MAX, leg) for leg in range(6)
                   if abs(motors.breakaway_torques[n, leg]) > 2.0}
         wanted |= {(TORQUE_SPEED, leg) for leg in range(6)
@@ -122,7 +122,7 @@ def test_the_torque_follows_a_clipped_force_but_limits_see_the_demanded_one() ->
                           'drive.torque_max': 0.06})
     output, _, (exceedances,) = answers(p, Motion(np.array([[0.0, 0.0, 1.0]]), np.eye(3)[None]))
     assert output.forces.tolist() == [[100.0] * 6]
-    assert output.motors[0, TORQUES] == pytest.approx([100.0 / 3769.911184] * 6)
+    assert output.motors[0, COMMANDS] == pytest.approx([100.0 / 3769.911184] * 6)
     assert {each.limit for each in exceedances} == {'limits.force_max', TORQUE_MAX}
     assert exceedances[6].words(p['joints']).startswith('leg_1: motor torque 0.06')
 
@@ -131,10 +131,10 @@ def test_windings_keep_their_temperature_where_time_jumps_back() -> None:
     random = rng(3)
     p = driven(HEXAPOD, random, **THERMAL)
     motion = random_motion(p, random, 10)
-    straight, jumped = (answers(p, motion, restarts).outputs.motors for restarts in ([], [6]))
-    assert np.array_equal(jumped[5], straight[5])
-    assert np.array_equal(jumped[6, RISES], jumped[5, RISES])
-    assert not np.array_equal(jumped[6, RISES], straight[6, RISES])
+    straight, jumped = (answers(p, motion, restarts).outputs for restarts in ([], [6]))
+    assert np.array_equal(jumped.motors[5], straight.motors[5])
+    assert np.array_equal(jumped.rises[6], jumped.rises[5])
+    assert not np.array_equal(jumped.rises[6], straight.rises[6])
 
 
 def test_a_setpoint_that_the_legs_cannot_reach_warms_no_winding() -> None:
@@ -148,12 +148,13 @@ def test_a_setpoint_that_the_legs_cannot_reach_warms_no_winding() -> None:
     outputs, states, exceedances = answers(p, motion)
     assert [any(each.limit == 'jump' for each in found) for found in exceedances] == [
         False] * 4 + [True] * 2 + [False] * 6
-    windings = [state[STATE['windings']] for state in states]
-    assert windings[3].all()
-    assert np.array_equal(windings[3], windings[5])
-    heat = np.tile(windings[3][6:], (2, 1))
-    assert outputs.motors[6, RISES] == pytest.approx(temperature_rises(
-        p, np.array([0.0, 0.3]), heat, outputs.motors[3, RISES])[1], rel=1e-9)
+    kept, after = states[3][0], states[5][0]
+    assert kept['rises'].all() and kept['copper_heat'].all()
+    assert np.array_equal(kept['rises'], after['rises'])
+    assert np.array_equal(kept['copper_heat'], after['copper_heat'])
+    heat = np.tile(kept['copper_heat'], (2, 1))
+    assert outputs.rises[6] == pytest.approx(temperature_rises(
+        p, np.array([0.0, 0.3]), heat, outputs.rises[3])[1], rel=1e-9)
 
 
 def test_without_forces_there_are_angles_and_speeds_alone() -> None:
@@ -161,7 +162,7 @@ def test_without_forces_there_are_angles_and_speeds_alone() -> None:
     quarter = Motion.from_euler([[0.0, 0.0, 1.0]], [[0.0, 0.0, np.pi / 2]])
     output = answered(Step(p), Batch.of(STAMP, quarter.rows))
     assert np.isnan(output.forces).all()
-    assert np.isnan(output.motors[:, DEMANDED_TORQUES]).all()
+    assert np.isnan(output.motors[:, BREAKAWAY_TORQUES]).all()
     messages = written(OutputMessages(p), output)
     assert 'motor_torques' not in messages
     state: Any = STORE.deserialize_cdr(messages['motor_states'], 'sensor_msgs/msg/JointState')
@@ -174,12 +175,13 @@ def test_a_motor_whose_numbers_overflow_is_not_published() -> None:
     fast = Motion([0.0, 0.0, 1.0], np.eye(3), [0.0, 0.0, 1e3])
     step, setpoint = Step(p), Batch.of(STAMP, fast.rows)
     output = answered(step, setpoint)
-    assert not output.motors[0, SOUND] and not step.exceedances(setpoint.motions, output)
+    assert not output.rows[0, FINITE_MOTORS] and not step.exceedances(output)
     assert 'motor_states' not in written(OutputMessages(p), output)
 
 
 def test_nothing_is_computed_without_drives() -> None:
     output = answered(Step(HEXAPOD.replaced({'actuator.screw_lead': 0.01})), Batch.of(
         STAMP, Motion([0.0, 0.0, 1.0], np.eye(3)).rows))
-    assert output.motors.shape == (1, 0) and not output.state[STATE['windings']].any()
+    assert output.motors.shape == output.rises.shape == (1, 0)
+    assert not output.state['copper_heat'].any()
     assert 'motor_states' not in OutputMessages(HEXAPOD).types

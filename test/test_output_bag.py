@@ -52,7 +52,8 @@ def turning(number: int, first: int = 0) -> Outputs:
 
 
 def part_of(outputs: Outputs, which: slice) -> Outputs:
-    return Outputs._make((*(part[which] for part in outputs[:-1]), outputs.state))
+    return outputs._replace(**{name: getattr(outputs, name)[which]
+                               for name in ('answered', 'stamps', 'rows')})
 
 
 def times_of(number: int, first: int = 0) -> NDArray[np.int64]:

@@ -374,7 +374,7 @@ def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded(
             parameters = FREE.replaced(changes)
             assert check(([0], rows), parameters).accepted != exceeded
             step, setpoint = Step(parameters), Batch.of(0, motion_of(rows).rows)
-            assert bool(step.exceedances(setpoint.motions, step(setpoint))) == exceeded
+            assert bool(step.exceedances(step(setpoint))) == exceeded
             simulated_parameters = simulated(**{**UNLIMITED, **changes})
             if exceeded:
                 with snapshot.raises(ParameterError):

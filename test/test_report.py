@@ -37,7 +37,7 @@ from stewart_dynamics.replay.summary_text import measured_headline
 from stewart_dynamics.reporting.pages import (
     decimals, digits, number, plotly_script, thousands)
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
-from stewart_dynamics.setpoints.step import Batch, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, Step
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -70,7 +70,8 @@ class Given:
         """Return some of the setpoints as the replay gives them, or the same again later [s]."""
         return Answered(
             self.seconds[part] + later, self.setpoints.chosen(part),
-            Outputs._make((*(each[part] for each in self.outputs[:-1]), self.outputs.state)),
+            self.outputs._replace(**{name: getattr(self.outputs, name)[part]
+                                     for name in ('answered', 'stamps', 'rows')}),
             self.base_wrenches[part], self.powers[part], self.breakdown[part])
 
     def summary(self, **changes: Any) -> dict[str, Any]:

@@ -31,7 +31,6 @@ from stewart_dynamics.setpoints.rejections import DROPPED, OUT_OF_RANGE, Rejecti
 PACKAGE = Path(stewart_dynamics.__file__).parent
 BEGIN = 1_700_000_000_000_000_000  # a stamp [ns]
 MOST_FILES = 12
-RESTARTING = places('step_state')['restarting']
 
 
 class Fed:
@@ -113,11 +112,11 @@ def test_a_restart_that_is_dropped_or_cannot_be_answered_holds_for_the_next(fed:
     fed.gather(day, sample=too_large)
     fed.node._answer_waiting()
     assert fed.counts[Rejection('setpoint', OUT_OF_RANGE)] == 1
-    assert fed.node._state[RESTARTING]
+    assert fed.node._state['restarting'][0]
     fed.gather(day + 1)
     fed.node._answer_waiting()
     assert fed.answered(3)[2] == day + 1
-    assert not fed.node._state[RESTARTING]
+    assert not fed.node._state['restarting'][0]
 
 
 def test_the_page_names_the_files_that_a_setpoint_runs_through(domain: int) -> None:

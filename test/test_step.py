@@ -10,7 +10,7 @@ from itertools import product
 import math
 from typing import Any
 
-from checked_results import checked
+from checked_results import checked, state_of
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -18,8 +18,8 @@ from referees import (
     QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, relative,
     rng, symmetric_parameters)
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.core.binding import places
+from stewart_dynamics.arrays import Array, Records, Stamps
+from stewart_dynamics.core.binding import CONSTANTS
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JOINT_FORCE_MAX, JUMP, LENGTH_MAX,
@@ -30,15 +30,13 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import LEG_SHAPE
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
-from stewart_dynamics.setpoints.step import Batch, FIRST, JITTER, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
 
 PARAMETERS = symmetric_parameters()
 STEP = Step(PARAMETERS)
 UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 REST = (0.0,) * 12
 STAMP = 12_000_000_034
-
-STATE = places('step_state')
 
 # The hexapod turned as far as it is singular, and its legs and platform in one plane.
 QUARTER = Batch.of(STAMP, (0.0, 0.0, 1.0, *QUARTER_TURN.ravel(), *REST))
@@ -64,29 +62,26 @@ def each_alone(
     many = step(setpoints)
     for n, setpoint in enumerate(singles(setpoints)):
         outputs = step(setpoint)
-        found = step.exceedances(setpoint.motions, outputs)
-        assert found == step.exceedances(setpoints.motions, many, n)
+        found = step.exceedances(outputs)
+        assert found == step.exceedances(many, n)
         yield outputs, found
 
 
-def answered(step: Step, setpoints: Batch, before: Array = FIRST) -> Outputs:
+def answered(step: Step, setpoints: Batch, before: Records = FIRST) -> Outputs:
     outputs = step(setpoints, before)
     assert outputs.answered.all()
     assert outputs.stamps.tolist() == setpoints.stamps.tolist()
     return outputs
 
 
-def state_of(**parts: Any) -> Array:
-    """Return a state of the step: the first but for some parts."""
-    state = FIRST.copy()
-    for name, part in parts.items():
-        state[STATE[name]] = part
-    return state
-
-
 def bits(outputs: Outputs, n: int = 0) -> list[bytes]:
     """Return the bits of all that is answered to a setpoint."""
-    return [part[n].tobytes() for part in outputs[1:-1]]
+    return [part[n].tobytes() for part in arrays(outputs)]
+
+
+def arrays(outputs: Outputs) -> tuple[Stamps, Array]:
+    """Return the arrays with a row for each setpoint that is answered."""
+    return outputs.stamps, outputs.rows
 
 
 # Results
@@ -112,13 +107,12 @@ def test_the_step_gives_the_librarys_bits() -> None:
 
 def test_the_step_keeps_no_state() -> None:
     given = singles(random_setpoints(PARAMETERS, 30))
-    seconds, nanoseconds = divmod(STAMP - 1, 10 ** 9)
     calls = list(product(given, (
-        FIRST, state_of(warning=Singularity(Cause.CONDITION, True, -1.0)),
-        state_of(seconds=seconds, nanoseconds=nanoseconds, lengths=1.0))))
+        FIRST, state_of(Singularity(Cause.CONDITION, True, -1.0)),
+        state_of(Singularity(), followed=1, stamp=STAMP - 1, lengths=1.0))))
 
-    def found(step: Step, calls: Sequence[tuple[Batch, Array]]) -> list[list[bytes]]:
-        return [[part.tobytes() for part in step(*each)] for each in calls]
+    def found(step: Step, calls: Sequence[tuple[Batch, Records]]) -> list[list[bytes]]:
+        return [[part.tobytes() for part in arrays(step(*each))] for each in calls]
 
     first = found(STEP, calls)
     assert first == found(STEP, calls) == found(Step(PARAMETERS), calls[::-1])[::-1]
@@ -130,14 +124,14 @@ def test_forces_are_clipped_and_reported() -> None:
     for setpoint in singles(random_setpoints(PARAMETERS, 20)):
         free = answered(STEP, setpoint)
         forces = free.demanded_forces[0].tolist()
-        assert not STEP.exceedances(setpoint.motions, free)
+        assert not STEP.exceedances(free)
         bounds = [abs(force) * (0.5 if leg % 2 else 1.0) for leg, force in enumerate(forces)]
         step = Step(PARAMETERS.replaced({'limits.force_max': bounds}))
         output = answered(step, setpoint)
         assert output.demanded_forces[0].tolist() == forces
         assert output.forces[0].tolist() == [
             force / 2 if leg % 2 else force for leg, force in enumerate(forces)]
-        assert step.exceedances(setpoint.motions, output) == tuple(
+        assert step.exceedances(output) == tuple(
             Exceedance('limits.force_max', leg, forces[leg], bounds[leg]) for leg in (1, 3, 5))
 
 
@@ -160,15 +154,15 @@ def both_ways(step: Step, setpoints: Sequence[Batch]) -> Outputs:
         output = answered(step, setpoint, state)
         state = output.state
         assert bits(output) == bits(outputs, n)
-        exceedances = step.exceedances(setpoint.motions, output)
-        assert exceedances == step.exceedances(whole.motions, outputs, n)
+        exceedances = step.exceedances(output)
+        assert exceedances == step.exceedances(outputs, n)
         assert outputs.exceeding[n] == bool(exceedances)
         assert outputs.jumped[n] == any(each.limit == JUMP for each in exceedances)
     assert state.tobytes() == outputs.state.tobytes()
     for cut in range(len(setpoints) + 1):
         first = answered(step, whole.chosen(slice(0, cut)))
         second = answered(step, whole.chosen(slice(cut, None)), first.state)
-        for parts in zip(first[1:-1], second[1:-1], outputs[1:-1], strict=True):
+        for parts in zip(*map(arrays, (first, second, outputs)), strict=True):
             assert np.concatenate(parts[:2]).tobytes() == parts[2].tobytes()
         assert second.state.tobytes() == outputs.state.tobytes()
     return outputs
@@ -212,9 +206,9 @@ def test_a_setpoint_that_the_legs_cannot_reach_in_time_is_a_jump(action: str) ->
     assert outputs.jumped.tolist() == [False, False, True, False, False]
     assert outputs.with_forces.tolist() == [True, True, action == 'warn', True, True]
     assert (np.isnan(outputs.forces).T == ~outputs.with_forces).all()
-    worst = step.exceedances(Batch.joined(setpoints).motions, outputs, 2)[0]
+    worst = step.exceedances(outputs, 2)[0]
     lengths = outputs.lengths[:, worst.leg]
-    assert worst.value == pytest.approx((lengths[2] - lengths[1]) / (1e-3 + JITTER))
+    assert worst.value == pytest.approx((lengths[2] - lengths[1]) / (1e-3 + CONSTANTS['JITTER']))
     assert worst.bound == RATE
     assert 'limits.velocity_max' in worst.words(PARAMETERS['joints'])
 
@@ -281,7 +275,7 @@ def test_a_suppressed_force_above_its_limit_is_still_reported() -> None:
     setpoint = _turned(89.99)
     output = answered(step, setpoint)
     assert np.isnan(output.forces).all()
-    assert {each.limit for each in step.exceedances(setpoint.motions, output)} == {
+    assert {each.limit for each in step.exceedances(output)} == {
         'limits.force_max'}
 
 
@@ -295,7 +289,7 @@ def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Batc
     assert output.conditions[0] >= UNSOLVABLE_CONDITION
     assert np.isnan(output.demanded_forces).all()
     assert np.isnan(output.forces).all()
-    assert not step.exceedances(setpoint.motions, output)
+    assert not step.exceedances(output)
     assert output.warnings[0]
     rotation = np.reshape(setpoint.motions[0, 3:12], (3, 3))
     legs = (setpoint.motions[0, :3] + PARAMETERS['geometry.platform_joints'] @ rotation.T
@@ -316,7 +310,7 @@ def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Batc
 def test_a_setpoint_that_overflows_gives_nothing(setpoint: Batch) -> None:
     output = STEP(setpoint)
     assert not output.answered[0]
-    assert [len(part) for part in output[1:-1]] == [0] * 5
+    assert [len(part) for part in arrays(output)] == [0] * 2
     assert STEP(HOME, output.state).answered[0]
 
 
@@ -330,7 +324,7 @@ rotations = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(
 
 def test_a_restart_is_no_crossing() -> None:
     before = Singularity(Cause.CONDITION, True, -0.2, crossings=1)
-    output = answered(STEP, HOME.replaced(restarts=True), state_of(warning=before, lengths=1.0))
+    output = answered(STEP, HOME.replaced(restarts=True), state_of(before, followed=1, lengths=1.0))
     assert output.singularity().crossings == 1
     assert not output.warnings[0]
     assert output.changed[0]

@@ -39,7 +39,7 @@ from stewart_dynamics.whole_file import to_json
 Array = NDArray[np.float64]
 
 SECOND = 1_000_000_000
-RESTART = places('setpoint_output')['restart']
+RESTART = places('stewart_output')['restart']
 LIMITS = {
     'limits.length_min': [0.5, 0.6, 0.7, 0.5, 0.6, 0.0],
     'limits.length_max': [1.5, 1.4, 1.3, 1.5, 1.4, 9.0],

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps, STAMPS_END
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.bags.baseline import gap_of, integrated
 from stewart_dynamics.errors import BagError, shown_name
 from stewart_dynamics.mechanics.frames.motion import Pose

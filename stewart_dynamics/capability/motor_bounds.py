@@ -14,7 +14,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.force_intervals import quadratic_exit
 from stewart_dynamics.mechanics.drives.motor_limits import largest_torques
 from stewart_dynamics.mechanics.drives.motors import (
-    ACCELERATIONS, drive_constants, Drives, MOTORS, Motors, SPEEDS)
+    ACCELERATIONS, Drives, MOTORS, Motors, SPEEDS)
 from stewart_dynamics.mechanics.limits import (
     short_name, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import MOTION, RESULT
@@ -49,9 +49,9 @@ class MotorBounds:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = p = parameters
         self._drives = Drives(p)
-        constants = drive_constants(p)
-        self.ratio, self._mass = constants[:, 0], constants[:, 2]
-        self._factors = 1.0 + constants[:, 3], 1.0 + constants[:, 4]
+        legs = p.structure['legs']
+        self.ratio, self._mass = legs['motor_ratio'], legs['reflected_mass']
+        self._factors = 1.0 + legs['driving_loss'], 1.0 + legs['driven_loss']
         self.inertia = self._mass / self.ratio ** 2
         self._strongest, self.fastest = (
             six_of(each, math.inf) for each in (p.drive.torque_max, p.drive.speed_max))

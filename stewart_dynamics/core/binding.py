@@ -18,7 +18,7 @@ from operator import itemgetter
 from pathlib import Path
 import re
 from struct import Struct
-from typing import Any, cast
+from typing import Any, cast, NamedTuple
 
 import numpy as np
 
@@ -37,9 +37,49 @@ def header(name: str) -> str:
     return (Path(__file__).parent / name).read_text(encoding='utf-8')
 
 
+class LimitRow(NamedTuple):
+    """A line of the table of limits in ``stewart_dynamics.h``."""
+
+    bit: int  # of stewart_output.exceeded
+    name: str
+    field: str  # of stewart_leg
+    depends: str  # what its quantity depends on: POSE, TWIST, LOAD or MOTOR
+    quantity: str  # field of stewart_output
+    minimum: bool
+
+
+class Rule(NamedTuple):
+    """A line of the table of rules in ``stewart_dynamics.h``."""
+
+    name: str
+    parameters: tuple[str, ...]
+    text: str
+
+
+_HEADERS = header('stewart_dynamics.h') + header('library.h')
+LIMIT_ROWS = tuple(
+    LimitRow(int(bit), name, field, depends, quantity, kind == 'MINIMUM')
+    for kind, bit, name, field, depends, quantity in re.findall(
+        r'(M\w+IMUM)\((\d+), (\w+), (\w+), (\w+), ([\w.]+)\)', _HEADERS))
+"""The limits of the legs."""
+RULES = {int(code): Rule(name, tuple(names.split(', ')), text) for code, name, names, text in
+         re.findall(r'RULE\((\d+), (\w+), "([^"]*)",[\s\\]*"([^"]*)"\)', _HEADERS)}
+"""The rules of ``stewart_check`` by their codes."""
+
+
 def _declarations() -> str:
-    text = header('stewart_dynamics.h') + header('library.h')
-    return re.sub(r'/\*.*?\*/|^#.*?$', ' ', text, flags=re.DOTALL | re.MULTILINE)
+    """Return the headers without comments and directives, their tables written out."""
+    text = re.sub(r'/\*.*?\*/', ' ', _HEADERS, flags=re.DOTALL)
+    text = re.sub(r'^#(?:.*\\\n)*.*$', ' ', text, flags=re.MULTILINE)
+    for use, lines in (
+            ('STEWART_LIMITS(STEWART_BIT, STEWART_BIT)',
+             [f'STEWART_{row.name} = {row.bit},' for row in LIMIT_ROWS]),
+            ('STEWART_LIMITS(STEWART_FIELD, STEWART_FIELD)',
+             [f'double {row.field};' for row in LIMIT_ROWS]),
+            ('STEWART_RULES(STEWART_RULE_CODE)',
+             [f'STEWART_RULE_{rule.name} = {code},' for code, rule in RULES.items()])):
+        text = text.replace(use, ' '.join(lines))
+    return text
 
 
 _TEXT = _declarations()
@@ -50,7 +90,7 @@ CODES = {name: int(value) for enum in re.findall(r'enum \{(.*?)\};', _TEXT, re.D
 
 CONSTANTS = {name: float(value) for file in ('stewart_dynamics.c', 'plant.c')
              for name, value in re.findall(
-                 r'^#define ([A-Z_]+) ([0-9.e-]+)\b', header(file), re.MULTILINE)}
+                 r'^#define ([A-Z_]+) (?:INT64_C\()?([0-9.e-]+)\b', header(file), re.MULTILINE)}
 """Tolerances and other numbers that the source defines."""
 
 
@@ -67,20 +107,21 @@ def record(name: str) -> np.dtype[Any]:
 
 def _fields(text: str) -> Iterator[tuple[str, np.dtype[Any], tuple[int, ...]]]:
     for kind, names in re.findall(r'(\w+)\s+([^;]+);', text):
-        for name, count in re.findall(r'(\w+)(?:\[(\d+)\])?(?:,|$)', names.strip()):
-            yield name, record(kind), (int(count),) if count else ()
+        for name, sizes in re.findall(r'(\w+)((?:\[\d+\])*)(?:,|$)', names.strip()):
+            yield name, record(kind), tuple(map(int, re.findall(r'\d+', sizes)))
 
 
 def places(name: str) -> dict[str, Any]:
     """
-    Return where the fields of a structure of doubles are in a row of its numbers.
+    Return where the doubles of a structure are in a row of its numbers.
 
     Numbers have an index, arrays and structures a slice; the fields of a structure in it follow
-    it, as ``result.forces``.
+    it, as ``result.forces``. Fields of other types have no place.
     """
     return {field: begin if kind.base.fields is None and not kind.shape
             else slice(begin, begin + kind.itemsize // 8)
-            for field, kind, begin in _numbered(record(name))}
+            for field, kind, begin in _numbered(record(name))
+            if kind.base.fields is not None or kind.base == np.float64}
 
 
 def _numbered(structure: np.dtype[Any], first: int = 0, prefix: str = '',

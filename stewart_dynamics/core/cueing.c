@@ -253,13 +253,10 @@ static void cue(
 }
 
 void cue_many(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, const governor_limits * limits, int64_t limited,
+  const stewart_platform * platform, const governor_limits * limits, int64_t limited,
   const washout_filters * filters, int64_t count, const double * times, const double * inputs,
   cueing_state * state, stewart_motion * motions) {
-  governed on = {
-    {platform, drives, n, curve, n_base, base, n_moving, moving, checks}, limits};
+  governed on = {platform, limits};
   for (int64_t k = 0; k < count; k++) {
     if (isnan(state->time)) {
       begin_cueing(&on, limited != 0, filters, &inputs[6 * k], state);

@@ -72,7 +72,7 @@ FLAT static void accelerate(
   const stewart_platform * platform, stewart_motion * motion, const double forces[6],
   const double wrench[6], const stewart_base * base) {
   double per_size = 1.0 / platform->characteristic_length, inertia[6];
-  int turning = pitch_of(&platform->legs[0]) != 0.0, moving = moves(base);
+  int turning = platform->legs[0].pitch != 0.0, moving = moves(base);
   const double * r = motion->rotation;
   system6 work = {{{0.0}}, {0.0}};
   for (int n = 0; n < 3; n++) {
@@ -330,7 +330,7 @@ static void put_regressor(
     double row[6];
     columns[i] = columns_of(leg, motion, of);
     put3(row, at.direction), put3(row + 3, scale(per_size, cross(at.arm, at.direction)));
-    if (pitch_of(leg) != 0.0) {
+    if (leg->pitch != 0.0) {
       drive_motion drive = move_drive(leg, motion);
       turning_row(platform, i, motion, row);
       columns[i].rate = drive.rate, columns[i].acceleration = drive.acceleration;
@@ -383,7 +383,7 @@ static void add_external_wrench(
     double row[6], force = weight * (model[i] - measured[i]);
     leg_pose at = pose_of(leg, position, rotation);
     put3(row, at.direction), put3(row + 3, cross(at.arm, at.direction));
-    if (pitch_of(leg) != 0.0) {
+    if (leg->pitch != 0.0) {
       turning_row(platform, i, &motion, row);
       for (int n = 3; n < 6; n++) {row[n] *= platform->characteristic_length;}
     }

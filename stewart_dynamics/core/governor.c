@@ -40,7 +40,7 @@ typedef struct {
 
 /* A hexapod whose limits have the margins of a governor, and what else that keeps. */
 typedef struct {
-  machine of;
+  const stewart_platform * platform;
   const governor_limits * limits;
 } governed;
 
@@ -109,14 +109,6 @@ static void put_motion(
   }
 }
 
-/* Whether one of six values is above its bound; nan is. */
-static int one_above(const double * values, const double * most) {
-  for (int i = 0; i < 6; i++) {
-    if (!(fabs(values[i]) <= most[i])) {return 1;}
-  }
-  return 0;
-}
-
 /* The lowest of some bits, counted from 1; 0 if there is none. */
 static int lowest(unsigned bits) {
   int bit = 1;
@@ -135,11 +127,11 @@ typedef struct { double lengths[6], room[12], condition; } pose_room;
    is enough; else the condition number. Returns det(J). */
 static double find_condition(
   const governed * on, const stewart_motion * motion, const stewart_result * known, double * to) {
-  const stewart_platform * platform = on->of.platform;
+  const stewart_platform * platform = on->platform;
   double enough = CERTAIN * on->limits->condition_max;
   leg_pose at[6];
   double rows[6][6], inverse[6][6], of_rows = 6.0, of_inverse = 0.0;
-  if (known && pitch_of(&platform->legs[0]) == 0.0) {
+  if (known && platform->legs[0].pitch == 0.0) {
     for (int i = 0; i < 6; i++) {
       double moment = on->limits->radii[i] / platform->characteristic_length;
       of_rows += moment * moment;
@@ -160,8 +152,7 @@ static int find_room(
   const governed * on, int kind, const stewart_motion * motion, const stewart_result * known,
   pose_room * to) {
   const governor_limits * g = on->limits;
-  const machine * of = &on->of;
-  const stewart_leg * legs = of->platform->legs;
+  const stewart_leg * legs = on->platform->legs;
   unsigned exceeded = 0;
   for (int i = 0; i < 6; i++) {
     to->lengths[i] =
@@ -179,20 +170,23 @@ static int find_room(
         above(length, legs[i].length_max, STEWART_LENGTH_MAX);
     }
   } else if (kind == ANGLES) {
-    double angles[12];
-    put_angles(of, motion, angles);
+    double base_angles[6], angles[6];
+    put_joint_angles(on->platform, motion, base_angles, angles);
     for (int i = 0; i < 6; i++) {
       double base = legs[i].base_joint_angle_max, moving = legs[i].platform_joint_angle_max;
-      to->room[i] = isinf(base) ? HUGE_VAL : base - angles[i];  /* without it, the angle is nan */
-      to->room[i + 6] = isinf(moving) ? HUGE_VAL : moving - angles[i + 6];
-      exceeded |= check_angles(&legs[i], angles[i], angles[i + 6]);
+      to->room[i] = isinf(base) ? HUGE_VAL : base - base_angles[i];  /* without it it is nan */
+      to->room[i + 6] = isinf(moving) ? HUGE_VAL : moving - angles[i];
+      exceeded |= above(base_angles[i], base, STEWART_BASE_JOINT_ANGLE_MAX) |
+        above(angles[i], moving, STEWART_PLATFORM_JOINT_ANGLE_MAX);
     }
   } else {
     double clearances[6];
     int64_t nearest[6];
-    put_clearances(of, motion, clearances, nearest);
-    for (int i = 0; i < 6; i++) {to->room[i] = clearances[i] - of->platform->leg_clearance_min;}
-    exceeded |= check_clearances(of, clearances);
+    put_clearances(on->platform, motion, clearances, nearest);
+    for (int i = 0; i < 6; i++) {
+      to->room[i] = clearances[i] - on->platform->leg_clearance_min;
+      exceeded |= below(clearances[i], on->platform->leg_clearance_min, STEWART_LEG_CLEARANCE_MIN);
+    }
   }
   return lowest(exceeded);
 }
@@ -235,10 +229,10 @@ static int leaves(
       }
     } else if (kind == CLEARANCES) {
       /* A cylinder may end beyond the joint: where the piston begins for the plate of the base. */
-      d *= largest(1.0, on->of.platform->legs[i].cylinder_length / from->lengths[i]);
+      d *= largest(1.0, on->platform->legs[i].cylinder_length / from->lengths[i]);
       if (!(d + farthest <= from->room[i] + margins * g->clearance_margin)) {return 1;}
     } else {
-      double moment = g->radii[i] * (by.turn + turn) / on->of.platform->characteristic_length;
+      double moment = g->radii[i] * (by.turn + turn) / on->platform->characteristic_length;
       square += turn * turn + moment * moment;
     }
   }
@@ -282,35 +276,28 @@ static int check_poses(const governed * on, int kind, const stop_samples * stop)
 
 /* The limit of rates and loads, counted from 1, that a motion exceeds, 0 if none. */
 static int overloads(
-  const governed * on, const leg_drives * drives, const stewart_motion * motion,
-  const stewart_result * result) {
-  const governor_limits * g = on->limits;
-  const machine * of = &on->of;
+  const governed * on, const stewart_motion * motion, const stewart_result * result) {
+  stewart_output found;
   unsigned exceeded = 0;
+  found.result = *result;
+  complete_loads(on->platform, motion, 1, &found);
+  if (on->platform->with_motors && found.finite_motors == 0.0) {return GOVERNED_SINGULARITY + 1;}
   for (int i = 0; i < 6; i++) {
-    exceeded |= check_leg(&of->platform->legs[i], result, i, 1.0);
+    double * torque = &found.motors.breakaway_torques[i];
+    *torque = fabs(*torque) + on->limits->friction_torque[i];
+    exceeded |= check_leg(on->platform, &found, i);
   }
-  if (exceeded || of->checks->motors == 0.0) {return lowest(exceeded);}
-  motor_row row;
-  put_motors(of->platform, drives, of->n_curve, of->curve, motion, result->forces,
-             result->forces, &row);
-  for (int i = 0; i < 6; i++) {
-    row.available_torques[i] = g->load_share * row.available_torques[i] - g->friction_torque[i];
-  }
-  return one_above(row.speeds, g->speed_max) ? GOVERNED_SPEED_MAX + 1
-    : one_above(row.breakaway_torques, row.available_torques) ? GOVERNED_TORQUE_MAX + 1 : 0;
+  return lowest(exceeded);
 }
 
 /* The limit, counted from 1, that a state or the stop from it exceeds, 0 if none. */
 static int inadmissible(const governed * on, const coordinates * state) {
   static const double no_wrench[6] = {0.0};
   static const stewart_base still = {{NAN, NAN, NAN}, {0.0}, {0.0}, {0.0}};
-  const machine * of = &on->of;
-  const double checked[KINDS] = {1.0, of->checks->angles, of->checks->clearance, 1.0};
+  const stewart_platform * platform = on->platform;
+  const int checked[KINDS] = {1, platform->with_joint_angles, platform->with_clearance, 1};
   double rate = on->limits->stop_rate;
   stop_samples stop;
-  leg_drives drives = *of->drives;  /* breakaway torques, as if each leg could reverse */
-  for (int i = 0; i < 6; i++) {drives.legs[i].slow = HUGE_VAL;}
   int found = 0;
   stop.from = state;
   for (int first = 0; first < STOP_SAMPLES && !found; first += SAMPLES_AT_ONCE) {
@@ -318,14 +305,14 @@ static int inadmissible(const governed * on, const coordinates * state) {
       coordinates at = stopped(state, rate, stop_times[n] / rate);
       put_motion(on->limits, &at, &stop.motions[n]);
     }
-    solve_many(of->platform, SAMPLES_AT_ONCE, &stop.motions[first], 1, no_wrench, 1, &still, 0,
+    solve_many(platform, SAMPLES_AT_ONCE, &stop.motions[first], 1, no_wrench, 1, &still, 0,
                &stop.results[first]);
     for (int n = first; n < first + SAMPLES_AT_ONCE && !found; n++) {
-      found = overloads(on, &drives, &stop.motions[n], &stop.results[n]);
+      found = overloads(on, &stop.motions[n], &stop.results[n]);
     }
   }
   for (int kind = 0; kind < KINDS && !found; kind++) {
-    if (checked[kind] != 0.0) {found = check_poses(on, kind, &stop);}
+    if (checked[kind]) {found = check_poses(on, kind, &stop);}
   }
   return found;
 }
@@ -525,22 +512,16 @@ static void follow(
 }
 
 int64_t governed_limit(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, const governor_limits * limits, const coordinates * state) {
-  governed on = {
-    {platform, drives, n, curve, n_base, base, n_moving, moving, checks}, limits};
+  const stewart_platform * platform, const governor_limits * limits, const coordinates * state) {
+  governed on = {platform, limits};
   return inadmissible(&on, state);
 }
 
 void govern_many(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, const governor_limits * limits, int64_t count,
+  const stewart_platform * platform, const governor_limits * limits, int64_t count,
   const double * times, const coordinates * demands, governed_stream * stream,
   stewart_motion * motions) {
-  governed on = {
-    {platform, drives, n, curve, n_base, base, n_moving, moving, checks}, limits};
+  governed on = {platform, limits};
   for (int64_t k = 0; k < count; k++) {
     if (isnan(stream->time)) {
       stream->demand = demands[k];

@@ -48,16 +48,6 @@ void solve_many(
                 (double *)results, NUMBERS(stewart_result));
 }
 
-void solve_setpoints(
-  const stewart_platform * platform, int64_t count, const setpoint * setpoints,
-  setpoint_output * outputs) {
-  lane_rows motions = {(const double *)&setpoints->motion, NUMBERS(setpoint)};
-  lane_rows wrenches = {setpoints->wrench, NUMBERS(setpoint)};
-  lane_rows bases = {(const double *)&setpoints->base, NUMBERS(setpoint)};
-  solve_lanes()(platform, count, motions, wrenches, bases, 1, (double *)&outputs->result,
-                NUMBERS(setpoint_output));
-}
-
 /* Whether a base adds a load: one of nan adds none. */
 static int moves(const stewart_base * base) {return base->gravity[0] == base->gravity[0];}
 

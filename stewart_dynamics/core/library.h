@@ -14,53 +14,6 @@
 
 #include "stewart_dynamics.h"
 
-/* The singularity warning after a sample: stewart_state as numbers. */
-typedef struct {
-  double cause, stopped, determinant, time_to_crossing, crossings;
-} warning_state;
-
-/* Drive of a leg: turn of the motor by metre [rad/m]; where the angle is zero [m]; reflected mass
-   [kg]; losses of a motor that drives, and is driven, less 1; rate below which they are linear
-   [m/s]; [N m/A], [Ohm]. */
-typedef struct {
-  double ratio, zero, mass, driving, driven, slow, torque_constant, resistance;
-} leg_drive;
-
-/* The motors in a motion, six numbers each: see drives/motors.py. */
-typedef struct {
-  double angles[6], speeds[6], commands[6], breakaway_torques[6], torques[6], accelerations[6];
-  double currents[6], power[6], copper_heat[6], available_torques[6];
-} motor_row;
-
-/* The drives of a hexapod, and limits of their motors; nan where not given. */
-typedef struct {
-  leg_drive legs[6];
-  double torque_max[6];
-  double fastest[6], hottest[6];                   /* thresholds [rad/s, K] */
-  double thermal_resistance[6], time_constant[6];  /* [K/W], [s] */
-} leg_drives;
-
-/* The motors of a setpoint; flags are 0 or 1. */
-typedef struct {
-  double rises[6]; /* of the windings' temperatures [K] */
-  double sound, exceeding, running; /* finite; a limit exceeded; one of speed or temperature */
-  motor_row drives;
-} checked_motors;
-
-/* Which limits are checked beside those of the legs, flags that are 0 or 1; and the axes of joints,
-   nan where not needed. */
-typedef struct { double angles, clearance, motors, joint_axes[36]; } limit_checks;
-
-/* The state of the step after a setpoint: of the warning; stamp [s, ns] and lengths [m] of the last
-   setpoint that was not a jump, nan before the first; temperature rises [K] and copper heat [W] of
-   the windings; whether time has jumped back before a setpoint that could not be answered. */
-typedef struct {
-  warning_state warning;
-  double seconds, nanoseconds, lengths[6];
-  double windings[12];
-  double restarting;
-} step_state;
-
 /* A setpoint. Flags are 0 or 1. */
 typedef struct {
   stewart_motion motion;
@@ -70,19 +23,6 @@ typedef struct {
   double restart;     /* time has jumped back before it */
   double stamped;     /* its stamp comes from messages, otherwise it is the time of arrival */
 } setpoint;
-
-/* The outputs of the step for a setpoint, beside its motors. */
-typedef struct {
-  stewart_result result;  /* forces nan where J_inv cannot be solved or the base is not known */
-  double positions[6];    /* of the joints: lengths of the legs less those at zero [m] */
-  double forces[6];       /* to publish [N]; nan where suppressed, as the motors' commands */
-  warning_state warning;
-  double mean_rates[6]; /* from the last setpoint that was not a jump [m/s] */
-  double answered; /* all numbers are finite */
-  double restart;  /* time has jumped back before it, or before one that was not answered */
-  double changed;  /* the warning has changed, or is the first */
-  double exceeding, jumped; /* a limit is exceeded; the legs cannot follow */
-} setpoint_output;
 
 /* A motion under loads, and what a call of one sample gives. */
 typedef struct {
@@ -124,7 +64,7 @@ typedef struct {
 } plant_state;
 
 typedef struct {
-  double by_torques, driven;           /* flags: commands are torques; drives are given */
+  double by_torques;                   /* flag: commands are torques */
   double steps, step;                  /* in a period, and the length of one [s] */
   end_stops stops;
   double force_max[6];
@@ -133,16 +73,15 @@ typedef struct {
   plant_state state;
   double lengths[6], rates[6], forces[6], acceleration[6];
   double sound;                        /* all steps could be computed */
-  motor_row motors;
+  stewart_motors motors;
 } one_plant;
 
 /* Coordinates of a governed motion, with their derivatives: displacement of the head, and angles of
    R = Rz Ry Rx, both from home and in its axes [m, rad]. */
 typedef struct { double value[6], rate[6], acceleration[6]; } coordinates;
 
-/* Where governor_state.held has the limits of the drives and singularity, after those of the legs:
-   bit n of stewart_output.exceeded is there n. */
-enum { GOVERNED_TORQUE_MAX = 16, GOVERNED_SPEED_MAX = 17, GOVERNED_SINGULARITY = 18 };
+/* Where governor_state.held has the singularity; bit n of stewart_output.exceeded is there n. */
+enum { GOVERNED_SINGULARITY = 18 };
 
 /* What a governor keeps besides the limits of the platform's legs: see mechanics/governor.py. All
    have its margins, which stand here by themselves for lengths, clearance [m] and angles [rad]. */
@@ -150,7 +89,6 @@ typedef struct {
   stewart_pose home;
   double head[3];                     /* platform frame [m] */
   double stop_rate, return_rate;      /* of the stop, and of the return to the demand [1/s] */
-  double speed_max[6], load_share;    /* of motors; part of the available torque that is used */
   double friction_torque[6];          /* change of the torque where the leg reverses [N m] */
   double condition_max, side;         /* side: sign of det(J) at home */
   double stop_condition;              /* without a margin */
@@ -191,26 +129,20 @@ typedef struct {
 
 /* The limit, counted from 1, that a governed state or the stop from it exceeds; 0 if none. */
 int64_t governed_limit(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, const governor_limits * limits, const coordinates * state);
+  const stewart_platform * platform, const governor_limits * limits, const coordinates * state);
 
 /* Motions (count,) that follow demands (count,) at times [s] as far as the limits let them; the
    first is the state of the stream. */
 void govern_many(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, const governor_limits * limits, int64_t count,
+  const stewart_platform * platform, const governor_limits * limits, int64_t count,
   const double * times, const coordinates * demands, governed_stream * stream,
   stewart_motion * motions);
 
 /* Motions (count,) at times [s] of inputs (count, 6), acceleration and angular velocity of the
    vehicle, linear between the times; the state is the one before, of an earlier time, and then the
-   last. Governed where `limited`. Arguments between are as in clearances_many, motors_many. */
+   last. Governed where `limited`. */
 void cue_many(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, const governor_limits * limits, int64_t limited,
+  const stewart_platform * platform, const governor_limits * limits, int64_t limited,
   const washout_filters * filters, int64_t count, const double * times, const double * inputs,
   cueing_state * state,
   stewart_motion * motions);
@@ -235,20 +167,18 @@ int64_t forward_kinematics_one(const stewart_platform * platform, one_pose * sam
 /* The kind of processor for which solve_many computes: 0 baseline, 1 AVX2, 2 AVX-512. */
 int64_t processor_kind(void);
 
-/* Results of setpoints. Then their checks, in order, and what is published of them; returns how many
-   are answered. Unless results, joint angles and clearances are `solved`, they are computed first.
-   A leg may move at its largest rate for an additional time [s], `slack` after a stamp,
-   `slack_of_arrival` after a time of arrival. */
+/* Outputs of setpoints: results, then all else that does not depend on earlier setpoints. Then the
+   steps, in order, and what is to be published; returns how many are answered. Unless outputs are
+   `solved`, they are computed first. */
+void complete_outputs(
+  const stewart_platform * platform, int64_t count, const setpoint * setpoints,
+  stewart_output * outputs);
 void solve_setpoints(
   const stewart_platform * platform, int64_t count, const setpoint * setpoints,
-  setpoint_output * outputs);
-int64_t check_setpoints(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t n_base, const double * base, int64_t n_moving, const double * moving,
-  const limit_checks * checks, const double * zero_lengths, double slack, double slack_of_arrival,
-  int64_t solved, int64_t count, const int64_t * stamps, const setpoint * setpoints,
-  double * joint_angles, double * clearances, step_state * state, setpoint_output * outputs,
-  checked_motors * motors);
+  stewart_output * outputs);
+int64_t step_setpoints(
+  const stewart_platform * platform, int64_t solved, int64_t count, const int64_t * stamps,
+  const setpoint * setpoints, stewart_state * state, stewart_output * outputs);
 
 /* A part of a message: its place, the first column of a row, and how many numbers; with none the
    byte there says whether the column is above zero. */
@@ -308,22 +238,21 @@ void regressors_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
   int64_t n_bases, const stewart_base * bases, double * results);
 
-/* Angles (count, 12) between legs and axes (12, 3) of base and platform joints [rad]. */
+/* Angles (count, 12) between legs and axes of base and platform joints [rad]. */
 void joint_angles_many(
-  const stewart_platform * platform, const double * axes, int64_t count,
-  const stewart_motion * motions, double * angles);
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  double * angles);
 
 /* sin^2(angle / 2) of the same, and its rate [1/s]; nan where numbers overflow. */
 void joint_haversines_many(
-  const stewart_platform * platform, const double * axes, int64_t count,
-  const stewart_motion * motions, double * values, double * rates);
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  double * values, double * rates);
 
-/* Clearance of each leg (count, 6) [m] from the nearest leg, or plate of n_base or n_moving
-   corners (n, 3); number of the leg, 6 for the plate of the base, 7 of the platform. */
+/* Clearance of each leg (count, 6) [m] from the nearest leg or plate; number of the leg, 6 for the
+   plate of the base, 7 of the platform. */
 void clearances_many(
-  const stewart_platform * platform, int64_t n_base, const double * base, int64_t n_moving,
-  const double * moving, int64_t count, const stewart_motion * motions, double * clearances,
-  int64_t * nearest);
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  double * clearances, int * nearest);
 
 /* Friction (count, 6) at rates (count, 6) [N]; coefficients of each leg (6,). */
 void friction_many(
@@ -339,15 +268,13 @@ void warm_many(
 /* Forces (count, 6) of drives without losses, whose motors have the torques of forces with them, at
    rates and accelerations of the drives. */
 void without_losses_many(
-  const leg_drives * drives, int64_t count, const double * forces, const double * rates,
+  const stewart_platform * platform, int64_t count, const double * forces, const double * rates,
   const double * accelerations, double * loads);
 
-/* Motors of motions, with demanded forces in the results, for published forces (count, 6) [N]; the
-   curve has n points of speed and torque. */
+/* Motors of motions, with demanded forces in the results, for published forces (count, 6) [N]. */
 void motors_many(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  int64_t count, const stewart_motion * motions, const stewart_result * results,
-  const double * forces, motor_row * rows);
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  const stewart_result * results, const double * forces, stewart_motors * rows);
 
 /* External wrenches (count, 6) of model forces and measured ones (count, 6), in poses. */
 void external_wrenches_many(
@@ -356,9 +283,7 @@ void external_wrenches_many(
 void estimate_one(const stewart_platform * platform, one_measurement * measurement);
 
 /* A period of the simulated hexapod; without steps, its state as it is. */
-void plant_advance(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  one_plant * plant);
+void plant_advance(const stewart_platform * platform, one_plant * plant);
 
 /* The records of an MCAP file: see bags/mcap_file.py. found is (4, room). */
 void scan_records(

@@ -12,8 +12,8 @@
 /* Write the acceleration of a motion under motor torques, which are clipped to those available,
    and the forces of the legs; `others` act along the legs, not through their screws. */
 static void accelerate_by_torques(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  stewart_motion * motion, double torques[6], const double others[6], const double wrench[6],
+  const stewart_platform * platform, stewart_motion * motion, double torques[6],
+  const double others[6], const double wrench[6],
   const stewart_base * base, double forces[6]) {
   stewart_platform changed = *platform;
   double power[6], factor[6], pushes[6];
@@ -22,24 +22,25 @@ static void accelerate_by_torques(
   }
   for (int i = 0; i < 6; i++) {
     double rate = move_drive(&platform->legs[i], motion).rate;
-    double most = curve_torque(n, curve, drives->legs[i].ratio * rate);
-    torques[i] = clipped(torques[i], least(drives->torque_max[i], most));
+    double most = curve_torque(platform, platform->legs[i].motor_ratio * rate);
+    torques[i] = clipped(torques[i], least(platform->legs[i].torque_max, most));
     power[i] = torques[i] * rate;
   }
   for (int attempt = 0, settled = 0; attempt < MOST_ATTEMPTS && !settled; attempt++) {
     for (int i = 0; i < 6; i++) {
-      const leg_drive * drive = &drives->legs[i];
-      factor[i] = factor_of(drive, power[i], move_drive(&platform->legs[i], motion).rate);
-      changed.legs[i].reflected_mass = drive->mass / factor[i];
-      pushes[i] = drive->ratio * torques[i] / factor[i] + others[i];
+      const stewart_leg * leg = &platform->legs[i];
+      factor[i] = factor_of(leg, power[i], move_drive(leg, motion).rate);
+      changed.legs[i].reflected_mass = leg->reflected_mass / factor[i];
+      pushes[i] = leg->motor_ratio * torques[i] / factor[i] + others[i];
     }
     accelerate(&changed, motion, pushes, wrench, base);
     settled = 1;
     for (int i = 0; i < 6; i++) {
-      const leg_drive * drive = &drives->legs[i];
-      drive_motion of = move_drive(&platform->legs[i], motion);
-      double through = (drive->ratio * torques[i] - drive->mass * of.acceleration) / factor[i];
-      forces[i] = through + drive->mass * of.acceleration;
+      const stewart_leg * leg = &platform->legs[i];
+      drive_motion of = move_drive(leg, motion);
+      double inertial = leg->reflected_mass * of.acceleration;
+      double through = (leg->motor_ratio * torques[i] - inertial) / factor[i];
+      forces[i] = through + inertial;
       if ((through * of.rate > 0.0) != (power[i] > 0.0) && (settled || attempt < CAREFUL)) {
         power[i] = through * of.rate, settled = 0;
       }
@@ -82,12 +83,11 @@ typedef struct { stewart_motion motion; double forces[6], torques[6]; } driven_m
 
 /* Write a state's time derivative under its loads and a motion of the base. */
 static driven_motion differentiate(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  const one_plant * plant, const plant_state * state, const stewart_base * base,
-  plant_state * slope) {
+  const stewart_platform * platform, const one_plant * plant, const plant_state * state,
+  const stewart_base * base, plant_state * slope) {
   driven_motion of;
   double load_of_all[6], stop[6];
-  int by_wrench = pitch_of(&platform->legs[0]) != 0.0;
+  int by_wrench = platform->legs[0].pitch != 0.0;
   vector velocity = read3(state->twist), omega = read3(state->twist + 3);
   put3(of.motion.position, read3(state->position));
   put_rotation(state->quaternion, of.motion.rotation);
@@ -107,7 +107,7 @@ static driven_motion differentiate(
     of.forces[i] = of.torques[i] + stop[i];
   }
   if (plant->by_torques > 0.0) {
-    accelerate_by_torques(platform, drives, n, curve, &of.motion, of.torques, stop, load_of_all,
+    accelerate_by_torques(platform, &of.motion, of.torques, stop, load_of_all,
                           base, of.forces);
   } else {
     accelerate(platform, &of.motion, of.forces, load_of_all, base);
@@ -151,21 +151,21 @@ static void step_from(
 /* Write the state after one step of the classical Runge-Kutta method; return whether it is finite.
    The base's motion is that at the begin, and becomes that at the end. */
 static int take_step(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  const one_plant * plant, double number_of_step, stewart_base * base, plant_state * after) {
+  const stewart_platform * platform, const one_plant * plant, double number_of_step,
+  stewart_base * base, plant_state * after) {
   plant_state slope, mean;
   double h = plant->step;
-  differentiate(platform, drives, n, curve, plant, &plant->state, base, &mean);
+  differentiate(platform, plant, &plant->state, base, &mean);
   step_from(&plant->state, 0.5 * h, &mean, after);
   move_base(plant, (number_of_step + 0.5) / plant->steps, base);
-  differentiate(platform, drives, n, curve, plant, after, base, &slope);
+  differentiate(platform, plant, after, base, &slope);
   step_from(&mean, 2.0, &slope, &mean);
   step_from(&plant->state, 0.5 * h, &slope, after);
-  differentiate(platform, drives, n, curve, plant, after, base, &slope);
+  differentiate(platform, plant, after, base, &slope);
   step_from(&mean, 2.0, &slope, &mean);
   step_from(&plant->state, h, &slope, after);
   move_base(plant, (number_of_step + 1.0) / plant->steps, base);
-  differentiate(platform, drives, n, curve, plant, after, base, &slope);
+  differentiate(platform, plant, after, base, &slope);
   step_from(&mean, 1.0, &slope, &mean);
   step_from(&plant->state, h / 6.0, &mean, after);
   int finite = all_finite(after, sizeof *after);
@@ -175,9 +175,7 @@ static int take_step(
   return finite;
 }
 
-void plant_advance(
-  const stewart_platform * platform, const leg_drives * drives, int64_t n, const double * curve,
-  one_plant * plant) {
+void plant_advance(const stewart_platform * platform, one_plant * plant) {
   stewart_base base = plant->bases[0];
   plant_state after, slope;
   int by_torques = plant->by_torques > 0.0;
@@ -188,19 +186,18 @@ void plant_advance(
   }
   int sound = plant->step * write_legs(platform, &plant->state, plant) <= LARGEST_MOVE;
   for (int64_t k = 0; k < (int64_t)plant->steps; k++) {
-    int finite = take_step(platform, drives, n, curve, plant, (double)k, &base, &after);
+    int finite = take_step(platform, plant, (double)k, &base, &after);
     sound = sound && finite &&
       plant->step * write_legs(platform, &after, plant) <= LARGEST_MOVE;
     if (!sound) {break;}
     plant->state = after;
   }
   driven_motion of =
-    differentiate(platform, drives, n, curve, plant, &plant->state, &base, &slope);
+    differentiate(platform, plant, &plant->state, &base, &slope);
   sound = sound && all_finite(slope.twist, sizeof slope.twist);
   for (int i = 0; i < 6 && by_torques; i++) {plant->forces[i] = of.forces[i];}
-  if (plant->driven > 0.0) {
-    put_motors(
-      platform, drives, n, curve, &of.motion, plant->forces, plant->forces, &plant->motors);
+  if (platform->with_motors) {
+    put_motors(platform, &of.motion, plant->forces, plant->forces, &plant->motors);
     for (int i = 0; i < 6 && by_torques; i++) {plant->motors.commands[i] = of.torques[i];}
   }
   for (int i = 0; i < 6; i++) {

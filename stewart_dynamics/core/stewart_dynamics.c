@@ -26,7 +26,10 @@
 #define LIMIT_TOLERANCE 1e-9       /* of limits, relative: above rounding errors */
 #define HYSTERESIS 0.8             /* a warning ends below this part of its threshold */
 #define JITTER 1e-3                /* of stamps [s] */
-#define STAMPS_END (INT64_C(2147483648) * INT64_C(1000000000)) /* [ns] */
+#define ONE_POINT 1e-12            /* of joints from their center, by their coordinates */
+#define FLATNESS 1e-6              /* of the corners of a plate, by its size */
+#define DEFINITENESS 1e-12         /* of an inertia that rounding made indefinite, by its trace */
+#define STAMPS_END INT64_C(2147483648000000000) /* of stamps, also negative: 2^31 s [ns] */
 #define LAGUERRE_STEPS 64          /* 4 to 7 are usual, 42 the most with equal eigenvalues */
 #define RESIDUAL 1e-12             /* of lengths found by the forward kinematics [m] */
 #define NEWTON_STEPS 50            /* 6 at most from nearly everywhere */
@@ -186,12 +189,6 @@ static vector turned(vector a, const stewart_motion * motion, vector * rate) {
   return add(cross(read3(motion->angular_acceleration), a), cross(omega, *rate));
 }
 
-/* How far the drive of a leg moves for a turn of its leg [m/rad]; 0 where its screw is guided. */
-static double pitch_of(const stewart_leg * leg) {
-  return leg->twist_ratio == 0.0 ? 0.0 :
-    leg->twist_ratio * leg->screw_lead / (2.0 * PI * leg->gear_ratio);
-}
-
 /* q of a drive: the length of its leg, less the extension by the turn of its leg. */
 typedef struct { real position, rate, acceleration; } drive_motion;
 
@@ -202,7 +199,7 @@ static drive_motion move_drive(const stewart_leg * leg, const stewart_motion * m
   vector x_rate = add(read3(motion->linear_velocity), a_rate);
   vector x_acc = add(read3(motion->linear_acceleration), a_acc);
   real rate = dot(s, x_rate);
-  double pitch = pitch_of(leg);
+  double pitch = leg->pitch;
   vector s_rate = scale(at.per_length, subtract(x_rate, scale(rate, s)));
   real acc = dot(s, x_acc) + at.length * dot(s_rate, s_rate);
   drive.position = at.length, drive.rate = rate, drive.acceleration = acc;
@@ -238,7 +235,7 @@ static void turning_row(
   vector s = at.direction, u = fixed3(leg->base_universal_axis);
   vector w = rotate(motion->rotation, fixed3(leg->platform_universal_axis));
   real us = dot(u, s), ws = dot(w, s);
-  double pitch = pitch_of(leg);
+  double pitch = leg->pitch;
   real of_u = pitch / (1.0 - us * us), of_w = pitch / (1.0 - ws * ws);
   vector turn = subtract(scale(us * of_u, cross(s, u)), scale(ws * of_w, cross(s, w)));
   vector h = add(s, scale(at.per_length, turn));
@@ -484,7 +481,7 @@ static void solve(
   determinant *= size * size * size;
   result->determinant = determinant, result->determinant_rate = determinant * change;
   result->condition_number = conditioned ? CONDITION_OF(rows, inverse) : number(0.0);
-  if (pitch_of(&platform->legs[0]) == 0.0) {return;}
+  if (platform->legs[0].pitch == 0.0) {return;}
 
   /* Screws that turn with their legs: J_q^T f = wrench, by virtual work f q'. */
   for (int i = 0; i < 6; i++) {
@@ -538,25 +535,42 @@ int stewart_rotation(const double quaternion[4], double rotation[9]) {
   return STEWART_OK;
 }
 
+/* Whether an inertia xx xy xz yy yz zz, with a part of its trace added, is positive definite. */
+static int is_definite(const double i[6], double part) {
+  double added = part * (i[0] + i[3] + i[5]);
+  double xx = i[0] + added, yy = i[3] + added, zz = i[5] + added;
+  double y = yy - i[1] * i[1] / xx, yz = i[4] - i[1] * i[2] / xx;
+  return xx > 0.0 && y > 0.0 && zz - i[2] * i[2] / xx - yz * yz / y > 0.0;
+}
+
 int stewart_add_payload(
   stewart_platform * platform, double mass, const double center_of_mass[3],
   const double inertia[6]) {
   if (!platform || !center_of_mass || !inertia) {return STEWART_NULL;}
   if (!all_finite(&mass, sizeof mass) || !all_finite(center_of_mass, 3 * sizeof(double)) ||
       !all_finite(inertia, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
-  stewart_platform whole = *platform;
-  whole.mass = platform->mass + mass;
-  if (!(whole.mass > 0.0)) {return STEWART_OUT_OF_RANGE;}
+  double total = platform->mass + mass, whole[9];  /* center of mass, inertia */
+  if (!(total > 0.0)) {return STEWART_OUT_OF_RANGE;}
+  double part_inertia[6];
+  int is_point = 1;
+  for (int n = 0; n < 6; n++) {
+    part_inertia[n] = mass < 0.0 ? -inertia[n] : inertia[n];
+    is_point = is_point && inertia[n] == 0.0;
+  }
+  if (!is_point && !is_definite(part_inertia, DEFINITENESS)) {return STEWART_BROKEN_RULE;}
   vector center = read3(platform->center_of_mass), arm = subtract(read3(center_of_mass), center);
   /* Parallel axes: both bodies about their common center of mass (Huygens and Steiner). */
-  double part = mass / whole.mass, reduced = platform->mass * part, square = dot(arm, arm);
-  put3(whole.center_of_mass, add(center, scale(part, arm)));
+  double part = mass / total, reduced = platform->mass * part, square = dot(arm, arm);
+  put3(whole, add(center, scale(part, arm)));
   double turning[6] = {square - arm.x * arm.x, -arm.x * arm.y, -arm.x * arm.z,
     square - arm.y * arm.y, -arm.y * arm.z, square - arm.z * arm.z};
-  for (int n = 0; n < 6; n++) {whole.inertia[n] += inertia[n] + reduced * turning[n];}
-  if (!isfinite(whole.mass) || !all_finite(whole.center_of_mass, 3 * sizeof(double)) ||
-      !all_finite(whole.inertia, 6 * sizeof(double))) {return STEWART_OUT_OF_RANGE;}
-  *platform = whole;
+  for (int n = 0; n < 6; n++) {
+    whole[3 + n] = platform->inertia[n] + (inertia[n] + reduced * turning[n]);
+  }
+  if (!isfinite(total) || !all_finite(whole, sizeof whole)) {return STEWART_OUT_OF_RANGE;}
+  platform->mass = total;
+  put3(platform->center_of_mass, read3(whole));
+  for (int n = 0; n < 6; n++) {platform->inertia[n] = whole[3 + n];}
   return STEWART_OK;
 }
 
@@ -623,6 +637,209 @@ static double clearance_of(
   return clearance;
 }
 
+static double norm(vector a) {return sqrt(dot(a, a));}
+
+/* Return the shortest vector from a segment q to a segment p. */
+static vector between(vector p, vector p_end, vector q, vector q_end) {
+  vector along = subtract(p_end, p), other = subtract(q_end, q), gap = subtract(p, q);
+  double length = norm(along), other_length = norm(other);
+  vector s = scale(length > 0.0 ? 1.0 / length : 0.0, along);
+  vector t = scale(other_length > 0.0 ? 1.0 / other_length : 0.0, other);
+  vector normal = cross(s, t);
+  double square = dot(normal, normal);
+  double u = square > 0.0 ? dot(gap, subtract(scale(dot(s, t), t), s)) / square : 0.0;
+  return shortest_of(gap, s, t, u, length, other_length);
+}
+
+/* Return the normal of a plate of corners, as long as twice its area. */
+static vector plate_area(int count, const double (* plate)[3]) {
+  vector origin = read3(plate[0]), area = make(0.0, 0.0, 0.0);
+  for (int n = 1; n < count - 1; n++) {
+    area = add(area, cross(subtract(read3(plate[n]), origin),
+                           subtract(read3(plate[n + 1]), origin)));
+  }
+  return area;
+}
+
+/* Return the distance of a segment from a plate of corners, zero where it crosses it; where it is
+   `enough` away from the plate's plane, the distance from the plane. */
+static double from_plate(
+  int count, const double (* plate)[3], vector p, vector p_end, double enough) {
+  vector origin = read3(plate[0]), area = plate_area(count, plate);
+  vector normal = scale(1.0 / norm(area), area);
+  double height = dot(normal, subtract(p, origin));
+  double end_height = dot(normal, subtract(p_end, origin));
+  double lowest = least(fabs(height), fabs(end_height)), distance = HUGE_VAL;
+  int crossing = (height < 0.0) != (end_height < 0.0), over = 1, end_over = 1;
+  if (!crossing && lowest >= enough) {return lowest;}
+  double part = crossing ? height / (height - end_height) : 0.0;
+  vector x = add(p, scale(part, subtract(p_end, p)));
+  for (int n = 0; n < count; n++) {
+    vector corner = read3(plate[n]), next = read3(plate[n + 1 < count ? n + 1 : 0]);
+    vector inward = cross(normal, subtract(next, corner));
+    over = over && dot(inward, subtract(p, corner)) >= 0.0;
+    end_over = end_over && dot(inward, subtract(p_end, corner)) >= 0.0;
+    crossing = crossing && dot(inward, subtract(x, corner)) >= 0.0;
+    distance = least(distance, norm(between(p, p_end, corner, next)));
+  }
+  if (crossing) {return 0.0;}
+  distance = over ? least(distance, fabs(height)) : distance;
+  return end_over ? least(distance, fabs(end_height)) : distance;
+}
+
+enum { BASE_PLATE = 6, MOVING_PLATE = 7 };
+
+static void keep_nearest(
+  double clearances[6], int nearest[6], int leg, int other, double clearance) {
+  if (clearance < clearances[leg]) {clearances[leg] = clearance, nearest[leg] = other;}
+}
+
+/* A plate limits the clearance of parts that are not joined to it: the moving one that of the
+   cylinders, the one of the base that of the pistons, from the end of the cylinder on. */
+static void put_plates(
+  const stewart_platform * platform, const stewart_motion * motion, const leg_pose at[6],
+  double clearances[6], int nearest[6]) {
+  for (int i = 0; i < 6; i++) {
+    const stewart_leg * leg = &platform->legs[i];
+    vector joint = read3(leg->base_joint), s = at[i].direction;
+    double cylinder = leg->cylinder_length < at[i].length ? leg->cylinder_length : at[i].length;
+    if (platform->n_platform_outline) {
+      vector begin = rotate_back(motion->rotation, subtract(joint, read3(motion->position)));
+      vector end = add(begin, scale(cylinder, rotate_back(motion->rotation, s)));
+      double radius = leg->cylinder_radius;
+      keep_nearest(clearances, nearest, i, MOVING_PLATE, from_plate(
+        platform->n_platform_outline, platform->platform_outline, begin, end,
+        clearances[i] + radius) - radius);
+    }
+    if (platform->n_base_outline) {
+      vector begin = add(joint, scale(leg->cylinder_length, s));
+      vector end = add(joint, scale(at[i].length, s));
+      double radius = leg->piston_radius;
+      keep_nearest(clearances, nearest, i, BASE_PLATE, from_plate(
+        platform->n_base_outline, platform->base_outline, begin, end,
+        clearances[i] + radius) - radius);
+    }
+  }
+}
+
+/* Write the clearance of each leg from the nearest leg or plate, and which that is. */
+static void put_clearances(
+  const stewart_platform * platform, const stewart_motion * motion, double clearances[6],
+  int nearest[6]) {
+  leg_pose at[6];
+  for (int i = 0; i < 6; i++) {
+    at[i] = pose_of(&platform->legs[i], motion->position, motion->rotation);
+    clearances[i] = HUGE_VAL, nearest[i] = i;
+  }
+  for (int i = 0; i < 6; i++) {
+    for (int j = i + 1; j < 6; j++) {
+      double clearance = clearance_of(&platform->legs[i], &platform->legs[j], &at[i], &at[j]);
+      keep_nearest(clearances, nearest, i, j, clearance);
+      keep_nearest(clearances, nearest, j, i, clearance);
+    }
+  }
+  put_plates(platform, motion, at, clearances, nearest);
+}
+
+/* Write the angles of the joints [rad]; nan where an axis is. */
+static void put_joint_angles(
+  const stewart_platform * platform, const stewart_motion * motion, double base_angles[6],
+  double platform_angles[6]) {
+  for (int i = 0; i < 6; i++) {
+    const stewart_leg * leg = &platform->legs[i];
+    vector s = pose_of(leg, motion->position, motion->rotation).direction;
+    base_angles[i] = joint_angle(leg->base_joint_axis, s);
+    platform_angles[i] = joint_angle(
+      leg->platform_joint_axis, rotate_back(motion->rotation, s));
+  }
+}
+
+/* ---- motors --------------------------------------------------------------------------------- */
+
+/* Return the torque of a screw by that of an ideal one; losses are friction by the load. */
+static double torque_factor(double power, double slipping, double driving, double driven)
+{return 1.0 + (power > 0.0 ? driving : driven) * fabs(slipping);}
+
+/* Return that for a rate of the drive and the power that its load takes. */
+static double factor_of(const stewart_leg * leg, double power, double rate) {
+  return torque_factor(
+    power, slip(rate / leg->loss_velocity), leg->driving_loss, leg->driven_loss);
+}
+
+static double screw_torque(const stewart_leg * leg, double through, double rate)
+{return through / leg->motor_ratio * factor_of(leg, through * rate, rate);}
+
+/* Return the torque of the torque-speed curve at a speed; infinite without points. */
+static double curve_torque(const stewart_platform * platform, double speed) {
+  int count = platform->n_torque_speed;
+  if (count == 0) {return HUGE_VAL;}
+  double torque = platform->torque_speed[0][1], at = fabs(speed);
+  for (int n = 1; n < count; n++) {
+    const double * a = platform->torque_speed[n - 1], * b = platform->torque_speed[n];
+    if (at > a[0]) {torque = a[1] + least((at - a[0]) / (b[0] - a[0]), 1.0) * (b[1] - a[1]);}
+  }
+  return at > platform->torque_speed[count - 1][0] * (1.0 + LIMIT_TOLERANCE) ? 0.0 : torque;
+}
+
+/* Return a value limited to +- most; nan stays nan. */
+static double clipped(double value, double most)
+{return value > most ? most : value < -most ? -most : value;}
+
+/* Write the motors of demanded forces; commands are those of the forces to command. */
+static void put_motors(
+  const stewart_platform * platform, const stewart_motion * motion, const double demanded[6],
+  const double forces[6], stewart_motors * motors) {
+  for (int i = 0; i < 6; i++) {
+    const stewart_leg * leg = &platform->legs[i];
+    drive_motion of = move_drive(leg, motion);
+    double ratio = leg->motor_ratio, mass = leg->reflected_mass, speed = ratio * of.rate;
+    double acceleration = ratio * of.acceleration, own = mass / ratio / ratio * acceleration;
+    double through = demanded[i] - mass * of.acceleration;
+    double torque = own + screw_torque(leg, through, of.rate), breakaway = torque;
+    if (fabs(of.rate) < leg->loss_velocity) {
+      double other = own + through / ratio * (1.0 + leg->driven_loss);
+      breakaway = own + through / ratio * (1.0 + leg->driving_loss);
+      breakaway = fabs(other) > fabs(breakaway) ? other : breakaway;
+    }
+    double available = least(leg->torque_max, curve_torque(platform, speed));
+    double command = own + screw_torque(leg, forces[i] - mass * of.acceleration, of.rate);
+    double current = torque / leg->torque_constant;
+    double heat = leg->resistance * current * current;
+    motors->angles[i] = ratio * (of.position - leg->zero_length);
+    motors->speeds[i] = speed;
+    motors->commands[i] = clipped(command, available);
+    motors->breakaway_torques[i] = breakaway;
+    motors->torques[i] = torque;
+    motors->accelerations[i] = acceleration;
+    motors->currents[i] = current;
+    motors->power[i] = torque * speed + heat;
+    motors->copper_heat[i] = heat;
+    motors->available_torques[i] = available;
+  }
+}
+
+int stewart_motor_torques(
+  const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
+  stewart_motors * motors) {
+  stewart_motors found;
+  if (!platform || !motion || !forces || !motors) {return STEWART_NULL;}
+  if (!(platform->legs[0].screw_lead > 0.0)) {return STEWART_NO_MOTORS;}
+  put_motors(platform, motion, forces, forces, &found);
+  if (!all_finite(found.angles, sizeof found.angles) ||
+      !all_finite(found.speeds, sizeof found.speeds) ||
+      !all_finite(found.torques, sizeof found.torques) ||
+      !all_finite(found.accelerations, sizeof found.accelerations)) {return STEWART_OUT_OF_RANGE;}
+  *motors = found;
+  return STEWART_OK;
+}
+
+/* Return a temperature rise [K] after a time [s] of constant copper heat [W]. */
+static double warmed(
+  double rise, double heat, double time, double resistance, double time_constant)
+{return rise + (rise - heat * resistance) * expm1(-time / time_constant);}
+
+/* ---- limits --------------------------------------------------------------------------------- */
+
 /* Return the bit of a limit if a value is past it, above rounding errors; nan never is. */
 static unsigned above(double value, double most, unsigned bit)
 {return value > most * (1.0 + LIMIT_TOLERANCE) ? bit : 0u;}
@@ -630,35 +847,31 @@ static unsigned above(double value, double most, unsigned bit)
 static unsigned below(double value, double minimum, unsigned bit)
 {return value < minimum * (1.0 - LIMIT_TOLERANCE) ? bit : 0u;}
 
-/* Return which limits of its joints a leg exceeds. */
-static unsigned check_angles(const stewart_leg * leg, double base_angle, double platform_angle) {
-  return above(base_angle, leg->base_joint_angle_max, STEWART_BASE_JOINT_ANGLE_MAX) |
-    above(platform_angle, leg->platform_joint_angle_max, STEWART_PLATFORM_JOINT_ANGLE_MAX);
+enum { POSE, TWIST, LOAD, MOTOR };  /* what the quantity of a limit depends on */
+
+/* Return which limits a leg exceeds. */
+static unsigned check_leg(
+  const stewart_platform * platform, const stewart_output * found, int i) {
+  const stewart_leg * leg = &platform->legs[i];
+  unsigned exceeded = below(
+    found->clearances[i], platform->leg_clearance_min, STEWART_LEG_CLEARANCE_MIN);
+  unsigned of_motors = STEWART_TORQUE_SPEED;
+  if (found->motors.available_torques[i] < leg->torque_max) {
+    exceeded |= above(fabs(found->motors.breakaway_torques[i]),
+                      found->motors.available_torques[i], STEWART_TORQUE_SPEED);
+  }
+#define MINIMUM(bit, NAME, field, DEPENDS, quantity) \
+  exceeded |= below(found->quantity[i], leg->field, bit);
+#define MAXIMUM(bit, NAME, field, DEPENDS, quantity) \
+  exceeded |= above(fabs(found->quantity[i]), leg->field, bit); \
+  of_motors |= DEPENDS == MOTOR ? bit : 0u;
+  STEWART_LIMITS(MINIMUM, MAXIMUM)
+#undef MINIMUM
+#undef MAXIMUM
+  return found->finite_motors > 0.0 ? exceeded : exceeded & ~of_motors;
 }
 
-/* Write for each leg which limits of its joints and of clearance a motion exceeds. */
-static void check_joints(
-  const stewart_platform * platform, const stewart_motion * motion, unsigned exceeded[6]) {
-  const stewart_leg * legs = platform->legs;
-  leg_pose at[6];
-  for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &legs[i];
-    at[i] = pose_of(leg, motion->position, motion->rotation);
-    vector s = at[i].direction, s_p = rotate_back(motion->rotation, s);
-    exceeded[i] = check_angles(
-      leg, isfinite(leg->base_joint_angle_max) ? joint_angle(leg->base_joint_axis, s) : 0.0,
-      isfinite(leg->platform_joint_angle_max) ? joint_angle(leg->platform_joint_axis, s_p) : 0.0);
-  }
-  for (int i = 0; isfinite(platform->leg_clearance_min) && i < 6; i++) {
-    for (int j = i + 1; j < 6; j++) {
-      unsigned near = below(clearance_of(&legs[i], &legs[j], &at[i], &at[j]),
-                            platform->leg_clearance_min, STEWART_LEG_CLEARANCE_MIN);
-      exceeded[i] |= near, exceeded[j] |= near;
-    }
-  }
-}
-
-/* ---- singularity warning, limits, the step -------------------------------------------------- */
+/* ---- singularity warning, the step ---------------------------------------------------------- */
 
 static void advance_warning(
   const stewart_platform * platform, const stewart_result * result, stewart_state * state) {
@@ -679,29 +892,109 @@ static void advance_warning(
   state->determinant = det != 0.0 ? det : state->determinant;
 }
 
-/* Return which limits a leg exceeds by its result; of rates and loads, a share of them. */
-static unsigned check_leg(
-  const stewart_leg * leg, const stewart_result * result, int i, double share) {
-  return below(result->lengths[i], leg->length_min, STEWART_LENGTH_MIN) |
-    above(result->lengths[i], leg->length_max, STEWART_LENGTH_MAX) |
-    above(fabs(result->rates[i]), share * leg->velocity_max, STEWART_VELOCITY_MAX) |
-    above(fabs(result->forces[i]), share * leg->force_max, STEWART_FORCE_MAX) |
-    above(fabs(result->joint_forces[i]), share * leg->joint_force_max, STEWART_JOINT_FORCE_MAX);
+static void fill_nan(double * numbers, size_t size) {
+  for (size_t n = 0; n < size / sizeof(double); n++) {numbers[n] = NAN;}
 }
 
-/* Whether the forces are suppressed; running: a motor is too fast or too hot. */
-static int suppresses(
-  const stewart_platform * platform, int stopped, unsigned exceeded, int running) {
-  return (stopped && platform->suppress_near_singularity) ||
-    (((exceeded & ~(unsigned)STEWART_FORCE_MAX) || running) && platform->suppress_at_limits);
-}
-
-/* Write the forces within the limit; nan stays nan. */
-static void clip_forces(
-  const stewart_platform * platform, const stewart_result * result, double forces[6]) {
+/* Write forces and motors of an output, which follow from its result; known: the base's motion is.
+   Joint angles and clearances are nan. */
+static void complete_loads(
+  const stewart_platform * platform, const stewart_motion * motion, int known,
+  stewart_output * to) {
+  stewart_result * result = &to->result;
+  to->answered = all_finite(result, sizeof *result);
+  to->solved = known && result->condition_number < UNSOLVABLE_CONDITION;
   for (int i = 0; i < 6; i++) {
-    double force = result->forces[i], most = platform->legs[i].force_max;
-    forces[i] = force > most ? most : force < -most ? -most : force;
+    const stewart_leg * leg = &platform->legs[i];
+    if (to->solved == 0.0) {result->forces[i] = result->joint_forces[i] = NAN;}
+    to->positions[i] = result->lengths[i] - leg->zero_length;
+    to->forces[i] = clipped(result->forces[i], leg->force_max);
+    to->base_joint_angles[i] = to->platform_joint_angles[i] = to->clearances[i] = NAN;
+    to->rises[i] = NAN, to->nearest[i] = i, to->exceeded[i] = 0;
+  }
+  to->finite_motors = 0.0;
+  if (!platform->with_motors) {
+    fill_nan(to->motors.angles, sizeof to->motors);
+    return;
+  }
+  put_motors(platform, motion, result->forces, to->forces, &to->motors);
+  int finite = all_finite(to->motors.angles, sizeof to->motors.angles) &&
+    all_finite(to->motors.speeds, sizeof to->motors.speeds);
+  for (int i = 0; i < 6; i++) {finite = finite && !isinf(to->motors.breakaway_torques[i]);}
+  to->finite_motors = finite;
+}
+
+/* Write all of an output that follows from its result. */
+static void complete_output(
+  const stewart_platform * platform, const stewart_motion * motion, int known,
+  stewart_output * to) {
+  complete_loads(platform, motion, known, to);
+  if (platform->with_joint_angles) {
+    put_joint_angles(platform, motion, to->base_joint_angles, to->platform_joint_angles);
+  }
+  if (platform->with_clearance) {
+    put_clearances(platform, motion, to->clearances, to->nearest);
+  }
+}
+
+/* Advance the windings by a time, under the copper heat since the last setpoint. */
+static void heat_windings(
+  const stewart_platform * platform, double time, const stewart_state * state,
+  stewart_output * to) {
+  for (int i = 0; i < 6; i++) {
+    const stewart_leg * leg = &platform->legs[i];
+    to->rises[i] = warmed(state->rises[i], state->copper_heat[i], time, leg->thermal_resistance,
+                          leg->thermal_time_constant);
+  }
+}
+
+/* Keep an output as the one before the next. */
+static void keep_output(const stewart_output * from, int64_t stamp, stewart_state * state) {
+  state->followed = 1, state->stamp = stamp;
+  for (int i = 0; i < 6; i++) {
+    double heat = from->motors.copper_heat[i];
+    state->lengths[i] = from->result.lengths[i], state->rises[i] = from->rises[i];
+    state->copper_heat[i] = isfinite(heat) ? heat : state->copper_heat[i];
+  }
+}
+
+/* Advance the state by a complete output: warning, windings, limits, what is to be commanded. A
+   leg may move at its largest rate for an additional time, `slack` [s]. */
+static void advance_step(
+  const stewart_platform * platform, int64_t stamp, double slack, int restart,
+  stewart_state * state, stewart_output * to) {
+  to->restart = restart = restart || state->restarting > 0.0;
+  state->restarting = restart && to->answered == 0.0;  /* then the next setpoint is the restart */
+  if (to->answered == 0.0) {return;}
+  int first = !state->followed, warned = state->warning != STEWART_NO_WARNING;
+  if (restart) {  /* this setpoint is the first, but for the count of crossings */
+    state->warning = STEWART_NO_WARNING, state->stopped = 0, state->determinant = 0.0;
+  }
+  advance_warning(platform, &to->result, state);
+  to->changed = first || warned != (state->warning != STEWART_NO_WARNING);
+  to->warning = state->warning, to->stopped = state->stopped;
+  to->determinant = state->determinant, to->time_to_crossing = state->time_to_crossing;
+  to->crossings = state->crossings;
+
+  double since = 0.0, elapsed = HUGE_VAL;
+  if (!first && !restart && stamp > state->stamp) {
+    since = (double)(stamp - state->stamp) * 1e-9;
+    elapsed = since + slack;
+  }
+  if (platform->with_motors) {heat_windings(platform, since, state, to);}
+  unsigned any = 0;
+  for (int i = 0; i < 6; i++) {
+    double way = first ? (double)NAN : to->result.lengths[i] - state->lengths[i];
+    to->mean_rates[i] = way / elapsed;
+    to->exceeded[i] = check_leg(platform, to, i) |
+      above(fabs(way), platform->legs[i].velocity_max * elapsed, STEWART_JUMP);
+    any |= to->exceeded[i];
+  }
+  to->jumped = (any & STEWART_JUMP) != 0, to->exceeding = any != 0;
+  if (to->jumped == 0.0) {keep_output(to, stamp, state);}
+  if (to->solved == 0.0 || (state->stopped && platform->suppress_near_singularity) ||
+      ((any & ~(unsigned)STEWART_CLIPPED) && platform->suppress_at_limits)) {
+    for (int i = 0; i < 6; i++) {to->forces[i] = to->motors.commands[i] = NAN;}
   }
 }
 
@@ -709,64 +1002,205 @@ int stewart_step(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
   const stewart_base * base, int64_t stamp, stewart_state * state, stewart_output * output) {
   stewart_output found;
-  unsigned any = 0;
   if (!state || !output) {return STEWART_NULL;}
   if (stamp < -STAMPS_END || stamp >= STAMPS_END) {return STEWART_OUT_OF_RANGE;}
   int code = stewart_inverse_dynamics(platform, motion, wrench, base, &found.result);
   if (code != STEWART_OK && code != STEWART_SINGULAR) {return code;}
-  advance_warning(platform, &found.result, state);
-  check_joints(platform, motion, found.exceeded);
-  double elapsed = HUGE_VAL;
-  if (state->followed && stamp > state->stamp) {
-    elapsed = (double)(stamp - state->stamp) * 1e-9 + (JITTER + platform->sync_tolerance);
-  }
-  for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &platform->legs[i];
-    double way = state->followed ? found.result.lengths[i] - state->lengths[i] : 0.0;
-    found.exceeded[i] |= check_leg(leg, &found.result, i, 1.0) |
-      above(fabs(way), leg->velocity_max * elapsed, STEWART_JUMP);
-    any |= found.exceeded[i];
-  }
-  if (!(any & STEWART_JUMP)) {
-    state->followed = 1, state->stamp = stamp;
-    for (int i = 0; i < 6; i++) {state->lengths[i] = found.result.lengths[i];}
-  }
-  clip_forces(platform, &found.result, found.forces);
-  if (code == STEWART_OK && suppresses(platform, state->stopped, any, 0)) {
-    code = STEWART_SUPPRESSED;
-    for (int i = 0; i < 6; i++) {found.forces[i] = 0.0;}
+  complete_output(platform, motion, 1, &found);
+  advance_step(platform, stamp, JITTER + platform->sync_tolerance, 0, state, &found);
+  if (code == STEWART_OK && isnan(found.forces[0])) {code = STEWART_SUPPRESSED;}
+  for (int i = 0; code != STEWART_OK && i < 6; i++) {
+    found.forces[i] = found.motors.commands[i] = 0.0;
+    if (code == STEWART_SINGULAR) {found.result.forces[i] = found.result.joint_forces[i] = 0.0;}
   }
   *output = found;
   return code;
 }
 
-/* ---- motors --------------------------------------------------------------------------------- */
+/* ---- the rules of a hexapod ----------------------------------------------------------------- */
 
-/* Return the torque of a screw by that of an ideal one; losses are friction by the load. */
-static double torque_factor(double power, double slipping, double driving, double driven)
-{return 1.0 + (power > 0.0 ? driving : driven) * fabs(slipping);}
-
-int stewart_motor_torques(
-  const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
-  stewart_motors * motors) {
-  stewart_motors found;
-  if (!platform || !motion || !forces || !motors) {return STEWART_NULL;}
-  if (!(platform->legs[0].screw_lead > 0.0)) {return STEWART_NO_MOTORS;}
-  for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &platform->legs[i];
-    drive_motion drive = move_drive(leg, motion);
-    double rate = drive.rate, ratio = 2.0 * PI * leg->gear_ratio / leg->screw_lead;
-    found.angles[i] = ratio * (drive.position - leg->zero_length);
-    found.speeds[i] = ratio * rate;
-    found.accelerations[i] = ratio * drive.acceleration;
-    double through = forces[i] - leg->reflected_mass * drive.acceleration;  /* the screw */
-    found.torques[i] = leg->reflected_mass / ratio / ratio * found.accelerations[i] +
-      through / ratio * torque_factor(through * rate, slip(rate / leg->coulomb_velocity),
-        1.0 / leg->efficiency - 1.0, leg->back_driving_efficiency - 1.0);
+const char * stewart_rule(int code) {
+  switch (code) {
+#define RULE(code, NAME, parameters, rule) case code: return parameters ": " rule;
+    STEWART_RULES(RULE)
+#undef RULE
+    default: return NULL;
   }
-  if (!all_finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
-  *motors = found;
-  return STEWART_OK;
+}
+
+/* Mean distance of the platform joints from their center [m], and their largest coordinate. */
+static double mean_radius(const stewart_platform * platform, double * extent) {
+  vector center = {0.0, 0.0, 0.0};
+  double sum = 0.0;
+  *extent = 0.0;
+  for (int i = 0; i < 6; i++) {
+    vector joint = read3(platform->legs[i].platform_joint);
+    center = add(center, joint);
+    *extent = largest(*extent, largest(fabs(joint.x), largest(fabs(joint.y), fabs(joint.z))));
+  }
+  center = make(center.x / 6.0, center.y / 6.0, center.z / 6.0);
+  for (int i = 0; i < 6; i++) {
+    sum += norm(subtract(read3(platform->legs[i].platform_joint), center));
+  }
+  return sum / 6.0;
+}
+
+/* Give an axis unit length, unless it has that or is not set. */
+static void put_unit(double axis[3]) {
+  double size = largest(fabs(axis[0]), largest(fabs(axis[1]), fabs(axis[2])));
+  if (!(size > 0.0 && fabs(norm(read3(axis)) - 1.0) > 1e-15)) {return;}
+  vector scaled = make(axis[0] / size, axis[1] / size, axis[2] / size);
+  double length = norm(scaled);
+  put3(axis, make(scaled.x / length, scaled.y / length, scaled.z / length));
+}
+
+void stewart_complete(stewart_platform * platform) {
+  double extent, radius = mean_radius(platform, &extent);
+  if (!(platform->characteristic_length > 0.0)) {platform->characteristic_length = radius;}
+  platform->with_joint_angles = 0;
+  platform->with_clearance = isfinite(platform->leg_clearance_min);
+  for (int i = 0; i < 6; i++) {
+    stewart_leg * leg = &platform->legs[i];
+    double gear = leg->gear_ratio, ratio = leg->screw_lead > 0.0 ?
+      2.0 * PI * gear / leg->screw_lead : (double)NAN;
+    if (isnan(leg->back_driving_efficiency)) {
+      leg->back_driving_efficiency = 2.0 - 1.0 / leg->efficiency;
+    }
+    if (leg->screw_lead > 0.0 && (leg->motor_inertia > 0.0 || leg->screw_inertia > 0.0)) {
+      leg->reflected_mass =
+        ratio * ratio * (leg->motor_inertia + leg->screw_inertia / (gear * gear));
+    }
+    leg->motor_ratio = ratio;
+    leg->pitch = leg->twist_ratio == 0.0 ? 0.0 :
+      leg->twist_ratio * leg->screw_lead / (2.0 * PI * gear);
+    leg->driving_loss = 1.0 / leg->efficiency - 1.0;
+    leg->driven_loss = leg->back_driving_efficiency - 1.0;
+    leg->loss_velocity = leg->coulomb_velocity;
+    put_unit(leg->base_joint_axis), put_unit(leg->platform_joint_axis);
+    put_unit(leg->base_universal_axis), put_unit(leg->platform_universal_axis);
+    platform->with_joint_angles = platform->with_joint_angles ||
+      isfinite(leg->base_joint_angle_max) || isfinite(leg->platform_joint_angle_max);
+  }
+}
+
+/* Write the corners of a plate from the first one, of size 1 whatever its size is; return whether it
+   has one. */
+static int scale_plate(int count, const double (* plate)[3], double scaled[][3]) {
+  double extent = 0.0, size = 0.0;
+  for (int n = 0; n < 3 * count; n++) {extent = largest(extent, fabs(plate[n / 3][n % 3]));}
+  for (int n = 0; n < 3 * count; n++) {
+    scaled[n / 3][n % 3] = plate[n / 3][n % 3] / extent - plate[0][n % 3] / extent;
+    size = largest(size, fabs(scaled[n / 3][n % 3]));
+  }
+  for (int n = 0; n < 3 * count; n++) {scaled[n / 3][n % 3] /= size;}
+  return size > 0.0;
+}
+
+/* Return the rule of a plate that its corners break. */
+static int check_plate(int count, const double (* plate)[3]) {
+  double corners[sizeof ((stewart_platform *)NULL)->base_outline / (3 * sizeof(double))][3];
+  double least_turn = HUGE_VAL, around = 0.0;
+  if (count == 0) {return STEWART_VALID;}
+  if (count < 3) {return STEWART_RULE_CORNERS;}
+  if (!scale_plate(count, plate, corners)) {return STEWART_RULE_CORNERS_ON_A_LINE;}
+  vector area = plate_area(count, (const double (*)[3])corners);
+  if (!(norm(area) > FLATNESS)) {return STEWART_RULE_CORNERS_ON_A_LINE;}
+  vector normal = scale(1.0 / norm(area), area);
+  for (int n = 0; n < count; n++) {
+    vector corner = read3(corners[n]), next = read3(corners[(n + 1) % count]);
+    vector edge = subtract(next, corner);
+    vector next_edge = subtract(read3(corners[(n + 2) % count]), next);
+    if (fabs(dot(normal, corner)) > FLATNESS) {return STEWART_RULE_CORNERS_IN_A_PLANE;}
+    double turn = dot(normal, cross(edge, next_edge));
+    least_turn = least(least_turn, turn), around += atan2(turn, dot(edge, next_edge));
+  }
+  return least_turn < -FLATNESS || around > 3.0 * PI ? STEWART_RULE_CONVEX : STEWART_VALID;
+}
+
+/* Whether an axis has a direction, or is not set. */
+static int has_direction(const double axis[3])
+{return axis[0] != 0.0 || axis[1] != 0.0 || axis[2] != 0.0;}
+
+static int check_drive(const stewart_platform * platform, const stewart_leg * leg) {
+  if (platform->with_motors && !(leg->screw_lead > 0.0)) {return STEWART_RULE_SCREW_LEAD;}
+  if (!(leg->efficiency > 0.0 && leg->efficiency <= 1.0)) {return STEWART_RULE_EFFICIENCY;}
+  if (isfinite(leg->resistance) && isnan(leg->torque_constant)) {return STEWART_RULE_RESISTANCE;}
+  if (isfinite(leg->thermal_resistance) &&
+      (isnan(leg->resistance) || isnan(leg->thermal_time_constant))) {
+    return STEWART_RULE_THERMAL_RESISTANCE;
+  }
+  if (isfinite(leg->thermal_time_constant) && isnan(leg->thermal_resistance)) {
+    return STEWART_RULE_THERMAL_TIME_CONSTANT;
+  }
+  if (isfinite(leg->temperature_rise_max) && isnan(leg->thermal_resistance)) {
+    return STEWART_RULE_TEMPERATURE_RISE;
+  }
+  if (!has_direction(leg->base_universal_axis)) {return STEWART_RULE_BASE_UNIVERSAL;}
+  return has_direction(leg->platform_universal_axis) ? STEWART_VALID :
+    STEWART_RULE_PLATFORM_UNIVERSAL;
+}
+
+static int check_leg_rules(const stewart_platform * platform, const stewart_leg * leg) {
+  int limits = 1;
+#define MINIMUM(bit, NAME, field, DEPENDS, quantity) limits = limits && leg->field >= 0.0;
+#define MAXIMUM(bit, NAME, field, DEPENDS, quantity) limits = limits && leg->field > 0.0;
+  STEWART_LIMITS(MINIMUM, MAXIMUM)
+#undef MINIMUM
+#undef MAXIMUM
+  if (!all_finite(leg->base_joint, 6 * sizeof(double)) || !isfinite(leg->zero_length) ||
+      !isfinite(leg->cylinder_center_of_mass) || !isfinite(leg->piston_center_of_mass)) {
+    return STEWART_RULE_FINITE;
+  }
+  if (!(leg->cylinder_mass >= 0.0 && leg->piston_mass >= 0.0 && leg->cylinder_inertia >= 0.0 &&
+        leg->piston_inertia >= 0.0)) {return STEWART_RULE_LEG_MASS;}
+  if (!(leg->reflected_mass >= 0.0 && leg->viscous_friction >= 0.0 &&
+        leg->coulomb_friction >= 0.0)) {return STEWART_RULE_ACTUATOR;}
+  if (!(leg->coulomb_velocity > 0.0)) {return STEWART_RULE_COULOMB_VELOCITY;}
+  if (!limits) {return STEWART_RULE_LIMIT;}
+  if (!(leg->length_min < leg->length_max)) {return STEWART_RULE_LENGTHS;}
+  if (platform->with_clearance && !(leg->cylinder_radius >= 0.0 && leg->cylinder_length >= 0.0 &&
+                                    leg->piston_radius >= 0.0)) {return STEWART_RULE_SHAPE;}
+  if (leg->piston_radius > leg->cylinder_radius) {return STEWART_RULE_RADII;}
+  if (!has_direction(leg->base_joint_axis)) {return STEWART_RULE_BASE_AXIS;}
+  if (!has_direction(leg->platform_joint_axis)) {return STEWART_RULE_PLATFORM_AXIS;}
+  return check_drive(platform, leg);
+}
+
+static int check_platform(const stewart_platform * platform) {
+  double extent, radius = mean_radius(platform, &extent);
+  if (!all_finite(platform->gravity, 3 * sizeof(double)) || !isfinite(platform->mass) ||
+      !all_finite(platform->center_of_mass, 9 * sizeof(double))) {return STEWART_RULE_FINITE;}
+  if (!(platform->mass > 0.0)) {return STEWART_RULE_MASS;}
+  if (!is_definite(platform->inertia, 0.0)) {return STEWART_RULE_INERTIA;}
+  if (!(radius > ONE_POINT * extent)) {return STEWART_RULE_ONE_POINT;}
+  if (!(platform->characteristic_length > 0.0)) {return STEWART_RULE_CHARACTERISTIC_LENGTH;}
+  if (!(platform->warn_condition >= 1.0)) {return STEWART_RULE_WARN_CONDITION;}
+  if (!(platform->stop_condition >= platform->warn_condition)) {
+    return STEWART_RULE_STOP_CONDITION;
+  }
+  if (!(platform->warn_time >= 0.0)) {return STEWART_RULE_WARN_TIME;}
+  for (int n = 0; n < platform->n_torque_speed; n++) {
+    double before = n == 0 ? -1.0 : platform->torque_speed[n - 1][0];
+    if (!(platform->torque_speed[n][0] > before && platform->torque_speed[n][0] >= 0.0)) {
+      return STEWART_RULE_TORQUE_SPEED;
+    }
+  }
+  return STEWART_VALID;
+}
+
+int stewart_check(const stewart_platform * platform, int * where) {
+  int rule = check_platform(platform), leg, plate;
+  *where = -1;
+  for (leg = 0; leg < 6 && rule == STEWART_VALID; leg++) {
+    rule = check_leg_rules(platform, &platform->legs[leg]);
+    *where = rule == STEWART_VALID ? -1 : leg;
+  }
+  for (plate = 0; plate < 2 && rule == STEWART_VALID; plate++) {
+    rule = plate == 0 ? check_plate(platform->n_base_outline, platform->base_outline) :
+      check_plate(platform->n_platform_outline, platform->platform_outline);
+    *where = rule == STEWART_VALID ? -1 : plate;
+  }
+  return rule;
 }
 
 /* ---- twist and acceleration from the legs --------------------------------------------------- */

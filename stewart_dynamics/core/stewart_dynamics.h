@@ -36,7 +36,8 @@ enum {
   STEWART_SINGULAR = 6,       /* J_inv cannot be solved: forces are zero */
   STEWART_SUPPRESSED = 7,     /* by singularity.action or limits.action: forces are zero */
   STEWART_NO_POSE = 8,        /* no pose with these lengths found from this guess */
-  STEWART_NO_MOTORS = 9       /* actuator.screw_lead is not in the parameters */
+  STEWART_NO_MOTORS = 9,      /* actuator.screw_lead is not in the parameters */
+  STEWART_BROKEN_RULE = 10    /* of the hexapod: stewart_check says which */
 };
 
 /* Why the singularity warning is on: stewart_state.warning. */
@@ -47,21 +48,35 @@ enum {
   STEWART_CROSSED = 3    /* det(J) has changed its sign since the last call */
 };
 
-/* Limits that a leg exceeds: bits of stewart_output.exceeded. All but _FORCE_MAX suppress forces
- * where limits.action says so. */
+/* The limits of a leg, a line each: bit of stewart_output.exceeded, name, field of stewart_leg;
+ * what the quantity depends on: pose, twist or load of the motion, or motor; its numbers in
+ * stewart_output, whose magnitudes must be at least a MINIMUM or at most a MAXIMUM. */
+#define STEWART_LIMITS(MINIMUM, MAXIMUM) \
+  MINIMUM(1, LENGTH_MIN, length_min, POSE, result.lengths) \
+  MAXIMUM(2, LENGTH_MAX, length_max, POSE, result.lengths) \
+  MAXIMUM(4, VELOCITY_MAX, velocity_max, TWIST, result.rates) \
+  MAXIMUM(8, FORCE_MAX, force_max, LOAD, result.forces) \
+  MAXIMUM(16, BASE_JOINT_ANGLE_MAX, base_joint_angle_max, POSE, base_joint_angles) \
+  MAXIMUM(32, PLATFORM_JOINT_ANGLE_MAX, platform_joint_angle_max, POSE, platform_joint_angles) \
+  MAXIMUM(256, JOINT_FORCE_MAX, joint_force_max, LOAD, result.joint_forces) \
+  MAXIMUM(512, TORQUE_MAX, torque_max, MOTOR, motors.breakaway_torques) \
+  MAXIMUM(2048, SPEED_MAX, speed_max, MOTOR, motors.speeds) \
+  MAXIMUM(4096, TEMPERATURE_RISE_MAX, temperature_rise_max, MOTOR, rises)
+#define STEWART_BIT(bit, NAME, field, DEPENDS, quantity) STEWART_ ## NAME = bit,
+#define STEWART_FIELD(bit, NAME, field, DEPENDS, quantity) double field;
+
+/* Limits that a leg exceeds: bits of stewart_output.exceeded. To those in _CLIPPED, forces and
+ * torques to command are clipped; while another is exceeded, limits.action may suppress them. */
 enum {
-  STEWART_LENGTH_MIN = 1,
-  STEWART_LENGTH_MAX = 2,
-  STEWART_VELOCITY_MAX = 4,
-  STEWART_FORCE_MAX = 8, /* the force to command is clipped to the limit */
-  STEWART_BASE_JOINT_ANGLE_MAX = 16,
-  STEWART_PLATFORM_JOINT_ANGLE_MAX = 32,
-  STEWART_LEG_CLEARANCE_MIN = 64,
-  STEWART_JUMP = 128, /* too far from the last setpoint for limits.velocity_max */
-  STEWART_JOINT_FORCE_MAX = 256
+  STEWART_LIMITS(STEWART_BIT, STEWART_BIT)
+  STEWART_LEG_CLEARANCE_MIN = 64, /* stewart_platform.leg_clearance_min */
+  STEWART_JUMP = 128,             /* too far from the last setpoint for limits.velocity_max */
+  STEWART_TORQUE_SPEED = 1024,    /* stewart_platform.torque_speed */
+  STEWART_CLIPPED = 1544          /* STEWART_FORCE_MAX, _TORQUE_MAX, _TORQUE_SPEED */
 };
 
-/* A leg, with the names of the parameter file; its inertias are transverse, about the CoM. */
+/* A leg, with the names of the parameter file; its inertias are transverse, about the CoM.
+ * Not set: NAN; a limit: infinite, length_min: 0; screw_lead: 0. */
 typedef struct {
   double base_joint[3], platform_joint[3]; /* base frame; platform frame [m] */
   double zero_length;                      /* where the published position is zero [m] */
@@ -69,18 +84,25 @@ typedef struct {
   double piston_mass, piston_center_of_mass, piston_inertia;       /* CoM from platform joint */
   double reflected_mass, viscous_friction, coulomb_friction;       /* [kg], [N s/m], [N] */
   double coulomb_velocity; /* rate below which Coulomb friction is linear [m/s], above 0 */
-  double length_min, length_max, velocity_max, force_max; /* 0 or infinite if not set */
-  double joint_force_max;                                 /* [N] */
-  double base_joint_axis[3], base_joint_angle_max; /* unit vector, base axes; [rad] or infinite */
-  double platform_joint_axis[3], platform_joint_angle_max;  /* platform axes */
-  double cylinder_radius, cylinder_length, piston_radius;   /* for leg_clearance_min [m] */
-  double screw_lead, gear_ratio;                            /* lead 0 if not set [m/turn] */
+  STEWART_LIMITS(STEWART_FIELD, STEWART_FIELD)      /* length_min, length_max, ... */
+  double base_joint_axis[3], platform_joint_axis[3]; /* unit vectors, base axes; platform axes */
+  double cylinder_radius, cylinder_length, piston_radius; /* for leg_clearance_min [m] */
+  double screw_lead, gear_ratio;                          /* [m/turn] */
   double efficiency, back_driving_efficiency;
+  double motor_inertia, screw_inertia;                /* [kg m^2]; reflected_mass follows */
+  double torque_constant, resistance;                 /* [N m/A], [Ohm] */
+  double thermal_resistance, thermal_time_constant;   /* [K/W], [s] */
   double twist_ratio; /* turns of the motor by turn of the leg, 0 where the screw is guided */
   double base_universal_axis[3], platform_universal_axis[3];
+  /* Written by stewart_complete: turn of the motor by metre [rad/m]; metres by turn of the leg
+   * [m/rad]; losses of a motor that drives, and is driven, less 1; rate below which they are
+   * linear [m/s]. */
+  double motor_ratio, pitch, driving_loss, driven_loss, loss_velocity;
 } stewart_leg;
 
-/* A hexapod, constant while it is used. stewart_export writes one from a parameter file. */
+/* A hexapod, constant while it is used: all that the parameter file says of its forces.
+ * stewart_export writes one; who fills or changes one calls stewart_complete, then stewart_check.
+ */
 typedef struct {
   double gravity[3];                             /* acceleration of free fall [m/s^2] */
   double mass, center_of_mass[3];                /* of platform with payload; platform axes */
@@ -90,9 +112,14 @@ typedef struct {
   double characteristic_length;                  /* divides moments in the condition number [m] */
   double warn_condition, stop_condition;         /* condition numbers */
   double warn_time;                              /* before a predicted crossing [s] */
-  double sync_tolerance;                         /* uncertainty of stamps [s] */
+  double sync_tolerance, timeout;                /* of setpoints: setpoint.* [s] */
+  double torque_speed[96][2];                    /* points: speed [rad/s] and torque [N m] */
+  double base_outline[32][3], platform_outline[32][3]; /* corners of plates [m] */
+  int n_torque_speed, n_base_outline, n_platform_outline;
+  int with_motors;                               /* drive.* is given: stewart_step has motors */
   int suppress_near_singularity;                 /* singularity.action is suppress_forces */
   int suppress_at_limits;                        /* limits.action is suppress_forces */
+  int with_joint_angles, with_clearance;         /* a limit needs them: stewart_complete */
 } stewart_platform;
 
 /* Pose of the platform frame in the base frame; rotation: platform to base axes, row by row. */
@@ -121,26 +148,112 @@ typedef struct {
   double joint_forces[6];      /* along the legs, in joints and rods: without the actuators' own */
 } stewart_result;
 
+/* Motors: zero where the published leg position is zero, + extends; nan where drive.* does not
+ * give them. */
+typedef struct {
+  double angles[6], speeds[6];     /* [rad], [rad/s] */
+  double commands[6];              /* torques to command: within the available ones [N m] */
+  double breakaway_torques[6];     /* of the demanded forces: which limits are checked with */
+  double torques[6];               /* of the demanded forces; at rest without losses */
+  double accelerations[6];         /* [rad/s^2] */
+  double currents[6], power[6];    /* [A]; from the bus [W] */
+  double copper_heat[6];           /* part of the power that heats the winding [W] */
+  double available_torques[6];     /* by torque_max and torque_speed at this speed [N m] */
+} stewart_motors;
+
 /* What stewart_step keeps from call to call: all zero before the first, or to start anew. */
 typedef struct {
   int warning;             /* STEWART_NO_WARNING, or why the warning is on */
   int stopped;             /* inside singularity.stop_condition */
   uint32_t crossings;      /* changes of sign of det(J) */
+  int followed;            /* whether stamp and what follows it are given */
   double determinant;      /* the last that was not zero [m^3] */
   double time_to_crossing; /* of det(J) = 0 at its present rate [s]; infinite: never */
-  int followed;            /* whether the next two are given */
   int64_t stamp;           /* of the last setpoint that was not a jump [ns] */
   double lengths[6];       /* at that setpoint [m] */
+  double rises[6];         /* of the temperatures of the windings at it [K] */
+  double copper_heat[6];   /* since then [W] */
+  double restarting;       /* flag: time has jumped back before a setpoint without a result */
 } stewart_state;
 
+/* What stewart_step finds. Numbers that no limit needs, and motors without drive.*, are nan. */
 typedef struct {
   stewart_result result;
-  double forces[6];     /* to command [N]: clipped to force_max; zero unless STEWART_OK */
-  unsigned exceeded[6]; /* limits that each leg exceeds: bits STEWART_LENGTH_MIN, ... */
+  double forces[6];        /* to command [N]: clipped to force_max; zero unless STEWART_OK */
+  double positions[6];     /* of the joints: lengths less zero_length [m] */
+  double mean_rates[6];    /* from the last setpoint that was not a jump [m/s]; nan at the first */
+  double base_joint_angles[6], platform_joint_angles[6]; /* [rad] */
+  double clearances[6];    /* from the nearest other leg or plate [m] */
+  stewart_motors motors;
+  double rises[6];         /* of the temperatures of the windings [K] */
+  /* The singularity warning as in stewart_state, and flags: whether it has changed, or is the
+   * first; a limit is exceeded; the legs cannot follow; the motors' numbers are finite; the
+   * forces can be computed, and are to be commanded. */
+  double warning, stopped, determinant, time_to_crossing, crossings;
+  double changed, exceeding, jumped, finite_motors, solved, answered, restart;
+  unsigned exceeded[6];    /* limits that each leg exceeds: bits STEWART_LENGTH_MIN, ... */
+  int nearest[6];          /* what is nearest: a leg, 6 the plate of the base, 7 of the platform */
 } stewart_output;
 
-/* Motors: zero where the published leg position is zero, + extends; [rad], ..., [N m]. */
-typedef struct { double angles[6], speeds[6], accelerations[6], torques[6]; } stewart_motors;
+/* Rules that a hexapod must keep, a line each: code, name, parameters, rule. Codes are those of
+ * stewart_check. */
+#define STEWART_RULES(RULE) \
+  RULE(1, FINITE, "", "must be finite") \
+  RULE(2, MASS, "platform.mass", "must be more than 0") \
+  RULE(3, INERTIA, "platform.inertia", "must be positive definite") \
+  RULE(4, ONE_POINT, "geometry.platform_joints", "all six are at one point") \
+  RULE(5, CHARACTERISTIC_LENGTH, "singularity.characteristic_length", "must be more than 0") \
+  RULE(6, WARN_CONDITION, "singularity.warn_condition", "must be at least 1") \
+  RULE(7, STOP_CONDITION, "singularity.stop_condition", \
+       "must be at least singularity.warn_condition") \
+  RULE(8, WARN_TIME, "singularity.warn_time", "must be at least 0") \
+  RULE(9, LEG_MASS, "legs", "masses and inertias must be at least 0") \
+  RULE(10, ACTUATOR, "actuator", "reflected mass and friction must be at least 0") \
+  RULE(11, COULOMB_VELOCITY, "actuator.coulomb_velocity", "must be more than 0") \
+  RULE(12, LIMIT, "limits", "must be more than 0") \
+  RULE(13, LENGTHS, "limits.length_min", "must be less than limits.length_max") \
+  RULE(14, SHAPE, "legs.cylinder.radius, legs.cylinder.length, legs.piston.radius", \
+       "not set: needed by limits.leg_clearance_min") \
+  RULE(15, RADII, "legs.piston.radius", "must be at most legs.cylinder.radius") \
+  RULE(16, BASE_AXIS, "geometry.base_joint_axes", "a direction must not be 0, 0, 0") \
+  RULE(17, PLATFORM_AXIS, "geometry.platform_joint_axes", "a direction must not be 0, 0, 0") \
+  RULE(18, BASE_UNIVERSAL, "drive.base_universal_axes", "a direction must not be 0, 0, 0") \
+  RULE(19, PLATFORM_UNIVERSAL, "drive.platform_universal_axes", \
+       "a direction must not be 0, 0, 0") \
+  RULE(20, SCREW_LEAD, "actuator.screw_lead", "not set: needed by drive.*") \
+  RULE(21, EFFICIENCY, "drive.efficiency", "must be more than 0 and at most 1") \
+  RULE(22, RESISTANCE, "drive.torque_constant", "not set: needed by drive.resistance") \
+  RULE(23, THERMAL_RESISTANCE, "drive.resistance, drive.thermal_time_constant", \
+       "not set: needed by drive.thermal_resistance") \
+  RULE(24, THERMAL_TIME_CONSTANT, "drive.thermal_resistance", \
+       "not set: needed by drive.thermal_time_constant") \
+  RULE(25, TEMPERATURE_RISE, "drive.thermal_resistance", \
+       "not set: needed by drive.temperature_rise_max") \
+  RULE(26, TORQUE_SPEED, "drive.torque_speed", \
+       "speeds must be strictly increasing, from 0 or more") \
+  RULE(27, CORNERS, "geometry.base_outline, geometry.platform_outline", \
+       "must have three corners or more") \
+  RULE(28, CORNERS_ON_A_LINE, "geometry.base_outline, geometry.platform_outline", \
+       "the corners are on one line") \
+  RULE(29, CORNERS_IN_A_PLANE, "geometry.base_outline, geometry.platform_outline", \
+       "the corners must be in one plane, to 1e-06 of its size") \
+  RULE(30, CONVEX, "geometry.base_outline, geometry.platform_outline", \
+       "must be convex, its corners in order around it")
+#define STEWART_RULE_CODE(code, NAME, parameters, rule) STEWART_RULE_ ## NAME = code,
+
+enum { STEWART_RULES(STEWART_RULE_CODE) STEWART_VALID = 0 };
+
+/* Writes what follows from other numbers of a hexapod: motor_ratio, pitch, driving_loss, ...;
+ * reflected_mass where inertias are given; characteristic_length where it is not above 0;
+ * back_driving_efficiency where it is not set; axes of unit length; which checks are on. */
+void stewart_complete(stewart_platform * platform);
+
+/* Returns the first rule that a complete hexapod breaks: STEWART_VALID or STEWART_RULE_...; where:
+ * the leg (0 to 5), for plates 0 the base's and 1 the platform's, else -1. */
+int stewart_check(const stewart_platform * platform, int * where);
+
+/* Returns a rule in words, beginning with the parameters; NULL for another code. */
+const char * stewart_rule(int code);
 
 /* Inverse dynamics: lengths, rates and forces of the legs, and how near a singularity it is.
  *
@@ -151,8 +264,9 @@ int stewart_inverse_dynamics(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
   const stewart_base * base, stewart_result * result);
 
-/* The node's step: inverse dynamics, then singularity warning with its hysteresis and limits;
- * forces are clipped to limits.force_max, and suppressed where the parameters say so.
+/* The node's step: inverse dynamics, joints, clearance, motors with the heat of their windings,
+ * then singularity warning with its hysteresis and limits; forces and torques are clipped to their
+ * limits, and suppressed where the parameters say so.
  *
  * stamp: time of the setpoint, of any clock that rises [ns]; between stamps velocity_max holds.
  * State and output are written with STEWART_OK, _SUPPRESSED and _SINGULAR alone. */
@@ -160,10 +274,10 @@ int stewart_step(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
   const stewart_base * base, int64_t stamp, stewart_state * state, stewart_output * output);
 
-/* The motors' angles, and torques that give leg forces, with drive.* in the parameters.
+/* The motors that give leg forces, with drive.* in the parameters.
  *
  * motion: one that stewart_step has accepted. forces: of the result or of the output [N].
- * Motors are written with STEWART_OK alone. Torques are not limited; at rest without losses. */
+ * Motors are written with STEWART_OK alone. Their torques are not limited, their commands are. */
 int stewart_motor_torques(
   const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
   stewart_motors * motors);
@@ -183,7 +297,8 @@ int stewart_motion_of_legs(
 
 /* Adds a payload to the platform, as one rigid body with it: its mass [kg], center of mass [m] and
  * inertia about that [kg m^2], as those of the platform. With mass and inertia negated it removes
- * one. Written with STEWART_OK alone; STEWART_OUT_OF_RANGE: no mass is left. */
+ * one. Written with STEWART_OK alone; STEWART_OUT_OF_RANGE: no mass is left; STEWART_BROKEN_RULE:
+ * the payload's inertia is not positive semidefinite (nor negated: negative). */
 int stewart_add_payload(
   stewart_platform * platform, double mass, const double center_of_mass[3],
   const double inertia[6]);

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 import hashlib
 from importlib.resources import files
 import math
@@ -15,14 +14,13 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics import __version__
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.core.binding import header
-from stewart_dynamics.errors import ParameterError, shown, StewartError
+from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.export.golden_vectors import COLUMNS, golden_vectors, PARTS, WHOLE
-from stewart_dynamics.mechanics.hexapod_structure import (
-    field_values, FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
-from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
-from stewart_dynamics.mechanics.limits import Limits
-from stewart_dynamics.parameters.table import OUTLINES, PARAMETERS, Parameters
+from stewart_dynamics.mechanics.hexapod_structure import limited_structure
+from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
+from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
 SOURCES = 'stewart_dynamics.h', 'stewart_dynamics.c'  # files that are the same for every hexapod
 
@@ -62,8 +60,8 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
     """
     Return the texts of all files by their names.
 
-    Raises StewartError: the name cannot be used in C; a limit of joint angles is set, its axes are
-        not, and there is no home pose; or plates limit the clearance of the legs.
+    Raises StewartError: the name cannot be used in C; or a limit of joint angles is set, its axes
+        are not, and there is no home pose.
     """
     check_name(name)
     head = (f'A hexapod, written by stewart_export {__version__}.\n'
@@ -88,46 +86,32 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
             'test_golden.c': filled('test_golden.c'), 'CMakeLists.txt': filled('CMakeLists.txt')}
 
 
-def exported_values(parameters: Parameters) -> dict[str, Any]:
-    """
-    Return ``field_values`` with the axes of the joints whose angles are limited.
-
-    Raises ParameterError: axes that are needed are not given, and there is no home pose; or the
-        clearance of the legs is limited, and a plate is given, which the C source does not know.
-    """
-    plates = [name for name in OUTLINES if parameters[name] is not None]
-    if plates and parameters.limits.leg_clearance_min is not None:
-        raise ParameterError(
-            f'{", ".join(plates)}: must not be set with limits.leg_clearance_min: the exported '
-            'source has the clearance between legs, not that from plates')
-    values = field_values(parameters)
-    angles = angles_to_check(parameters, Limits(parameters).of_joints)
-    if angles is not None:
-        axes = np.nan_to_num(angles.axes)
-        values['geometry.base_joint_axes'] = axes[:6]
-        values['geometry.platform_joint_axes'] = axes[6:]
-    return values
-
-
 def digest(parameters: Parameters) -> str:
-    """Return the SHA-256 of the values of all fields, in hexadecimal digits."""
-    text = '\n'.join(f'{name} {" ".join(_numbers(value))}'
-                     for name, value in exported_values(parameters).items())
-    return hashlib.sha256(text.encode()).hexdigest()
+    """Return the SHA-256 of the hexapod in C, in hexadecimal digits."""
+    return hashlib.sha256(platform_source(parameters, '').encode()).hexdigest()
 
 
 def platform_source(parameters: Parameters, name: str) -> str:
-    """Return the C definition of a hexapod, ``const stewart_platform NAME``."""
-    values = exported_values(parameters)
+    """
+    Return the C definition of a hexapod, ``const stewart_platform NAME``.
+
+    Raises ParameterError: axes that are needed are not given, and there is no home pose.
+    """
+    hexapod: Any = limited_structure(parameters)
     lines = [f'const stewart_platform {name} = {{']
-    lines += (_field(each, values[each], '  ') for each in FIELDS_BEFORE_LEGS.values())
-    lines.append('  {')
-    for leg, joint in enumerate(parameters.joints):
-        lines.append(f'    {{  /* leg {leg + 1}: {in_comment(joint)} */')
-        lines += (_field(each, values[each][leg], '      ') for each in LEG_FIELDS.values())
-        lines.append('    },')
-    lines.append('  },')
-    lines += (_field(each, values[each], '  ') for each in FIELDS_AFTER_LEGS.values())
+    for field in hexapod.dtype.names:
+        if field != 'legs':
+            lines.append(_field(PLATFORM_FIELDS.get(field) or LISTS.get(field, field),
+                                hexapod[field], '  '))
+            continue
+        lines.append('  {')
+        for leg, joint in enumerate(parameters.joints):
+            lines.append(f'    {{  /* leg {leg + 1}: {in_comment(joint)} */')
+            of_leg = hexapod['legs'][leg]
+            lines += (_field(LEG_FIELDS.get(each, each), of_leg[each],
+                             '      ') for each in of_leg.dtype.names)
+            lines.append('    },')
+        lines.append('  },')
     return '\n'.join([*lines, '};', ''])
 
 
@@ -138,19 +122,36 @@ def in_comment(text: str) -> str:
 
 
 def _field(name: str, value: Any, indent: str) -> str:
-    numbers = ', '.join(_numbers(value))
-    text = f'{{{numbers}}}' if np.ndim(value) else numbers
-    unit = PARAMETERS[name].unit
-    decimal = ', '.join(f'{each:.9g}' for each in np.ravel(value))
-    return f'{indent}{text},  /* {name}: {decimal}{unit and f" {unit}"} */'
+    """Return the line of a field: its numbers, then the parameter or field, values and unit."""
+    unit = PARAMETERS[name].unit if name in PARAMETERS else ''
+    decimal = ', '.join(f'{each:.9g}' for each in _without_end(np.ravel(value)))
+    return f'{indent}{_constant(value)},  /* {name}: {decimal}{unit and f" {unit}"} */'
+
+
+def _constant(value: Any) -> str:
+    """Return a number, or an array of numbers in braces, as a constant of C."""
+    if not np.ndim(value):
+        return hexadecimal(value.item())
+    rows = list(value) if np.ndim(value) == 1 else [
+        row for row, used in zip(value, _used(value), strict=True) if used] or [value[0]]
+    return f'{{{", ".join(map(_constant, rows))}}}'
+
+
+def _used(points: Array) -> Flags:
+    """Return which points (N, M) are given: all to the last that is not zero."""
+    used: Flags = np.cumsum(points.any(axis=1)[::-1])[::-1] > 0
+    return used
+
+
+def _without_end(numbers: Array) -> Array:
+    """Return the numbers to the last that is not zero, or the first one."""
+    return numbers[:max(1, 1 + int(np.max(np.flatnonzero(numbers), initial=0)))]
 
 
 def hexadecimal(number: float) -> str:
     """Return a number as a constant of C with all its bits."""
+    if math.isnan(number):
+        return 'NAN'
     if math.isinf(number):
         return 'HUGE_VAL' if number > 0.0 else '-HUGE_VAL'
     return str(number) if isinstance(number, int) else number.hex()
-
-
-def _numbers(value: Any) -> Iterator[str]:
-    return map(hexadecimal, np.ravel(value).tolist())

@@ -11,7 +11,6 @@ The results are those of the library.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import math
 
 import numpy as np
@@ -23,10 +22,10 @@ from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
-from stewart_dynamics.mechanics.limits import Exceedance, LIMITS, OF_MOTORS
 from stewart_dynamics.mechanics.rows import BASE, FORCES, MOTION, POSE, RESULT, WRENCH
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
+from stewart_dynamics.setpoints.step import (
+    Batch, FIRST, MOTOR_COMMANDS, Outputs, RISES, Step)
 
 # Return codes of the C source.
 OK, SINGULAR, SUPPRESSED, NO_POSE, NO_MOTORS = (CODES[f'STEWART_{name}'] for name in (
@@ -58,6 +57,8 @@ PARTS: dict[str, list[str]] = {
     'FORCES': _legs('force'),
     'EXCEEDED': _legs('exceeded'),
     'WARNING': ['warning', 'stopped', 'crossings'],
+    'COMMANDS': _legs('motor_command'),
+    'RISES': _legs('winding_rise'),
     'MOTOR_CODE': ['motor_code'],
     'MOTORS': [*_legs('motor_angle'), *_legs('motor_speed'), *_legs('motor_acceleration'),
                *_legs('motor_torque')],
@@ -76,8 +77,7 @@ WHOLE = {name for part in ('STAMP', 'HAS_BASE', 'CODE', 'EXCEEDED', 'WARNING', '
 
 def golden_vectors(parameters: Parameters) -> Array:
     """Return the vectors (N, len(COLUMNS)); samples whose numbers overflow are left out."""
-    # The C source checks no limits of motors.
-    step = Step(parameters.replaced(dict.fromkeys(OF_MOTORS)))
+    step = Step(parameters)
     hexapod = hexapod_structure(parameters)
     drives = None if parameters.actuator.screw_lead is None else Drives(parameters)
     motions = _motions(parameters)
@@ -100,9 +100,9 @@ def golden_vectors(parameters: Parameters) -> Array:
         forward_kinematics.poses(
             hexapod, outputs.lengths.copy(), guess, code, steps, residual)
         rows.append([
-            stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(
-                outputs, step.exceedances(motions[n:n + 1], outputs)),
-            *_motors(drives, motions[n:n + 1], outputs), int(code[0]), *guess[0, :POSE.stop]])
+            stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(outputs),
+            *_commanded(outputs), *_motors(drives, motions[n:n + 1], outputs), int(code[0]),
+            *guess[0, :POSE.stop]])
     return np.array(rows, dtype=float).reshape(-1, len(COLUMNS))
 
 
@@ -125,17 +125,22 @@ def _motions(parameters: Parameters) -> Array:
                   turning.linear_acceleration, turning.angular_acceleration).rows
 
 
-def _results(outputs: Outputs, exceedances: Sequence[Exceedance]) -> list[float]:
+def _results(outputs: Outputs) -> list[float]:
     """Return the columns from CODE to WARNING of one setpoint's outputs."""
     forces = outputs.forces[0]
     code = SINGULAR if not outputs.solvable[0] else OK if outputs.with_forces[0] else SUPPRESSED
-    exceeded = [sum(LIMITS[each.limit].bit for each in exceedances
-                    if each.leg == leg) for leg in range(6)]
+    exceeded = outputs.records['exceeded'][0]
     state = outputs.singularity()
     return [code, *outputs.lengths[0], *outputs.rates[0], *_or_zero(outputs.demanded_forces[0]),
             outputs.determinants[0], outputs.determinant_rates[0], outputs.conditions[0],
             *outputs.unit_load_forces[0], *_or_zero(outputs.joint_forces[0]), *_or_zero(forces),
             *exceeded, state.cause, state.stopped, state.crossings]
+
+
+def _commanded(outputs: Outputs) -> list[float]:
+    """Return the columns of torques to command and of temperature rises, 0 for nan."""
+    return np.nan_to_num(np.concatenate(
+        [outputs.rows[0, MOTOR_COMMANDS], outputs.rows[0, RISES]])).tolist()
 
 
 def _or_zero(forces: Array) -> Array:

@@ -49,19 +49,19 @@ from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, Pose
-from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
+from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, LIMITS, LOAD, OF_JOINTS, OF_LEGS, PLATFORM_ANGLE_MAX, POSE, short_name,
-    SINGULARITY, SPEED_MAX, TORQUE_MAX)
+    SINGULARITY, SPEED_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import DETERMINANT, MOTION, ROTATION
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.parameters.table import Parameters, six_of
 
 KEPT: Mapping[int, str] = {
-    **{LIMITS[name].bit.bit_length() - 1: name for name in OF_LEGS},
-    CODES['GOVERNED_TORQUE_MAX']: TORQUE_MAX, CODES['GOVERNED_SPEED_MAX']: SPEED_MAX,
+    **{LIMITS[name].bit.bit_length() - 1: name
+       for name in (*OF_LEGS, TORQUE_MAX, TORQUE_SPEED, SPEED_MAX)},
     CODES['GOVERNED_SINGULARITY']: SINGULARITY}
 """The limits that a governor keeps, by their places in ``governor_state.held``."""
 
@@ -83,7 +83,7 @@ class Governor:
     """
     The limits of a hexapod as the functions in C take them.
 
-    arguments: their first ones: hexapod, motors, plates, limits.
+    arguments: their first ones: hexapod, limits.
     limits (): the structure ``governor_limits``.
     head (3,): point of the platform whose displacement is governed, platform frame [m].
 
@@ -102,7 +102,6 @@ class Governor:
         limits['condition_max'] = (1.0 - _OF_LOADS) * stop_condition_of(parameters)
         limits['stop_condition'] = stop_condition_of(parameters)
         limits['side'] = math.copysign(1.0, result[DETERMINANT])
-        limits['load_share'] = 1.0 - _OF_LOADS
         self._pose_limits = PoseLimits(parameters)
         joints, clearance = parameters.geometry.platform_joints, self._pose_limits.clearance
         corners = joints if clearance is None else np.concatenate([joints, clearance.platform])
@@ -111,18 +110,13 @@ class Governor:
         limits['reach'] = np.linalg.norm(corners - head, axis=1).max()
         for name, margins in _margins(parameters).items():
             limits[name] = margins
-        arguments = list(self._pose_limits.arguments)
         if parameters.drives:
-            limits['speed_max'] = (1.0 - _OF_OTHERS) * largest_speeds(parameters)
             # Friction changes its sign where a leg reverses between two samples.
             limits['friction_torque'] = Friction.of(parameters).largest_change / motor_ratio(
                 parameters) * np.maximum(1.0 / parameters.drive.efficiency, 1.0)
-            if (curve := parameters.drive.torque_speed) is not None:
-                lowest = _lowest_nearby(curve)
-                arguments[1:3] = len(lowest), lowest
         self.limits: Records = limits
         self.home = home
-        self.arguments = within, *arguments, limits
+        self.arguments = within, limits
         self._at_home = row, result
 
     def coordinates(self, motion: Motion) -> Records:
@@ -244,7 +238,7 @@ def check_gaps(times: Array, before: Array) -> None:
 
 def _within(parameters: Parameters) -> Records:
     """Return the structure of a hexapod whose limits have the margins of a governor."""
-    found: Any = hexapod_structure(parameters)
+    found: Any = limited_structure(parameters)
     legs, margins = found['legs'], _margins(parameters)
     for name in OF_LEGS:
         limit = LIMITS[name]
@@ -257,6 +251,13 @@ def _within(parameters: Parameters) -> Records:
     for name in OF_JOINTS:
         legs[short_name(name)] -= margins[_ANGLE_MARGINS[name]]
     found['leg_clearance_min'] += margins['clearance_margin']
+    legs['torque_max'] *= 1.0 - _OF_LOADS
+    if (curve := parameters.drive.torque_speed) is not None:
+        lowest = _lowest_nearby(curve)
+        found['n_torque_speed'] = len(lowest)
+        found['torque_speed'][:len(lowest)] = lowest * [1.0, 1.0 - _OF_LOADS]
+    legs['speed_max'] = (1.0 - _OF_OTHERS) * largest_speeds(parameters)
+    legs['loss_velocity'] = math.inf  # breakaway torques at any rate, as if each leg could reverse
     return found  # type: ignore[no-any-return]
 
 

@@ -6,24 +6,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.core.binding import CODES
+from stewart_dynamics.core.binding import CODES, CONSTANTS, LIMIT_ROWS, places
 from stewart_dynamics.mechanics.rows import (
-    BASE_JOINT_ANGLES, FORCES, JOINT_FORCES, LENGTHS, PLATFORM_JOINT_ANGLES, RATES)
-from stewart_dynamics.parameters.table import OUTLINES, Parameters
+    BASE_JOINT_ANGLES, PLATFORM_JOINT_ANGLES, RESULT)
+from stewart_dynamics.parameters.structure import LEG_FIELDS
+from stewart_dynamics.parameters.table import OUTLINES, PARAMETERS, Parameters
 
 # A quantity depends on the pose alone; is linear in the twist; is affine in the acceleration and
 # in loads on the platform; or is one of the motors.
 POSE, TWIST, LOAD, MOTOR = 'pose', 'twist', 'load', 'motor'
 NO_COLUMNS = slice(0)  # of quantities that are not in a row of results
 # Relative tolerance of limit checks, above rounding errors.
-TOLERANCE = 1e-9
+TOLERANCE = CONSTANTS['LIMIT_TOLERANCE']
 
 
 class Quantity(NamedTuple):
@@ -43,24 +44,24 @@ class Limit(NamedTuple):
     A limit of each leg: the magnitude of a quantity is at most, or a minimum at least, its bound.
 
     Step, diagnostics, planned trajectories, capability, summary, plots and datasheet go through
-    LIMITS: one more limit is a parameter in the table, an entry here, and its bit in C.
+    LIMITS: one more limit is a row in the table of parameters and a line of STEWART_LIMITS in C.
     """
 
     name: str  # of the parameter
+    bit: int  # of ``stewart_output.exceeded``
     phrase: str  # its name in a datasheet
     quantity: Quantity
     depends: str  # POSE, TWIST, LOAD or MOTOR
-    columns: slice = NO_COLUMNS  # of the values in a row of results
+    columns: slice  # of the values in a row of outputs, which begins with a row of results
     minimum: bool = False
-    clips: bool = False  # published values are clipped to it; others follow limits.action
     title: str = ''  # of the plot of a quantity in a row of results
     note: str = ''
     usual: bool = False  # the quantity is shown where the limit is not given, too
 
     @property
-    def bit(self) -> int:
-        """Return its bit of ``stewart_output.exceeded``; KeyError for a limit of the motors."""
-        return CODES[f'STEWART_{short_name(self.name).upper()}']
+    def clips(self) -> bool:
+        """Return whether published values are clipped to it; others follow limits.action."""
+        return bool(self.bit & CODES['STEWART_CLIPPED'])
 
 
 LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX, JOINT_FORCE_MAX = (
@@ -69,39 +70,44 @@ LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX, JOINT_FORCE_MAX = (
 BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX = OF_JOINTS = (
     'limits.base_joint_angle_max', 'limits.platform_joint_angle_max')
 CLEARANCE_MIN = 'limits.leg_clearance_min'
-TORQUE_MAX, TORQUE_SPEED, SPEED_MAX, TEMPERATURE_RISE_MAX = OF_MOTORS = (
+TORQUE_MAX, TORQUE_SPEED, SPEED_MAX, TEMPERATURE_RISE_MAX = (
     'drive.torque_max', 'drive.torque_speed', 'drive.speed_max', 'drive.temperature_rise_max')
 JUMP = 'jump'
 
-_LENGTH, _TORQUE = Quantity('length', 'm'), Quantity('motor torque', 'N m')
-_LENGTHS: dict[str, Any] = {
-    'columns': LENGTHS, 'title': 'Leg lengths', 'note': 'between the joint centers', 'usual': True}
+# Depends, quantity and sense of limits without a line of STEWART_LIMITS.
+_OTHERS = {CLEARANCE_MIN: (POSE, 'clearances', True),
+           TORQUE_SPEED: (MOTOR, 'motors.breakaway_torques', False)}
+_ROWS = {LEG_FIELDS[row.field]: (row.depends.lower(), row.quantity, row.minimum)
+         for row in LIMIT_ROWS} | _OTHERS
+_PLACES = places('stewart_output')
+
+
+def _of_parameters() -> Iterator[Limit]:
+    """Yield the limits that are parameters."""
+    for name, parameter in PARAMETERS.items():
+        if (words := parameter.limit) is not None:
+            depends, quantity, minimum = _ROWS[name]
+            yield Limit(
+                name, CODES[f'STEWART_{short_name(name).upper()}'], words.phrase,
+                Quantity(words.quantity, words.unit or parameter.unit), depends,
+                _PLACES[quantity], minimum, words.title, words.note, words.usual)
+
+
+def short_name(limit: str) -> str:
+    """Return the name of a limit without its section: length_max."""
+    return limit.rpartition('.')[2]
+
+
 LIMITS: Mapping[str, Limit] = {each.name: each for each in (
-    Limit(LENGTH_MIN, 'shortest leg', _LENGTH, POSE, minimum=True, **_LENGTHS),
-    Limit(LENGTH_MAX, 'longest leg', _LENGTH, POSE, **_LENGTHS),
-    Limit(VELOCITY_MAX, 'speed of a leg', Quantity('rate', 'm/s'), TWIST, RATES,
-          title='Leg rates', note='+ extends', usual=True),
-    Limit(FORCE_MAX, 'force of a leg', Quantity('force', 'N'), LOAD, FORCES, clips=True,
-          title='Leg forces', note='demanded by the motion, + pushes', usual=True),
-    Limit(JOINT_FORCE_MAX, 'force in a joint', Quantity('joint force', 'N'), LOAD, JOINT_FORCES,
-          title='Forces in the joints',
-          note='along the legs, without friction and reflected mass of the actuators, + pushes'),
-    Limit(BASE_ANGLE_MAX, 'joint angle at the base', Quantity('base joint angle', 'rad'), POSE),
-    Limit(PLATFORM_ANGLE_MAX, 'joint angle at the platform',
-          Quantity('platform joint angle', 'rad'), POSE),
-    Limit(CLEARANCE_MIN, 'clearance between legs', Quantity('clearance', 'm'), POSE,
-          minimum=True),
-    Limit(TORQUE_MAX, 'torque of a motor', _TORQUE, MOTOR, clips=True),
-    Limit(TORQUE_SPEED, 'torque of a motor at its speed', _TORQUE, MOTOR, clips=True),
-    Limit(SPEED_MAX, 'speed of a motor', Quantity('motor speed', 'rad/s'), MOTOR),
-    Limit(TEMPERATURE_RISE_MAX, 'temperature of a winding', Quantity('temperature rise', 'K'),
-          MOTOR),
+    *sorted(_of_parameters(), key=lambda each: each.depends == MOTOR),
     # Without a parameter of its own: too far from the last setpoint for limits.velocity_max.
-    Limit(JUMP, 'jump', Quantity('mean rate from the last setpoint', 'm/s'), TWIST))}
+    Limit(JUMP, CODES['STEWART_JUMP'], 'jump', Quantity('mean rate from the last setpoint', 'm/s'),
+          TWIST, _PLACES['mean_rates']))}
 """All limits by name."""
 OF_LEGS = tuple(name for name, each in LIMITS.items() if name.startswith('limits.'))
+OF_MOTORS = tuple(name for name, each in LIMITS.items() if each.depends == MOTOR)
 OF_POSES = tuple(name for name in OF_LEGS if LIMITS[name].depends == POSE)
-OF_RESULTS = tuple(name for name in OF_LEGS if LIMITS[name].columns != NO_COLUMNS)
+OF_RESULTS = tuple(name for name in OF_LEGS if LIMITS[name].columns.stop <= RESULT)
 OF_LOADS = tuple(name for name in OF_RESULTS if LIMITS[name].depends == LOAD)
 USUAL = tuple(name for name in OF_RESULTS if LIMITS[name].usual)
 OF_RATES = tuple(name for name in OF_RESULTS if LIMITS[name].depends == TWIST)
@@ -110,11 +116,6 @@ TORQUE_CONTINUOUS = 'drive.torque_continuous'
 SINGULARITY = 'singularity'  # among short names: inside stop_condition, or beyond det(J) = 0
 ANGLES = {BASE_ANGLE_MAX: BASE_JOINT_ANGLES, PLATFORM_ANGLE_MAX: PLATFORM_JOINT_ANGLES}
 """Where in a row of joint angles the values of a limit are."""
-
-
-def short_name(limit: str) -> str:
-    """Return the name of a limit without its section: length_max."""
-    return limit.rpartition('.')[2]
 
 
 def result_values(results: Any) -> dict[str, Any]:
@@ -149,6 +150,12 @@ class Exceedance(NamedTuple):
                 f'{unit} {how} {limit}')
 
 
+def limit_bounds(parameters: Parameters) -> dict[str, Array]:
+    """Return the values (6,) of the limits that are given, but for the torque-speed curve."""
+    return {name: np.broadcast_to(parameters[name], 6) for name in LIMITS
+            if name not in (JUMP, TORQUE_SPEED) and parameters[name] is not None}
+
+
 class Limits:
     """
     The limits of the legs of a hexapod; those that are not given are never exceeded.
@@ -162,9 +169,8 @@ class Limits:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self.bounds: dict[str, Array] = {
-            name: np.broadcast_to(parameters[name], 6)
-            for name in OF_LEGS if parameters[name] is not None}
+        self.bounds = {name: bound for name, bound in limit_bounds(parameters).items()
+                       if name in OF_LEGS}
         self.thresholds = {name: _threshold(LIMITS[name], self.bounds.get(name))
                            for name in OF_LEGS}
         self.of_joints = tuple(name for name in OF_JOINTS if name in self.bounds)

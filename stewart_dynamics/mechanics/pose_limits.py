@@ -9,14 +9,12 @@ Lengths, joint angles, clearance, singularities; and forces and torques that hol
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.core.binding import record
 from stewart_dynamics.mechanics.drives.motor_limits import exceeds, MotorLimits
 from stewart_dynamics.mechanics.drives.motors import Drives
+from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
@@ -35,7 +33,7 @@ class PoseLimits:
     angles, clearance: of joints and legs; None without limits of them.
     drives, motors: motors at rows of motion, None without any, and their limits.
     stop_condition: condition number from which on a pose is singular.
-    arguments: those of functions in C that check limits, after the hexapod: drives, plates, which.
+    hexapod: its structure, with what its limits need.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -43,19 +41,9 @@ class PoseLimits:
         self.angles = angles_to_check(parameters, self.limits.of_joints)
         self.clearance = clearance_to_check(parameters)
         self.stop_condition = stop_condition_of(parameters)
-        drives = Drives(parameters)
-        self.drives = drives if parameters.drives else None
+        self.drives = Drives(parameters) if parameters.drives else None
         self.motors = MotorLimits(parameters)
-        none = np.empty((0, 3))
-        base, platform = (none, none) if self.clearance is None else (
-            self.clearance.base, self.clearance.platform)
-        checks: Any = np.zeros((), record('limit_checks'))
-        checks['angles'], checks['clearance'], checks['motors'] = (
-            self.angles is not None, self.clearance is not None, self.drives is not None)
-        if self.angles is not None:
-            checks['joint_axes'] = self.angles.axes.reshape(36)
-        self.arguments = (
-            *drives.arguments[1:], len(base), base, len(platform), platform, checks)
+        self.hexapod = limited_structure(parameters)
 
     def values(self, motions: Array, results: Array) -> dict[str, Array]:
         """Return the (N, 6) values of all limits at rows of motion and their results."""

@@ -239,8 +239,8 @@ class DynamicsNode(ManagedNode[Parameters]):
         """Pass the answer to other publishers and diagnostics."""
         self._last = setpoint, outputs
         motion = setpoint.motions[0]
-        exceedances = self._models.step.exceedances(
-            setpoint.motions, outputs) if outputs.rows[0, EXCEEDING] else ()
+        exceedances = (
+            self._models.step.exceedances(outputs) if outputs.rows[0, EXCEEDING] else ())
         self._markers.note(setpoint, outputs, exceedances)
         self._travel.note(motion)
         if not self._model_measured:

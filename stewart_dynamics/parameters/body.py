@@ -14,6 +14,10 @@ from stewart_dynamics.core.binding import CODES, function, record
 from stewart_dynamics.errors import ParameterError
 
 
+class BodyError(ParameterError):
+    """The inertia of a part is not that of a rigid body."""
+
+
 class Body(NamedTuple):
     """Mass, center of mass and inertia, as a parameter file has them."""
 
@@ -34,6 +38,8 @@ class Body(NamedTuple):
         whole['mass'], whole['center_of_mass'], whole['inertia'] = self
         code = function('stewart_add_payload')(
             whole, mass, np.ascontiguousarray(center), np.ascontiguousarray(inertia))
+        if code == CODES['STEWART_BROKEN_RULE']:
+            raise BodyError('must be positive semidefinite')
         if code != CODES['STEWART_OK']:
             raise ParameterError('no mass is left, or the numbers overflow')
         return Body(float(whole['mass']), whole['center_of_mass'].copy(), whole['inertia'].copy())

@@ -32,6 +32,17 @@ _KINDS: Mapping[Any, str] = {
     str: 'string', tuple[str, ...]: 'string', float: 'double', Array: 'double', bool: 'bool'}
 
 
+class LimitWords(NamedTuple):
+    """Words of a parameter that limits a quantity of each leg."""
+
+    quantity: str
+    phrase: str  # name of the limit in a datasheet
+    unit: str = ''  # of the quantity; by default that of the parameter
+    title: str = ''  # of the plot of the quantity, where it is a result of the inverse dynamics
+    note: str = ''
+    usual: bool = False  # the quantity is shown where the limit is not given, too
+
+
 class Parameter(NamedTuple):
     """The declaration of one parameter."""
 
@@ -52,6 +63,7 @@ class Parameter(NamedTuple):
     choices: tuple[str, ...] = ()  # the accepted texts
     instead: tuple[str, ...] = ()  # parameters of which one may be given in place of this one
     while_active: bool = False  # whether it may be changed while the node is active
+    limit: LimitWords | None = None  # of a limit of the legs, see ``mechanics.limits``
 
     @property
     def ros_type(self) -> str:

@@ -17,14 +17,15 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.core.binding import CONSTANTS
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import CONSTANTS, Rule
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameters.body import Body
+from stewart_dynamics.parameters.body import Body, BodyError
 from stewart_dynamics.parameters.circles import (
     BODIES, circle_names, joints_of, without_other)
 from stewart_dynamics.parameters.parameter_set import (
-    declare, Parameter, ParameterGroup, ParameterSet)
+    declare, LimitWords, Parameter, ParameterGroup, ParameterSet)
+from stewart_dynamics.parameters.structure import broken_rule, LISTS, MOST_POINTS, structure_of
 from stewart_dynamics.parameters.tolerances import (
     is_unit, REFLECTED_MASS_TOLERANCE, START_TOLERANCE, unit_rule)
 
@@ -32,12 +33,8 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 CENTER_UNCERTAINTY = 0.1  # default of uncertainty.center_of_mass, by the characteristic length
-# Moments of an inertia that rounding made negative, by the largest.
-_ROUNDING = 1e-12
-ONE_POINT = 1e-12
+ONE_POINT = CONSTANTS['ONE_POINT']
 """Joints that are this near to their center, in terms of their coordinates, are at one point."""
-# Corners of a plate are in a plane to this part of its size.
-_FLAT = 1e-6
 NO_MASS = 1e-15
 """Mass of a platform in a cube on its radius that stands for none: forces are zero [kg/m^3]."""
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s^2]
@@ -60,23 +57,21 @@ LEG_SHAPE = 'legs.cylinder.radius', 'legs.cylinder.length', 'legs.piston.radius'
 BASE_OUTLINE, PLATFORM_OUTLINE = OUTLINES = 'geometry.base_outline', 'geometry.platform_outline'
 """Parameters of the plates that the clearance counts for."""
 
-_RELATIONS = {'less than': np.less, 'at most': np.less_equal, 'at least': np.greater_equal}
-_RELATED = (
-    ('limits.length_min', 'less than', 'limits.length_max'),
-    ('legs.piston.radius', 'at most', 'legs.cylinder.radius'),
-    ('singularity.stop_condition', 'at least', 'singularity.warn_condition'),
-    ('drive.torque_continuous', 'at most', 'drive.torque_max'))
-_NEEDED_BY = {
-    'limits.leg_clearance_min': LEG_SHAPE,
-    'drive.resistance': ('drive.torque_constant',),
-    'drive.thermal_resistance': ('drive.resistance', 'drive.thermal_time_constant'),
-    'drive.thermal_time_constant': ('drive.thermal_resistance',),
-    'drive.temperature_rise_max': ('drive.thermal_resistance',)}
-
-
 def _legs(text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Any:
     """Declare a value of each leg, or one for all."""
     return declare(text, unit, default, sizes=(1, 6), **rule)
+
+
+def _limit(text: str, unit: str, quantity: str, phrase: str, *, title: str = '', note: str = '',
+           usual: bool = False, **rule: Any) -> Any:
+    """
+    Declare a limit of each leg, unlimited if it is not set.
+
+    It is checked where ``STEWART_LIMITS`` in ``core/stewart_dynamics.h`` has a line of its name.
+    """
+    words = LimitWords(quantity, phrase, title=title, note=note, usual=usual)
+    return _legs(f'{text}; unlimited if not set', unit, (),
+                 **{'minimum': 0.0, 'above': True, 'limit': words, **rule})
 
 
 def _point(text: str, unit: str = 'm', default: Any = (0.0, 0.0, 0.0), **rule: Any) -> Any:
@@ -262,19 +257,19 @@ class DriveGroup(ParameterGroup):
     back_driving_efficiency: Array = _legs(
         'the same where the leg drives the motor, 0 or less for a self-locking screw; by default '
         '2 - 1 / drive.efficiency', '', (), minimum=-100.0, maximum=1.0)
-    torque_max: Array | None = _legs(
-        'maximum torque of a motor, to which torques are clipped; unlimited if not set', 'N m',
-        (), minimum=0.0, above=True)
+    torque_max: Array | None = _limit(
+        'maximum torque of a motor, to which torques are clipped', 'N m', 'motor torque',
+        'torque of a motor')
     torque_continuous: Array | None = _legs(
         'torque that a motor can hold without end, for the RMS torque of a motion', 'N m', (),
         minimum=0.0, above=True)
-    speed_max: Array | None = _legs(
-        'maximum speed of a motor; unlimited if not set', 'rad/s', (), minimum=0.0, above=True)
     torque_speed: Array | None = declare(
         'largest torque of a motor at rising speeds, speed and torque of one point after the '
         'other, linear between them; from 0 rad/s to the first speed the first torque, above the '
         'last speed 0 N m; unlimited if not set', 'rad/s, N m', (), sizes=(2,), repeated=True,
-        minimum=0.0)
+        minimum=0.0, limit=LimitWords('motor torque', 'torque of a motor at its speed', 'N m'))
+    speed_max: Array | None = _limit(
+        'maximum speed of a motor', 'rad/s', 'motor speed', 'speed of a motor')
     torque_constant: Array | None = _legs(
         'torque of a motor for each ampere', 'N m/A', (), minimum=0.0, above=True)
     resistance: Array | None = _legs(
@@ -284,9 +279,9 @@ class DriveGroup(ParameterGroup):
         'from winding to ambient', 'K/W', (), minimum=0.0, above=True)
     thermal_time_constant: Array | None = _legs(
         'of the winding with its motor', 's', (), minimum=0.0, above=True)
-    temperature_rise_max: Array | None = _legs(
-        'maximum temperature of a winding above ambient; unlimited if not set', 'K', (),
-        minimum=0.0, above=True)
+    temperature_rise_max: Array | None = _limit(
+        'maximum temperature of a winding above ambient', 'K', 'temperature rise',
+        'temperature of a winding')
     rated_torque: Array | None = _legs(
         'torque that the amplifier calls 1000 per mille, object 6076h of CiA 402; for '
         'stewart_export --drives', 'N m', (), minimum=0.0, above=True)
@@ -306,32 +301,38 @@ class DriveGroup(ParameterGroup):
     platform_universal_axes: Array | None = _universal_axes('platform')
 
 
+_LENGTHS: dict[str, Any] = {
+    'title': 'Leg lengths', 'note': 'between the joint centers', 'usual': True}
+
+
 class LimitsGroup(ParameterGroup):
     """Limits of legs and joints."""
 
-    length_min: Array | None = _legs(
-        'minimum length of a leg; unlimited if not set', 'm', (), minimum=0.0)
-    length_max: Array | None = _legs(
-        'maximum length of a leg; unlimited if not set', 'm', (), minimum=0.0, above=True)
-    velocity_max: Array | None = _legs(
-        'maximum rate of a leg; unlimited if not set', 'm/s', (), minimum=0.0, above=True)
-    force_max: Array | None = _legs(
-        'maximum force of a leg, to which forces are clipped; unlimited if not set', 'N', (),
-        minimum=0.0, above=True)
-    joint_force_max: Array | None = _legs(
+    length_min: Array | None = _limit(
+        'minimum length of a leg', 'm', 'length', 'shortest leg', above=False, **_LENGTHS)
+    length_max: Array | None = _limit(
+        'maximum length of a leg', 'm', 'length', 'longest leg', **_LENGTHS)
+    velocity_max: Array | None = _limit(
+        'maximum rate of a leg', 'm/s', 'rate', 'speed of a leg', title='Leg rates',
+        note='+ extends', usual=True)
+    force_max: Array | None = _limit(
+        'maximum force of a leg, to which forces are clipped', 'N', 'force', 'force of a leg',
+        title='Leg forces', note='demanded by the motion, + pushes', usual=True)
+    joint_force_max: Array | None = _limit(
         'maximum force along a leg that its joints and its rod carry, the thrust rating of a '
-        'cylinder: without friction and reflected mass of the actuator; unlimited if not set',
-        'N', (), minimum=0.0, above=True)
-    base_joint_angle_max: Array | None = _legs(
-        'maximum angle between a leg and its geometry.base_joint_axes; unlimited if not set',
-        'rad', (), minimum=0.0, above=True, maximum=math.pi)
-    platform_joint_angle_max: Array | None = _legs(
-        'maximum angle between a leg and its geometry.platform_joint_axes; unlimited if not set',
-        'rad', (), minimum=0.0, above=True, maximum=math.pi)
+        'cylinder: without friction and reflected mass of the actuator', 'N', 'joint force',
+        'force in a joint', title='Forces in the joints',
+        note='along the legs, without friction and reflected mass of the actuators, + pushes')
+    base_joint_angle_max: Array | None = _limit(
+        'maximum angle between a leg and its geometry.base_joint_axes', 'rad',
+        'base joint angle', 'joint angle at the base', maximum=math.pi)
+    platform_joint_angle_max: Array | None = _limit(
+        'maximum angle between a leg and its geometry.platform_joint_axes', 'rad',
+        'platform joint angle', 'joint angle at the platform', maximum=math.pi)
     leg_clearance_min: float | None = declare(
         'minimum distance of the surface of a leg, a cylinder and a thinner piston, from that of '
         'another leg, and from the outlines of geometry that are given; unlimited if not set',
-        'm', minimum=0.0)
+        'm', minimum=0.0, limit=LimitWords('clearance', 'clearance between legs'))
     action: str = declare(
         'action while a limit of length, rate, joint force, joint angle or clearance, or of speed '
         'or temperature of a motor, is exceeded, or a setpoint is too far from the last one for '
@@ -600,6 +601,7 @@ class Parameters(ParameterSet):
                  *(circle_names(body)[2] for body in BODIES))
     drives: tuple[str, ...]  # names of drive.* that are given; without them no motors are computed
     carried: Body  # by the legs: platform and payload as one
+    structure: Records  # () for the functions in C, without axes of joints: ``hexapod_structure``
 
     def _check_together(self, source: str) -> None:
         """Check the rules between parameters."""
@@ -608,60 +610,92 @@ class Parameters(ParameterSet):
         joints = self.joints
         if len(set(joints)) < 6 or '' in joints:
             raise ParameterError(f'{source}: joints: {list(joints)}: six different names needed')
-        self._check_bodies(source)
-        for name, relation, other in _RELATED:
-            values = [np.asarray(self[each]).tolist() for each in (name, other)]
-            if None not in values and not np.all(_RELATIONS[relation](*values)):
-                raise ParameterError(
-                    f'{source}: {name}: {values[0]}: must be {relation} {other}, {values[1]}')
-        for name, needs in _NEEDED_BY.items():
-            missing = [each for each in needs if self[each] is None]
-            if self[name] is not None and missing:
-                raise ParameterError(
-                    f'{source}: {", ".join(missing)}: not set: needed by {name}')
-        for name in OUTLINES:
-            if self[name] is not None and (rule := _broken_rule_of_plate(self[name])):
-                raise ParameterError(f'{source}: {name}: {self[name].tolist()}: {rule}')
         length = float(np.linalg.norm(self.base.imu.orientation))
         if not is_unit(length):
             raise ParameterError(f'{source}: base.imu.orientation: '
                                  f'{self.base.imu.orientation.tolist()}: {unit_rule(length)}')
-        platform_joints = self.geometry.platform_joints
-        size = mean_radius(platform_joints)
-        if size <= ONE_POINT * np.abs(platform_joints).max():
-            name = ('geometry.platform_joints' if self.geometry.platform_angles is None
-                    else 'geometry.platform_angles')
-            raise ParameterError(f'{source}: {name}: all six are at one point')
+        for name in LISTS.values():
+            if self[name] is not None and len(self[name]) > MOST_POINTS:
+                raise ParameterError(
+                    f'{source}: {name}: {len(self[name])} points: must be at most {MOST_POINTS}')
+        self._check_drives(source)
+        self.structure = structure_of(self, bool(self.drives), SUPPRESS_FORCES)
+        self._check_reflected_mass(source)
+        if (broken := broken_rule(self.structure)) is not None:
+            raise ParameterError(f'{source}: {self._broken_words(*broken)}')
+        self._complete_derived()
+        self._carry_payload(source)
+
+    def _broken_words(self, rule: Rule, where: int) -> str:
+        """Return which parameter breaks a rule of the structure, its value and the rule."""
+        names, text = rule.parameters, rule.text
+        if text.startswith('not set'):
+            return f'{", ".join(each for each in names if self[each] is None)}: {text}'
+        name = names[max(where, 0)] if len(names) == 2 else names[0]
+        if name not in self.table:
+            return f'{name}: {text}'
+        if rule.name == 'ONE_POINT':
+            return ('geometry.platform_angles' if self.geometry.platform_angles is not None
+                    else name) + f': {text}'
+        value = np.asarray(self[name])
+        words = f'{name}: {value.tolist()}: {text}'
+        other = text.rpartition(' ')[2]
+        if other in self.table:
+            words += f', {np.asarray(self[other]).tolist()}'
+        if rule.name == 'INERTIA':
+            words += _smallest_moment(value)
+        elif rule.name == 'TORQUE_SPEED':
+            words = (f'{name}: speeds {value[:, 0].tolist()} rad/s: must be strictly increasing '
+                     '(the order is speed, torque, speed, torque, ...)')
+        return words
+
+    def _complete_derived(self) -> None:
+        """Set parameters that follow from others."""
+        legs = self.structure['legs']
         if self.singularity.characteristic_length is None:
-            self._complete('singularity.characteristic_length', size)
+            self._complete('singularity.characteristic_length',
+                           float(self.structure['characteristic_length']))
         if self.uncertainty.center_of_mass is None:
             self._complete('uncertainty.center_of_mass',
                            CENTER_UNCERTAINTY * self.singularity.characteristic_length)
-        for name in ('geometry.base_joint_axes', 'geometry.platform_joint_axes',
-                     'drive.base_universal_axes', 'drive.platform_universal_axes'):
-            axes = self[name]
-            if axes is not None and not axes.any(axis=1).all():
-                raise ParameterError(
-                    f'{source}: {name}: {axes.tolist()}: a direction must not be 0, 0, 0')
-        self._check_drives(source)
+        if self.drive.back_driving_efficiency is None:
+            self._complete('drive.back_driving_efficiency', legs['back_driving_efficiency'].copy())
+        self._complete('actuator.reflected_mass', legs['reflected_mass'].copy())
 
-    def _check_bodies(self, source: str) -> None:
-        """Check the inertias of platform and payload, and set ``carried``."""
-        for name, least, rule in (('platform.inertia', 0.0, 'positive definite'),
-                                  ('payload.inertia', -_ROUNDING, 'positive semidefinite')):
-            moments = np.linalg.eigvalsh(inertia_matrix(self[name]))
-            if moments[0] < least * moments[2] or moments[0] == least:
-                raise ParameterError(
-                    f'{source}: {name}: {self[name].tolist()}: must be {rule}, but its smallest '
-                    f'principal moment is {moments[0]:.6g} kg m^2 (the order is ixx ixy ixz iyy '
-                    'iyz izz)')
+    def _check_reflected_mass(self, source: str) -> None:
+        """Check the reflected mass that is given against the one that follows from drive.*."""
+        follows = self.structure['legs']['reflected_mass']
+        given = self.actuator.reflected_mass
+        wrong = np.abs(given - follows) > REFLECTED_MASS_TOLERANCE * follows
+        if 'actuator.reflected_mass' in self.given and wrong.any():
+            leg = int(np.argmax(wrong))
+            raise ParameterError(
+                f'{source}: actuator.reflected_mass: {given[leg]:g} kg: contradicts '
+                f'{MOTOR_INERTIA} and {SCREW_INERTIA}, with which it is {follows[leg]:.6g} kg')
+        if not np.isfinite(follows).all():
+            raise ParameterError(f'{source}: actuator.reflected_mass: {follows.tolist()} kg '
+                                 f'from {MOTOR_INERTIA} and {SCREW_INERTIA}: must be finite')
+
+    def _carry_payload(self, source: str) -> None:
+        """Set ``carried``, and put it into the structure."""
         self.carried = self.platform.body
+        try:
+            # Checked also where it has no mass yet, and no effect.
+            whole = self.carried.with_body(Body(
+                self.payload.mass or self.carried.mass, self.payload.center_of_mass,
+                self.payload.inertia))
+        except BodyError as exc:
+            raise ParameterError(
+                f'{source}: payload.inertia: {self.payload.inertia.tolist()}: {exc}'
+                f'{_smallest_moment(self.payload.inertia)}') from exc
+        except ParameterError as exc:
+            raise ParameterError(f'{source}: payload.mass: {self.payload.mass:g} kg, with '
+                                 f'platform.mass: {exc}') from exc
         if self.payload.mass > 0.0:
-            try:
-                self.carried = self.carried.with_body(self.payload.body)
-            except ParameterError as exc:
-                raise ParameterError(f'{source}: payload.mass: {self.payload.mass:g} kg, with '
-                                     f'platform.mass: {exc}') from exc
+            self.carried = whole
+            (self.structure['mass'], self.structure['center_of_mass'],
+             self.structure['inertia']) = whole
+        self.structure.setflags(write=False)
 
     def replaced(self, changes: Mapping[str, Any], source: str = '', *,
                  exact_types: bool = False) -> Self:
@@ -689,8 +723,8 @@ class Parameters(ParameterSet):
             **dict.fromkeys(payload_values(self.payload.body))})
 
     def _check_drives(self, source: str) -> None:
-        """Check drive.*, and complete it and actuator.reflected_mass."""
-        lead, ratio = self.actuator.screw_lead, self.drive.gear_ratio
+        """Check drive.*, and set ``drives``."""
+        lead = self.actuator.screw_lead
         with np.errstate(over='ignore'):
             driven_back = 2.0 - 1.0 / self.drive.efficiency
         given = tuple(name for name in self.given
@@ -703,60 +737,18 @@ class Parameters(ParameterSet):
             if np.size(default) == 0 or not np.all(self[name] == default):
                 raise ParameterError(
                     f'{source}: actuator.screw_lead: not set: needed by {name}')
-        if self.drive.back_driving_efficiency is None:
-            self._complete('drive.back_driving_efficiency', driven_back)
-        if lead is not None and any(np.any(self[name] > 0.0) for name in DRIVE_INERTIAS):
-            with np.errstate(all='ignore'):
-                follows = (2.0 * math.pi * ratio / lead) ** 2 * (
-                    self.drive.motor_inertia + self.drive.screw_inertia / ratio ** 2)
-            mass = self.actuator.reflected_mass
-            wrong = np.abs(mass - follows) > REFLECTED_MASS_TOLERANCE * follows
-            if 'actuator.reflected_mass' in self.given and wrong.any():
-                leg = int(np.argmax(wrong))
-                raise ParameterError(
-                    f'{source}: actuator.reflected_mass: {mass[leg]:g} kg: contradicts '
-                    f'{MOTOR_INERTIA} and {SCREW_INERTIA}, with which it is {follows[leg]:.6g} kg')
-            if not np.isfinite(follows).all():
-                raise ParameterError(f'{source}: actuator.reflected_mass: {follows.tolist()} kg '
-                                     f'from {MOTOR_INERTIA} and {SCREW_INERTIA}: must be finite')
-            self._complete('actuator.reflected_mass', follows)
+        continuous, most = self.drive.torque_continuous, self.drive.torque_max
+        if continuous is not None and most is not None and np.any(continuous > most):
+            raise ParameterError(
+                f'{source}: drive.torque_continuous: {continuous.tolist()}: must be at most '
+                f'drive.torque_max, {most.tolist()}')
         direction = self.drive.direction
         if np.any(np.abs(direction) != 1.0):
             raise ParameterError(
                 f'{source}: drive.direction: {direction.tolist()}: must be 1.0 or -1.0')
-        curve = self.drive.torque_speed
-        if curve is not None and np.any(np.diff(curve[:, 0]) <= 0.0):
-            raise ParameterError(
-                f'{source}: drive.torque_speed: speeds {curve[:, 0].tolist()} rad/s: must be '
-                'strictly increasing (the order is speed, torque, speed, torque, ...)')
 
 
 PARAMETERS: Mapping[str, Parameter] = Parameters.table
-
-
-def _broken_rule_of_plate(corners: Array) -> str:
-    """Return the rule that corners (M, 3) of a plate break; empty if they break none."""
-    if len(corners) < 3:
-        return 'must have three corners or more'
-    # The rules do not depend on the size; that of a plate of any size is one from here on.
-    corners = corners / max(float(np.abs(corners).max()), np.finfo(float).tiny)
-    arms = corners - corners[0]
-    size = float(np.abs(arms).max())
-    if size == 0.0:
-        return 'the corners are on one line'
-    corners, arms = corners / size, arms / size
-    area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
-    if np.linalg.norm(area) <= _FLAT:
-        return 'the corners are on one line'
-    normal = area / np.linalg.norm(area)
-    if np.abs(arms @ normal).max() > _FLAT:
-        return f'the corners must be in one plane, to {_FLAT:g} of its size'
-    edges = np.roll(corners, -1, axis=0) - corners
-    turns = np.cross(edges, np.roll(edges, -1, axis=0)) @ normal
-    around = np.arctan2(turns, np.sum(edges * np.roll(edges, -1, axis=0), axis=1)).sum()
-    if turns.min() < -_FLAT or around > 3.0 * math.pi:
-        return 'must be convex, its corners in order around it'
-    return ''
 
 
 def payload_values(payload: Body) -> dict[str, Any]:
@@ -782,3 +774,9 @@ def inertia_matrix(six: ArrayLike) -> Any:
     """Return the matrix (3, 3) of ixx ixy ixz iyy iyz izz [kg m^2]."""
     ixx, ixy, ixz, iyy, iyz, izz = np.asarray(six, dtype=float)
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
+
+def _smallest_moment(six: Array) -> str:
+    moment = np.linalg.eigvalsh(inertia_matrix(six))[0]
+    return (f', but its smallest principal moment is {moment:.6g} kg m^2 (the order is ixx ixy '
+            'ixz iyy iyz izz)')

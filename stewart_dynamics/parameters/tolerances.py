@@ -21,6 +21,9 @@ The legs may be this far from where a planned trajectory starts, in characterist
 trajectory.approach has that checked.
 """
 
+STAMPS_END = int(CONSTANTS['STAMPS_END'])
+"""Stamps are less, and not less than its negative [ns]."""
+
 
 def is_unit(length: Any) -> Any:
     """Return whether a quaternion's length, or each of an array, is one within the tolerance."""

@@ -46,7 +46,6 @@ from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.response.recorded_response import Followed
 from stewart_dynamics.response.response_charts import bode_charts, legs_chart, zoom_charts
 from stewart_dynamics.response.response_measures import bandwidth
-from stewart_dynamics.setpoints.motor_row import OF_DRIVES, RISES
 from stewart_dynamics.setpoints.rejections import stamp_of
 from stewart_dynamics.whole_file import FilesOfFolder, write_files
 
@@ -109,13 +108,13 @@ class Report:
             'joint_angles': np.degrees(outputs.joint_angles),
             'clearances': outputs.clearances}
         if self._operating is not None:
-            motors = Motors.of_rows(outputs.motors[:, OF_DRIVES])
+            motors = Motors.of_rows(outputs.motors)
             with np.errstate(invalid='ignore'):
                 quantities |= {
                     'torques': motors.torques, 'speeds': motors.speeds,
-                    'rises': outputs.motors[:, RISES],
+                    'rises': outputs.rises,
                     'bus_power': motors.power.sum(axis=1, keepdims=True)}
-            self._operating.add(outputs.motors)
+            self._operating.add(motors)
         self._places = _add(self._curves, seconds, quantities)
         self._spectrum.add(seconds, base_wrenches.T)
         self._frames.add(seconds, np.concatenate(

@@ -16,7 +16,6 @@ from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds, large
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.parameters.table import Parameters, six_of
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
-from stewart_dynamics.setpoints.motor_row import OF_DRIVES
 
 # Cells of each motor: magnitude of the speed, torque.
 _CELLS = 128
@@ -41,9 +40,8 @@ class OperatingPoints:
         self._counts: Integers = np.zeros((6, _CELLS, _CELLS), dtype=np.int64)
         self._exponents = [_FINEST, _FINEST]
 
-    def add(self, rows: Array) -> None:
-        """Add rows of motors (N, MOTOR_ROW)."""
-        motors = Motors.of_rows(rows[:, OF_DRIVES])
+    def add(self, motors: Motors) -> None:
+        """Add motors (N,)."""
         torques, speeds = motors.breakaway_torques, np.abs(motors.speeds)
         torques = np.where(motors.speeds == 0.0, np.abs(torques),
                            torques * np.sign(motors.speeds))

@@ -22,7 +22,6 @@ from stewart_dynamics.mechanics.limits import (
     LIMITS, OF_MOTORS, SPEED_MAX, TORQUE_SPEED)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.block_statistics import Exceeded, Extreme, finite, Integral
-from stewart_dynamics.setpoints.motor_row import OF_DRIVES, RISES
 
 MARGIN = 1.2  # factor on torques and speed of the motor that is needed
 _OF_VELOCITY = TORQUE_SPEED, SPEED_MAX
@@ -64,9 +63,13 @@ class MotorLoads:
         # copper heat; power drawn; power regenerated
         self._electrical = Integral(8)
 
-    def add(self, seconds: Array, steps: Array, rows: Array) -> None:
-        """Add rows (N, MOTOR_ROW) at times (N,), and the time to each from the one before [s]."""
-        motors, rises = Motors.of_rows(rows[:, OF_DRIVES]), rows[:, RISES]
+    def add(self, seconds: Array, steps: Array, rows: Array, rises: Array) -> None:
+        """
+        Add rows of motors (N, MOTORS) and temperature rises (N, 6) [K] at times (N,).
+
+        steps (N,): the time to each from the one before [s].
+        """
+        motors = Motors.of_rows(rows)
         with np.errstate(over='ignore', invalid='ignore'):
             power = motors.power.sum(axis=1, keepdims=True)
             self._means.add(steps, np.concatenate(
@@ -80,7 +83,7 @@ class MotorLoads:
         self._rise.add(seconds, rises)
         self._drawn.add(seconds, power)
         self._regenerated.add(seconds, power)
-        checked = self._limits.excesses(rows[:, OF_DRIVES], rises)
+        checked = self._limits.excesses(rows, rises)
         for limit, exceeded in self._exceeded.items():
             values, bounds = checked[limit]
             exceeded.add(seconds, exceeds(values, bounds), values, bounds)

@@ -38,7 +38,6 @@ from stewart_dynamics.replay.summary import COMPONENTS, unit_key
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
 from stewart_dynamics.reporting.block_statistics import Extreme
 from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
-from stewart_dynamics.setpoints.motor_row import OF_DRIVES
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
@@ -131,7 +130,7 @@ class Comparison:
         """Add setpoints, see Summary.add; return the compared setpoints."""
         columns = [seconds, setpoints.motions[:, POSE], outputs.demanded_forces]
         if self._losses:
-            motors = Motors.of_rows(outputs.motors[:, OF_DRIVES])
+            motors = Motors.of_rows(outputs.motors)
             columns += [motors.speeds / self._ratio, motors.accelerations / self._ratio]
         self._setpoints.add(setpoints.stamps, np.column_stack(columns))
         return self._compared()

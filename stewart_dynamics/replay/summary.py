@@ -167,7 +167,7 @@ class Summary:
             exceeded.add(seconds, self._limits.exceeds(name, values[name]), values[name],
                          self._limits.bounds[name])
         if self._motors is not None:
-            self._motors.add(seconds, steps, outputs.motors)
+            self._motors.add(seconds, steps, outputs.motors, outputs.rises)
         self._nearest.add(seconds, outputs.determinants[:, None])
         self._condition.add(seconds, outputs.conditions[:, None])
         self._time_to_crossing.add(seconds, outputs.times_to_crossing[:, None])

@@ -19,9 +19,9 @@ from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.messages.standard import BOOLEAN, FLOAT64, FLOAT64_ARRAY
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
-from stewart_dynamics.setpoints.motor_row import ANGLES, MOTOR_ROW, SOUND, SPEEDS, TORQUES
 from stewart_dynamics.setpoints.step import (
-    CHANGED, OUTPUT, Outputs, POSITIONS, PUBLISHED_FORCES, WARNING_STATE)
+    CHANGED, FINITE_MOTORS, MOTOR_ANGLES, MOTOR_COMMANDS, MOTOR_SPEEDS, OUTPUT, Outputs, POSITIONS,
+    PUBLISHED_FORCES, WARNING_STATE)
 
 LEG_STATES, LEG_LENGTHS, LEG_FORCES = 'leg_states', 'leg_lengths', 'leg_forces'
 DETERMINANT, WARNING = 'jacobian_determinant', 'singularity_warning'
@@ -52,24 +52,25 @@ class OutputMessages:
     def __init__(self, parameters: Parameters) -> None:
         states = JointStateWriter(parameters.joints)
         force, moving = PUBLISHED_FORCES.start, [POSITIONS, rows.RATES]
-        self._of_legs = SideBySide([
+        kinds = [
             Written(LEG_STATES, states.layout(True), [*moving, PUBLISHED_FORCES], known=force),
             Written(LEG_STATES, states.layout(False), moving, unknown=force),
             Written(LEG_LENGTHS, FLOAT64_ARRAY, [rows.LENGTHS]),
             Written(LEG_FORCES, FLOAT64_ARRAY, [PUBLISHED_FORCES], known=force),
             Written(DETERMINANT, FLOAT64, [slice(rows.DETERMINANT, rows.CONDITION)]),
-            Written(WARNING, BOOLEAN, [WARNING_STATE], positive=CHANGED)], OUTPUT)
-        self._of_motors: SideBySide | None = None
+            Written(WARNING, BOOLEAN, [WARNING_STATE], positive=CHANGED)]
+        self.types = OUTPUT_TYPES
         if (motors := motor_states_writer(parameters)) is not None:
-            torque, turning = TORQUES.start, [ANGLES, SPEEDS]
-            self._of_motors = SideBySide([
-                Written(MOTOR_STATES, motors.layout(True), [*turning, TORQUES], known=torque,
-                        positive=SOUND),
+            torque, turning = MOTOR_COMMANDS.start, [MOTOR_ANGLES, MOTOR_SPEEDS]
+            kinds += [
+                Written(MOTOR_STATES, motors.layout(True), [*turning, MOTOR_COMMANDS],
+                        known=torque, positive=FINITE_MOTORS),
                 Written(MOTOR_STATES, motors.layout(False), turning, unknown=torque,
-                        positive=SOUND),
-                Written(MOTOR_TORQUES, FLOAT64_ARRAY, [TORQUES], known=torque, positive=SOUND),
-            ], MOTOR_ROW)
-        self.types = OUTPUT_TYPES | (MOTOR_TYPES if self._of_motors else {})
+                        positive=FINITE_MOTORS),
+                Written(MOTOR_TORQUES, FLOAT64_ARRAY, [MOTOR_COMMANDS], known=torque,
+                        positive=FINITE_MOTORS)]
+            self.types = OUTPUT_TYPES | MOTOR_TYPES
+        self._of_outputs = SideBySide(kinds, OUTPUT)
         self._wrench = StampedWriter(parameters.base_frame, 6)
 
     def of(self, outputs: Outputs) -> list[tuple[str, Flags, NDArray[np.void]]]:
@@ -78,10 +79,7 @@ class OutputMessages:
 
         Returns topics, which outputs have a message (N,), and the messages (N,), of one length.
         """
-        found = self._of_legs.write(outputs.stamps, outputs.rows)
-        if self._of_motors is not None:
-            found += self._of_motors.write(outputs.stamps, outputs.motors)
-        return found
+        return self._of_outputs.write(outputs.stamps, outputs.rows)
 
     def of_wrench(self, stamp: int, wrench: Sequence[float]) -> bytes:
         """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""

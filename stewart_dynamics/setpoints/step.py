@@ -11,49 +11,46 @@ for the next. A single setpoint is a batch of one; results are bit-identical, wh
 from __future__ import annotations
 
 from collections.abc import Sequence
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Stamps
-from stewart_dynamics.core.binding import function, places
+from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Records, Stamps
+from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.mechanics.batch import in_parts
-from stewart_dynamics.mechanics.drives.motor_limits import MotorLimits
+from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, JUMP, result_values)
-from stewart_dynamics.mechanics.pose_limits import PoseLimits
+    ANGLES, CLEARANCE_MIN, Exceedance, JUMP, limit_bounds, LIMITS, NO_COLUMNS, OF_MOTORS,
+    OF_RESULTS, TORQUE_SPEED, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_ANGLES, JOINT_FORCES, LENGTHS, MOTION,
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, MOTION,
     NO_BASE, RATES, RESULT, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
     CAUSE, Singularity, TIME, UNSOLVABLE_CONDITION)
-from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.motor_row import (
-    EXCEEDING as MOTORS_EXCEEDING, MOTOR_ROW, OF_DRIVES, RISES)
 
-# Tolerance of the stamps of setpoints [s]: a leg may move at its rate limit for this additional
-# time before a setpoint counts as a jump.
-JITTER = 1e-3
-
-# Parts of the rows of setpoints, of their outputs, and of the state of the step.
-_SETPOINT, _OUTPUT, _STATE = (
-    places(name) for name in ('setpoint', 'setpoint_output', 'step_state'))
+# Parts of the rows of setpoints, and of their outputs.
+_SETPOINT, _OUTPUT = places('setpoint'), places('stewart_output')
 _MOTION, _LOAD, _BASE, _BASE_KNOWN, _RESTART, _STAMPED = (_SETPOINT[name] for name in (
     'motion', 'wrench', 'base', 'base_known', 'restart', 'stamped'))
 SETPOINT = 1 + _STAMPED
-POSITIONS, PUBLISHED_FORCES, WARNING_STATE, _MEAN_RATES = (
-    _OUTPUT[name] for name in ('positions', 'forces', 'warning', 'mean_rates'))
-_ANSWERED, _RESTARTED, CHANGED, EXCEEDING, _JUMPED = (
-    _OUTPUT[name] for name in ('answered', 'restart', 'changed', 'exceeding', 'jumped'))
-OUTPUT = 1 + _JUMPED
+(POSITIONS, PUBLISHED_FORCES, _MEAN_RATES, _BASE_JOINT_ANGLES, _PLATFORM_JOINT_ANGLES,
+ _CLEARANCES, MOTORS, RISES) = (_OUTPUT[name] for name in (
+     'positions', 'forces', 'mean_rates', 'base_joint_angles', 'platform_joint_angles',
+     'clearances', 'motors', 'rises'))
+MOTOR_ANGLES, MOTOR_SPEEDS, MOTOR_COMMANDS = (
+    _OUTPUT[f'motors.{name}'] for name in ('angles', 'speeds', 'commands'))
+_ANSWERED, _RESTARTED, CHANGED, EXCEEDING, _JUMPED, FINITE_MOTORS = (_OUTPUT[name] for name in (
+    'answered', 'restart', 'changed', 'exceeding', 'jumped', 'finite_motors'))
+WARNING_STATE = slice(_OUTPUT['warning'], 1 + _OUTPUT['crossings'])
+_JOINT_ANGLES = slice(_BASE_JOINT_ANGLES.start, _PLATFORM_JOINT_ANGLES.stop)
+_OUTPUT_RECORD, _STATE_RECORD = record('stewart_output'), record('stewart_state')
+OUTPUT = _OUTPUT_RECORD.itemsize // 8
+"""Numbers in a row of outputs; the last ones are integers, which no slice here has."""
 
-FIRST: Array = np.zeros(1 + _STATE['restarting'])
-"""The state before the first setpoint."""
-FIRST[_STATE['warning.time_to_crossing']] = math.inf
-FIRST[_STATE['lengths']] = math.nan
+FIRST: Records = np.zeros(1, _STATE_RECORD)
+"""The state before the first setpoint, the structure ``stewart_state`` in C."""
 FIRST.flags.writeable = False
 # The mask of a single answered setpoint: making it took as long as the computation.
 _THE_ONE: Flags = np.ones(1, dtype=bool)
@@ -146,6 +143,14 @@ class Batch(NamedTuple):
         return self._replace(rows=rows)
 
 
+class Computed(NamedTuple):
+    """Which parts of an output are computed; the others are nan."""
+
+    joint_angles: bool
+    clearances: bool
+    motors: bool
+
+
 class Outputs(NamedTuple):
     """Results of the step for the N setpoints of a batch that could be answered."""
 
@@ -153,14 +158,11 @@ class Outputs(NamedTuple):
     stamps: Stamps  # (N,) [ns]
     rows: Array
     """
-    (N, OUTPUT), the structure ``setpoint_output`` in C; its parts are properties. It begins with
+    (N, OUTPUT), the structure ``stewart_output`` in C; its parts are properties. It begins with
     the row of results of ``inverse_dynamics``.
     """
-    joint_angles: Array  # (N, 12) [rad], nan without a limit of theirs; (N, 0) without any
-    clearances: Array
-    """Distance of the surface of each leg to the nearest other (N, 6) [m]; (N, 0): no limit."""
-    motors: Array  # rows of motors (N, MOTOR_ROW), or (N, 0); see ``motor_row``
-    state: Array  # for the next setpoint, see ``FIRST``
+    computed: Computed
+    state: Records  # for the next setpoint, see ``FIRST``
 
     @property
     def results(self) -> Array:
@@ -223,6 +225,31 @@ class Outputs(NamedTuple):
         return ~np.isnan(self.rows[:, PUBLISHED_FORCES.start])
 
     @property
+    def joint_angles(self) -> Array:
+        """(N, 12) [rad], nan without a limit of theirs; (N, 0) without any."""
+        return self.rows[:, _JOINT_ANGLES if self.computed.joint_angles else NO_COLUMNS]
+
+    @property
+    def clearances(self) -> Array:
+        """Distance of each leg to the nearest leg or plate (N, 6) [m]; (N, 0): no limit."""
+        return self.rows[:, _CLEARANCES if self.computed.clearances else NO_COLUMNS]
+
+    @property
+    def motors(self) -> Array:
+        """Rows of ``mechanics.drives.motors`` (N, MOTORS), commands as published; or (N, 0)."""
+        return self.rows[:, MOTORS if self.computed.motors else NO_COLUMNS]
+
+    @property
+    def rises(self) -> Array:
+        """Temperature rises of the windings (N, 6) [K]; (N, 0) without motors."""
+        return self.rows[:, RISES if self.computed.motors else NO_COLUMNS]
+
+    @property
+    def records(self) -> Records:
+        """The rows as structures ``stewart_output`` (N,)."""
+        return self.rows.view(_OUTPUT_RECORD)[:, 0]
+
+    @property
     def states(self) -> Array:
         """States of the singularity warning (N, STATE), rows of Singularity."""
         return self.rows[:, WARNING_STATE]
@@ -262,13 +289,12 @@ class Outputs(NamedTuple):
         return Singularity.of(self.states[n].tolist())
 
     def values(self) -> dict[str, Array]:
-        """Return the (N, 6) values of the limits of the legs, those that are computed."""
-        found = result_values(self.rows)
-        if self.joint_angles.shape[1]:
-            found |= {name: self.joint_angles[:, where] for name, where in ANGLES.items()}
-        if self.clearances.shape[1]:
-            found[CLEARANCE_MIN] = self.clearances
-        return found
+        """Return the values (N, 6) of the limits, those that are computed."""
+        found = {*OF_RESULTS, *(ANGLES if self.computed.joint_angles else ()),
+                 *([CLEARANCE_MIN] if self.computed.clearances else ()),
+                 *(OF_MOTORS if self.computed.motors and self.rows[:, FINITE_MOTORS].all() else ())}
+        return {name: self.rows[:, limit.columns] for name, limit in LIMITS.items()
+                if name in found}
 
 
 class Step:
@@ -281,26 +307,17 @@ class Step:
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
-        self._platform = StewartPlatform(parameters)
-        self._of_poses = of_poses = PoseLimits(parameters)
-        self._limits, self._motors = of_poses.limits, MotorLimits(parameters)
-        of_angles, of_clearance = of_poses.angles, of_poses.clearance
-        self._widths = (0 if of_angles is None else JOINT_ANGLES, 0 if of_clearance is None else 6,
-                        MOTOR_ROW if parameters.drives else 0)
-        # The last two: by how much the time between two setpoints may exceed that between their
-        # stamps, or between their times of arrival [s].
-        constants = (
-            self._platform.structure, *of_poses.arguments, parameters.geometry.zero_length,
-            JITTER + parameters.setpoint.sync_tolerance, JITTER + parameters.setpoint.timeout)
-        self._check = function('check_setpoints').bound(*constants)
+        hexapod = limited_structure(parameters)
+        self._hexapod, self._bounds = hexapod, limit_bounds(parameters)
+        self._computed = Computed(*(bool(hexapod[name]) for name in (
+            'with_joint_angles', 'with_clearance', 'with_motors')))
+        self._step = function('step_setpoints').bound(hexapod)
         # A single setpoint is copied to memory that stays: half the time of a call with any.
         self._memory: tuple[Any, ...] = (
-            np.zeros(1, np.int64), np.zeros((1, SETPOINT)),
-            *(np.empty((1, width)) for width in self._widths[:2]), FIRST.copy(),
-            np.empty((1, OUTPUT)), np.empty((1, self._widths[2])))
-        self._check_one = function('check_setpoints').bound(*constants, 0, 1, *self._memory)
+            np.zeros(1, np.int64), np.zeros((1, SETPOINT)), FIRST.copy(), np.empty((1, OUTPUT)))
+        self._step_one = function('step_setpoints').bound(hexapod, 0, 1, *self._memory)
 
-    def __call__(self, setpoints: Batch, before: Array = FIRST) -> Outputs:
+    def __call__(self, setpoints: Batch, before: Records = FIRST) -> Outputs:
         """
         Return the outputs of setpoints in order.
 
@@ -309,44 +326,36 @@ class Step:
         """
         stamps, given, number = setpoints.stamps, setpoints.rows, len(setpoints.stamps)
         if number == 1:
-            at, of_one, *found = self._memory
-            at[:], of_one[:], found[2][:] = stamps, given, before
-            n_answered = self._check_one()
-            angles, clearances, state, rows, motors = [
-                each.copy() if each.size else each for each in found]
+            at, of_one, last, found = self._memory
+            at[:], of_one[:], last[:] = stamps, given, before
+            n_answered = self._step_one()
+            state, rows = last.copy(), found.copy()
         else:
             rows, state = np.empty((number, OUTPUT)), before.copy()
-            angles, clearances, motors = (np.empty((number, width)) for width in self._widths)
             in_parts(self._solve, (), given, rows)
-            if self._of_poses.angles is not None:
-                angles = self._of_poses.angles(setpoints.motions)
-            if self._of_poses.clearance is not None:
-                clearances = self._of_poses.clearance(setpoints.motions)
-            n_answered = self._check(
-                1, number, stamps, given, angles, clearances, state, rows, motors)
+            n_answered = self._step(1, number, stamps, given, state, rows)
         if n_answered == number == 1:
             answered = _THE_ONE
         else:
             answered = rows[:, _ANSWERED] > 0.0
         if n_answered < number:
-            stamps = stamps[answered]
-            rows, angles, clearances, motors = (
-                each[answered] for each in (rows, angles, clearances, motors))
-        return Outputs(answered, stamps, rows, angles, clearances, motors, state)
+            stamps, rows = stamps[answered], rows[answered]
+        return Outputs(answered, stamps, rows, self._computed, state)
 
     def _solve(self, setpoints: Array, outputs: Array) -> None:
-        function('solve_setpoints')(self._platform.structure, len(setpoints), setpoints, outputs)
+        function('solve_setpoints')(self._hexapod, len(setpoints), setpoints, outputs)
 
-    def exceedances(self, motions: Array, outputs: Outputs, n: int = 0) -> tuple[Exceedance, ...]:
-        """Return the limits that a setpoint exceeds; motions (N, MOTION): those of the outputs."""
-        values = {name: each[n].tolist() for name, each in outputs.values().items()}
-        if outputs.jumped[n]:
-            values[JUMP] = outputs.rows[n, _MEAN_RATES].tolist()
-        nearest: list[int] = []
-        if self._of_poses.clearance is not None:
-            nearest = self._of_poses.clearance.nearest(motions[n:n + 1])[1][0].tolist()
-        found = self._limits.exceeded(values, nearest)
-        motors = outputs.motors[n]
-        if len(motors) and motors[MOTORS_EXCEEDING]:
-            found += self._motors.exceeded(motors[OF_DRIVES], motors[RISES])
-        return found
+    def exceedances(self, outputs: Outputs, n: int = 0) -> tuple[Exceedance, ...]:
+        """Return the limits that the motion or the motors of a setpoint exceed."""
+        row, found = outputs.rows[n], outputs.records[n]
+        exceeded = [int(bits) for bits in found['exceeded']]
+        return tuple(
+            Exceedance(name, leg, float(row[limit.columns][leg]), self._bound(name, row, leg),
+                       int(found['nearest'][leg]) if name == CLEARANCE_MIN else -1)
+            for name, limit in LIMITS.items() for leg, bits in enumerate(exceeded)
+            if bits & limit.bit)
+
+    def _bound(self, limit: str, row: Array, leg: int) -> float:
+        if limit == TORQUE_SPEED:
+            return float(row[_OUTPUT['motors.available_torques']][leg])
+        return float(self._bounds[VELOCITY_MAX if limit == JUMP else limit][leg])

@@ -41,7 +41,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.core.binding import CONSTANTS, function, record, Sample
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.drives.motors import Drives, motor_ratio
+from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
@@ -181,15 +181,13 @@ class Plant:
         self._plant = plant[0]
         self._driven = bool(parameters.drives)
         plant['by_torques'] = parameters.commands == TORQUE
-        plant['driven'], plant['step'] = self._driven, self._step
+        plant['step'] = self._step
         plant['stops'], plant['force_max'] = stops_of(parameters), self._limits.force_max
         self._sample['bases'][:] = math.nan
         pose = parameters.initial_pose
         plant['state']['position'] = pose[:3]
         plant['state']['quaternion'] = to_quaternion(from_euler(pose[3:]))
-        drives = Drives(parameters).arguments if self._driven else (
-            hexapod_structure(parameters), np.zeros((), record('leg_drives')), 0, np.empty((0, 2)))
-        self._take_steps = function('plant_advance').bound(*drives, plant)
+        self._take_steps = function('plant_advance').bound(hexapod_structure(parameters), plant)
         self.state = self._run(0)._replace(acceleration=NO_WRENCH)  # the present one
         self._check_lengths()
         self._deviations = np.repeat([

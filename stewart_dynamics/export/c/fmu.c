@@ -31,7 +31,9 @@ double * fmu_value(fmu_instance * instance, uint32_t reference, fmu_type type, i
 {
   fmu_type actual = FMU_REAL;
   if (reference >= FMU_VALUES ||
-    (reference >= FMU_MOTOR_SPEEDS && !(fmu_platform->legs[0].screw_lead > 0.0)) || (settable && reference >= FMU_LENGTHS)) {
+    (reference >= FMU_MOTOR_SPEEDS && !fmu_platform->with_motors) ||
+    (settable && reference >= FMU_LENGTHS))
+  {
     return NULL;
   }
   if (reference >= FMU_EXCEEDED && reference <= FMU_STATUS) {
@@ -44,46 +46,30 @@ double * fmu_value(fmu_instance * instance, uint32_t reference, fmu_type type, i
   return type == actual ? &instance->memory.values[reference] : NULL;
 }
 
-/* Return whether an inertia xx xy xz yy yz zz, with a part of its trace added to each moment, is
-   positive definite. */
-static int is_definite(const double * i, double part)
-{
-  double added = part * (i[0] + i[3] + i[5]), xx = i[0] + added;
-  double yy = i[3] + added - i[1] * i[1] / xx, yz = i[4] - i[1] * i[2] / xx;
-  return xx > 0.0 && yy > 0.0 && i[5] + added - i[2] * i[2] / xx - yz * yz / yy > 0.0;
-}
-
-/* Return whether the inertia of a payload is positive semidefinite, as that of a point is. */
-static int is_semidefinite(const double * inertia)
-{
-  int n, is_point = 1;
-  for (n = 0; n < 6; n++) {
-    is_point = is_point && inertia[n] == 0.0;
-  }
-  return is_point || is_definite(inertia, 1e-12);
-}
-
-/* Put the parameters of the instance into a hexapod; return whether they keep their rules. */
+/* Put parameters and payload of the instance into a hexapod; return a code of stewart_dynamics.h. */
 static int put_parameters(const double * values, stewart_platform * platform)
 {
-  const double * i = values + FMU_INERTIA;
-  int n;
+  const double * payload = values + FMU_PAYLOAD_MASS;
+  int n, where, code;
   for (n = FMU_MASS; n < FMU_LENGTHS; n++) {
     if (!isfinite(values[n])) {
-      return 0;
+      return STEWART_NOT_FINITE;
     }
   }
   platform->mass = values[FMU_MASS];
   memcpy(platform->center_of_mass, values + FMU_CENTER_OF_MASS, 3 * sizeof *values);
-  memcpy(platform->inertia, i, 6 * sizeof *values);
+  memcpy(platform->inertia, values + FMU_INERTIA, 6 * sizeof *values);
   platform->warn_condition = values[FMU_WARN_CONDITION];
   platform->stop_condition = values[FMU_STOP_CONDITION];
   platform->warn_time = values[FMU_WARN_TIME];
   platform->suppress_near_singularity = values[FMU_SUPPRESS_NEAR_SINGULARITY] != 0.0;
   platform->suppress_at_limits = values[FMU_SUPPRESS_AT_LIMITS] != 0.0;
-  return platform->mass > 0.0 && is_definite(i, 0.0) &&
-    platform->warn_condition >= 1.0 && platform->stop_condition >= platform->warn_condition &&
-    platform->warn_time >= 0.0;
+  if (stewart_check(platform, &where) != STEWART_VALID || payload[0] < 0.0) {
+    return STEWART_BROKEN_RULE;
+  }
+  code = payload[0] == 0.0 ? STEWART_OK : stewart_add_payload(
+    platform, payload[0], values + FMU_PAYLOAD_CENTER_OF_MASS, values + FMU_PAYLOAD_INERTIA);
+  return code;
 }
 
 /* The inputs in the order of the variables: the structures are arrays of doubles. */
@@ -107,25 +93,15 @@ int fmu_step(fmu_instance * instance, double time)
   stewart_motion motion;
   stewart_base base;
   stewart_output output;
-  stewart_motors motors;
-  int code, n;
+  int code, rotation, n;
   if (instance->memory.initializing) {  /* each set of inputs is the first */
     memset(&instance->memory.state, 0, sizeof instance->memory.state);
   }
   put_motion(values, &motion, &base);
-  code = stewart_rotation(values + FMU_ORIENTATION, motion.rotation);
-  if (!put_parameters(values, &platform) || !(fabs(time) < 2e9)) {
-    code = STEWART_OUT_OF_RANGE;
-  }
-  if (code == STEWART_OK && values[FMU_PAYLOAD_MASS] != 0.0) {
-    code = stewart_add_payload(
-      &platform, values[FMU_PAYLOAD_MASS], values + FMU_PAYLOAD_CENTER_OF_MASS,
-      values + FMU_PAYLOAD_INERTIA);
-    if (code == STEWART_OK &&
-      !(values[FMU_PAYLOAD_MASS] > 0.0 && is_semidefinite(values + FMU_PAYLOAD_INERTIA)))
-    {
-      code = STEWART_OUT_OF_RANGE;
-    }
+  rotation = stewart_rotation(values + FMU_ORIENTATION, motion.rotation);
+  code = put_parameters(values, &platform);
+  if (code == STEWART_OK) {
+    code = fabs(time) < 2e9 ? rotation : STEWART_OUT_OF_RANGE;
   }
   if (code == STEWART_OK) {
     code = stewart_step(
@@ -135,26 +111,19 @@ int fmu_step(fmu_instance * instance, double time)
   if (code == STEWART_OK || code == STEWART_SUPPRESSED || code == STEWART_SINGULAR) {
     memcpy(values + FMU_LENGTHS, output.result.lengths, 6 * sizeof *values);
     memcpy(values + FMU_RATES, output.result.rates, 6 * sizeof *values);
+    memcpy(values + FMU_MOTOR_SPEEDS, output.motors.speeds, 6 * sizeof *values);
     values[FMU_DETERMINANT] = output.result.determinant;
     values[FMU_DETERMINANT_RATE] = output.result.determinant_rate;
     values[FMU_CONDITION_NUMBER] = output.result.condition_number;
-    values[FMU_WARNING] = instance->memory.state.warning != STEWART_NO_WARNING;
+    values[FMU_WARNING] = output.warning != STEWART_NO_WARNING;
     for (n = 0; n < 6; n++) {
       values[FMU_EXCEEDED + n] = output.exceeded[n];
     }
   }
-  memset(&motors, 0, sizeof motors);
-  if ((code == STEWART_OK || code == STEWART_SUPPRESSED || code == STEWART_SINGULAR) &&
-    stewart_motor_torques(&platform, &motion, output.forces, &motors) == STEWART_OK)
-  {
-    memcpy(values + FMU_MOTOR_SPEEDS, motors.speeds, 6 * sizeof *values);
-  }
-  for (n = 0; n < 6; n++) {
-    values[FMU_MOTOR_TORQUES + n] = code == STEWART_OK ? motors.torques[n] : 0.0;
-  }
   for (n = 0; n < 6; n++) {
     values[FMU_FORCES + n] = code == STEWART_OK ? output.forces[n] : 0.0;
     values[FMU_JOINT_FORCES + n] = code == STEWART_OK ? output.result.joint_forces[n] : 0.0;
+    values[FMU_MOTOR_TORQUES + n] = code == STEWART_OK ? output.motors.commands[n] : 0.0;
   }
   values[FMU_STATUS] = code;
   values[FMU_TIME] = time;
@@ -169,6 +138,7 @@ const char * fmu_text(int code)
     case STEWART_NOT_UNIT: return "forces are zero: orientation is not a unit quaternion";
     case STEWART_SINGULAR: return "forces are zero: det(J) is zero";
     case STEWART_SUPPRESSED: return "forces are zero: singularity.action or limits.action";
-    default: return "forces are zero: an input, a parameter or the time is out of range";
+    case STEWART_BROKEN_RULE: return "forces are zero: a parameter breaks a rule";
+    default: return "forces are zero: an input or the time is out of range";
   }
 }

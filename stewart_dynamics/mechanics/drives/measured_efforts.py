@@ -13,7 +13,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.drives.motors import drives_structure, motor_ratio
+from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.parameters.table import AUTO, Parameters, STANDARD_GRAVITY
 
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
@@ -80,7 +80,7 @@ def without_losses(forces: Array, rates: Array, accelerations: Array, p: Paramet
     rates, accelerations (N, 6): of the drives, q' and q'' [m/s, m/s^2].
     """
     loads = np.empty((len(forces), 6))
-    function('without_losses_many')(drives_structure(p), len(forces), *map(
+    function('without_losses_many')(p.structure, len(forces), *map(
         np.ascontiguousarray, (forces, rates, accelerations)), loads)
     return loads
 

@@ -13,7 +13,7 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.drives.motors import (
     AVAILABLE_TORQUES, BREAKAWAY_TORQUES, motor_ratio, SPEEDS)
 from stewart_dynamics.mechanics.limits import (
-    Exceedance, OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE, TORQUE_MAX, TORQUE_SPEED)
+    OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.parameters.table import Parameters, six_of, UNIVERSAL
 
 _WITHOUT_TWIST = 0.9
@@ -43,13 +43,6 @@ class MotorLimits:
             SPEED_MAX: (rows[..., SPEEDS], np.broadcast_to(self.bounds[SPEED_MAX], torques.shape)),
             TEMPERATURE_RISE_MAX: (
                 rises, np.broadcast_to(self.bounds[TEMPERATURE_RISE_MAX], rises.shape))}
-
-    def exceeded(self, row: Array, rises: Array) -> tuple[Exceedance, ...]:
-        """Return all limits that a row of motors (MOTORS,) with rises (6,) exceeds."""
-        return tuple(
-            Exceedance(limit, int(leg), float(values[leg]), float(bounds[leg]))
-            for limit, (values, bounds) in self.excesses(row, rises).items()
-            for leg in np.flatnonzero(exceeds(values, bounds)))
 
 
 def largest_torques(p: Parameters, speeds: Array) -> Array:

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 # A row of the six motors' quantities. Commands are the torques of the forces that are published,
 # clipped to the available torques.
 (ANGLES, SPEEDS, COMMANDS, BREAKAWAY_TORQUES, TORQUES, ACCELERATIONS, CURRENTS, POWER, COPPER_HEAT,
- AVAILABLE_TORQUES) = places('motor_row').values()
+ AVAILABLE_TORQUES) = places('stewart_motors').values()
 MOTORS = AVAILABLE_TORQUES.stop
 # Columns in the order of the C source.
 MECHANICAL = np.r_[ANGLES, SPEEDS, ACCELERATIONS, TORQUES]
@@ -137,18 +137,10 @@ class Motors(NamedTuple):
 
 
 class Drives:
-    """
-    The motors of a hexapod: rows of motions and of their results to rows of motors.
-
-    arguments: the first of the functions in C: hexapod, drives, and the points of the torque-speed
-        curve with their number.
-    """
+    """The motors of a hexapod: rows of motions and of their results to rows of motors."""
 
     def __init__(self, parameters: Parameters) -> None:
-        curve = parameters.drive.torque_speed
-        curve = np.empty((0, 2)) if curve is None else np.array(curve)
-        self.arguments = (
-            hexapod_structure(parameters), drives_structure(parameters), len(curve), curve)
+        self._hexapod = hexapod_structure(parameters)
 
     def __call__(self, motions: Array, results: Array) -> Array:
         """Return rows (N, MOTORS) for rows of motion and results, unchecked."""
@@ -158,34 +150,10 @@ class Drives:
         return rows
 
     def _write(self, motions: Array, results: Array, forces: Array, rows: Array) -> None:
-        function('motors_many')(*self.arguments, len(motions), motions, results, forces, rows)
+        function('motors_many')(self._hexapod, len(motions), motions, results, forces, rows)
 
 
 def motor_ratio(parameters: Parameters) -> Array:
     """Return the turn of the motors for a metre of their legs (6,) [rad/m]; nan if not given."""
-    with np.errstate(over='ignore'):
-        ratio: Array = (2.0 * math.pi * parameters.drive.gear_ratio
-                        / six_of(parameters.actuator.screw_lead, math.nan))
+    ratio: Array = parameters.structure['legs']['motor_ratio']
     return ratio
-
-
-def drive_constants(p: Parameters) -> Array:
-    """Return the constants (6, 8) of the drives, see ``leg_drive`` in C; nan if not given."""
-    return np.column_stack([
-        motor_ratio(p), p.geometry.zero_length, p.actuator.reflected_mass,
-        1.0 / p.drive.efficiency - 1.0, p.drive.back_driving_efficiency - 1.0,
-        p.actuator.coulomb_velocity, six_of(p.drive.torque_constant, math.nan),
-        six_of(p.drive.resistance, math.nan)])
-
-
-def drives_structure(p: Parameters) -> Records:
-    """Return the structure () of the drives."""
-    drives = np.zeros((), record('leg_drives'))
-    drives['legs'] = np.ascontiguousarray(drive_constants(p)).view(record('leg_drive'))[:, 0]
-    drives['torque_max'] = six_of(p.drive.torque_max, math.inf)
-    drives['fastest'] = (1.0 + TOLERANCE) * six_of(p.drive.speed_max, math.inf)
-    drives['hottest'] = (1.0 + TOLERANCE) * six_of(p.drive.temperature_rise_max, math.inf)
-    # Each needs the other; without them there are no temperatures.
-    drives['thermal_resistance'] = six_of(p.drive.thermal_resistance, math.nan)
-    drives['time_constant'] = six_of(p.drive.thermal_time_constant, math.nan)
-    return drives

@@ -22,33 +22,18 @@ import math
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
-from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, HomeDirections
+from stewart_dynamics.mechanics.kinematics.joint_axes import AXES
 from stewart_dynamics.mechanics.limits import ANGLES, OF_JOINTS
 from stewart_dynamics.mechanics.rows import JOINT_ANGLES
 from stewart_dynamics.parameters.table import Parameters
 
-
-def joint_angles(hexapod: Records, axes: Array, motions: Array, angles: Array) -> None:
-    """
-    Write the angles of the joints in each motion.
-
-    hexapod (): its structure, see ``hexapod_structure``.
-    axes (12, 3): unit vectors: of the base joints in base axes, of the platform joints in platform
-        axes.
-    motions (N, MOTION): rows of motion.
-    angles (N, JOINT_ANGLES): written [rad]; nan where an axis is.
-    """
-    function('joint_angles_many')(hexapod, axes, len(motions), motions, angles)
-
-
-BASE_AXES, PLATFORM_AXES = AXES = 'geometry.base_joint_axes', 'geometry.platform_joint_axes'
 
 # No ball joint or universal joint reaches this angle, 92 degrees [rad].
 _WIDEST = 1.6
@@ -68,22 +53,24 @@ class JointAngles:
     """
 
     def __init__(self, parameters: Parameters, needed: Sequence[str] = AXES) -> None:
-        self._hexapod = hexapod_structure(parameters)
-        self.axes = np.concatenate([
-            axes if name in needed else np.full((6, 3), np.nan)
-            for name, axes in zip(AXES, _axes(parameters, needed), strict=True)])
+        self._hexapod = hexapod_structure(parameters, axes=needed)
+        legs = self._hexapod['legs']
+        self.axes: Array = np.concatenate([legs['base_joint_axis'], legs['platform_joint_axis']])
 
     def __call__(self, motions: Array) -> Array:
         """Return the angles (N, JOINT_ANGLES) [rad] in motions (N, MOTION)."""
         angles = np.empty((len(motions), JOINT_ANGLES))
-        batch.in_parts(joint_angles, (self._hexapod, self.axes), batch.compact(motions), angles)
+        batch.in_parts(self._write, (), batch.compact(motions), angles)
         return angles
+
+    def _write(self, motions: Array, angles: Array) -> None:
+        function('joint_angles_many')(self._hexapod, len(motions), motions, angles)
 
     def haversines(self, motions: Array) -> tuple[Array, Array]:
         """Return sin^2(angle / 2) and its rate [1/s], both (N, JOINT_ANGLES), in motions."""
         values, rates = (np.empty((len(motions), JOINT_ANGLES)) for _ in range(2))
         function('joint_haversines_many')(
-            self._hexapod, self.axes, len(motions), batch.compact(motions), values, rates)
+            self._hexapod, len(motions), batch.compact(motions), values, rates)
         return values, rates
 
 
@@ -121,28 +108,3 @@ def likely_mistakes(parameters: Parameters) -> Iterator[str]:
         elif bounds is not None and angle > bounds[leg]:
             yield (f'{limit}: {bounds[leg]:.3g} rad, but at home {joint} is {angle:.3g} rad from '
                    f'its axis in {axes}')
-
-
-def _axes(p: Parameters, needed: Sequence[str]) -> list[Array]:
-    """Return the unit vectors of base joints and platform joints, (6, 3) each."""
-    with np.errstate(all='ignore'):
-        directions = _at_home(p, [name for name in needed if p[name] is None])
-        found = [at_home if p[name] is None else _unit(p[name])
-                 for name, at_home in zip(AXES, directions, strict=True)]
-    return found
-
-
-def _at_home(p: Parameters, missing: Sequence[str]) -> HomeDirections:
-    if missing:
-        try:
-            home_pose(p)
-        except ParameterError as exc:
-            raise ParameterError(f'{exc}; needed without {missing[0]}') from exc
-    return home_directions(p)
-
-
-def _unit(vectors: Array) -> Array:
-    # Scaled first: the squares of very large or small numbers are out of range.
-    vectors = vectors / np.abs(vectors).max(axis=1, keepdims=True)
-    units: Array = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-    return units

@@ -23,8 +23,9 @@ the polygon is nearest, or an edge is.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array, Integers, Records
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
@@ -32,22 +33,6 @@ from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.parameters.table import BASE_OUTLINE, LEG_SHAPE, Parameters, PLATFORM_OUTLINE
 
 BASE, PLATFORM = 6, 7  # numbers of the plates, where 0 to 5 are legs
-
-
-def leg_clearances(hexapod: Records, base: Array, platform: Array, motions: Array,
-                   clearances: Array, nearest: Integers) -> None:
-    """
-    Write the clearance of each leg from the nearest other leg or plate.
-
-    hexapod (): its structure, see ``hexapod_structure``.
-    base, platform (M, 3): corners of the plates, base frame and platform frame [m]; none without a
-        plate.
-    motions (N, MOTION): rows of motion.
-    clearances, nearest (N, 6): written: clearance [m], negative where legs overlap; and number of
-        the leg or plate.
-    """
-    function('clearances_many')(hexapod, len(base), base, len(platform), platform, len(motions),
-                                motions, clearances, nearest)
 
 
 class LegClearance:
@@ -72,18 +57,20 @@ class LegClearance:
             for name in (BASE_OUTLINE, PLATFORM_OUTLINE))
         self.reach = float(np.linalg.norm(np.concatenate([
             parameters.geometry.platform_joints, self.platform]), axis=1).max())
-        self._constants = hexapod_structure(parameters), self.base, self.platform
+        self._hexapod = hexapod_structure(parameters)
 
     def __call__(self, motions: Array) -> Array:
         """Return the clearance of each leg (N, 6) [m] in motions (N, MOTION)."""
         return self.nearest(motions)[0]
 
-    def nearest(self, motions: Array) -> tuple[Array, Integers]:
+    def nearest(self, motions: Array) -> tuple[Array, NDArray[np.intc]]:
         """Return the clearance of each leg (N, 6) [m], and number of the leg or plate."""
-        clearances, nearest = np.empty((len(motions), 6)), np.empty((len(motions), 6), np.int64)
-        batch.in_parts(leg_clearances, self._constants, batch.compact(motions), clearances,
-                       nearest)
+        clearances, nearest = np.empty((len(motions), 6)), np.empty((len(motions), 6), np.intc)
+        batch.in_parts(self._write, (), batch.compact(motions), clearances, nearest)
         return clearances, nearest
+
+    def _write(self, motions: Array, clearances: Array, nearest: NDArray[np.intc]) -> None:
+        function('clearances_many')(self._hexapod, len(motions), motions, clearances, nearest)
 
 
 def clearance_to_check(parameters: Parameters) -> LegClearance | None:

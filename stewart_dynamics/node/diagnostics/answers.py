@@ -20,8 +20,7 @@ from statistics import median
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
-    Exceedance, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS, OF_LOADS, SPEED_MAX, TEMPERATURE_RISE_MAX,
-    TORQUE_MAX)
+    Exceedance, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS, OF_LOADS, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
@@ -29,13 +28,10 @@ from stewart_dynamics.mechanics.singularity_warning import (
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
-from stewart_dynamics.setpoints.motor_row import DEMANDED_TORQUES, RISES, SOUND, SPEEDS
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 from stewart_dynamics.setpoints.step import Batch, Outputs, PUBLISHED_FORCES, WARNING_STATE
 
 _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singularity
-# Where the values of limits are in a row of motors.
-_OF_MOTORS = {SPEED_MAX: SPEEDS, TORQUE_MAX: DEMANDED_TORQUES, TEMPERATURE_RISE_MAX: RISES}
 _DEMANDED = *OF_LOADS, TORQUE_MAX
 _OF_POSE = LENGTH_MIN, LENGTH_MAX, JUMP  # those that a wrong pose exceeds
 
@@ -311,10 +307,7 @@ class LimitsDiagnostics(StatusPart):
     def _of_legs(self, outputs: Outputs) -> list[tuple[str, Array]]:
         """Return each quantity that is computed, with its unit, and six numbers."""
         numbers = {limit: values[0] for limit, values in outputs.values().items()
-                   if limit != LENGTH_MIN}
-        motors = outputs.motors[0]
-        if len(motors) and motors[SOUND]:
-            numbers |= {limit: motors[where] for limit, where in _OF_MOTORS.items()}
+                   if limit not in (LENGTH_MIN, TORQUE_SPEED)}
         return [(f'{LIMITS[limit].quantity.name}{" demanded" * (limit in _DEMANDED)} '
                  f'({LIMITS[limit].quantity.unit})', each) for limit, each in numbers.items()]
 

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The structure ``stewart_platform`` of a parameter file, and the rules that it keeps.
+
+All but the axes of joints, which may follow from the home pose: ``mechanics.hexapod_structure``
+adds them. Derived numbers are those of ``stewart_complete``, rules those of ``stewart_check``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import function, LIMIT_ROWS, record, Rule, RULES
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters.table import Parameters
+
+LEG_FIELDS: Mapping[str, str] = {
+    'base_joint': 'geometry.base_joints', 'platform_joint': 'geometry.platform_joints',
+    'zero_length': 'geometry.zero_length', 'cylinder_mass': 'legs.cylinder.mass',
+    'cylinder_center_of_mass': 'legs.cylinder.center_of_mass',
+    'cylinder_inertia': 'legs.cylinder.inertia', 'piston_mass': 'legs.piston.mass',
+    'piston_center_of_mass': 'legs.piston.center_of_mass',
+    'piston_inertia': 'legs.piston.inertia', 'reflected_mass': 'actuator.reflected_mass',
+    'viscous_friction': 'actuator.viscous_friction',
+    'coulomb_friction': 'actuator.coulomb_friction',
+    'coulomb_velocity': 'actuator.coulomb_velocity',
+    **{row.field: f'{"drive" if row.depends == "MOTOR" else "limits"}.{row.field}'
+       for row in LIMIT_ROWS},
+    'cylinder_radius': 'legs.cylinder.radius', 'cylinder_length': 'legs.cylinder.length',
+    'piston_radius': 'legs.piston.radius', 'screw_lead': 'actuator.screw_lead',
+    **{name: f'drive.{name}' for name in (
+        'gear_ratio', 'efficiency', 'back_driving_efficiency', 'motor_inertia', 'screw_inertia',
+        'torque_constant', 'resistance', 'thermal_resistance', 'thermal_time_constant')},
+    **{f'{end}_joint_axis': f'geometry.{end}_joint_axes' for end in ('base', 'platform')},
+    **{f'{end}_universal_axis': f'drive.{end}_universal_axes' for end in ('base', 'platform')}}
+"""Fields of ``stewart_leg`` and the parameters that they hold; others follow from these."""
+PLATFORM_FIELDS: Mapping[str, str] = {
+    'gravity': 'gravity', 'mass': 'platform.mass', 'center_of_mass': 'platform.center_of_mass',
+    'inertia': 'platform.inertia', 'leg_clearance_min': 'limits.leg_clearance_min',
+    'characteristic_length': 'singularity.characteristic_length',
+    'warn_condition': 'singularity.warn_condition', 'stop_condition': 'singularity.stop_condition',
+    'warn_time': 'singularity.warn_time', 'sync_tolerance': 'setpoint.sync_tolerance',
+    'timeout': 'setpoint.timeout'}
+"""The same for ``stewart_platform``."""
+LISTS: Mapping[str, str] = {
+    'torque_speed': 'drive.torque_speed', 'base_outline': 'geometry.base_outline',
+    'platform_outline': 'geometry.platform_outline'}
+"""Fields that hold points, as many as the field ``n_...`` counts."""
+_IF_NOT_SET = {'limits.length_min': 0.0, 'limits.leg_clearance_min': -math.inf,
+               'actuator.screw_lead': 0.0, 'singularity.characteristic_length': 0.0,
+               **{LEG_FIELDS[row.field]: math.inf for row in LIMIT_ROWS if not row.minimum}}
+
+
+MOST_POINTS = 32
+"""Points that each of LISTS may have; the structure has room for three torques at each speed."""
+
+
+def structure_of(parameters: Parameters, with_motors: bool, suppressing: str) -> Records:
+    """
+    Return the complete structure () of parameters, without a payload and axes of joints.
+
+    with_motors: motors are computed. suppressing: value of an action that suppresses forces.
+    """
+    hexapod: Any = np.zeros((), record('stewart_platform'))
+    legs = hexapod['legs']
+    for fields, of in ((LEG_FIELDS, legs), (PLATFORM_FIELDS, hexapod)):
+        for field, name in fields.items():
+            value = parameters[name]
+            of[field] = _IF_NOT_SET.get(name, math.nan) if value is None else value
+    for field, name in LISTS.items():
+        points = parameters[name]
+        if points is not None:
+            hexapod[f'n_{field}'] = len(points)
+            hexapod[field][:len(points)] = points
+    hexapod['with_motors'] = with_motors
+    hexapod['suppress_near_singularity'] = parameters['singularity.action'] == suppressing
+    hexapod['suppress_at_limits'] = parameters['limits.action'] == suppressing
+    function('stewart_complete')(hexapod)
+    return hexapod  # type: ignore[no-any-return]
+
+
+def broken_rule(hexapod: Records) -> tuple[Rule, int] | None:
+    """Return the first rule that a hexapod breaks and where; None if it keeps all of them."""
+    where: Array = np.empty(1, np.intc)
+    code = function('stewart_check')(hexapod, where)
+    return None if code == 0 else (RULES[code], int(where[0]))
