@@ -118,10 +118,15 @@ def test_a_motion_at_rest_on_its_payload_carries_its_weight() -> None:
     assert relative(more, np.concatenate([force, np.cross(at, force)])) < EXACT
 
 
+def bits_of(parameters: Parameters) -> bytes:
+    """Return the bits of the structure of a hexapod; numbers that are not set are nan."""
+    return StewartPlatform(parameters).structure.tobytes()
+
+
 def test_without_a_mass_it_is_the_file_bit_for_bit() -> None:
     no_mass = FILE.replaced({'payload.center_of_mass': [0.1, 0.2, 0.3],
                              'payload.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]})
-    assert StewartPlatform(no_mass).structure == StewartPlatform(FILE).structure
+    assert bits_of(no_mass) == bits_of(FILE)
     assert np.array_equal(linear_parameters(no_mass), linear_parameters(FILE))
     assert Unknowns(no_mass).theta(Unknowns(no_mass).start).tolist() == Unknowns(FILE).theta(
         Unknowns(FILE).start).tolist()
@@ -131,7 +136,7 @@ def test_without_a_mass_it_is_the_file_bit_for_bit() -> None:
 def test_merged_parameters_are_the_same_hexapod_bit_for_bit() -> None:
     merged = WITH_DRIVER.merged()
     assert merged['payload.mass'] == 0.0 and merged['platform.mass'] == 150.0 + 82.0
-    assert StewartPlatform(merged).structure == StewartPlatform(WITH_DRIVER).structure
+    assert bits_of(merged) == bits_of(WITH_DRIVER)
     assert platform_source(merged, 'hexapod') == platform_source(WITH_DRIVER, 'hexapod')
 
 

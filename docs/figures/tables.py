@@ -21,11 +21,10 @@ from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
-from stewart_dynamics.mechanics.hexapod_structure import (
-    FIELDS_AFTER_LEGS, FIELDS_BEFORE_LEGS, LEG_FIELDS)
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.sample_joining import WAITING
@@ -50,12 +49,11 @@ CONTROLLER = (
               sizes=(6,)))
 
 PAYLOAD = {each: f'payload.{each}' for each in ('mass', 'center_of_mass', 'inertia')}
-# Parameters of the node that the controller reads: it commands forces, not motor torques.
-CONTROLLER_NAMES = ('joints', 'base_frame', 'setpoint.timeout', *(
-    name for fields in (FIELDS_BEFORE_LEGS, PAYLOAD, LEG_FIELDS, FIELDS_AFTER_LEGS)
-    for name in fields.values()
-    if not name.startswith('drive.')
-    and name not in ('actuator.screw_lead', 'setpoint.sync_tolerance')))
+# Parameters of the node that the controller reads: all that the structure in C holds.
+CONTROLLER_NAMES = ('joints', 'base_frame', *(
+    name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, LISTS) for name in fields.values()
+    if name != 'setpoint.sync_tolerance'),
+    'drive.screw_rotation', 'drive.screw_hand', 'singularity.action', 'limits.action')
 
 # Those that are set first; legs.* stands for the two parts of a leg.
 FIRST = ('joints', 'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',

@@ -20,6 +20,7 @@ namespace
 {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kNotSet = std::numeric_limits<double>::quiet_NaN();
 
 /// Return the value of a leg in an array of 1 or 6; if_not_set for an empty one.
 double of_leg(
@@ -40,35 +41,6 @@ double of_leg(
   return value;
 }
 
-/// Copy the entries of row n of an array.
-void copy_row(const std::vector<double> & values, std::size_t n, double * row)
-{
-  std::copy_n(values.begin() + 3 * static_cast<std::ptrdiff_t>(n), 3, row);
-}
-
-/// Write the direction of an axis as a unit vector, where a limit of angles needs it.
-void put_axis(
-  const char * name, const std::vector<double> & axes, std::size_t leg, double angle_max,
-  double * axis)
-{
-  if (!std::isfinite(angle_max)) {
-    std::fill_n(axis, 3, 0.0);
-    return;
-  }
-  if (axes.size() != 18) {
-    throw std::invalid_argument(
-            std::string(name) + ": must be set, 18 entries: needed by the limit of its angle");
-  }
-  copy_row(axes, leg, axis);
-  const double length = std::hypot(axis[0], axis[1], axis[2]);
-  if (!(length > 0.0)) {
-    throw std::invalid_argument(std::string(name) + ": a direction must not be 0, 0, 0");
-  }
-  for (std::size_t n = 0; n < 3; ++n) {
-    axis[n] /= length;
-  }
-}
-
 void check(bool holds, const char * rule)
 {
   if (!holds) {
@@ -76,65 +48,114 @@ void check(bool holds, const char * rule)
   }
 }
 
-/// Mean distance of the platform joints from their center.
-double mean_radius(const std::vector<double> & joints)
+/// Write row n of an array of the legs' points or directions; nan where it is empty.
+void put_row(const char * name, const std::vector<double> & values, std::size_t n, double * row)
 {
-  double center[3] = {0.0, 0.0, 0.0}, sum = 0.0;
-  for (std::size_t n = 0; n < 18; ++n) {
-    center[n % 3] += joints[n] / 6.0;
+  if (values.empty()) {
+    std::fill_n(row, 3, kNotSet);
+    return;
   }
-  for (std::size_t n = 0; n < 18; n += 3) {
-    sum += std::hypot(
-      joints[n] - center[0], joints[n + 1] - center[1], joints[n + 2] - center[2]);
+  if (values.size() != 18) {
+    throw std::invalid_argument(
+            std::string(name) + ": must have 18 entries, has " + std::to_string(values.size()));
   }
-  return sum / 6.0;
+  std::copy_n(values.begin() + 3 * static_cast<std::ptrdiff_t>(n), 3, row);
+}
+
+/// Write points of a curve or a plate; return how many there are.
+template<std::size_t kMost, std::size_t kSize>
+int put_points(
+  const char * name, const std::vector<double> & values, double (& points)[kMost][kSize])
+{
+  if (values.size() % kSize != 0 || values.size() > kMost * kSize) {
+    throw std::invalid_argument(
+            std::string(name) + ": must have " + std::to_string(kSize) + " numbers for each of at "
+            "most " + std::to_string(kMost) + " points, has " + std::to_string(values.size()));
+  }
+  std::copy(values.begin(), values.end(), &points[0][0]);
+  return static_cast<int>(values.size() / kSize);
 }
 
 stewart_leg leg_of(const Params & p, std::size_t n)
 {
   stewart_leg leg{};
-  copy_row(p.geometry.base_joints, n, leg.base_joint);
-  copy_row(p.geometry.platform_joints, n, leg.platform_joint);
+  put_row("geometry.base_joints", p.geometry.base_joints, n, leg.base_joint);
+  put_row("geometry.platform_joints", p.geometry.platform_joints, n, leg.platform_joint);
   leg.zero_length = of_leg("geometry.zero_length", p.geometry.zero_length, n);
   const auto & cylinder = p.legs.cylinder;
   leg.cylinder_mass = of_leg("legs.cylinder.mass", cylinder.mass, n);
   leg.cylinder_center_of_mass = of_leg("legs.cylinder.center_of_mass", cylinder.center_of_mass, n);
   leg.cylinder_inertia = of_leg("legs.cylinder.inertia", cylinder.inertia, n);
-  leg.cylinder_radius = of_leg("legs.cylinder.radius", cylinder.radius, n);
-  leg.cylinder_length = of_leg("legs.cylinder.length", cylinder.length, n);
+  leg.cylinder_radius = of_leg("legs.cylinder.radius", cylinder.radius, n, kNotSet);
+  leg.cylinder_length = of_leg("legs.cylinder.length", cylinder.length, n, kNotSet);
   const auto & piston = p.legs.piston;
   leg.piston_mass = of_leg("legs.piston.mass", piston.mass, n);
   leg.piston_center_of_mass = of_leg("legs.piston.center_of_mass", piston.center_of_mass, n);
   leg.piston_inertia = of_leg("legs.piston.inertia", piston.inertia, n);
-  leg.piston_radius = of_leg("legs.piston.radius", piston.radius, n);
+  leg.piston_radius = of_leg("legs.piston.radius", piston.radius, n, kNotSet);
   const auto & actuator = p.actuator;
   leg.reflected_mass = of_leg("actuator.reflected_mass", actuator.reflected_mass, n);
   leg.viscous_friction = of_leg("actuator.viscous_friction", actuator.viscous_friction, n);
   leg.coulomb_friction = of_leg("actuator.coulomb_friction", actuator.coulomb_friction, n);
   leg.coulomb_velocity = of_leg("actuator.coulomb_velocity", actuator.coulomb_velocity, n, 1e-3);
-  check(leg.coulomb_velocity > 0.0, "actuator.coulomb_velocity: must be more than 0");
-  const auto & limits = p.limits;
-  leg.length_min = of_leg("limits.length_min", limits.length_min, n);
-  leg.length_max = of_leg("limits.length_max", limits.length_max, n, kInfinite);
-  leg.velocity_max = of_leg("limits.velocity_max", limits.velocity_max, n, kInfinite);
-  leg.force_max = of_leg("limits.force_max", limits.force_max, n, kInfinite);
-  leg.joint_force_max =
-    of_leg("limits.joint_force_max", limits.joint_force_max, n, kInfinite);
-  check(leg.length_min < leg.length_max, "limits.length_min: must be less than limits.length_max");
-  check(leg.velocity_max > 0.0, "limits.velocity_max: must be more than 0");
-  check(leg.force_max > 0.0, "limits.force_max: must be more than 0");
-  check(leg.joint_force_max > 0.0, "limits.joint_force_max: must be more than 0");
-  leg.base_joint_angle_max =
-    of_leg("limits.base_joint_angle_max", limits.base_joint_angle_max, n, kInfinite);
-  leg.platform_joint_angle_max =
-    of_leg("limits.platform_joint_angle_max", limits.platform_joint_angle_max, n, kInfinite);
-  put_axis(
-    "geometry.base_joint_axes", p.geometry.base_joint_axes, n, leg.base_joint_angle_max,
-    leg.base_joint_axis);
-  put_axis(
-    "geometry.platform_joint_axes", p.geometry.platform_joint_axes, n,
-    leg.platform_joint_angle_max, leg.platform_joint_axis);
+  leg.screw_lead = of_leg("actuator.screw_lead", actuator.screw_lead, n);
+  const auto & drive = p.drive;
+  leg.gear_ratio = of_leg("drive.gear_ratio", drive.gear_ratio, n, 1.0);
+  leg.efficiency = of_leg("drive.efficiency", drive.efficiency, n, 1.0);
+  leg.back_driving_efficiency =
+    of_leg("drive.back_driving_efficiency", drive.back_driving_efficiency, n, kNotSet);
+  leg.motor_inertia = of_leg("drive.motor_inertia", drive.motor_inertia, n);
+  leg.screw_inertia = of_leg("drive.screw_inertia", drive.screw_inertia, n);
+  leg.torque_constant = of_leg("drive.torque_constant", drive.torque_constant, n, kNotSet);
+  leg.resistance = of_leg("drive.resistance", drive.resistance, n, kNotSet);
+  leg.thermal_resistance =
+    of_leg("drive.thermal_resistance", drive.thermal_resistance, n, kNotSet);
+  leg.thermal_time_constant =
+    of_leg("drive.thermal_time_constant", drive.thermal_time_constant, n, kNotSet);
+  put_row("drive.base_universal_axes", drive.base_universal_axes, n, leg.base_universal_axis);
+  put_row(
+    "drive.platform_universal_axes", drive.platform_universal_axes, n,
+    leg.platform_universal_axis);
+  if (drive.screw_rotation == "universal") {
+    check(
+      !drive.base_universal_axes.empty() && !drive.platform_universal_axes.empty(),
+      "drive.base_universal_axes, drive.platform_universal_axes: must be set: needed by "
+      "drive.screw_rotation: universal");
+    leg.twist_ratio = drive.screw_hand == "right" ? -leg.gear_ratio : leg.gear_ratio;
+  }
+  put_row("geometry.base_joint_axes", p.geometry.base_joint_axes, n, leg.base_joint_axis);
+  put_row(
+    "geometry.platform_joint_axes", p.geometry.platform_joint_axes, n, leg.platform_joint_axis);
+  // A limit is named by its line in STEWART_LIMITS: limits.length_max, drive.torque_max, ...
+#define SECTION_POSE limits
+#define SECTION_TWIST limits
+#define SECTION_LOAD limits
+#define SECTION_MOTOR drive
+#define MINIMUM(bit, NAME, field, DEPENDS, quantity) \
+  leg.field = of_leg(#field, p.SECTION_ ## DEPENDS.field, n);
+#define MAXIMUM(bit, NAME, field, DEPENDS, quantity) \
+  leg.field = of_leg(#field, p.SECTION_ ## DEPENDS.field, n, kInfinite);
+  STEWART_LIMITS(MINIMUM, MAXIMUM)
+#undef MINIMUM
+#undef MAXIMUM
+  check(
+    !std::isfinite(leg.base_joint_angle_max) || !p.geometry.base_joint_axes.empty(),
+    "geometry.base_joint_axes: must be set: needed by limits.base_joint_angle_max");
+  check(
+    !std::isfinite(leg.platform_joint_angle_max) || !p.geometry.platform_joint_axes.empty(),
+    "geometry.platform_joint_axes: must be set: needed by limits.platform_joint_angle_max");
   return leg;
+}
+
+/// Throw the rule that a complete hexapod breaks, with the number of its leg.
+void check_rules(const stewart_platform & hexapod)
+{
+  int where = -1;
+  const int rule = stewart_check(&hexapod, &where);
+  if (rule != STEWART_VALID) {
+    const std::string leg = where < 0 ? "" : ": leg or plate " + std::to_string(where + 1);
+    throw std::invalid_argument(stewart_rule(rule) + leg);
+  }
 }
 
 }  // namespace
@@ -146,38 +167,31 @@ stewart_platform hexapod_of(const Params & p)
   hexapod.mass = p.platform.mass;
   std::copy_n(p.platform.center_of_mass.begin(), 3, hexapod.center_of_mass);
   std::copy_n(p.platform.inertia.begin(), 6, hexapod.inertia);
-  const double * i = hexapod.inertia;  // xx xy xz yy yz zz
-  const double minor = i[0] * i[3] - i[1] * i[1];
-  check(
-    i[0] > 0.0 && minor > 0.0 && minor * i[5] - i[0] * i[4] * i[4] - i[2] * i[2] * i[3] +
-    2.0 * i[1] * i[2] * i[4] > 0.0, "platform.inertia: must be positive definite");
-  check(
-    p.payload.mass == 0.0 || stewart_add_payload(
-      &hexapod, p.payload.mass, p.payload.center_of_mass.data(), p.payload.inertia.data()) ==
-    STEWART_OK, "payload: must be finite");
   for (std::size_t n = 0; n < 6; ++n) {
     hexapod.legs[n] = leg_of(p, n);
   }
   const double clearance = p.limits.leg_clearance_min;
   hexapod.leg_clearance_min = std::isnan(clearance) ? -kInfinite : clearance;
-  check(
-    std::isnan(clearance) || (!p.legs.cylinder.radius.empty() && !p.legs.cylinder.length.empty() &&
-    !p.legs.piston.radius.empty()), "legs.cylinder.radius, legs.cylinder.length, "
-    "legs.piston.radius: must be set: needed by limits.leg_clearance_min");
-  const double length = p.singularity.characteristic_length;
-  hexapod.characteristic_length =
-    std::isnan(length) ? mean_radius(p.geometry.platform_joints) : length;
-  check(
-    hexapod.characteristic_length > 0.0, "singularity.characteristic_length: must be more than 0");
+  hexapod.n_torque_speed =
+    put_points("drive.torque_speed", p.drive.torque_speed, hexapod.torque_speed);
+  hexapod.n_base_outline =
+    put_points("geometry.base_outline", p.geometry.base_outline, hexapod.base_outline);
+  hexapod.n_platform_outline = put_points(
+    "geometry.platform_outline", p.geometry.platform_outline, hexapod.platform_outline);
+  hexapod.characteristic_length = p.singularity.characteristic_length;
   hexapod.warn_condition = p.singularity.warn_condition;
   hexapod.stop_condition = p.singularity.stop_condition;
   hexapod.warn_time = p.singularity.warn_time;
-  check(
-    hexapod.stop_condition >= hexapod.warn_condition,
-    "singularity.stop_condition: must be at least singularity.warn_condition");
-  hexapod.sync_tolerance = 0.0;
+  hexapod.timeout = p.setpoint.timeout;
+  hexapod.with_motors = !p.actuator.screw_lead.empty();
   hexapod.suppress_near_singularity = p.singularity.action == "suppress_forces";
   hexapod.suppress_at_limits = p.limits.action == "suppress_forces";
+  stewart_complete(&hexapod);
+  check_rules(hexapod);
+  check(
+    p.payload.mass == 0.0 || stewart_add_payload(
+      &hexapod, p.payload.mass, p.payload.center_of_mass.data(), p.payload.inertia.data()) ==
+    STEWART_OK, "payload: must be finite, its inertia positive semidefinite");
   return hexapod;
 }
 

@@ -50,12 +50,7 @@ double * fmu_value(fmu_instance * instance, uint32_t reference, fmu_type type, i
 static int put_parameters(const double * values, stewart_platform * platform)
 {
   const double * payload = values + FMU_PAYLOAD_MASS;
-  int n, where, code;
-  for (n = FMU_MASS; n < FMU_LENGTHS; n++) {
-    if (!isfinite(values[n])) {
-      return STEWART_NOT_FINITE;
-    }
-  }
+  int where;
   platform->mass = values[FMU_MASS];
   memcpy(platform->center_of_mass, values + FMU_CENTER_OF_MASS, 3 * sizeof *values);
   memcpy(platform->inertia, values + FMU_INERTIA, 6 * sizeof *values);
@@ -67,9 +62,8 @@ static int put_parameters(const double * values, stewart_platform * platform)
   if (stewart_check(platform, &where) != STEWART_VALID || payload[0] < 0.0) {
     return STEWART_BROKEN_RULE;
   }
-  code = payload[0] == 0.0 ? STEWART_OK : stewart_add_payload(
+  return payload[0] == 0.0 ? STEWART_OK : stewart_add_payload(
     platform, payload[0], values + FMU_PAYLOAD_CENTER_OF_MASS, values + FMU_PAYLOAD_INERTIA);
-  return code;
 }
 
 /* The inputs in the order of the variables: the structures are arrays of doubles. */
