@@ -10,13 +10,16 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.core.binding import places
 from stewart_dynamics.mechanics.drives.motors import (
-    AVAILABLE_TORQUES, BREAKAWAY_TORQUES, motor_ratio, SPEEDS)
+    AVAILABLE_TORQUES, motor_ratio)
 from stewart_dynamics.mechanics.limits import (
-    OF_MOTORS, SPEED_MAX, TEMPERATURE_RISE_MAX, TOLERANCE, TORQUE_MAX, TORQUE_SPEED)
+    LIMITS, OF_MOTORS, TOLERANCE, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.parameters.table import Parameters, six_of, UNIVERSAL
 
 _WITHOUT_TWIST = 0.9
+# In a row of outputs: where the row of motors begins, and the temperature rises.
+_FIRST, _RISES = places('stewart_output')['motors'].start, places('stewart_output')['rises']
 
 
 class MotorLimits:
@@ -35,14 +38,17 @@ class MotorLimits:
 
     def excesses(self, rows: Array, rises: Array) -> dict[str, tuple[Array, Array]]:
         """Return values and bounds (..., 6) of each limit for rows of motors, and rises [K]."""
-        torques, available = rows[..., BREAKAWAY_TORQUES], rows[..., AVAILABLE_TORQUES]
-        most = np.broadcast_to(self.bounds[TORQUE_MAX], torques.shape)
-        return {
-            TORQUE_MAX: (torques, most),
-            TORQUE_SPEED: (torques, np.where(available < most, available, math.inf)),
-            SPEED_MAX: (rows[..., SPEEDS], np.broadcast_to(self.bounds[SPEED_MAX], torques.shape)),
-            TEMPERATURE_RISE_MAX: (
-                rises, np.broadcast_to(self.bounds[TEMPERATURE_RISE_MAX], rises.shape))}
+        available, found = rows[..., AVAILABLE_TORQUES], {}
+        for name in OF_MOTORS:
+            at = LIMITS[name].columns
+            values = rises if at == _RISES else rows[..., at.start - _FIRST:at.stop - _FIRST]
+            if name == TORQUE_SPEED:
+                most = self.bounds[TORQUE_MAX]
+                bounds = np.where(available < most, available, math.inf)
+            else:
+                bounds = np.broadcast_to(self.bounds[name], values.shape)
+            found[name] = values, bounds
+        return found
 
 
 def largest_torques(p: Parameters, speeds: Array) -> Array:
