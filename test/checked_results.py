@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.arrays import Records
-from stewart_dynamics.core.binding import function, places
+from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.rows import MOTION, NO_BASE, RESULT
@@ -22,16 +21,22 @@ from stewart_dynamics.setpoints.step import Batch, FIRST, OUTPUT, WARNING_STATE
 EXCEEDING = places('stewart_output')['exceeding']
 
 
-def state_of(singularity: Singularity, **fields: Any) -> Records:
+def state_of(singularity: Singularity, **fields: Any) -> NDArray[np.float64]:
     """Return a state of the step: a singularity warning, and other fields."""
     state = FIRST.copy()
+    found = state_record(state)
     for field, value in fields.items():
-        state[field] = value
+        found[field] = value
     for field, value in zip(
             ('warning', 'stopped', 'determinant', 'time_to_crossing', 'crossings'), singularity,
             strict=True):
-        state[field] = value
+        found[field] = value
     return state
+
+
+def state_record(state: NDArray[np.float64]) -> Any:
+    """Return a state of the step as the structure () that it is."""
+    return state.view(record('stewart_state')).reshape(())
 
 
 def checked(parameters: Parameters, result: NDArray[np.float64],

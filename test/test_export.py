@@ -16,6 +16,7 @@ import subprocess
 import sys
 from typing import Any
 
+from checked_results import state_record
 import numpy as np
 import pytest
 from referees import (
@@ -299,7 +300,7 @@ def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
                 exceeded[each.leg] |= LIMITS[each.limit].bit
             assert codes[0, n] == code
             assert outputs['exceeded'][n].tolist() == exceeded
-            assert all(np.array_equal(states[n][name], state[0][name], equal_nan=True)
+            assert all(np.array_equal(states[n][name], state_record(state)[name], equal_nan=True)
                        for name in STATE.names)
             expected = output.records.copy()
             if code != OK:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from checked_results import state_record
 import numpy as np
 import pytest
 from referees import random_motion, rng
@@ -148,7 +149,7 @@ def test_a_setpoint_that_the_legs_cannot_reach_warms_no_winding() -> None:
     outputs, states, exceedances = answers(p, motion)
     assert [any(each.limit == 'jump' for each in found) for found in exceedances] == [
         False] * 4 + [True] * 2 + [False] * 6
-    kept, after = states[3][0], states[5][0]
+    kept, after = state_record(states[3]), state_record(states[5])
     assert kept['rises'].all() and kept['copper_heat'].all()
     assert np.array_equal(kept['rises'], after['rises'])
     assert np.array_equal(kept['copper_heat'], after['copper_heat'])
@@ -183,5 +184,5 @@ def test_nothing_is_computed_without_drives() -> None:
     output = answered(Step(HEXAPOD.replaced({'actuator.screw_lead': 0.01})), Batch.of(
         STAMP, Motion([0.0, 0.0, 1.0], np.eye(3)).rows))
     assert output.motors.shape == output.rises.shape == (1, 0)
-    assert not output.state['copper_heat'].any()
+    assert not state_record(output.state)['copper_heat'].any()
     assert 'motor_states' not in OutputMessages(HEXAPOD).types

@@ -13,6 +13,7 @@ from types import FrameType
 from typing import Any
 from unittest.mock import patch
 
+from checked_results import state_record
 import pytest
 
 pytest.importorskip('rclpy', reason='the node needs ROS')
@@ -112,11 +113,11 @@ def test_a_restart_that_is_dropped_or_cannot_be_answered_holds_for_the_next(fed:
     fed.gather(day, sample=too_large)
     fed.node._answer_waiting()
     assert fed.counts[Rejection('setpoint', OUT_OF_RANGE)] == 1
-    assert fed.node._state['restarting'][0]
+    assert state_record(fed.node._state)['restarting']
     fed.gather(day + 1)
     fed.node._answer_waiting()
     assert fed.answered(3)[2] == day + 1
-    assert not fed.node._state['restarting'][0]
+    assert not state_record(fed.node._state)['restarting']
 
 
 def test_the_page_names_the_files_that_a_setpoint_runs_through(domain: int) -> None:

@@ -18,7 +18,7 @@ from referees import (
     QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, relative,
     rng, symmetric_parameters)
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
-from stewart_dynamics.arrays import Array, Records, Stamps
+from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.core.binding import CONSTANTS
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import (
@@ -67,7 +67,7 @@ def each_alone(
         yield outputs, found
 
 
-def answered(step: Step, setpoints: Batch, before: Records = FIRST) -> Outputs:
+def answered(step: Step, setpoints: Batch, before: Array = FIRST) -> Outputs:
     outputs = step(setpoints, before)
     assert outputs.answered.all()
     assert outputs.stamps.tolist() == setpoints.stamps.tolist()
@@ -111,7 +111,7 @@ def test_the_step_keeps_no_state() -> None:
         FIRST, state_of(Singularity(Cause.CONDITION, True, -1.0)),
         state_of(Singularity(), followed=1, stamp=STAMP - 1, lengths=1.0))))
 
-    def found(step: Step, calls: Sequence[tuple[Batch, Records]]) -> list[list[bytes]]:
+    def found(step: Step, calls: Sequence[tuple[Batch, Array]]) -> list[list[bytes]]:
         return [[part.tobytes() for part in arrays(step(*each))] for each in calls]
 
     first = found(STEP, calls)

@@ -45,12 +45,15 @@ _ANSWERED, _RESTARTED, CHANGED, EXCEEDING, _JUMPED, FINITE_MOTORS = (_OUTPUT[nam
     'answered', 'restart', 'changed', 'exceeding', 'jumped', 'finite_motors'))
 WARNING_STATE = slice(_OUTPUT['warning'], 1 + _OUTPUT['crossings'])
 _JOINT_ANGLES = slice(_BASE_JOINT_ANGLES.start, _PLATFORM_JOINT_ANGLES.stop)
-_OUTPUT_RECORD, _STATE_RECORD = record('stewart_output'), record('stewart_state')
+_OUTPUT_RECORD = record('stewart_output')
 OUTPUT = _OUTPUT_RECORD.itemsize // 8
 """Numbers in a row of outputs; the last ones are integers, which no slice here has."""
 
-FIRST: Records = np.zeros(1, _STATE_RECORD)
-"""The state before the first setpoint, the structure ``stewart_state`` in C."""
+FIRST: Array = np.zeros(record('stewart_state').itemsize // 8)
+"""
+The state before the first setpoint: the bits of the structure ``stewart_state`` in C, which are
+copied far faster than a record.
+"""
 FIRST.flags.writeable = False
 # The mask of a single answered setpoint: making it took as long as the computation.
 _THE_ONE: Flags = np.ones(1, dtype=bool)
@@ -162,7 +165,7 @@ class Outputs(NamedTuple):
     the row of results of ``inverse_dynamics``.
     """
     computed: Computed
-    state: Records  # for the next setpoint, see ``FIRST``
+    state: Array  # for the next setpoint, see ``FIRST``
 
     @property
     def results(self) -> Array:
@@ -317,7 +320,7 @@ class Step:
             np.zeros(1, np.int64), np.zeros((1, SETPOINT)), FIRST.copy(), np.empty((1, OUTPUT)))
         self._step_one = function('step_setpoints').bound(hexapod, 0, 1, *self._memory)
 
-    def __call__(self, setpoints: Batch, before: Records = FIRST) -> Outputs:
+    def __call__(self, setpoints: Batch, before: Array = FIRST) -> Outputs:
         """
         Return the outputs of setpoints in order.
 
