@@ -23,6 +23,7 @@ from stewart_dynamics.mechanics.kinematics.pose_mistakes import Angles, PoseByAn
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.setpoint import StampedWriter
+from stewart_dynamics.parameters.tolerances import STAMPS_END
 from stewart_dynamics.program import NODE
 from stewart_dynamics.tables.column_names import (
     ACCELERATION, ANGULAR_ACCELERATION, ANGULAR_VELOCITY, MOTION, POSITION, ROTATIONS, VELOCITY)
