@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The check of a single result, as the node's step has it."""
+"""The check of a single result, as the node's step has it; parts of states and outputs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.rows import MOTION, NO_BASE, RESULT
 from stewart_dynamics.mechanics.singularity_warning import Singularity
-from stewart_dynamics.setpoints.step import Batch, FIRST, OUTPUT, WARNING_STATE
+from stewart_dynamics.setpoints.step import Batch, FIRST, OUTPUT, Outputs, WARNING_STATE
 
 EXCEEDING = places('stewart_output')['exceeding']
 
@@ -32,6 +32,12 @@ def state_of(singularity: Singularity, **fields: Any) -> NDArray[np.float64]:
             strict=True):
         found[field] = value
     return state
+
+
+def part_of(outputs: Outputs, which: Any) -> Outputs:
+    """Return the outputs of some setpoints, as new arrays; all were answered."""
+    return outputs._replace(**{name: getattr(outputs, name)[which].copy()
+                               for name in ('answered', 'stamps', 'rows')})
 
 
 def state_record(state: NDArray[np.float64]) -> Any:

@@ -25,11 +25,11 @@ from stewart_dynamics.setpoints.consistency import Mistake
 from stewart_dynamics.setpoints.input_messages import ACCEL, BASE_IMU, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_FINITE, NOT_JOINED, Rejection, STAMP_ZERO, TWICE)
-from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step, WARNING_STATE
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
 PROGRAM = 'stewart_dynamics'
-OUTPUT = places('stewart_output')
+OUTPUT = places('stewart_output') | {'warning': WARNING_STATE}
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)

@@ -239,8 +239,9 @@ def limited(random: np.random.Generator) -> Parameters:
             'legs.cylinder.radius': 0.08, 'legs.cylinder.length': 0.5, 'legs.piston.radius': 0.05,
             'limits.leg_clearance_min': random.uniform(0.0, 0.2)}
         if random.random() < 0.5:
-            given |= {'geometry.base_outline': [-0.9, -0.9, 0.0, 0.9, -0.9, 0.0, 0.0, 0.9, 0.0],
-                      'geometry.platform_outline': [-0.5, -0.4, 0.0, 0.5, -0.4, 0.0, 0.0, 0.6, 0.0]}
+            given |= {
+                'geometry.base_outline': [-0.9, -0.9, 0.0, 0.9, -0.9, 0.0, 0.0, 0.9, 0.0],
+                'geometry.platform_outline': [-0.5, -0.4, 0.0, 0.5, -0.4, 0.0, 0.0, 0.6, 0.0]}
     given |= {
         'singularity.action': str(random.choice(['warn', 'suppress_forces'])),
         'limits.action': str(random.choice(['warn', 'suppress_forces'])),

@@ -13,11 +13,11 @@ import sys
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-ROW = '''    power_max: Array | None = _limit(
+ROW = """    power_max: Array | None = _limit(
         'maximum electrical power of a motor', 'W', 'motor power', 'power of a motor')
-'''
+"""
 LINE = '  MAXIMUM(8192, POWER_MAX, power_max, MOTOR, motors.power)'
-PROGRAM = '''
+PROGRAM = """
 import numpy as np
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.export.c_project import c_project
@@ -40,11 +40,11 @@ assert not step(Batch.of(0, Motion.from_pose(home).rows)).exceeding[0]
 assert 'drive.power_max: 150 W' in c_project(p, 'rig')['rig.c']
 print(found[0].words(p.joints))
 print(Parameters.table['drive.power_max'].text)
-'''
+"""
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not shutil.which('cc') and not shutil.which('gcc'), reason='needs a C compiler')
+@pytest.mark.skipif(not any(map(shutil.which, ('cc', 'gcc'))), reason='needs a C compiler')
 def test_a_limit_is_a_row_of_the_table_and_a_line_of_c(tmp_path: Path) -> None:
     """A limit of the power of the motors: step, node, planned trajectories and source have it."""
     for name in ('stewart_dynamics', 'config'):

@@ -17,6 +17,7 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
+from checked_results import part_of
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -49,11 +50,6 @@ def turning(number: int, first: int = 0) -> Outputs:
     motions[:, 3:12] = from_euler(0.01 * n[:, None] * [0.0, 0.0, 1.0]).reshape(-1, 9)
     motions[:, 17] = 1.0
     return STEP(Batch.of(1_000_000 * (n + 1), motions))
-
-
-def part_of(outputs: Outputs, which: slice) -> Outputs:
-    return outputs._replace(**{name: getattr(outputs, name)[which]
-                               for name in ('answered', 'stamps', 'rows')})
 
 
 def times_of(number: int, first: int = 0) -> NDArray[np.int64]:

@@ -18,6 +18,7 @@ import sys
 import time
 from typing import Any, TYPE_CHECKING
 
+from checked_results import part_of
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -70,8 +71,7 @@ class Given:
         """Return some of the setpoints as the replay gives them, or the same again later [s]."""
         return Answered(
             self.seconds[part] + later, self.setpoints.chosen(part),
-            self.outputs._replace(**{name: getattr(self.outputs, name)[part]
-                                     for name in ('answered', 'stamps', 'rows')}),
+            part_of(self.outputs, part),
             self.base_wrenches[part], self.powers[part], self.breakdown[part])
 
     def summary(self, **changes: Any) -> dict[str, Any]:

@@ -25,7 +25,6 @@ from referees import ROOT  # noqa: E402
 from running import HOME, nanoseconds, Peer, PLATFORM, QOS, raw, Sample, SEPARATE  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 import stewart_dynamics  # noqa: E402
-from stewart_dynamics.core.binding import places  # noqa: E402
 from stewart_dynamics.node.dynamics_node import BACKLOG, DynamicsNode  # noqa: E402
 from stewart_dynamics.setpoints.rejections import DROPPED, OUT_OF_RANGE, Rejection  # noqa: E402
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import product
 import math
-from typing import Any
 
 from checked_results import checked, state_of
 from hypothesis import strategies as st
@@ -324,7 +323,8 @@ rotations = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(
 
 def test_a_restart_is_no_crossing() -> None:
     before = Singularity(Cause.CONDITION, True, -0.2, crossings=1)
-    output = answered(STEP, HOME.replaced(restarts=True), state_of(before, followed=1, lengths=1.0))
+    state = state_of(before, followed=1, lengths=1.0)
+    output = answered(STEP, HOME.replaced(restarts=True), state)
     assert output.singularity().crossings == 1
     assert not output.warnings[0]
     assert output.changed[0]

@@ -16,6 +16,7 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+from checked_results import part_of
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -33,13 +34,14 @@ from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.reporting.block_statistics import LISTED
 from stewart_dynamics.setpoints.rejections import NOT_JOINED
 from stewart_dynamics.setpoints.step import (
-    Batch, FIRST, OUTPUT, Outputs, PUBLISHED_FORCES, WARNING_STATE)
+    Batch, Computed, FIRST, OUTPUT, Outputs, PUBLISHED_FORCES, WARNING_STATE)
 from stewart_dynamics.whole_file import to_json
 
 Array = NDArray[np.float64]
 
 SECOND = 1_000_000_000
-RESTART = places('stewart_output')['restart']
+RESTART, CLEARANCES = (places('stewart_output')[name] for name in ('restart', 'clearances'))
+JOINT_ANGLES = slice(CLEARANCES.start - 12, CLEARANCES.start)
 LIMITS = {
     'limits.length_min': [0.5, 0.6, 0.7, 0.5, 0.6, 0.0],
     'limits.length_max': [1.5, 1.4, 1.3, 1.5, 1.4, 9.0],
@@ -92,7 +94,7 @@ class Samples:
     def outputs(self, parameters: Parameters) -> Outputs:
         """Return them as the step gives them: angles and clearances only if they have limits."""
         many = len(self.seconds)
-        with_limits = slice(None if parameters['limits.leg_clearance_min'] is not None else 0)
+        limited = parameters['limits.leg_clearance_min'] is not None
         rows = np.zeros((many, OUTPUT))
         rows[:, :RESULT] = np.concatenate([
             self.lengths, self.rates, self.demanded, self.det[:, None],
@@ -101,9 +103,9 @@ class Samples:
         rows[:, PUBLISHED_FORCES], rows[:, RESTART] = self.forces, self.restarts
         states = rows[:, WARNING_STATE]
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
+        rows[:, JOINT_ANGLES], rows[:, CLEARANCES] = self.joint_angles, self.clearances
         outputs = Outputs(np.ones(many, dtype=bool), self.stamps, rows,
-                          self.joint_angles[:, with_limits], self.clearances[:, with_limits],
-                          np.empty((many, 0)), FIRST)
+                          Computed(limited, limited, False), FIRST)
         np.testing.assert_array_equal(outputs.warnings, self.warnings)
         np.testing.assert_array_equal(outputs.times_to_crossing, self.time_to_crossing)
         return outputs
@@ -125,7 +127,7 @@ class Samples:
             part = slice(first, end)
             yield Answered(
                 self.seconds[part], setpoints.chosen(part),
-                Outputs._make((*(each[part] for each in outputs[:-1]), outputs.state)),
+                part_of(outputs, part),
                 self.base_wrenches[part], powers[part],
                 None if self.breakdown is None else self.breakdown[part])
 
@@ -420,7 +422,7 @@ def test_it_keeps_no_samples() -> None:
             # new arrays: any that the summary keeps would be counted
             summary.add(Answered(
                 samples.seconds + n, setpoints.chosen(np.arange(2000)),
-                Outputs(*map(np.copy, outputs)), samples.base_wrenches.copy(),
+                part_of(outputs, slice(None)), samples.base_wrenches.copy(),
                 samples.demanded * samples.rates, samples.breakdown.copy()))
         return tracemalloc.get_traced_memory()[0]
 

@@ -77,7 +77,7 @@ void joint_haversines_many(
 
 void clearances_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
-  double * clearances, int * nearest) {
+  double * clearances, int64_t * nearest) {
   for (int64_t n = 0; n < count; n++) {
     put_clearances(platform, &motions[n], &clearances[6 * n], &nearest[6 * n]);
   }

@@ -252,7 +252,7 @@ void joint_haversines_many(
    plate of the base, 7 of the platform. */
 void clearances_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
-  double * clearances, int * nearest);
+  double * clearances, int64_t * nearest);
 
 /* Friction (count, 6) at rates (count, 6) [N]; coefficients of each leg (6,). */
 void friction_many(

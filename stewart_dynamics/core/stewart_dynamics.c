@@ -690,7 +690,7 @@ static double from_plate(
 enum { BASE_PLATE = 6, MOVING_PLATE = 7 };
 
 static void keep_nearest(
-  double clearances[6], int nearest[6], int leg, int other, double clearance) {
+  double clearances[6], int64_t nearest[6], int leg, int other, double clearance) {
   if (clearance < clearances[leg]) {clearances[leg] = clearance, nearest[leg] = other;}
 }
 
@@ -698,7 +698,7 @@ static void keep_nearest(
    cylinders, the one of the base that of the pistons, from the end of the cylinder on. */
 static void put_plates(
   const stewart_platform * platform, const stewart_motion * motion, const leg_pose at[6],
-  double clearances[6], int nearest[6]) {
+  double clearances[6], int64_t nearest[6]) {
   for (int i = 0; i < 6; i++) {
     const stewart_leg * leg = &platform->legs[i];
     vector joint = read3(leg->base_joint), s = at[i].direction;
@@ -725,7 +725,7 @@ static void put_plates(
 /* Write the clearance of each leg from the nearest leg or plate, and which that is. */
 static void put_clearances(
   const stewart_platform * platform, const stewart_motion * motion, double clearances[6],
-  int nearest[6]) {
+  int64_t nearest[6]) {
   leg_pose at[6];
   for (int i = 0; i < 6; i++) {
     at[i] = pose_of(&platform->legs[i], motion->position, motion->rotation);

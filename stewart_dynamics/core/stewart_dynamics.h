@@ -192,7 +192,7 @@ typedef struct {
   double warning, stopped, determinant, time_to_crossing, crossings;
   double changed, exceeding, jumped, finite_motors, solved, answered, restart;
   unsigned exceeded[6];    /* limits that each leg exceeds: bits STEWART_LENGTH_MIN, ... */
-  int nearest[6];          /* what is nearest: a leg, 6 the plate of the base, 7 of the platform */
+  int64_t nearest[6];      /* what is nearest: a leg, 6 the plate of the base, 7 of the platform */
 } stewart_output;
 
 /* Rules that a hexapod must keep, a line each: code, name, parameters, rule. Codes are those of

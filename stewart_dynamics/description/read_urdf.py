@@ -82,7 +82,7 @@ def _beside(source: Path, joints: Iterable[ET.Element], placements: dict[str, Pl
 
 
 def _constraint(element: ET.Element, placements: dict[str, Placement], source: Path) -> Joint:
-    """Return an element ``constraint`` of ros/urdfdom_headers#108, with a frame on each link."""
+    """Return an element ``constraint`` of ros/urdfdom_headers, with a frame on each link."""
     name, ends, points, axes = element.get('name', ''), [], [], []
     for side in ('parent', 'child'):
         end, origin, axis = (end_of(element, side, source), element.find(f'{side}_origin'),

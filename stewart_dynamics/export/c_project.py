@@ -139,7 +139,7 @@ def _constant(value: Any) -> str:
 
 def _used(points: Array) -> Flags:
     """Return which points (N, M) are given: all to the last that is not zero."""
-    used: Flags = np.cumsum(points.any(axis=1)[::-1])[::-1] > 0
+    used: Flags = np.cumsum(np.any(points, axis=1)[::-1])[::-1] > 0
     return used
 
 

@@ -139,8 +139,8 @@ def _results(outputs: Outputs) -> list[float]:
 
 def _commanded(outputs: Outputs) -> list[float]:
     """Return the columns of torques to command and of temperature rises, 0 for nan."""
-    return np.nan_to_num(np.concatenate(
-        [outputs.rows[0, MOTOR_COMMANDS], outputs.rows[0, RISES]])).tolist()
+    numbers: Array = np.concatenate([outputs.rows[0, MOTOR_COMMANDS], outputs.rows[0, RISES]])
+    return [*np.where(np.isnan(numbers), 0.0, numbers)]
 
 
 def _or_zero(forces: Array) -> Array:

@@ -678,12 +678,12 @@ class Parameters(ParameterSet):
 
     def _carry_payload(self, source: str) -> None:
         """Set ``carried``, and put it into the structure."""
-        self.carried = self.platform.body
+        self.carried, payload = self.platform.body, self.payload.body
         try:
-            # Checked also where it has no mass yet, and no effect.
-            whole = self.carried.with_body(Body(
-                self.payload.mass or self.carried.mass, self.payload.center_of_mass,
-                self.payload.inertia))
+            if payload.mass > 0.0:
+                self.carried = self.carried.with_body(payload)
+            else:  # without effect, but it must be a body's
+                self.carried.with_body(Body(0.0, self.carried.center, self.payload.inertia))
         except BodyError as exc:
             raise ParameterError(
                 f'{source}: payload.inertia: {self.payload.inertia.tolist()}: {exc}'
@@ -691,10 +691,8 @@ class Parameters(ParameterSet):
         except ParameterError as exc:
             raise ParameterError(f'{source}: payload.mass: {self.payload.mass:g} kg, with '
                                  f'platform.mass: {exc}') from exc
-        if self.payload.mass > 0.0:
-            self.carried = whole
-            (self.structure['mass'], self.structure['center_of_mass'],
-             self.structure['inertia']) = whole
+        (self.structure['mass'], self.structure['center_of_mass'],
+         self.structure['inertia']) = self.carried
         self.structure.setflags(write=False)
 
     def replaced(self, changes: Mapping[str, Any], source: str = '', *,

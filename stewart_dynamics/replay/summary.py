@@ -161,8 +161,9 @@ class Summary:
         self._published.add(seconds, outputs.forces)
         self._power.add(seconds, power)
         values = outputs.values()
-        for name, each in values.items():
-            self._peaks[name].add(seconds, each)
+        for name, peak in self._peaks.items():
+            if name in values:
+                peak.add(seconds, values[name])
         for name, exceeded in self._exceeded.items():
             exceeded.add(seconds, self._limits.exceeds(name, values[name]), values[name],
                          self._limits.bounds[name])

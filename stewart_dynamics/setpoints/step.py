@@ -293,9 +293,10 @@ class Outputs(NamedTuple):
 
     def values(self) -> dict[str, Array]:
         """Return the values (N, 6) of the limits, those that are computed."""
+        motors = self.computed.motors and self.rows[:, FINITE_MOTORS].all()
         found = {*OF_RESULTS, *(ANGLES if self.computed.joint_angles else ()),
                  *([CLEARANCE_MIN] if self.computed.clearances else ()),
-                 *(OF_MOTORS if self.computed.motors and self.rows[:, FINITE_MOTORS].all() else ())}
+                 *(OF_MOTORS if motors else ())}
         return {name: self.rows[:, limit.columns] for name, limit in LIMITS.items()
                 if name in found}
 

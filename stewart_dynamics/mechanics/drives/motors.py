@@ -31,20 +31,18 @@ are part of the leg forces: the torque of an ideal screw is f / k, and its power
 from __future__ import annotations
 
 from collections.abc import Sequence
-import math
 from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.core.binding import function, places, record
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.leg_columns import columns, LEGS
-from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import FORCES
-from stewart_dynamics.parameters.table import Parameters, six_of
+from stewart_dynamics.parameters.table import Parameters
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -23,9 +23,8 @@ the polygon is nearest, or an edge is.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
@@ -63,13 +62,13 @@ class LegClearance:
         """Return the clearance of each leg (N, 6) [m] in motions (N, MOTION)."""
         return self.nearest(motions)[0]
 
-    def nearest(self, motions: Array) -> tuple[Array, NDArray[np.intc]]:
+    def nearest(self, motions: Array) -> tuple[Array, Integers]:
         """Return the clearance of each leg (N, 6) [m], and number of the leg or plate."""
-        clearances, nearest = np.empty((len(motions), 6)), np.empty((len(motions), 6), np.intc)
+        clearances, nearest = np.empty((len(motions), 6)), np.empty((len(motions), 6), np.int64)
         batch.in_parts(self._write, (), batch.compact(motions), clearances, nearest)
         return clearances, nearest
 
-    def _write(self, motions: Array, clearances: Array, nearest: NDArray[np.intc]) -> None:
+    def _write(self, motions: Array, clearances: Array, nearest: Integers) -> None:
         function('clearances_many')(self._hexapod, len(motions), motions, clearances, nearest)
 
 
