@@ -1083,8 +1083,8 @@ void stewart_complete(stewart_platform * platform) {
   }
 }
 
-/* Write the corners of a plate from the first one, of size 1 whatever its size is; return whether it
-   has one. */
+/* Write the corners of a plate from the first one, of size 1 whatever its size is; return whether
+   it has one. */
 static int scale_plate(int count, const double (* plate)[3], double scaled[][3]) {
   double extent = 0.0, size = 0.0;
   for (int n = 0; n < 3 * count; n++) {extent = largest(extent, fabs(plate[n / 3][n % 3]));}

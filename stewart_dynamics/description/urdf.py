@@ -60,7 +60,8 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None,
     Return a hexapod as URDF; the robot has this name, or another one where a link has it.
 
     control: adds a block ros2_control for the six legs.
-    constraints: adds elements ``constraint`` of ros/urdfdom_headers, pull request 108 that close its loops.
+    constraints: adds elements ``constraint``, of pull request 108 of ros/urdfdom_headers, that
+        close its loops.
     solid: all links that move have a mass, and inertia about all axes.
     """
     root = ET.Element('robot')
