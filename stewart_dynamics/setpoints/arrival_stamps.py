@@ -22,8 +22,8 @@ from stewart_dynamics.setpoints.consistency import Mistake
 _FEWEST, _SHORTEST = 48, SECOND // 2
 # Blocks in a row that must agree.
 _PERSISTENT = 2
-# Deviation of the stamps from even times, RMS, from which it counts [s]: changes of a quantity with
-# a cut-off frequency of 10 Hz are then off by 15 %. Jitter of computers without real time is less.
+# Deviation of the stamps from even times, RMS, from which it counts [s]: changes of a quantity
+# with a cut-off frequency of 10 Hz are then off by 15 %. Jitter without real time is less.
 _LARGEST = 2.4e-3
 # Degree of the polynomials, and the ratio of the sums of their squared residuals that is clear:
 # noise in 50 readings has up to 1.5.
