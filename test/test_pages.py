@@ -27,6 +27,7 @@ from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import PARAMETERS
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.setpoints.arrival_stamps import LARGEST
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.input_messages import BASE_SOURCES
 from stewart_dynamics.setpoints.output_messages import MOTOR_STATES, MOTOR_TYPES
@@ -53,6 +54,11 @@ def test_generated_tables_are_current(tables: ModuleType) -> None:
     for path, own in pages.items():
         text = path.read_text(encoding='utf-8')
         assert tables.generated(text, own) == text, 'run: python docs/figures/tables.py'
+
+
+def test_thresholds_in_tables_of_faults_are_those_of_the_code() -> None:
+    text = (ROOT / 'docs' / 'faults.md').read_text()
+    assert set(re.findall(r'([0-9.]+) ms \(RMS\)', text)) == {f'{1e3 * LARGEST:g}'}
 
 
 def test_every_parameter_is_on_the_page_of_parameters() -> None:

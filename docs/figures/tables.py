@@ -27,6 +27,8 @@ from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.setpoints.consistency import (
+    DELAY, DELAY_IN_SAMPLES, PERIOD, PERSISTENT, SHARE, SLOWEST, TICK, TOLERANCE, WEAKEST)
 from stewart_dynamics.setpoints.sample_joining import WAITING
 from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 import yaml
@@ -94,6 +96,19 @@ def queues() -> str:
     return (f'At most {WAITING} samples of each topic wait for those of the other topics, and '
             f'{WAITING} messages\nin the middleware; at most {BACKLOG} setpoints wait for an '
             'answer.')
+
+
+def consistent() -> str:
+    """Return which differences of twists and accelerations are consistent."""
+    seconds = 1e-9 * TICK * PERIOD
+    return (f'A difference counts above {100.0 * TOLERANCE:g} % of the motion plus what jitter of '
+            f'stamps,\nnoise and quantization, and a delay of {DELAY_IN_SAMPLES:g} samples or '
+            f'{1e3 * DELAY:g} ms explain; the first three are estimated\nfrom the samples. A '
+            f'quantity is reported after {PERSISTENT} periods of {PERIOD} windows in a row '
+            f'({seconds:.1g} s each at 1 kHz,\n{PERIOD / 10.0:g} s at 10 Hz) in which at least '
+            f'{100.0 * SHARE:g} % of the windows with motion differ. Nothing is judged at rest,\n'
+            f'slower than {100.0 * SLOWEST:g} % of the platform\'s radius per second, below an '
+            f'acceleration of {WEAKEST:g} m/s^2, and across\ngaps and restarts.')
 
 
 def granted() -> str:
@@ -281,7 +296,8 @@ def pages() -> dict[Path, dict[str, str]]:
         ROOT / 'docs' / 'node.md': {
             'subscribed topics': topics('subscribed', SUBSCRIBED),
             'published topics': topics('published', PUBLISHED)},
-        ROOT / 'docs' / 'faults.md': {'queues': queues()},
+        ROOT / 'docs' / 'faults.md': {
+            'queues': queues(), 'consistent twists and accelerations': consistent()},
         ROOT / 'security' / 'policy.xml': {'topics of stewart_dynamics': granted()},
         ROOT / 'docs' / 'parameters.md': {
             'first parameters': rows({name: Parameters.table[name] for name in FIRST}),

@@ -42,7 +42,6 @@ _NEAR = 0.15  # relative difference of units
 _UNITS = {'g': 1.0 / 9.80665, 'ft/s^2': 1.0 / 0.3048, 'cm/s^2': 100.0, 'mm/s^2': 1000.0}
 _GRAVITY = 9.80665
 _HALF = 5.0  # mean specific force that is more than that of accelerations [m/s^2]
-_RESTART = SECOND  # stamps that jump back by more are a restart [ns]
 
 
 def vehicle_mistake(times: Array, forces: Array, rates: Array, kind: str) -> str:
@@ -188,6 +187,7 @@ class Vehicle:
         self._rejections = rejections
         self._notice = notice
         self._stamp: int | None = None
+        self._timeout = round(parameters.setpoint.timeout * SECOND)
         self._recent: deque[float] = deque()  # times [s]
         self._blocks: deque[list[float]] = deque(maxlen=_LONG_BLOCKS)
         self._sums: list[float] = [0.0] * 7
@@ -260,7 +260,7 @@ class Vehicle:
         """Return whether a reading is used; without a stamp it is used as it comes."""
         if stamp == NO_STAMP:
             return True
-        last, order = self._stamp or 0, order_of(stamp, self._stamp, _RESTART)
+        last, order = self._stamp or 0, order_of(stamp, self._stamp, self._timeout)
         if order is Order.RESTART:
             self._notice(f'vehicle: {jumped_back(last - stamp)}')
         if order.used:

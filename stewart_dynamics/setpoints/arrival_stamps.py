@@ -24,7 +24,7 @@ _FEWEST, _SHORTEST = 48, SECOND // 2
 _PERSISTENT = 2
 # Deviation of the stamps from even times, RMS, from which it counts [s]: changes of a quantity
 # with a cut-off frequency of 10 Hz are then off by 15 %. Jitter without real time is less.
-_LARGEST = 2.4e-3
+LARGEST = 2.4e-3
 # Degree of the polynomials, and the ratio of the sums of their squared residuals that is clear:
 # noise in 50 readings has up to 1.5.
 _DEGREE, _CLEAR = 8, 2.0
@@ -88,9 +88,9 @@ class ArrivalStamps:
         with np.errstate(all='ignore'):  # numbers that overflow are not judged
             off = _off(times)
             even, uneven = _evidence(times, readings)
-        if off > _LARGEST and even:
+        if off > LARGEST and even:
             self._row += 1
-        elif off <= _LARGEST or uneven:  # at rest readings show neither
+        elif off <= LARGEST or uneven:  # at rest readings show neither
             self._row, self.present = 0, None
         if self._row >= _PERSISTENT and self.present is None:
             step = 1e3 * times[-1] / (len(times) - 1)

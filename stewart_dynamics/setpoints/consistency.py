@@ -50,24 +50,24 @@ _LAGS = 1, 3, 9, 27
 _GATHERED = 64
 
 # Relative difference that is consistent, besides noise, jitter and delay.
-_TOLERANCE = 0.06
+TOLERANCE = 0.06
 # Delay of a derivative that is consistent: in samples (a difference with the sample before is half
 # a sample late, and messages may be two), and at least in seconds: that of a filter of 5 Hz.
-_DELAY_IN_SAMPLES, _DELAY = 3.0, 0.035
+DELAY_IN_SAMPLES, DELAY = 3.0, 0.035
 # Largest noise of a window, as part of its motion, with which it is judged.
 _NOISE_SHARE = 0.25
 # A pause this many times as long as usual is a gap.
 _GAP = 3.0
 # Share of the windows with motion that must differ, and their smallest number.
-_SHARE, _WINDOWS = 0.4, 6
+SHARE, _WINDOWS = 0.4, 6
 # Inconsistent periods in a row before anything is reported.
-_PERSISTENT = 2
+PERSISTENT = 2
 # Inconsistent periods whose windows are added up to find the reason.
 _MOST_PERIODS = 100
 
 # Slowest motion that is judged: velocity in platform radii per second (or rad/s), and
 # acceleration [m/s^2] (of a point at the platform radius): half a percent of gravity.
-_SLOWEST, _WEAKEST = 2e-3, 0.05
+SLOWEST, WEAKEST = 2e-3, 0.05
 # Smallest changes of a window: in platform radii (or rad) of the pose, of the integrated twist.
 _SMALLEST, _SMALLEST_INTEGRAL = 1e-5, 5e-3
 
@@ -206,11 +206,11 @@ class Consistency:
         radius = self._radius
         yield
         twists = yield from periods.windows(TWISTS, None, [
-            (size * _SMALLEST, size * _SMALLEST_INTEGRAL, size * _SLOWEST)
+            (size * _SMALLEST, size * _SMALLEST_INTEGRAL, size * SLOWEST)
             for size in (radius, 1.0)])
         rates = {} if self._frame is None else (yield from periods.windows(RATES, {
             twist: found.bad for twist, found in twists.items()}, [
-            (size * _WEAKEST * 1e-3, size * _WEAKEST, size * _WEAKEST)
+            (size * WEAKEST * 1e-3, size * WEAKEST, size * WEAKEST)
             for size in (1.0, 1.0 / radius)]))
         for n in range(len(at)):
             for quantity, found in (twists | rates).items():
@@ -234,7 +234,7 @@ class Consistency:
             sums = self._sums[quantity] = Sums(periods.first(n))
         if sums.periods < _MOST_PERIODS:
             periods.add_windows(quantity, n, lag, twist_bad, sums)
-            if self._row[quantity] >= _PERSISTENT:
+            if self._row[quantity] >= PERSISTENT:
                 self._report(quantity)
 
     def _report(self, quantity: str) -> None:
@@ -295,7 +295,7 @@ class _Periods:
         self.step = usual[:, 0] / _median(samples)[:, 0]  # between samples (n,) [s]
         changes = self._of_intervals(np.abs(np.diff(steps, prepend=steps[:1]))) / samples
         self._jitter = 2.0 * _median(changes)[:, 0]
-        self._delay = np.maximum(_DELAY_IN_SAMPLES * self.step, _DELAY)
+        self._delay = np.maximum(DELAY_IN_SAMPLES * self.step, DELAY)
         rows = motions[at]
         self._rows = rows
         rotations = rows[..., ROTATION].reshape(self._number, -1, 3, 3)
@@ -394,7 +394,7 @@ class _Periods:
             best[better], lags[better], moves[better] = score[better], lag, moved[better]
             bads[better] = bad.sum(axis=1)[better]
         enough = moves >= _WINDOWS
-        found = np.array([enough, enough & (bads >= _SHARE * moves), lags]).reshape(
+        found = np.array([enough, enough & (bads >= SHARE * moves), lags]).reshape(
             3, count, self._number)
         return {each: _Windows(found[0, n] > 0, found[1, n] > 0, found[2, n])
                 for n, each in enumerate(quantities)}
@@ -488,7 +488,7 @@ def _without_delay(
     delay = np.clip(-product / np.maximum(squares, 1e-300), -most, most)
     # The delay in radians, squared; half of it is the next term of the series.
     phase = delay ** 2 * squares / np.maximum(whole, 1e-300)
-    return differing + delay[..., None] * late, _TOLERANCE + 0.5 * phase
+    return differing + delay[..., None] * late, TOLERANCE + 0.5 * phase
 
 
 def _crossed(vectors: Array, matrices: Array) -> Array:
