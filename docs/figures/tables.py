@@ -107,7 +107,7 @@ def consistent() -> str:
             f'quantity is reported after {PERSISTENT} periods of {PERIOD} windows in a row '
             f'({seconds:.1g} s each at 1 kHz,\n{PERIOD / 10.0:g} s at 10 Hz) in which at least '
             f'{100.0 * SHARE:g} % of the windows with motion differ. Nothing is judged at rest,\n'
-            f'slower than {100.0 * SLOWEST:g} % of the platform\'s radius per second, below an '
+            f"slower than {100.0 * SLOWEST:g} % of the platform's radius per second, below an "
             f'acceleration of {WEAKEST:g} m/s^2, and across\ngaps and restarts.')
 
 
