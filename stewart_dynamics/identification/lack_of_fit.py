@@ -237,39 +237,36 @@ def lack_of_fit(platform: StewartPlatform, extracts: Extracts, noisy: Noisy, unk
         rest = _ranked(of_all, scores.without(best.places), _NOTICE)
     else:  # numbers that are far from the file's
         rest, rivals = [], rivals or any(_rivals(best, of_all, scores, unknowns))
+    cause, text = best.what, best.text
     if rivals or any(each.statistic > _LEAVES * best.statistic for each in rest):
+        cause, text = UNKNOWN, _largest_part(platform, _of(extracts, chosen), unknowns, fit)
+    if cause == UNKNOWN or not len(best.places):
         shifts = np.max([_model_error(of_all, scores, unknowns), *(
             shift for _, shift in contradicted)], axis=0)
-        return LackOfFit(UNKNOWN, _largest_part(platform, _of(extracts, chosen), unknowns, fit),
-                         tuple(ranked), WIDENING * shifts, 1.0)
-    for each, shifts in contradicted:
-        if each is best:
-            return LackOfFit(best.what, best.text, tuple(ranked), WIDENING * shifts, 1.0)
-    return LackOfFit(
-        best.what, best.text, tuple(ranked), WIDENING * _shifts(scores, best.places, unknowns),
-        math.sqrt(max(0.0, 1.0 - best.statistic / scores.squares)))
+        return LackOfFit(cause, text, tuple(ranked), WIDENING * shifts, 1.0)
+    shifts = _model_error(of_all, scores, unknowns, best.what)
+    return LackOfFit(cause, text, tuple(ranked), WIDENING * shifts,
+                     math.sqrt(max(0.0, 1.0 - best.statistic / scores.squares)))
 
 
-def _shifts(scores: _Scores, places: Integers, unknowns: Unknowns) -> Array:
-    """Return the change (k,) of each unknown if some columns are added to the fit."""
-    shifts: Array = np.abs(unknowns.root @ scores.change(places)[:len(unknowns.start)])
-    return shifts
-
-
-def _model_error(causes: Sequence[Cause], scores: _Scores, unknowns: Unknowns) -> Array:
+def _model_error(causes: Sequence[Cause], scores: _Scores, unknowns: Unknowns, named: str = '',
+                 ) -> Array:
     """
-    Return the change (k,) of each unknown by an error of the model that is not explained.
+    Return the change (k,) of each unknown by an error of the model.
 
-    It is made of the causes: any of those that are significant may be the first part, of which
-    the largest shift counts, and so may any of those that are left beside the likeliest.
+    It is made of the causes. The first part is any of those that are significant, of the named
+    kind if there is one, and the largest change counts; so may be any of those that are left
+    beside the likeliest.
     """
     shifts = np.zeros(len(unknowns.start))
     for _ in range(_MOST_PARTS):
         ranked = _ranked(causes, scores, _SUSPICIOUS)
         if not ranked:
             break
-        shifts += np.max([_shifts(scores, each.places, unknowns) for each in ranked], axis=0)
-        scores = scores.without(ranked[0].places)
+        shifts += np.max([
+            np.abs(unknowns.root @ scores.change(each.places)[:len(unknowns.start)])
+            for each in ranked if named in ('', each.what)], axis=0)
+        scores, named = scores.without(ranked[0].places), ''
     return shifts
 
 
