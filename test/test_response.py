@@ -413,7 +413,8 @@ def test_what_is_not_excited_is_not_stated() -> None:
         assert len(found[name]['frequency']) == 0 and found[name]['reason'] == 'not excited'
     x[:, 4] = x[:, 0]
     found = axes_of(x, x, rate)
-    assert found['x']['reason'] == found['ry']['reason'] == 'moves only together with other axes'
+    assert found['x']['reason'] == found['ry']['reason'] == (
+        'not separable: x and ry were moved alike')
     still = axes_of(np.zeros((500, 6)), np.zeros((500, 6)), rate)
     assert all(still[name]['reason'] == 'not excited' for name in AXES)
 

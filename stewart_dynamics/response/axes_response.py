@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.response.even_samples import Run, Runs, SHORTEST
+from stewart_dynamics.response.even_samples import Run, Runs
 from stewart_dynamics.response.frequency_response import (
-    aligned, FrequencyResponses, Part, periodic_parts, responses, segment_length, spectra)
+    FrequencyResponses, Part, parts_by_inputs, periodic_parts, responses, spectra)
+from stewart_dynamics.response.local_responses import local_responses
 from stewart_dynamics.response.response_measures import CERTAIN, Response
 
 AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
@@ -27,6 +28,8 @@ _EXCITED = 1e-3
 _STILL = 1e-9  # [m, rad]
 # Smallest drift of clocks that is stated, also in standard errors, and the periods it needs.
 _DRIFT, _CERTAIN_DRIFT, _FEWEST_PERIODS = 2e-6, 5.0, 4
+# Mean coherence of two inputs from which on they move alike.
+_ALIKE = 0.7
 # Time around a reversal of an axis in which the turn-around bump is searched [s].
 _AROUND = 0.1
 
@@ -49,9 +52,9 @@ class Analysis:
             (sizes > _EXCITED * sizes.max()) & (sizes > _STILL)).tolist()
         return moving
 
-    def axes(self) -> list[tuple[list[int], FrequencyResponses, float]]:
+    def axes(self) -> list[tuple[list[int], FrequencyResponses]]:
         """
-        Return responses of all six outputs: the inputs, the responses, the step in frequency.
+        Return responses of all six outputs, with their inputs.
 
         Each part that repeats has its own inputs; axes that have no such part follow.
         """
@@ -59,49 +62,69 @@ class Analysis:
         for run, part in self.periodic:
             inputs = self._moving(run.commanded[part.begin:part.end])
             if (one := self._of([_both(run, part)], part.period, inputs)) is not None:
-                found.append((inputs, *one))
-        covered = {each for inputs, several, _ in found for n, each in enumerate(inputs)
+                found.append((inputs, one))
+        covered = {each for inputs, several in found for n, each in enumerate(inputs)
                    if np.isfinite(several.responses[:, each, n]).any()}
         if set(self.excited) - covered:
-            whole = self._of([_both(run) for run in self._recorded.runs], None, self.excited)
-            if whole is not None:
-                found.append((self.excited, *whole))
+            found += self._by_regression()
         return found
 
-    def _of(self, samples: list[Array], period: int | None, inputs: Sequence[int],
-            ) -> tuple[FrequencyResponses, float] | None:
-        rate = self._recorded.rate
-        samples, late = (samples, 0) if period else aligned(samples, rate)
-        length = period or segment_length(samples, rate, len(inputs))
-        if length < (4 if period else SHORTEST):
+    def _of(self, samples: list[Array], period: int, inputs: Sequence[int],
+            ) -> FrequencyResponses | None:
+        found = spectra(samples, self._recorded.rate, period) if period >= 4 else None
+        if not inputs or found is None or found.averages <= len(inputs):
             return None
-        found = spectra(samples, rate, length, hann=period is None)
-        if found is None or found.averages <= len(inputs):
-            return None
-        return _later(responses(found, inputs, range(6, 12)), late / rate), rate / length
+        return responses(found, inputs, range(6, 12))
 
-    def legs(self) -> list[tuple[Response, float]]:
+    def _by_regression(self) -> list[tuple[list[int], FrequencyResponses]]:
+        """Return the responses of the parts in which the same axes move, with their inputs."""
+        parts: dict[tuple[int, ...], list[Array]] = {}
+        for run in self._recorded.runs:
+            for begin, end, moved in parts_by_inputs(
+                    run.commanded[:, self.excited], self._recorded.rate):
+                inputs = tuple(self.excited[each] for each in moved)
+                parts.setdefault(inputs, []).append(_both(run)[begin:end])
+        found = []
+        for inputs, samples in parts.items():
+            if (one := self._regression(samples, inputs, range(6), inputs)) is not None:
+                found.append((list(inputs), one))
+        return found
+
+    def _regression(self, samples: list[Array], inputs: Sequence[int], outputs: Sequence[int],
+                    own: Sequence[int]) -> FrequencyResponses | None:
+        """Return the responses of outputs to inputs; both in units of their scales."""
+        columns = [*inputs, *(6 + each for each in outputs)]
+        scales = np.tile(self._scales, 2)[columns]
+        found = local_responses(
+            [each[:, columns] / scales for each in samples], self._recorded.rate, own,
+            self._recorded.highest)
+        if found is None:
+            return None
+        of_inputs, of_outputs = scales[:len(inputs)], scales[len(inputs):]
+        factor = of_outputs[:, None] / of_inputs
+        return found._replace(
+            responses=found.responses * factor, radii=found.radii * factor,
+            noise=found.noise * of_outputs ** 2)
+
+    def legs(self) -> list[Response]:
         """
-        Return the response of each leg to its own command, and the step in frequency.
+        Return the response of each leg to its own command.
 
         Legs are driven one by one: all parts with the period of most samples are averaged.
         """
-        rate = self._recorded.rate
-        lengths: dict[int | None, list[Array]] = {}
+        lengths: dict[int, list[Array]] = {}
         for run, part in self.periodic:
             lengths.setdefault(part.period, []).append(_both(run, part))
         if lengths:
             period = max(lengths, key=lambda each: sum(map(len, lengths[each])))
-            samples = lengths[period]
+            whole = spectra(lengths[period], self._recorded.rate, period) if period >= 4 else None
+            several = [] if whole is None or whole.averages <= 1 else [
+                responses(whole, [leg], [6 + leg]) for leg in range(6)]
         else:
-            period, samples = None, [_both(run) for run in self._recorded.runs]
-        samples, late = (samples, 0) if period else aligned(samples, rate)
-        length = period or segment_length(samples, rate, 1)
-        found = spectra(samples, rate, length, period is None) if length >= 4 else None
-        if found is None or found.averages <= 1:
-            return []
-        return [(self.one(_later(responses(found, [leg], [6 + leg]), late / rate), 0, 0),
-                 rate / length) for leg in range(6)]
+            samples = [_both(run) for run in self._recorded.runs]
+            several = [each for leg in range(6) if (
+                each := self._regression(samples, [leg], [leg], [0])) is not None]
+        return [self.one(each, 0, 0) for each in several]
 
     def one(self, several: FrequencyResponses, output: int, number: int) -> Response:
         """Return one of several responses, at the frequencies where it is known."""
@@ -120,7 +143,6 @@ class Analysis:
         times: list[Array] = [np.empty(0)]
         lags: list[Array] = [np.empty(0)]
         for run, part in self.periodic:
-            assert part.period is not None
             for axis in self._moving(run.commanded[part.begin:part.end]):
                 x, y = (np.fft.rfft(each[part.begin:part.end, axis].reshape(-1, part.period))
                         for each in (run.commanded, run.achieved))
@@ -152,7 +174,6 @@ class Analysis:
         from the coherent response around the reversals of the axis. None without periods.
         """
         for run, part in self.periodic:
-            assert part.period is not None
             if axis not in self._moving(run.commanded[part.begin:part.end]):
                 continue
             commanded, achieved = (
@@ -174,12 +195,6 @@ class Analysis:
         return None
 
 
-def _later(several: FrequencyResponses, seconds: float) -> FrequencyResponses:
-    """Return responses of outputs that are later by a time."""
-    turn = np.exp(-2j * np.pi * several.frequencies * seconds)
-    return several._replace(responses=several.responses * turn[:, None, None])
-
-
 def _both(run: Run, part: Part | None = None) -> Array:
     """Return commanded and achieved samples side by side."""
     which = slice(None) if part is None else slice(part.begin, part.end)
@@ -192,33 +207,45 @@ def axes_response(recorded: Runs, size: float) -> dict[str, Any]:
     found = analysis.axes()
     result: dict[str, Any] = {}
     for axis, name in enumerate(AXES):
-        pieces = [(several, inputs.index(axis), step) for inputs, several, step in found
-                  if axis in inputs]
-        own = [analysis.one(several, axis, number) for several, number, _ in pieces]
+        pieces = [(several, inputs.index(axis)) for inputs, several in found if axis in inputs]
+        own = [analysis.one(several, axis, number) for several, number in pieces]
         response = _joined(own)
         excited = bool(len(response.frequency))
-        noise = next(
-            (several.noise[:, axis], step) for (several, _, step), one in
-            zip(pieces, own, strict=True) if len(one.frequency)) if excited else _quiet(
-                found, axis)
+        noise = next((several for (several, _), one in zip(pieces, own, strict=True)
+                      if len(one.frequency)), found[0][1] if found and not excited else None)
         repeated = analysis.deviations(axis) if excited else None
         result[name] = {
             **(response.measures() if excited else _NOT_EXCITED),
             'cross': _cross(analysis, pieces, axis) if excited else {},
-            'noise': None if noise is None else float(np.sqrt(np.sum(noise[0]) * noise[1])),
+            'noise': None if noise is None else float(
+                np.sqrt(noise.noise[:, axis] @ noise.widths)),
             'repeatability': repeated and repeated[0], 'turn_around': repeated and repeated[1],
-            'reason': None if response.coherent.any() else _reason(
-                analysis, excited, bool(pieces), axis)}
+            'reason': None if response.coherent.any() else _reason(analysis, excited, found, axis)}
     return result | {'clock_drift': analysis.clock_drift()}
 
 
-def _reason(analysis: Analysis, excited: bool, analyzed: bool, axis: int) -> str:
+def _reason(analysis: Analysis, excited: bool,
+            found: Sequence[tuple[list[int], FrequencyResponses]], axis: int) -> str:
     """Return why an axis is not stated."""
     if excited:
         return 'not coherent with its setpoints'
     if axis not in analysis.excited:
         return 'not excited'
-    return 'moves only together with other axes' if analyzed else 'the recording is too short'
+    names = sorted({each for inputs, several in found if axis in inputs
+                    for each in _moved_alike(several, inputs, axis)} | {axis})
+    if len(names) < 2:
+        return 'the recording is too short'
+    *first, last = (AXES[each] for each in names)
+    return f'not separable: {", ".join(first)} and {last} were moved alike'
+
+
+def _moved_alike(several: FrequencyResponses, inputs: Sequence[int], axis: int) -> list[int]:
+    """Return the axes that moved as one axis did, or, where several together did, all."""
+    alike = several.alike[:, inputs.index(axis)]
+    known = np.isfinite(alike).all(axis=1)
+    mean = alike[known].mean(axis=0) if known.any() else np.zeros(len(inputs))
+    alone = [each for n, each in enumerate(inputs) if each != axis and mean[n] > _ALIKE]
+    return alone or [each for each in inputs if known.any()]
 
 
 _NOT_EXCITED: dict[str, Any] = {name: [] for name in (
@@ -240,32 +267,26 @@ def _joined(pieces: Sequence[Response]) -> Response:
     return Response(*(each[first] for each in columns))
 
 
-def _cross(analysis: Analysis, pieces: Sequence[tuple[FrequencyResponses, int, float]],
-           axis: int) -> dict[str, float | None]:
+def _cross(analysis: Analysis, pieces: Sequence[tuple[FrequencyResponses, int]], axis: int,
+           ) -> dict[str, float | None]:
     """Return the largest gain from an axis to each other one; None: lost in the noise."""
     cross: dict[str, float | None] = {}
     for other, name in enumerate(AXES):
         if other == axis:
             continue
-        all_of = _joined([analysis.one(several, other, number) for several, number, _ in pieces])
+        all_of = _joined([analysis.one(several, other, number) for several, number in pieces])
         gains = np.abs(all_of.value)
         sure = gains > CERTAIN * all_of.radius
         cross[name] = float(gains[sure].max()) if sure.any() else None
     return cross
 
 
-def _quiet(found: Sequence[tuple[list[int], FrequencyResponses, float]], axis: int,
-           ) -> tuple[Array, float] | None:
-    """Return the density of the noise of an axis that is not excited, and its step [Hz]."""
-    return next(((several.noise[:, axis], step) for _, several, step in found), None)
-
-
 def legs_response(recorded: Runs, joints: Sequence[str]) -> dict[str, Any]:
     """Return the parts of ``response`` about the legs."""
     found = Analysis(recorded, [1.0] * 6).legs()
-    legs = {joint: one.measures() for joint, (one, _) in zip(joints, found, strict=False)
+    legs = {joint: one.measures() for joint, one in zip(joints, found, strict=False)
             if len(one.frequency)}
-    return {'legs': legs, 'leg_balance': _balance([one for one, _ in found])}
+    return {'legs': legs, 'leg_balance': _balance(found)}
 
 
 def _balance(legs: Sequence[Response]) -> dict[str, float] | None:

@@ -2,16 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Frequency responses of several outputs to several inputs, with coherence and confidence bands.
+Frequency responses of several outputs to several inputs that repeat, with confidence bands.
 
 The estimator is H = S_yx S_xx^-1 of averaged spectra (J. S. Bendat, A. G. Piersol, Random Data,
 4th ed., 2010, doi:10.1002/9781118032428, chapters 7 and 9): noise on the outputs does not bias it.
-Spectra are those of ``scipy.signal``. Where the inputs repeat, a segment is one period without a
-window, so that nothing leaks between the lines and the response is that of the steady state;
-elsewhere segments are Hann windows that overlap by half.
+A segment is one period without a window, so that nothing leaks between the lines and the response
+is that of the steady state.
 
-At each frequency only the inputs with power there are taken. Inputs that move together cannot be
-separated: their responses are nan.
+At each frequency only the inputs with power there are taken. Inputs that move alike cannot be
+separated: their responses are nan. Motion that does not repeat: ``local_responses``.
 """
 
 from __future__ import annotations
@@ -29,15 +28,13 @@ from stewart_dynamics.estimation.confidence_level import CONFIDENCE_LEVEL
 Complex = NDArray[np.complex128]
 
 # Power of an input at a frequency, relative to its largest, below which it is not excited there.
-_EXCITED = 1e-5
+EXCITED = 1e-5
 # Part of an input's power that the other inputs do not explain; less cannot be separated.
-_SEPARATE = 0.01
+SEPARATE = 0.01
 # Largest change of an input from one period to the next, relative to its RMS.
 _REPEATED = 1e-3
-# Longest segment of an input that does not repeat [s], and fewest samples in one.
-_LONGEST, _FEWEST = 20.0, 64
-# Longest delay by which inputs that do not repeat are aligned with outputs [s].
-_LATEST = 1.0
+# Shortest part in which the same inputs move, relative to the whole.
+_SHORTEST_PART = 1.0 / 12.0
 # Frequencies whose noise is averaged where periods are few.
 _NEIGHBORS = 9
 # A smaller gain is one of rounding errors.
@@ -51,7 +48,7 @@ class Part(NamedTuple):
 
     begin: int
     end: int
-    period: int | None  # samples after which the inputs repeat; None: they do not
+    period: int  # samples after which the inputs repeat
 
 
 class Spectra(NamedTuple):
@@ -71,7 +68,9 @@ class FrequencyResponses(NamedTuple):
     responses: Complex  # (F, O, I)
     radii: Array  # (F, O, I): radius of its confidence circle around each
     coherences: Array  # (F, O, I): part of the power due to the input, of this and noise
-    noise: Array  # (F, O): one-sided density of what is not coherent with any input
+    noise: Array  # (F, O): one-sided density of the power that is not coherent with any input
+    widths: Array  # (F,): distances of the frequencies [Hz], to integrate over the noise
+    alike: Array  # (F, I, I): how alike two inputs move, 0 to 1; nan where one has no power
 
 
 def signal_module() -> Any:
@@ -95,7 +94,7 @@ def periodic_parts(inputs: Array, rate: float, still: float = 1.0) -> list[Part]
     still: an input that does not move for this time is at rest [s].
     """
     found = []
-    for begin, end in _same_inputs_move(inputs, round(still * rate)):
+    for begin, end, _ in _same_inputs_move(inputs, round(still * rate)):
         if part := _repeated(inputs[begin:end]):
             first, stop, period = part
             if stop - first >= 3 * period:
@@ -105,8 +104,35 @@ def periodic_parts(inputs: Array, rate: float, still: float = 1.0) -> list[Part]
     return found
 
 
-def _same_inputs_move(inputs: Array, still: int) -> list[tuple[int, int]]:
-    """Return begin and end of each part in which the same inputs move."""
+def parts_by_inputs(inputs: Array, rate: float, still: float = 1.0,
+                    ) -> list[tuple[int, int, list[int]]]:
+    """
+    Return begin, end and inputs of the parts of inputs (N, I) in which the same ones move.
+
+    A part lasts until the next one begins. Short ones belong to the part before them, or to the
+    first one.
+    """
+    parts: list[list[int]] = []
+    for begin, _, code in _same_inputs_move(inputs, round(still * rate)):
+        if parts and parts[-1][1] == code:
+            continue
+        parts.append([begin, code])
+    shortest = len(inputs) * _SHORTEST_PART
+    merged: list[list[int]] = []
+    for (begin, code), end in zip(parts, [*(each[0] for each in parts[1:]), len(inputs)],
+                                  strict=True):
+        short = end - begin < shortest or (merged and begin - merged[-1][0] < shortest)
+        if merged and (short or merged[-1][1] == code):
+            merged[-1][1] |= code
+        else:
+            merged.append([begin, code])
+    ends = [*(each[0] for each in merged[1:]), len(inputs)]
+    return [(begin, end, [n for n in range(inputs.shape[1]) if code >> n & 1])
+            for (begin, code), end in zip(merged, ends, strict=True)]
+
+
+def _same_inputs_move(inputs: Array, still: int) -> list[tuple[int, int, int]]:
+    """Return begin and end of each part in which the same inputs move, and their bits."""
     steps = np.abs(np.diff(inputs, axis=0, prepend=inputs[:1]))
     moves: Flags = steps > 1e-6 * np.ptp(inputs, axis=0)
     moves &= np.ptp(inputs, axis=0) > 0.0
@@ -116,7 +142,8 @@ def _same_inputs_move(inputs: Array, still: int) -> list[tuple[int, int]]:
     near: Flags = counts[high] > counts[low]
     codes = near @ (1 << np.arange(inputs.shape[1]))
     edges = [0, *(np.flatnonzero(np.diff(codes)) + 1).tolist(), len(codes)]
-    return [(begin, end) for begin, end in zip(edges[:-1], edges[1:], strict=True) if codes[begin]]
+    return [(begin, end, int(codes[begin]))
+            for begin, end in zip(edges[:-1], edges[1:], strict=True) if codes[begin]]
 
 
 def _repeated(inputs: Array) -> tuple[int, int, int] | None:
@@ -147,67 +174,22 @@ def _longest(flags: Flags) -> tuple[int, int]:
     return begin, end
 
 
-def spectra(runs: Iterable[Array], rate: float, length: int, hann: bool) -> Spectra | None:
-    """
-    Return the mean spectra of runs (N, C) without a gap; None if all are shorter than a segment.
-
-    length: samples in a segment.
-    hann: Hann windows that overlap by half; else segments one after the other, as they are.
-    """
-    signal = signal_module()
-    window = signal.get_window('hann' if hann else 'boxcar', length)
-    step = length - length // 2 if hann else length
+def spectra(samples: Iterable[Array], rate: float, period: int) -> Spectra | None:
+    """Return the mean spectra of samples (N, C) in whole periods; None without a period."""
     total: Any = 0.0
     count = 0
-    frequencies = np.arange(length // 2 + 1, dtype=np.float64) * (rate / length)
-    for run in runs:
-        if len(run) < length:
-            continue
-        _, _, parts = signal.stft(
-            run, rate, window, length, length - step, detrend='constant', boundary=None,
-            padded=False, axis=0, scaling='psd')
-        parts = np.moveaxis(parts, 1, -1)  # (F, K, C)
-        total = total + np.swapaxes(parts, 1, 2) @ parts.conj()
-        count += parts.shape[1]
+    for each in samples:
+        periods = len(each) // period
+        whole = each[:periods * period].reshape(periods, period, -1)
+        lines = np.fft.rfft(whole - whole.mean(axis=1, keepdims=True), axis=1).swapaxes(0, 1)
+        total = total + lines.swapaxes(1, 2) @ lines.conj()
+        count += periods
     if not count:
         return None
-    # Segments that overlap are not independent (Welch, 1967).
-    shared = np.sum(window[step:] * window[:length - step]) ** 2 / np.sum(window ** 2) ** 2
-    averages = count / (1.0 + 2.0 * shared * (count - 1) / count)
-    # The mean leaks into the first frequency of Hann windows.
-    first = 2 if hann else 1
-    neighbors = 1 if hann else min(_NEIGHBORS, (length // 2 - 2) // 2 * 2 + 1)
-    return Spectra(frequencies[first:], 2.0 * total[first:] / count, averages, max(neighbors, 1))
-
-
-def aligned(runs: Sequence[Array], rate: float) -> tuple[list[Array], int]:
-    """
-    Return runs whose outputs are earlier by the samples by which they are late, and their number.
-
-    Windows at the same time see different parts of inputs and outputs that are late, which biases
-    the response; at the largest correlation of their speeds they see the same.
-
-    runs: (N, 2 C), C inputs and as many outputs.
-    """
-    longest = max(runs, key=len, default=np.empty((0, 0)))
-    speeds = np.diff(longest, axis=0)
-    most = min(round(_LATEST * rate), len(speeds) // 8)
-    sizes = speeds.std(axis=0) if len(speeds) else np.empty(0)
-    half = len(sizes) // 2
-    moving = (sizes[:half] > 0.0) & (sizes[half:] > 0.0)
-    if not most or not moving.any():
-        return list(runs), 0
-    x, y = (np.fft.rfft((speeds / np.where(sizes > 0.0, sizes, 1.0))[:, part][:, moving],
-                        2 * len(speeds), axis=0) for part in (slice(half), slice(half, None)))
-    similar = np.fft.irfft(np.sum(y * x.conj(), axis=1))[:most + 1]
-    late = int(similar.argmax())
-    return [np.hstack([run[:len(run) - late, :half], run[late:, half:]]) for run in runs], late
-
-
-def segment_length(runs: Sequence[Array], rate: float, inputs: int) -> int:
-    """Return the samples of a segment, so that enough of them separate the inputs."""
-    longest = max((len(run) for run in runs), default=0)
-    return min(round(_LONGEST * rate), int(2 * longest / (4 * inputs + 6)))
+    frequencies = np.arange(period // 2 + 1, dtype=np.float64) * (rate / period)
+    neighbors = min(_NEIGHBORS, (period // 2 - 2) // 2 * 2 + 1)
+    return Spectra(frequencies[1:], total[1:] * (2.0 / (rate * period * count)), float(count),
+                   max(neighbors, 1))
 
 
 def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int],
@@ -221,7 +203,7 @@ def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int],
         raise StewartError(f'{found.averages:.3g} averages: must be more than the inputs')
     densities = found.densities
     own = np.diagonal(densities, axis1=1, axis2=2).real[:, inputs]
-    excited: Flags = own > _EXCITED * own.max(axis=0)
+    excited: Flags = own > EXCITED * own.max(axis=0)
     shape = len(densities), len(outputs), len(inputs)
     h = np.full(shape, np.nan, dtype=complex)
     powers = np.full((len(densities), len(inputs)), np.nan)  # that other inputs do not explain
@@ -239,10 +221,34 @@ def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int],
     smooth, free = _smooth(noise, found.neighbors), free * found.neighbors
     quantile = free * ((1.0 - CONFIDENCE_LEVEL) ** (-1.0 / free) - 1.0)
     radii = np.sqrt(quantile / found.averages * smooth[:, :, None] / powers[:, None, :])
-    due = np.where(np.abs(h) > _ROUNDING, np.abs(h) ** 2 * powers[:, None, :], 0.0)
-    total = due + smooth[:, :, None]
-    coherences = np.divide(due, total, out=np.zeros_like(total), where=total > 0.0)
-    return FrequencyResponses(found.frequencies, h, radii, coherences, noise)
+    _, alike = separate_shares(densities[:, inputs][:, :, inputs])
+    step = np.full(len(own), found.frequencies[0])
+    return FrequencyResponses(
+        found.frequencies, h, radii, coherences_of(h, powers[:, None, :], smooth[:, :, None]),
+        noise, step, np.where(excited[:, :, None], alike, np.nan))
+
+
+def coherences_of(h: Complex, powers: Array, noise: Array) -> Array:
+    """Return the part of the power that is due to inputs, of this part and noise."""
+    due = np.where(np.abs(h) > _ROUNDING, np.abs(h) ** 2 * powers, 0.0)
+    total = due + noise
+    return np.divide(due, total, out=np.zeros_like(total), where=total > 0.0)
+
+
+def separate_shares(densities: Complex, least: float = 1e-13) -> tuple[Array, Array]:
+    """
+    Return the parts (F, I) of the powers that other inputs do not explain, and |coherence|.
+
+    densities: of the inputs (F, I, I). least: power, relative to the largest, of inputs that
+    explain nothing.
+    """
+    powers = np.diagonal(densities, axis1=1, axis2=2).real
+    scale = np.sqrt(np.maximum(powers, 1e-300))
+    normal = densities / (scale[:, :, None] * scale[:, None, :])
+    weak = least * np.maximum(powers.max(axis=1, keepdims=True), 1e-300) / scale ** 2
+    inverse = np.linalg.inv(normal + weak[:, :, None] * np.eye(powers.shape[1]))
+    alone = 1.0 / np.maximum(np.diagonal(inverse, axis1=1, axis2=2).real, 1e-300) - weak
+    return alone.clip(0.0, 1.0), np.abs(normal)
 
 
 def _one_set(densities: Complex, inputs: Integers, outputs: Integers,
@@ -258,7 +264,7 @@ def _one_set(densities: Complex, inputs: Integers, outputs: Integers,
     h = (yx / scale[:, None, :]) @ inverse
     explained = np.einsum('foi,fij,foj->fo', h, normal, h.conj()).real
     alone = 1.0 / np.maximum(np.diagonal(inverse, axis1=1, axis2=2).real, 1.0)
-    lost = alone < _SEPARATE
+    lost = alone < SEPARATE
     return (np.where(lost[:, None, :], np.nan, h / scale[:, None, :]),
             np.where(lost, np.nan, alone * scale ** 2), np.maximum(yy - explained, 0.0))
 
