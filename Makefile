@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
-  bench-replay clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
+  bench-replay bench-response clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
   lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff test tools
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
@@ -158,6 +158,9 @@ bench-calibrate: $(TOOLS)
 bench-coverage: $(TOOLS)
 	$(VENV)/bin/python benchmarks/interval_coverage.py --write
 	$(VENV)/bin/python benchmarks/interval_coverage.py --table --write
+
+bench-response: $(TOOLS)
+	$(VENV)/bin/python benchmarks/response.py --write
 
 bench-lack-of-fit: $(TOOLS)
 	$(VENV)/bin/python benchmarks/lack_of_fit.py --write

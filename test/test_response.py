@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import rng, ROOT
+from response_cases import EXCITATIONS, judged, NOISES
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from scipy import signal
@@ -306,7 +307,8 @@ def test_clocks_that_drift_are_said(periodic: tuple[Array, Array]) -> None:
 
 
 def axes_of(commanded: Array, achieved: Array, rate: float) -> dict[str, Any]:
-    run = Run(np.arange(len(commanded)) / rate, commanded, achieved)
+    run = Run(np.arange(len(commanded)) / rate, commanded, achieved,
+              np.zeros(len(commanded), dtype=bool))
     return axes_response(Runs([run], rate, 0.45 * rate), 0.3)
 
 
@@ -471,3 +473,61 @@ def test_a_platform_that_follows_at_once_has_no_delay(periodic: tuple[Array, Arr
         assert found[name]['delay'] == pytest.approx(0.0, abs=1e-9)
         np.testing.assert_allclose(found[name]['gain'], 1.0, atol=1e-9)
         assert found[name]['bandwidth_3db'] is found[name]['bandwidth_90deg'] is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('kind', EXCITATIONS)
+def test_bands_contain_the_truth(kind: str) -> None:
+    found = [judged(kind, axes, noise, seed) for noise in NOISES
+             for axes, seed in ((1, 1), (1, 2), (2, 1), (3, 1))]
+    inside = [each for one in found for each in one.own]
+    # Estimates at neighboring frequencies share their noise: about ten of an axis are independent.
+    independent = min(len(inside), 10 * sum(one.stated for one in found))
+    assert np.mean(inside) > 0.95 - 4.0 * math.sqrt(0.95 * 0.05 / independent)
+    assert sum(one.stated for one in found) >= 16
+    bandwidths = np.array([each for one in found for each in one.bandwidths])
+    delays = [each for one in found for each in one.delays]
+    assert np.abs(bandwidths - 1.0).max() < 0.1 and np.abs(delays).max() < 2e-3
+
+
+def test_axes_that_move_alike_are_not_stated() -> None:
+    rate = 50.0
+    white = signal.lfilter(*signal.butter(2, 0.3), rng(1).normal(size=4000))
+    x = 0.01 * white[:, None] * [1.0, 0.0, 0.5, 1.0, 0.0, 0.0]
+    x[:, 2] += 0.01 * signal.lfilter(*signal.butter(2, 0.3), rng(2).normal(size=4000))
+    found = axes_of(x, DRIVE.moved(x, rate), rate)
+    for name in ('x', 'rx'):
+        assert found[name]['reason'] == 'not separable: x and rx were moved alike'
+        assert not len(found[name]['frequency']) and found[name]['delay'] is None
+    assert found['z']['delay'] == pytest.approx(DRIVE.late, abs=1e-3)
+
+
+@pytest.mark.parametrize('how', ['missing', 'frozen'])
+def test_poses_that_a_tracker_loses_are_left_out(how: str, tmp_path: Path) -> None:
+    rate, count = 50.0, 3000
+    x = np.zeros((count, 6))
+    white = signal.lfilter(*signal.butter(2, 0.2), rng(1).normal(size=count))
+    x[:, 0] = 0.01 * white * np.clip(np.arange(count) / 100.0, 0.0, 1.0)
+    y = DRIVE.moved(x, rate)
+    times = np.arange(count) / rate
+    kept: NDArray[np.bool_] = np.arange(count) % 150 >= 15
+    seen = y if how == 'missing' else y[np.maximum.accumulate(
+        np.where(kept, np.arange(count), 0))]
+    tracked = poses(seen)
+    rows = np.hstack([tracked.position, to_quaternion(tracked.rotation)])
+    if how == 'missing':
+        rows, at = rows[kept], times[kept]
+    else:
+        at = times
+    motion = Motion(poses(x).position, poses(x).rotation, *np.zeros((4, count, 3)))
+    bag = write_bag(tmp_path / 'lost', motion, times, {TRACKER: (rows, at)})
+    summary = replayed(bag, tmp_path / 'out', '--measured-pose', TRACKER, '--no-report')
+    one = summary['response']['x']
+    f = np.array(one['frequency'])
+    value = np.array(one['gain']) * np.exp(1j * np.radians(one['phase']))
+    low = f < 5.0
+    assert low.sum() > 20
+    assert np.abs(value - DRIVE.at(f))[low].max() < 5e-3
+    assert one['delay'] == pytest.approx(DRIVE.late, abs=5e-4)
+    assert any('repeat the one before' in each for each in summary['notices']) == (
+        how == 'frozen')

@@ -19,7 +19,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.response.even_samples import Run, Runs
 from stewart_dynamics.response.frequency_response import (
     FrequencyResponses, Part, parts_by_inputs, periodic_parts, responses, spectra)
-from stewart_dynamics.response.local_responses import local_responses
+from stewart_dynamics.response.local_responses import interpolated, local_responses
 from stewart_dynamics.response.response_measures import CERTAIN, Response
 
 AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
@@ -30,6 +30,8 @@ _STILL = 1e-9  # [m, rad]
 _DRIFT, _CERTAIN_DRIFT, _FEWEST_PERIODS = 2e-6, 5.0, 4
 # Mean coherence of two inputs from which on they move alike.
 _ALIKE = 0.7
+# Times that lost samples are predicted.
+_FILLED = 6
 # Time around a reversal of an axis in which the turn-around bump is searched [s].
 _AROUND = 0.1
 
@@ -38,12 +40,16 @@ class Analysis:
     """The frequency responses of the axes, or of the legs, of a recording."""
 
     def __init__(self, recorded: Runs, scales: Sequence[float]) -> None:
-        self._recorded = recorded
         self._scales = np.asarray(scales)
+        self._recorded = recorded
         whole = np.concatenate([run.commanded for run in recorded.runs])
         self.excited = self._moving(whole)
+        lost = np.concatenate([run.lost for run in recorded.runs])
+        self._lost = float(lost.mean())
+        for _ in range(_FILLED if lost.any() and not lost.all() else 0):
+            self._recorded = self._recorded._replace(runs=self._filled())
         self.periodic = [
-            (run, part) for run in recorded.runs
+            (run, part) for run in self._recorded.runs
             for part in periodic_parts(run.commanded[:, self.excited], recorded.rate)]
 
     def _moving(self, commanded: Array) -> list[int]:
@@ -75,6 +81,33 @@ class Analysis:
         if not inputs or found is None or found.averages <= len(inputs):
             return None
         return responses(found, inputs, range(6, 12))
+
+    def _filled(self) -> list[Run]:
+        """
+        Return the runs with lost samples as the responses so far predict them.
+
+        Repeated, this is the EM algorithm for lost samples. What is not predicted is taken from
+        the samples around a gap.
+        """
+        predicted = [np.zeros_like(run.achieved) for run in self._recorded.runs]
+        found = self._by_regression()
+        for run, total in zip(self._recorded.runs, predicted, strict=True):
+            f = np.fft.rfftfreq(len(run.commanded), 1.0 / self._recorded.rate)
+            lines = np.fft.rfft(run.commanded - run.commanded.mean(axis=0), axis=0)
+            for inputs, several in found:
+                for number, axis in enumerate(inputs):
+                    h = interpolated(several, axis, number, f)
+                    total[:, axis] += np.fft.irfft(h * lines[:, axis], len(total))
+        runs = []
+        for run, total in zip(self._recorded.runs, predicted, strict=True):
+            rest, known = run.achieved - total, np.flatnonzero(~run.lost)
+            at = np.flatnonzero(run.lost)
+            filled = run.achieved.copy()
+            if len(known):
+                filled[at] = total[at] + np.stack(
+                    [np.interp(at, known, each[known]) for each in rest.T], axis=1)
+            runs.append(run._replace(achieved=filled))
+        return runs
 
     def _by_regression(self) -> list[tuple[list[int], FrequencyResponses]]:
         """Return the responses of the parts in which the same axes move, with their inputs."""
@@ -131,7 +164,7 @@ class Analysis:
         value = several.responses[:, output, number]
         known = np.isfinite(value) & (several.frequencies <= self._recorded.highest)
         return Response(several.frequencies[known], value[known],
-                        several.radii[known, output, number],
+                        several.radii[known, output, number] / (1.0 - self._lost),
                         several.coherences[known, output, number])
 
     def clock_drift(self) -> float | None:

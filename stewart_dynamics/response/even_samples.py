@@ -4,7 +4,8 @@
 """
 Samples of two sources, commanded and achieved, brought to the same even times.
 
-By cubic splines through the samples of each; where a source has a gap, a run of samples ends.
+By cubic splines through the samples of each; where a source has a long gap, a run of samples ends.
+Achieved samples in a short gap, as of a tracker that loses its target, are marked as lost.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
+from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.reporting.block_statistics import longest_step
 
@@ -23,6 +24,12 @@ from stewart_dynamics.reporting.block_statistics import longest_step
 _INTERPOLATED, _SAMPLED = 0.2, 0.45
 # Difference of two times that are the same, relative to a step.
 _SAME_TIME = 0.01
+# A step of achieved samples longer than this number of usual ones loses what is in it; longest gap
+# within a run [s].
+_LOST, _LONGEST_GAP = 2.5, 2.0
+# Samples without any change from which on a source is frozen, if the setpoints move by more than
+# this part of their range; where most samples are, the platform is at rest.
+_FROZEN, _MOVED, _MOST = 3, 1e-3, 0.5
 # Shortest run [samples].
 SHORTEST = 64
 # Difference between the clocks of two sources from which on it is noticed [s].
@@ -69,6 +76,7 @@ class Run(NamedTuple):
     seconds: Array  # since the first setpoint (N,)
     commanded: Array  # (N, K)
     achieved: Array  # (N, K)
+    lost: Flags  # (N,): no achieved sample is near
 
 
 class Runs(NamedTuple):
@@ -83,14 +91,17 @@ def at_even_times(commanded: Track, achieved: Track, timeout: float) -> Runs:
     """
     Return commanded and achieved samples at even times, where both are there.
 
-    timeout: a step up to this long is never a gap [s].
+    timeout: a step of the commanded samples up to this long is never a gap [s].
     """
     from scipy.interpolate import CubicSpline
 
     step = float(np.median(np.diff(commanded.stamps)))
     origin = int(commanded.stamps[0])
     times = [(each.stamps - origin) / step for each in (commanded, achieved)]
-    segments = [_segments(each, timeout * SECOND / step) for each in times]
+    segments = [_segments(each, longest * SECOND / step) for each, longest in
+                zip(times, (timeout, max(timeout, _LONGEST_GAP)), strict=True)]
+    steps = np.diff(times[1])
+    usual = float(np.median(steps))
     runs = []
     for first in segments[0]:
         for second in segments[1]:
@@ -99,14 +110,39 @@ def at_even_times(commanded: Track, achieved: Track, timeout: float) -> Runs:
             if end - begin + 1 < SHORTEST:
                 continue
             at = np.arange(begin, end + 1)
+            n = np.searchsorted(times[1], at - _SAME_TIME, side='right').clip(1, len(steps)) - 1
+            off = np.minimum(np.abs(at - times[1][n]), np.abs(at - times[1][n + 1]))
+            lost = (steps[n] > _LOST * usual) & (off > _SAME_TIME)
             runs.append(Run(at * step * NANOSECOND, *(
                 CubicSpline(time[part], track.values[part])(at) for time, part, track in
-                zip(times, (first, second), (commanded, achieved), strict=True))))
+                zip(times, (first, second), (commanded, achieved), strict=True)), lost))
     rate = SECOND / step
     other = SECOND / float(np.median(np.diff(achieved.stamps)))
     offsets = np.abs(times[1] - np.round(times[1]))
     same = float(np.median(offsets)) <= _SAME_TIME and other >= rate * (1.0 - _SAME_TIME)
     return Runs(runs, rate, _SAMPLED * rate if same else _INTERPOLATED * min(rate, other))
+
+
+def without_frozen(achieved: Track, commanded: Track) -> tuple[Track, int]:
+    """
+    Return achieved samples without those that repeat while the setpoints move, and their number.
+
+    A tracker that loses its target may repeat the last pose.
+    """
+    same = (achieved.values[1:] == achieved.values[:-1]).all(axis=1)
+    edges = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
+    frozen: Flags = np.zeros(len(achieved.stamps), dtype=bool)
+    least = _MOVED * np.ptp(commanded.values, axis=0)
+    for begin, end in edges[edges[:, 1] - edges[:, 0] >= _FROZEN].tolist():
+        low, high = np.searchsorted(commanded.stamps, achieved.stamps[[begin, end]])
+        part = commanded.values[low:high]
+        frozen[begin + 1:end + 1] = len(part) > 1 and bool(
+            (np.ptp(part, axis=0) > least).any())
+    count = int(np.count_nonzero(frozen))
+    if count > _MOST * len(frozen):
+        return achieved, 0
+    return (achieved._replace(stamps=achieved.stamps[~frozen], values=achieved.values[~frozen]),
+            count)
 
 
 def _segments(times: Array, timeout: float) -> list[slice]:

@@ -231,8 +231,9 @@ def responses(found: Spectra, inputs: Sequence[int], outputs: Sequence[int],
 def coherences_of(h: Complex, powers: Array, noise: Array) -> Array:
     """Return the part of the power that is due to inputs, of this part and noise."""
     due = np.where(np.abs(h) > _ROUNDING, np.abs(h) ** 2 * powers, 0.0)
-    total = due + noise
-    return np.divide(due, total, out=np.zeros_like(total), where=total > 0.0)
+    total: Array = due + noise
+    found: Array = np.divide(due, total, out=np.zeros_like(total), where=total > 0.0)
+    return found
 
 
 def separate_shares(densities: Complex, least: float = 1e-13) -> tuple[Array, Array]:

@@ -34,9 +34,10 @@ _NEAREST, _BESIDES, _WITH_POWER = 6, 9, 8
 _FARTHEST, _POWER = 2.0, 1e-2
 # Distance of the frequencies that are stated, relative to them, and in lines.
 _DISTANCE, _LINES = 0.03, 2
-# Ratio of the decays that are tried, by which G may be rougher than around a frequency, and ratio
-# of frequencies within which the decay is the same.
-_ROUGHER, _SAME_DECAY = 1.75, 1.6
+# Ratio of the decays that are tried, by which G may be rougher than around a frequency, and ratios
+# of a frequency to lower and higher ones that show its decay: G of a drive is flat far below its
+# bandwidth, which would promise the same for what follows.
+_ROUGHER, _SAME_DECAY = 1.75, (1.3, 10.0)
 # Variance of a level, before anything is known, by the mean ratio of the powers.
 _LEVEL = 30.0
 # Signal-to-noise ratios of power that are tried; larger ones are lost in rounding errors.
@@ -102,14 +103,14 @@ def local_responses(runs: Sequence[Array], rate: float, own: Sequence[int], high
     omega = 2.0 * np.pi * frequencies
     lines = [_lines(each, omega, count) for each in spectra]
     found = [_candidates(*each, omega, decays) for each in zip(spectra, lines, strict=True)]
-    of_decays = _decay_weights(found, omega, own)
-    value, radius, noise = _joined([_posterior(each, of_decays) for each in found])
     near = _hann_inputs(spectra, lines, count)
-    density = (near @ near.conj().swapaxes(1, 2)) / near.shape[2]
-    alone, alike = separate_shares(density, _WEAK)
-    total = np.diagonal(density, axis1=1, axis2=2).real
     excited: Flags = (powers[at] > EXCITED * powers.max(axis=0)) & (
         powers[at] > _POWER * (np.abs(near) ** 2).max(axis=2)) & (frequencies <= highest)[:, None]
+    of_decays = _decay_weights(found, omega, own, excited)
+    value, radius, noise = _joined([_posterior(each, of_decays) for each in found])
+    density = near @ near.conj().swapaxes(1, 2) / near.shape[2]
+    alone, alike = separate_shares(density, _WEAK)
+    total = np.diagonal(density, axis1=1, axis2=2).real
     stated = (excited & (alone > SEPARATE))[:, None, :]
     value = value * np.exp(-1j * omega[:, None] * late)[:, :, None]
     value, radius = (np.where(stated, each, np.nan) for each in (value, radius))
@@ -117,6 +118,23 @@ def local_responses(runs: Sequence[Array], rate: float, own: Sequence[int], high
         frequencies, value, radius,
         coherences_of(value, (alone * total)[:, None, :], noise[:, :, None]),
         2.0 / rate * noise, widths, np.where(excited[:, :, None], alike, np.nan))
+
+
+def interpolated(found: FrequencyResponses, output: int, number: int, frequencies: Array,
+                 ) -> Complex:
+    """Return G of an output and an input at all frequencies (F,); outside, as at the ends."""
+    from scipy.interpolate import PchipInterpolator
+
+    value = found.responses[:, output, number]
+    known = np.flatnonzero(np.isfinite(value))
+    if len(known) < 2:
+        return np.full(len(frequencies), value[known[0]] if len(known) else 0.0, dtype=complex)
+    f = np.append(0.0, found.frequencies[known])
+    # At zero, real.
+    h = np.append(np.abs(value[known[0]]) * np.sign(value[known[0]].real), value[known])
+    inside = frequencies.clip(0.0, f[-1])
+    return np.asarray(PchipInterpolator(f, h.real)(inside)
+                      + 1j * PchipInterpolator(f, h.imag)(inside))
 
 
 def _nearest(inputs: int) -> int:
@@ -147,7 +165,7 @@ def _delays(samples: Array, rate: float, own: Sequence[int]) -> Array:
 def _spectrum(samples: Array, rate: float, inputs: int, late: Array) -> _Spectrum:
     """Return the lines between zero and half the rate, of outputs without their delays (O,)."""
     whole = np.fft.rfft(samples - samples.mean(axis=0), axis=0) / np.sqrt(len(samples))
-    omega = 2.0 * np.pi * rate / len(samples) * np.arange(len(whole))
+    omega = 2.0 * np.pi * rate / len(samples) * np.arange(len(whole), dtype=np.float64)
     whole[:, inputs:] *= np.exp(1j * omega[:, None] * late)
     hann = (0.5 * whole[1:-1] - 0.25 * (whole[:-2] + whole[2:])) / np.sqrt(_HANN)
     return _Spectrum(omega[1:-1], whole[1:-1, :inputs], whole[1:-1, inputs:], hann)
@@ -155,8 +173,10 @@ def _spectrum(samples: Array, rate: float, inputs: int, late: Array) -> _Spectru
 
 def _powers(spectra: Sequence[_Spectrum], omega: Array, inputs: int) -> Array:
     """Return the largest powers (F, I) of the inputs in any record, at frequencies (F,)."""
-    return np.max([[np.interp(omega, each.omega, np.abs(hann) ** 2)
-                    for hann in each.hann.T[:inputs]] for each in spectra], axis=0).T
+    several = [np.stack([np.interp(omega, each.omega, np.abs(hann) ** 2)
+                         for hann in each.hann.T[:inputs]], axis=1) for each in spectra]
+    powers: Array = np.max(several, axis=0)
+    return powers
 
 
 def _frequencies(lines: Array, powers: Array) -> tuple[Array, Array, Integers]:
@@ -241,23 +261,30 @@ def _candidates(spectrum: _Spectrum, lines: Integers, centers: Array, decays: Ar
                        (1.0 / often[lines]).mean(axis=1))
 
 
-def _decay_weights(found: Sequence[_Candidates], omega: Array, own: Sequence[int]) -> Array:
+def _decay_weights(found: Sequence[_Candidates], omega: Array, own: Sequence[int],
+                   excited: Flags) -> Array:
     """
     Return the probabilities (A, C, O) of the decays.
 
-    Of an output that follows an input, its own; of others, which show less, those of all that do.
+    Of an output that follows an input, from where it is excited (C, I); of others, which show
+    less, those of all that follow one.
     """
-    near = (np.abs(np.log(omega[:, None] / omega)) < np.log(_SAME_DECAY)).astype(np.float64)
-    total: Array = sum(
-        near @ (np.logaddexp.reduce(each.likelihoods, axis=1) * each.shares[:, None])
-        for each in found)
+    ratio = omega / omega[:, None]
+    near = ((ratio > 1.0 / _SAME_DECAY[0]) & (ratio < _SAME_DECAY[1])).astype(np.float64)
+    several = [np.logaddexp.reduce(each.likelihoods, axis=1) * each.shares[:, None]
+               for each in found]
+    total: Array = np.zeros_like(several[0])
+    for number, output in enumerate(own):
+        total[..., output] = sum(
+            (each[..., output] * excited[:, number]) @ near.T for each in several)
     others = np.setdiff1d(np.arange(total.shape[2]), own)
     total[..., others] = total[..., list(own)].sum(axis=2, keepdims=True)
     weights: Array = np.exp(total - np.max(total, axis=0))
     # Near a resonance G is rougher than around it.
     weights[:-1] = weights[1:]
     weights[-1] = 0.0
-    return weights / weights.sum(axis=0)
+    weights /= weights.sum(axis=0)
+    return weights
 
 
 def _posterior(found: _Candidates, of_decays: Array) -> tuple[Complex, Array, Array, Array]:
@@ -318,7 +345,7 @@ def _joined(several: Sequence[tuple[Complex, Array, Array, Array]],
     random = sum(part ** 2 * one[1] for part, one in zip(parts, several, strict=True))
     rest = sum(part * np.sqrt(one[2]) for part, one in zip(parts, several, strict=True))
     noise: Array = np.mean([one[3] for one in several], axis=0)
-    radius: Array = np.sqrt(-np.log(1.0 - CONFIDENCE_LEVEL) * (random + rest ** 2))
+    radius = np.asarray(np.sqrt(-np.log(1.0 - CONFIDENCE_LEVEL) * (random + rest ** 2)))
     return value, radius, noise
 
 

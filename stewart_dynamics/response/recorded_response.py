@@ -30,7 +30,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.response.axes_response import AXES, axes_response, legs_response
 from stewart_dynamics.response.clock_alignment import aligned, overlaps
 from stewart_dynamics.response.even_samples import (
-    at_even_times, check_overlap, clock_notices, Runs, Track, Tracks)
+    at_even_times, check_overlap, clock_notices, Runs, Track, Tracks, without_frozen)
 from stewart_dynamics.response.frequency_response import signal_module
 from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.input_messages import SampleReader
@@ -147,6 +147,10 @@ class RecordedResponse:
                 f'{shift:.6g} s, where the speeds correlate best: delays are not known, phases '
                 'and bandwidths at 90 degrees are those without the mean delay')
         check_overlap(commanded, measured, self._topic)
+        measured, frozen = without_frozen(measured, commanded)
+        if frozen:
+            self.notices.append(f'response: {frozen} samples of {self._topic} are left out: they '
+                                'repeat the one before while the setpoints move')
         timeout = self._parameters.setpoint.timeout
         legs: dict[str, Any] = {'legs': {}, 'leg_balance': None}
         if self.key == MEASURED:

@@ -157,7 +157,7 @@ class Response(NamedTuple):
             return None
         omega, phase = 2.0 * np.pi * self.frequency[used], self.phase[used]
         sigma = np.maximum(self.radius[used] / np.abs(self.value[used]), _PHASE_FLOOR)
-        powers = _POWERS[:max(1, min(len(_POWERS), count // 3))]
+        powers = _POWERS[:max(1, min(len(_POWERS), count // 2))]
         scale = omega.max()
         columns = np.column_stack([(omega / scale) ** power for power in powers])
         weights = 1.0 / sigma
