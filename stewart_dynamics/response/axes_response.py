@@ -92,7 +92,8 @@ class Analysis:
         predicted = [np.zeros_like(run.achieved) for run in self._recorded.runs]
         found = self._by_regression()
         for run, total in zip(self._recorded.runs, predicted, strict=True):
-            f = np.fft.rfftfreq(len(run.commanded), 1.0 / self._recorded.rate)
+            f: Array = np.fft.rfftfreq(len(run.commanded), 1.0 / self._recorded.rate).astype(
+                np.float64)
             lines = np.fft.rfft(run.commanded - run.commanded.mean(axis=0), axis=0)
             for inputs, several in found:
                 for number, axis in enumerate(inputs):

@@ -24,8 +24,8 @@ from stewart_dynamics.reporting.block_statistics import longest_step
 _INTERPOLATED, _SAMPLED = 0.2, 0.45
 # Difference of two times that are the same, relative to a step.
 _SAME_TIME = 0.01
-# A step of achieved samples longer than this number of usual ones loses what is in it; longest gap
-# within a run [s].
+# Achieved samples were lost in a step longer than this number of usual ones; longest
+# gap within a run [s].
 _LOST, _LONGEST_GAP = 2.5, 2.0
 # Samples without any change from which on a source is frozen, if the setpoints move by more than
 # this part of their range; where most samples are, the platform is at rest.
@@ -113,9 +113,9 @@ def at_even_times(commanded: Track, achieved: Track, timeout: float) -> Runs:
             n = np.searchsorted(times[1], at - _SAME_TIME, side='right').clip(1, len(steps)) - 1
             off = np.minimum(np.abs(at - times[1][n]), np.abs(at - times[1][n + 1]))
             lost = (steps[n] > _LOST * usual) & (off > _SAME_TIME)
-            runs.append(Run(at * step * NANOSECOND, *(
-                CubicSpline(time[part], track.values[part])(at) for time, part, track in
-                zip(times, (first, second), (commanded, achieved), strict=True)), lost))
+            x, y = (CubicSpline(time[part], track.values[part])(at) for time, part, track in
+                    zip(times, (first, second), (commanded, achieved), strict=True))
+            runs.append(Run(at * step * NANOSECOND, x, y, lost))
     rate = SECOND / step
     other = SECOND / float(np.median(np.diff(achieved.stamps)))
     offsets = np.abs(times[1] - np.round(times[1]))

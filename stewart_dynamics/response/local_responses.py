@@ -36,7 +36,7 @@ _FARTHEST, _POWER = 2.0, 1e-2
 _DISTANCE, _LINES = 0.03, 2
 # Ratio of the decays that are tried, by which G may be rougher than around a frequency, and ratios
 # of a frequency to lower and higher ones that show its decay: G of a drive is flat far below its
-# bandwidth, which would promise the same for what follows.
+# bandwidth, which would promise the same above it.
 _ROUGHER, _SAME_DECAY = 1.75, (1.3, 10.0)
 # Variance of a level, before anything is known, by the mean ratio of the powers.
 _LEVEL = 30.0
@@ -183,8 +183,8 @@ def _frequencies(lines: Array, powers: Array) -> tuple[Array, Array, Integers]:
     """
     Return the frequencies that are stated, the distances between them, and their lines (C,).
 
-    Of neighboring lines (F,) the one with most power (F, I); where the power has its peak between
-    two lines, as that of a sine, the frequency of the peak.
+    Each is the line with most power (F, I) among neighboring lines (F,); where the power has its
+    peak between two lines, as for a sine, the frequency of the peak.
     """
     step = lines[0]
     edges = [0]
@@ -197,7 +197,7 @@ def _frequencies(lines: Array, powers: Array) -> tuple[Array, Array, Integers]:
     size = np.sqrt(np.pad(together, 1))
     left, middle, right = size[at], size[at + 1], size[at + 2]
     side = np.maximum(left, right)
-    # Of a Hann window, by the ratio of the two largest lines (exact for a sine).
+    # Ratio of the two largest lines of a Hann window: exact for a sine.
     off = np.where(middle > side, (2.0 * side - middle) / np.maximum(side + middle, 1e-300), 0.0)
     off = np.where(right > left, off, -off).clip(-0.5, 0.5)
     return lines[at] + step * off, step * np.diff(edges), at
@@ -238,7 +238,7 @@ def _candidates(spectrum: _Spectrum, lines: Integers, centers: Array, decays: Ar
     gain = np.sqrt((hann[:, :, count:].sum(axis=(1, 2)) + tiny)
                    / (hann[:, :, :count].sum(axis=(1, 2)) + tiny))
     power = np.mean(np.abs(x) ** 2, axis=1).sum(axis=1) + tiny
-    # Transients have the size of what leaks, at most that of the input.
+    # Transients are as large as the leakage, at most as the input.
     products = (x @ x.conj().swapaxes(1, 2)) / power[:, None, None] + 1.0
     between, to_center = omega[:, :, None] - omega[:, None, :], omega - centers[:, None]
     parts = []
@@ -266,8 +266,8 @@ def _decay_weights(found: Sequence[_Candidates], omega: Array, own: Sequence[int
     """
     Return the probabilities (A, C, O) of the decays.
 
-    Of an output that follows an input, from where it is excited (C, I); of others, which show
-    less, those of all that follow one.
+    An output that follows an input has its own, from frequencies with power (C, I); other outputs,
+    which show less, have those of all that follow an input.
     """
     ratio = omega / omega[:, None]
     near = ((ratio > 1.0 / _SAME_DECAY[0]) & (ratio < _SAME_DECAY[1])).astype(np.float64)
@@ -317,7 +317,7 @@ def _posterior(found: _Candidates, of_decays: Array) -> tuple[Complex, Array, Ar
             power = found.power[used, None]
             one = (rows[used].swapaxes(1, 2) @ (columns[used].conj() * inverse)) / power[..., None]
             known = (powers[used] * inverse).sum(axis=1) / power
-            # Of the variance, the part that the noise causes.
+            # The part of the variance that is due to noise.
             due = (powers[used] * inverse ** 2).sum(axis=1) / power / ratio
             of_noise, of_all = (size[used, None] * each for each in (
                 due, np.maximum(_LEVEL + 1.0 - known, due)))
