@@ -34,7 +34,7 @@ _TIMESTEP = 0.0005  # [s]
 # Constraints: time constant [s] and damping ratio; impedance, 1 for a rigid one, at no gap and
 # at one of the third number [m].
 _SOLREF = (2.0 * _TIMESTEP, 1.0)
-# Of the loops: the accelerations that close a gap are the gap by the square of the time constant.
+# Loops: the accelerations that close a gap are the gap by the square of the time constant.
 # With that of above the rounding errors of single precision, 0.1 um, would give 0.1 m/s^2.
 SOLREF_LOOP = (0.01, 1.0)
 SOLIMP = (0.9999, 0.9999, 0.001)

@@ -44,7 +44,7 @@ COULOMB_FRICTION = ('newton:friction', 'physxJointAxis:linear:staticFrictionEffo
                     'physxJointAxis:linear:dynamicFrictionEffort')
 RATE_LIMIT = ('newton:velocityLimit', 'physxJointAxis:linear:maxJointVelocity',
               'physxJoint:maxJointVelocity')
-# Those of MuJoCo by default; its schema needs all five numbers.
+# MuJoCo's defaults; its schema needs all five numbers.
 _MIDPOINT_POWER = 0.5, 2.0
 _EQUALITY = 'MjcEqualityConnectAPI'
 _SCHEMAS = 'NewtonJointAPI', 'PhysxJointAPI', 'PhysxJointAxisAPI:linear'

@@ -33,7 +33,7 @@ class PoseLimits:
     angles, clearance: of joints and legs; None without limits of them.
     drives, motors: motors at rows of motion, None without any, and their limits.
     stop_condition: condition number from which on a pose is singular.
-    hexapod: its structure, with what its limits need.
+    hexapod: its structure, with the axes that its limits need.
     """
 
     def __init__(self, parameters: Parameters) -> None:
