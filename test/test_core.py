@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from importlib.util import find_spec
+import math
 import os
 from pathlib import Path
 import re
@@ -22,8 +23,9 @@ from referees import (
     symmetric_parameters)
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.core import binding
-from stewart_dynamics.core.binding import CODES, Function, function, places, record
+from stewart_dynamics.core.binding import CODES, Function, function, places, record, RULES
 from stewart_dynamics.mechanics.rows import BASE, MOTION, POSE, RESULT, TWIST
+from stewart_dynamics.parameters.structure import broken_rule
 
 CORE = ROOT / 'stewart_dynamics' / 'core'
 COMPILER = next(filter(None, map(shutil.which, ('cc', 'gcc', 'clang'))), None)
@@ -189,3 +191,78 @@ def test_a_motion_is_found_again_from_its_legs() -> None:
     kept = motion.copy()
     assert call(flat, rates[0], rates[0], motion) == CODES['STEWART_SINGULAR']
     assert np.array_equal(motion, kept)
+
+
+def broken(name: str) -> Any:
+    """Return the complete structure of a hexapod with drives and plates that breaks a rule."""
+    hexapod: Any = HEXAPOD.structure.copy()
+    legs = hexapod['legs']
+    if name == 'TEMPERATURE_RISE':
+        legs['thermal_time_constant'] = NOT
+    field, value = BREAKING[name]
+    if isinstance(value, tuple):
+        leg, value = value
+        legs[field][leg] = value
+    else:
+        hexapod[field] = value
+    return hexapod
+
+
+HEXAPOD = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced({
+    'actuator.screw_lead': 0.01, 'drive.torque_speed': [0.0, 9.0, 300.0, 1.0],
+    'drive.torque_constant': 0.5, 'drive.resistance': 1.0, 'drive.thermal_resistance': 1.0,
+    'drive.thermal_time_constant': 9.0, 'drive.temperature_rise_max': 50.0,
+    'legs.cylinder.radius': 0.05, 'legs.cylinder.length': 0.6, 'legs.piston.radius': 0.03,
+    'limits.leg_clearance_min': 0.01,
+    'geometry.base_outline': [-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 0.0, -1.0, 1.0, 0.0],
+    'geometry.platform_outline': [-0.6, -0.6, 0.0, 0.6, -0.6, 0.0, 0.0, 0.6, 0.0]})
+NOT = math.nan
+SQUARE = HEXAPOD.structure['base_outline']
+
+
+def corner(n: int, *xyz: float) -> Any:
+    """Return the corners of the base with another one."""
+    corners = SQUARE.copy()
+    corners[n] = xyz
+    return corners
+
+
+# A field and a value for each rule; of a leg, its number and the value.
+BREAKING: dict[str, tuple[str, Any]] = {
+    'FINITE': ('gravity', [0.0, 0.0, NOT]), 'MASS': ('mass', 0.0),
+    'INERTIA': ('inertia', [1.0, 2.0, 0.0, 1.0, 0.0, 1.0]),
+    'ONE_POINT': ('platform_joint', (slice(None), [0.5, 0.0, 0.0])),
+    'CHARACTERISTIC_LENGTH': ('characteristic_length', -1.0),
+    'WARN_CONDITION': ('warn_condition', 0.5), 'STOP_CONDITION': ('stop_condition', 2.0),
+    'WARN_TIME': ('warn_time', -1.0), 'LEG_MASS': ('piston_mass', (3, -1.0)),
+    'ACTUATOR': ('viscous_friction', (0, NOT)), 'COULOMB_VELOCITY': ('coulomb_velocity', (5, 0.0)),
+    'LIMIT': ('force_max', (1, 0.0)), 'LENGTHS': ('length_min', (2, 9.0)),
+    'SHAPE': ('cylinder_length', (4, NOT)), 'RADII': ('piston_radius', (0, 0.06)),
+    'BASE_AXIS': ('base_joint_axis', (1, 0.0)),
+    'PLATFORM_AXIS': ('platform_joint_axis', (2, 0.0)),
+    'BASE_UNIVERSAL': ('base_universal_axis', (3, 0.0)),
+    'PLATFORM_UNIVERSAL': ('platform_universal_axis', (4, 0.0)),
+    'SCREW_LEAD': ('screw_lead', (5, 0.0)), 'EFFICIENCY': ('efficiency', (0, 1.5)),
+    'RESISTANCE': ('torque_constant', (1, NOT)), 'THERMAL_RESISTANCE': ('resistance', (2, NOT)),
+    'THERMAL_TIME_CONSTANT': ('thermal_resistance', (3, NOT)),
+    'TEMPERATURE_RISE': ('thermal_resistance', (0, NOT)),
+    'TORQUE_SPEED': ('torque_speed', -1.0), 'CORNERS': ('n_base_outline', 2),
+    'CORNERS_ON_A_LINE': ('base_outline', 1.0),
+    'CORNERS_IN_A_PLANE': ('base_outline', corner(2, 1.0, 1.0, 0.1)),
+    'CONVEX': ('base_outline', corner(2, -0.5, -0.5, 0.0)), 'POINTS': ('n_torque_speed', 1000)}
+
+
+@pytest.mark.parametrize('name', BREAKING)
+def test_a_broken_rule_is_named_with_its_leg(name: str) -> None:
+    assert broken_rule(HEXAPOD.structure) is None
+    found = broken_rule(broken(name))
+    assert found is not None
+    rule, where = found
+    assert rule.name == name
+    leg = BREAKING[name][1][0] if isinstance(BREAKING[name][1], tuple) else None
+    assert where == (leg if isinstance(leg, int) else 0 if name in (
+        'CORNERS', 'CORNERS_ON_A_LINE', 'CORNERS_IN_A_PLANE', 'CONVEX') else -1)
+
+
+def test_each_rule_is_tried() -> None:
+    assert {rule.name for rule in RULES.values()} == {*BREAKING}

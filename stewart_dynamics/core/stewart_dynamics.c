@@ -1166,6 +1166,10 @@ static int check_leg_rules(const stewart_platform * platform, const stewart_leg 
   return check_drive(platform, leg);
 }
 
+/* Whether an array of this size has room for a count of points, each of some numbers. */
+static int holds(int count, size_t size, size_t numbers)
+{return 0 <= count && (size_t)count <= size / (numbers * sizeof(double));}
+
 static int check_platform(const stewart_platform * platform) {
   double extent, radius = mean_radius(platform, &extent);
   if (!all_finite(platform->gravity, 3 * sizeof(double)) || !isfinite(platform->mass) ||
@@ -1179,6 +1183,11 @@ static int check_platform(const stewart_platform * platform) {
     return STEWART_RULE_STOP_CONDITION;
   }
   if (!(platform->warn_time >= 0.0)) {return STEWART_RULE_WARN_TIME;}
+  if (!holds(platform->n_torque_speed, sizeof platform->torque_speed, 2) ||
+      !holds(platform->n_base_outline, sizeof platform->base_outline, 3) ||
+      !holds(platform->n_platform_outline, sizeof platform->platform_outline, 3)) {
+    return STEWART_RULE_POINTS;
+  }
   for (int n = 0; n < platform->n_torque_speed; n++) {
     double before = n == 0 ? -1.0 : platform->torque_speed[n - 1][0];
     if (!(platform->torque_speed[n][0] > before && platform->torque_speed[n][0] >= 0.0)) {
@@ -1189,17 +1198,17 @@ static int check_platform(const stewart_platform * platform) {
 }
 
 int stewart_check(const stewart_platform * platform, int * where) {
-  int rule = check_platform(platform), leg, plate;
-  *where = -1;
-  for (leg = 0; leg < 6 && rule == STEWART_VALID; leg++) {
+  int rule = check_platform(platform), place = -1;
+  for (int leg = 0; leg < 6 && rule == STEWART_VALID; leg++) {
     rule = check_leg_rules(platform, &platform->legs[leg]);
-    *where = rule == STEWART_VALID ? -1 : leg;
+    place = rule == STEWART_VALID ? -1 : leg;
   }
-  for (plate = 0; plate < 2 && rule == STEWART_VALID; plate++) {
+  for (int plate = 0; plate < 2 && rule == STEWART_VALID; plate++) {
     rule = plate == 0 ? check_plate(platform->n_base_outline, platform->base_outline) :
       check_plate(platform->n_platform_outline, platform->platform_outline);
-    *where = rule == STEWART_VALID ? -1 : plate;
+    place = rule == STEWART_VALID ? -1 : plate;
   }
+  if (where) {*where = place;}
   return rule;
 }
 

@@ -238,7 +238,9 @@ typedef struct {
   RULE(29, CORNERS_IN_A_PLANE, "geometry.base_outline, geometry.platform_outline", \
        "the corners must be in one plane, to 1e-06 of its size") \
   RULE(30, CONVEX, "geometry.base_outline, geometry.platform_outline", \
-       "must be convex, its corners in order around it")
+       "must be convex, its corners in order around it") \
+  RULE(31, POINTS, "drive.torque_speed, geometry.base_outline, geometry.platform_outline", \
+       "more points than the structure holds")
 #define STEWART_RULE_CODE(code, NAME, parameters, rule) STEWART_RULE_ ## NAME = code,
 
 enum { STEWART_RULES(STEWART_RULE_CODE) STEWART_VALID = 0 };
@@ -248,8 +250,8 @@ enum { STEWART_RULES(STEWART_RULE_CODE) STEWART_VALID = 0 };
  * back_driving_efficiency where it is not set; axes of unit length; which checks are on. */
 void stewart_complete(stewart_platform * platform);
 
-/* Returns the first rule that a complete hexapod breaks: STEWART_VALID or STEWART_RULE_...; where:
- * the leg (0 to 5), for plates 0 the base's and 1 the platform's, else -1. */
+/* Returns the first rule that a complete hexapod breaks: STEWART_VALID or STEWART_RULE_...; where,
+ * unless it is NULL: the leg (0 to 5), for plates 0 the base's and 1 the platform's, else -1. */
 int stewart_check(const stewart_platform * platform, int * where);
 
 /* Returns a rule in words, beginning with the parameters; NULL for another code. */
