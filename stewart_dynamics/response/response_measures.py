@@ -78,8 +78,8 @@ class Response(NamedTuple):
             'coherence': self.coherence,
             'gain_low': bands[0], 'gain_high': bands[1],
             'phase_low': bands[2], 'phase_high': bands[3],
-            'delay': self.delay(), 'bandwidth_3db': self.bandwidth_3db,
-            'bandwidth_90deg': self.bandwidth_90deg,
+            'delay': _slow_delay(model) if model else self.delay(),
+            'bandwidth_3db': self.bandwidth_3db, 'bandwidth_90deg': self.bandwidth_90deg,
             'bandwidth_3db_bounds': self._bounds(*(_above_half_power(each) for each in bands[:2])),
             'bandwidth_90deg_bounds': self._bounds(*(each + 90.0 for each in bands[2:])),
             'second_order': model}
@@ -202,6 +202,11 @@ class Response(NamedTuple):
             return None
         return {'gain': gain, 'delay': delay, 'damping': damping,
                 'natural_frequency': float(np.exp(log_omega) / (2.0 * np.pi))}
+
+
+def _slow_delay(model: Mapping[str, float]) -> float:
+    """Return by how much slow motion is late behind a drive of second order [s]."""
+    return model['delay'] + model['damping'] / (np.pi * model['natural_frequency'])
 
 
 def _above_half_power(gain: Array) -> Array:
