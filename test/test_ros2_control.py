@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 from pathlib import Path
 import re
 import shutil
@@ -16,16 +17,22 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from referees import random_motion, random_wrench, rng
 from stewart_dynamics import Parameters
+from stewart_dynamics.core.binding import record
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
 from stewart_dynamics.mechanics.limits import LIMITS
+from stewart_dynamics.parameters.table import UNIVERSAL
+from stewart_dynamics.setpoints.step import Batch, Step
+from test_export import limited
 import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'ros2_control' / 'stewart_dynamics_controller'
 C_SOURCE = ROOT / 'stewart_dynamics' / 'core'
 NAME = 'stewart_dynamics_controller'
+OF_ALL = {limit.bit for limit in LIMITS.values()}
 
 
 @pytest.mark.parametrize(('c', 'cpp'), [('gcc', 'g++'), ('clang', 'clang++')])
@@ -59,6 +66,186 @@ def test_parameters_are_those_of_the_node() -> None:
     source = (PACKAGE / 'src' / 'hexapod.cpp').read_text()
     for name in {*tables.LEG_FIELDS.values(), *tables.LISTS.values()} - {*LIMITS}:
         assert f'"{name}"' in source, name  # read, and named in errors
+
+
+CPP_TYPES = {'double': 'double', 'string': 'std::string', 'bool': 'bool', 'int': 'std::int64_t'}
+READERS = r"""
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <istream>
+#include <string>
+#include <vector>
+
+namespace stewart_dynamics_controller
+{
+inline void read(std::istream & text, std::string & value) {text >> value;}
+inline void read(std::istream & text, double & value)
+{
+  std::string word;
+  text >> word;
+  value = std::strtod(word.c_str(), nullptr);
+}
+template<typename List>
+void read_all(std::istream & text, List & values)
+{
+  for (auto & each : values) {
+    read(text, each);
+  }
+}
+template<typename T, std::size_t N>
+void read(std::istream & text, std::array<T, N> & values) {read_all(text, values);}
+template<typename T>
+void read(std::istream & text, std::vector<T> & values)
+{
+  std::size_t count;
+  text >> count;
+  values.resize(count);
+  read_all(text, values);
+}
+"""
+
+
+def declared() -> dict[str, Any]:
+    """Return names and declarations of the controller's parameters."""
+    document = yaml.safe_load((PACKAGE / 'src' / f'{NAME}_parameters.yaml').read_text())[NAME]
+    found: dict[str, Any] = {}
+
+    def visit(section: dict[str, Any], above: str) -> None:
+        for key, value in section.items():
+            if isinstance(value.get('type'), str):
+                found[above + key] = value
+            else:
+                visit(value, f'{above}{key}.')
+
+    visit(document, '')
+    return found
+
+
+def parameters_header() -> str:
+    """Return the structure that generate_parameter_library declares, and a reader of text."""
+    def structure(names: dict[str, Any]) -> str:
+        text = ''
+        for section in dict.fromkeys(name.split('.')[0] for name in names):
+            inner = {name.partition('.')[2]: kind for name, kind in names.items()
+                     if name.split('.')[0] == section}
+            if '' in inner:
+                kind = inner['']
+                cpp = CPP_TYPES[kind.removesuffix('_array')]
+                text += (f'std::vector<{cpp}>' if kind.endswith('_array') else cpp) + (
+                    f' {section}{{}};\n')
+            else:
+                text += f'struct {{\n{structure(inner)}}} {section};\n'
+        return text
+
+    names = {name: each['type'] for name, each in declared().items()}
+    reading = '\n'.join(f'read(text, p.{name});' for name in names)
+    return ('#include <array>\n' + READERS + f'struct Params\n{{\n{structure(names)}}};\n'
+            f'inline void read(std::istream & text, Params & p)\n{{\n{reading}\n}}\n}}\n')
+
+
+def as_text(parameters: Parameters, changes: dict[str, Any] | None = None) -> str:
+    """Return the parameters of the node as the program reads those of the controller."""
+    words: list[str] = []
+    for name, declaration in declared().items():
+        default = declaration.get('default_value')
+        known = name in parameters.given or default is None  # else: what follows from others
+        value = parameters[name] if known else default
+        value = (changes or {}).get(name, default if value is None else value)
+        kind = declaration['type'].removesuffix('_array')
+        values = list(np.ravel(value))
+        if kind != declaration['type']:
+            words.append(str(len(values)))
+        words += [float(each).hex() if kind == 'double' else str(each) for each in values]
+    return '\n'.join(words) + '\n'
+
+
+@pytest.fixture(scope='module')
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the program that steps the hexapod of the controller's parameters."""
+    if not shutil.which('gcc') or not shutil.which('g++'):
+        pytest.skip('needs gcc and g++')
+    folder = tmp_path_factory.mktemp('hexapod')
+    (folder / NAME).mkdir()
+    (folder / NAME / f'{NAME}_parameters.hpp').write_text(parameters_header())
+    checked = ['-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all']
+    subprocess.run(['gcc', '-std=c99', *checked, '-c', C_SOURCE / 'stewart_dynamics.c',
+                    '-o', folder / 'c.o'], check=True)
+    subprocess.run(
+        ['g++', '-std=c++17', '-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow',
+         '-Werror', *checked, f'-I{folder}', f'-I{C_SOURCE}', f'-I{PACKAGE / "include"}',
+         folder / 'c.o', PACKAGE / 'src' / 'hexapod.cpp', PACKAGE / 'src' / 'feed_forward.cpp',
+         ROOT / 'test' / 'hexapod_steps.cpp', '-o', folder / 'steps'], check=True)
+    return folder / 'steps'
+
+
+def test_steps_have_the_bits_of_the_node(program: Path) -> None:
+    """Forces, torques of motors, heat, limits: all numbers of each step, whatever is given."""
+    random, seen = rng(55), set()
+    for _ in range(40):
+        # The controller has all numbers of a setpoint in one cycle: no tolerance of stamps.
+        p, count = limited(random).replaced({'setpoint.sync_tolerance': 0.0}), 20
+        if random.random() < 0.5:
+            p = p.replaced({'payload.mass': 40.0, 'payload.center_of_mass': [0.1, -0.1, 0.3],
+                            'payload.inertia': [2.0, 0.1, 0.2, 3.0, -0.1, 4.0]})
+        if p.drive.screw_rotation == UNIVERSAL:
+            axes = random.permuted(np.full((6, 2), [0.6, 0.8]), axis=1)
+            p = p.replaced(dict.fromkeys(
+                ('drive.base_universal_axes', 'drive.platform_universal_axes'),
+                np.column_stack([axes, np.zeros(6)]).ravel()))
+        motions = random_motion(p, random, count).rows
+        wrenches = random_wrench(p, random, count)
+        stamps = np.cumsum(random.choice([10_000_000, 300_000_000], count))
+        rows = [f'{stamp}\n' + '\n'.join(map(float.hex, (*motion, *wrench)))
+                for stamp, motion, wrench in zip(
+                    stamps.tolist(), motions.tolist(), wrenches.tolist(), strict=True)]
+        text = '\n'.join([as_text(p) + str(count), *rows])
+        done = subprocess.run([program], input=text.encode(), capture_output=True, check=False)
+        assert (done.returncode, done.stderr) == (0, b'')
+        found = np.frombuffer(done.stdout, record('stewart_output'))
+        outputs = Step(p)(Batch.of(stamps, motions, wrenches))
+        expected = outputs.records.copy()
+        # Without forces: those of C are zero, those of Python nan.
+        unknown = ~outputs.with_forces
+        expected['forces'][unknown] = expected['motors']['commands'][unknown] = 0.0
+        assert outputs.solvable.all()
+        for name in expected.dtype.names:
+            assert found[name].tobytes() == expected[name].tobytes(), name
+        seen |= {bits for bits in OF_ALL if (found['exceeded'] & bits).any()}
+        seen |= {'motors'} if np.isfinite(found['motors']['commands']).all() else set()
+    assert seen == {*OF_ALL, 'motors'}
+
+
+@pytest.mark.parametrize(('changes', 'message'), [
+    ({'limits.length_min': [1.0, 2.0]}, 'limits.length_min: must have 1 or 6 entries, has 2'),
+    ({'legs.piston.mass': [math.inf]}, 'legs.piston.mass: must be finite'),
+    ({'drive.efficiency': [1.0, 1.0, 1.5, 1.0, 1.0, 1.0], 'actuator.screw_lead': [0.01]},
+     'drive.efficiency: must be more than 0 and at most 1: leg or plate 3'),
+    ({'drive.torque_max': [3.0]},
+     'actuator.screw_lead: not set: needed by drive.*: leg or plate 1'),
+    ({'drive.torque_speed': [1.0, 2.0, 3.0], 'actuator.screw_lead': [0.01]},
+     'drive.torque_speed: must have 2 numbers for each of at most 96 points, has 3'),
+    ({'drive.screw_rotation': 'universal', 'actuator.screw_lead': [0.01]},
+     'drive.base_universal_axes, drive.platform_universal_axes: must be set: needed by '
+     'drive.screw_rotation: universal'),
+    ({'geometry.base_outline': [0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 'legs.piston.radius': [0.02]},
+     'geometry.base_outline, geometry.platform_outline: must have three corners or more: leg or '
+     'plate 1'),
+    ({'limits.base_joint_angle_max': [0.5]},
+     'geometry.base_joint_axes: must be set: needed by limits.base_joint_angle_max'),
+    ({'command_interfaces': ['torque']}, 'actuator.screw_lead: not set: needed by torque, '
+     'torque_per_mille and motor_velocity in command_interfaces'),
+    ({'command_interfaces': ['torque_per_mille'], 'actuator.screw_lead': [0.01]},
+     'drive.rated_torque: not set: needed by torque_per_mille in command_interfaces'),
+    ({'payload.mass': 3.0, 'payload.inertia': [-1.0, 0.0, 0.0, 1.0, 0.0, 1.0]},
+     'payload: must be finite, its inertia positive semidefinite')])
+def test_rules_in_one_line(program: Path, changes: dict[str, Any], message: str) -> None:
+    """A rule that is broken is named with its parameter, and the leg; nothing is computed."""
+    p = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+    bare = {'drive.torque_max': [], 'actuator.screw_lead': []}
+    done = subprocess.run([program], input=as_text(p, bare | changes) + '0', capture_output=True,
+                          text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (1, '', f'{message}\n')
 
 
 LEGS, LIVE = 'leg_feed_forward.yaml', 'platform_feed_forward.yaml'

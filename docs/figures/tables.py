@@ -44,8 +44,10 @@ CONTROLLER = (
     Parameter('reference', 'string', 'reference interfaces: motion of the platform, or of the '
               'legs', '', 'legs', choices=('legs', 'platform')),
     Parameter('command_interfaces', 'string', 'interfaces of each joint that are commanded; '
-              'position or effort must be one of them', default=('effort',), sizes=(1, 2, 3),
-              choices=('position', 'velocity', 'effort')),
+              'position, effort, torque or torque_per_mille must be one of them',
+              default=('effort',), sizes=tuple(range(1, 7)),
+              choices=('position', 'velocity', 'effort', 'torque', 'torque_per_mille',
+                       'motor_velocity')),
     Parameter('initial_pose', 'double', 'x y z alpha beta gamma near which the platform is when '
               'the controller starts; required where reference is legs', 'm, rad', (),
               sizes=(6,)))
@@ -55,7 +57,8 @@ PAYLOAD = {each: f'payload.{each}' for each in ('mass', 'center_of_mass', 'inert
 CONTROLLER_NAMES = ('joints', 'base_frame', *(
     name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, LISTS) for name in fields.values()
     if name != 'setpoint.sync_tolerance'),
-    'drive.screw_rotation', 'drive.screw_hand', 'singularity.action', 'limits.action')
+    'drive.rated_torque', 'drive.screw_rotation', 'drive.screw_hand', 'singularity.action',
+    'limits.action')
 
 # Those that are set first; legs.* stands for the two parts of a leg.
 FIRST = ('joints', 'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',

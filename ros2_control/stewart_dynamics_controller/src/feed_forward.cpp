@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 namespace stewart_dynamics_controller
 {
@@ -16,6 +17,15 @@ namespace
 bool finite(const Six & numbers)
 {
   return std::all_of(numbers.begin(), numbers.end(), [](double each) {return std::isfinite(each);});
+}
+
+/// Copy what stewart_step keeps of the windings; the warning and what belongs to it stay.
+void keep_windings(const stewart_state & from, stewart_state & to)
+{
+  to.followed = from.followed;
+  to.stamp = from.stamp;
+  std::copy_n(from.rises, 6, to.rises);
+  std::copy_n(from.copper_heat, 6, to.copper_heat);
 }
 
 constexpr char kTooFar[] =
@@ -46,9 +56,16 @@ std::array<double, 9> rotation_of_euler(double alpha, double beta, double gamma)
 FeedForward::FeedForward(
   const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout,
   std::int64_t period)
-: hexapod_(hexapod), guess_(guess), timeout_(timeout), period_(period)
+: guess_(guess), timeout_(timeout), period_(period)
 {
+  change(hexapod);
   start();
+}
+
+void FeedForward::change(const stewart_platform & hexapod)
+{
+  hexapod_ = unsuppressed_ = hexapod;
+  unsuppressed_.suppress_near_singularity = unsuppressed_.suppress_at_limits = 0;
 }
 
 void FeedForward::start()
@@ -85,12 +102,16 @@ int FeedForward::answer(
     catch_up();
   }
   updated_at_ = now;
+  // Steps are judged by check_lengths: cycles repeat references that come more rarely.
+  std::fill_n(state_.lengths, 6, std::numeric_limits<double>::quiet_NaN());
+  const stewart_state before = state_;
   stewart_motion motion;
   int code = motion_of(reference, motion);
   code = code == STEWART_OK ? follow(motion, wrench, feedback, now, command) :
     reject(code, text_of(code));
   if (code != STEWART_OK) {
-    hold(feedback, command);
+    keep_windings(before, state_);
+    hold(feedback, now, command);
   }
   return code;
 }
@@ -139,8 +160,6 @@ int FeedForward::follow(
   if (!finite(feedback)) {
     return reject(STEWART_NOT_FINITE, text_of(STEWART_NOT_FINITE));
   }
-  // Cycles repeat references that come more rarely: steps are judged by check_lengths instead.
-  state_.followed = 0;
   int code = stewart_step(&hexapod_, &motion, wrench.data(), nullptr, now, &state_, &output_);
   if (code != STEWART_OK) {
     return reject(code, text_of(code));
@@ -148,6 +167,10 @@ int FeedForward::follow(
   code = check_lengths();
   if (code != STEWART_OK) {
     return code;
+  }
+  code = put_loads(motion, output_, feedback, command);
+  if (code != STEWART_OK) {
+    return reject(code, text_of(code));
   }
   bool reached = true;
   for (std::size_t n = 0; n < 6; ++n) {
@@ -161,8 +184,6 @@ int FeedForward::follow(
     }
     command.positions[n] = length - leg.zero_length;
     command.velocities[n] = std::clamp(rate, -leg.velocity_max, leg.velocity_max);
-    command.efforts[n] =
-      std::clamp(output_.forces[n] + feedback[n], -leg.force_max, leg.force_max);
     held_lengths_[n] = length;
   }
   catching_up_ = catching_up_ && !reached;
@@ -198,22 +219,52 @@ int FeedForward::check_lengths()
   return STEWART_OK;
 }
 
-/// Feedback is added where it is a number: a loop around the efforts goes on.
-void FeedForward::hold(const Six & feedback, Command & command) const
+/// Write efforts and motors of a motion; a torque is that of the clipped effort, with the inertia,
+/// the losses and the available torque of its drive. Written with STEWART_OK alone.
+int FeedForward::put_loads(
+  const stewart_motion & motion, const stewart_output & output, const Six & feedback,
+  Command & command) const
 {
-  stewart_result at_rest;
-  if (!started_ || stewart_inverse_dynamics(
-      &hexapod_, &held_, held_wrench_.data(), nullptr, &at_rest) != STEWART_OK)
+  Six efforts;
+  for (std::size_t n = 0; n < 6; ++n) {
+    const double most = hexapod_.legs[n].force_max;
+    efforts[n] = std::clamp(output.result.forces[n] + feedback[n], -most, most);
+  }
+  stewart_motors motors{};
+  const int code = hexapod_.with_motors ?
+    stewart_motor_torques(&hexapod_, &motion, efforts.data(), &motors) : STEWART_OK;
+  if (code != STEWART_OK) {
+    return code;
+  }
+  command.efforts = efforts;
+  for (std::size_t n = 0; n < 6; ++n) {
+    const stewart_leg & leg = hexapod_.legs[n];
+    const double fastest =
+      hexapod_.with_motors ? std::min(leg.speed_max, leg.velocity_max * leg.motor_ratio) : 0.0;
+    command.torques[n] = motors.commands[n];
+    command.motor_velocities[n] = std::clamp(motors.speeds[n], -fastest, fastest);
+  }
+  return STEWART_OK;
+}
+
+/// Feedback is added where it is a number: a loop around the efforts goes on.
+void FeedForward::hold(const Six & feedback, std::int64_t now, Command & command)
+{
+  stewart_state state = state_;
+  stewart_output at_rest;
+  if (!started_ || stewart_step(
+      &unsuppressed_, &held_, held_wrench_.data(), nullptr, now, &state, &at_rest) != STEWART_OK)
   {
     return;
   }
+  keep_windings(state, state_);
+  Six added;
   for (std::size_t n = 0; n < 6; ++n) {
-    const stewart_leg & leg = hexapod_.legs[n];
-    const double added = std::isfinite(feedback[n]) ? feedback[n] : 0.0;
-    command.positions[n] = held_lengths_[n] - leg.zero_length;
+    added[n] = std::isfinite(feedback[n]) ? feedback[n] : 0.0;
+    command.positions[n] = held_lengths_[n] - hexapod_.legs[n].zero_length;
     command.velocities[n] = 0.0;
-    command.efforts[n] = std::clamp(at_rest.forces[n] + added, -leg.force_max, leg.force_max);
   }
+  put_loads(held_, at_rest, added, command);
 }
 
 }  // namespace stewart_dynamics_controller

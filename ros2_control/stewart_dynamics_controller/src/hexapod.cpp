@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -127,14 +128,17 @@ stewart_leg leg_of(const Params & p, std::size_t n)
   put_row(
     "geometry.platform_joint_axes", p.geometry.platform_joint_axes, n, leg.platform_joint_axis);
   // A limit is named by its line in STEWART_LIMITS: limits.length_max, drive.torque_max, ...
+#define QUOTED(name) #name
+#define NAME_OF(section, field) QUOTED(section) "." #field
 #define SECTION_POSE limits
 #define SECTION_TWIST limits
 #define SECTION_LOAD limits
 #define SECTION_MOTOR drive
 #define MINIMUM(bit, NAME, field, DEPENDS, quantity) \
-  leg.field = of_leg(#field, p.SECTION_ ## DEPENDS.field, n);
+  leg.field = of_leg(NAME_OF(SECTION_ ## DEPENDS, field), p.SECTION_ ## DEPENDS.field, n);
 #define MAXIMUM(bit, NAME, field, DEPENDS, quantity) \
-  leg.field = of_leg(#field, p.SECTION_ ## DEPENDS.field, n, kInfinite);
+  leg.field = of_leg( \
+    NAME_OF(SECTION_ ## DEPENDS, field), p.SECTION_ ## DEPENDS.field, n, kInfinite);
   STEWART_LIMITS(MINIMUM, MAXIMUM)
 #undef MINIMUM
 #undef MAXIMUM
@@ -145,6 +149,18 @@ stewart_leg leg_of(const Params & p, std::size_t n)
     !std::isfinite(leg.platform_joint_angle_max) || !p.geometry.platform_joint_axes.empty(),
     "geometry.platform_joint_axes: must be set: needed by limits.platform_joint_angle_max");
   return leg;
+}
+
+/// Return whether drive.* says anything of a leg.
+bool has_drive(const stewart_leg & leg)
+{
+  const double set[] = {leg.back_driving_efficiency, leg.torque_constant, leg.resistance,
+    leg.thermal_resistance, leg.thermal_time_constant, leg.torque_max, leg.speed_max,
+    leg.temperature_rise_max};
+  const auto is_set = [](double each) {return std::isfinite(each);};
+  return std::any_of(std::begin(set), std::end(set), is_set) || leg.gear_ratio != 1.0 ||
+         leg.efficiency != 1.0 || leg.motor_inertia != 0.0 || leg.screw_inertia != 0.0 ||
+         leg.twist_ratio != 0.0;
 }
 
 /// Throw the rule that a complete hexapod breaks, with the number of its leg.
@@ -183,7 +199,8 @@ stewart_platform hexapod_of(const Params & p)
   hexapod.stop_condition = p.singularity.stop_condition;
   hexapod.warn_time = p.singularity.warn_time;
   hexapod.timeout = p.setpoint.timeout;
-  hexapod.with_motors = !p.actuator.screw_lead.empty();
+  hexapod.with_motors = !p.actuator.screw_lead.empty() || !p.drive.torque_speed.empty() ||
+    std::any_of(std::begin(hexapod.legs), std::end(hexapod.legs), has_drive);
   hexapod.suppress_near_singularity = p.singularity.action == "suppress_forces";
   hexapod.suppress_at_limits = p.limits.action == "suppress_forces";
   stewart_complete(&hexapod);
@@ -206,6 +223,28 @@ stewart_pose initial_pose_of(const Params & p)
     rotation_of_euler(p.initial_pose[3], p.initial_pose[4], p.initial_pose[5]);
   std::copy(rotation.begin(), rotation.end(), pose.rotation);
   return pose;
+}
+
+Six torque_scales_of(const Params & p)
+{
+  Six scales{};
+  for (const auto & interface : p.command_interfaces) {
+    const bool per_mille = interface == "torque_per_mille";
+    check(
+      !p.actuator.screw_lead.empty() ||
+      !(per_mille || interface == "torque" || interface == "motor_velocity"),
+      "actuator.screw_lead: not set: needed by torque, torque_per_mille and motor_velocity in "
+      "command_interfaces");
+    check(
+      !per_mille || !p.drive.rated_torque.empty(),
+      "drive.rated_torque: not set: needed by torque_per_mille in command_interfaces");
+    for (std::size_t n = 0; per_mille && n < 6; ++n) {
+      const double rated = of_leg("drive.rated_torque", p.drive.rated_torque, n);
+      check(rated > 0.0, "drive.rated_torque: must be more than 0");
+      scales[n] = 1e3 / rated;
+    }
+  }
+  return scales;
 }
 
 }  // namespace stewart_dynamics_controller

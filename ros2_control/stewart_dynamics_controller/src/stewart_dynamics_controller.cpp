@@ -46,14 +46,16 @@ CallbackReturn StewartDynamicsController::on_configure(const rclcpp_lifecycle::S
   parameters_ = parameter_listener_->get_params();
   // Velocities alone would drift: no position of the legs is read.
   const auto & commanded = parameters_.command_interfaces;
-  if (std::none_of(commanded.begin(), commanded.end(), [](const std::string & each) {
-      return each == "position" || each == "effort";}))
+  if (std::all_of(commanded.begin(), commanded.end(), [](const std::string & each) {
+      return each == "velocity" || each == "motor_velocity";}))
   {
     RCLCPP_ERROR(
-      get_node()->get_logger(), "command_interfaces: position or effort must be one of them");
+      get_node()->get_logger(), "command_interfaces: position, effort, torque or "
+      "torque_per_mille must be one of them");
     return CallbackReturn::ERROR;
   }
   try {
+    per_newton_metre_ = torque_scales_of(parameters_);
     stewart_pose guess{};
     if (!of_platform()) {
       guess = initial_pose_of(parameters_);
@@ -102,8 +104,7 @@ CallbackReturn StewartDynamicsController::on_activate(const rclcpp_lifecycle::St
 CallbackReturn StewartDynamicsController::on_deactivate(const rclcpp_lifecycle::State &)
 {
   deactivated_at_ = get_node()->now().nanoseconds();
-  const bool stopped = write("velocity", Six{});
-  return write("effort", Six{}) && stopped ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
+  return write_all_but_positions(Command{}) ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
 }
 
 controller_interface::InterfaceConfiguration
@@ -250,8 +251,7 @@ return_type StewartDynamicsController::update_and_write_commands(
   bool written = true;
   if (feed_forward_->started()) {
     written = write("position", command_.positions);
-    written = write("velocity", command_.velocities) && written;
-    written = write("effort", command_.efforts) && written;
+    written = write_all_but_positions(command_) && written;
   }
   const stewart_result & result = feed_forward_->result();
   const double states[] = {result.determinant, result.condition_number,
@@ -313,6 +313,19 @@ int StewartDynamicsController::compute(std::int64_t now)
   take(reference.linear_acceleration);
   take(reference.angular_acceleration);
   return feed_forward_->update(reference, wrench, feedback, now, command_);
+}
+
+bool StewartDynamicsController::write_all_but_positions(const Command & command)
+{
+  Six per_mille;
+  for (std::size_t n = 0; n < 6; ++n) {
+    per_mille[n] = command.torques[n] * per_newton_metre_[n];
+  }
+  bool written = write("velocity", command.velocities);
+  written = write("effort", command.efforts) && written;
+  written = write("torque", command.torques) && written;
+  written = write("torque_per_mille", per_mille) && written;
+  return write("motor_velocity", command.motor_velocities) && written;
 }
 
 /// Write the values of an interface, if it is commanded.

@@ -65,6 +65,7 @@ stewart_platform hexapod()
     leg.coulomb_friction = 60.0;
     leg.coulomb_velocity = 1e-3;
     leg.length_max = leg.velocity_max = kInfinite;
+    leg.torque_max = leg.speed_max = leg.temperature_rise_max = kInfinite;
     leg.force_max = 5000.0;
     leg.joint_force_max = kInfinite;
     leg.base_joint_angle_max = leg.platform_joint_angle_max = kInfinite;
@@ -151,6 +152,87 @@ void test_platform()
         command.efforts[leg] == std::min(expected.forces[leg] + feedback[leg], 5000.0));
     }
   }
+}
+
+/// The same with drives whose windings heat up.
+stewart_platform driven()
+{
+  stewart_platform p = hexapod();
+  for (stewart_leg & leg : p.legs) {
+    leg.screw_lead = 0.01;
+    leg.gear_ratio = 2.0;
+    leg.efficiency = 0.8;
+    leg.back_driving_efficiency = 0.7;
+    leg.motor_inertia = 1e-4;
+    leg.torque_constant = 0.5;
+    leg.resistance = 0.4;
+    leg.thermal_resistance = 2.0;
+    leg.thermal_time_constant = 10.0;
+    leg.torque_max = 0.8;
+    leg.speed_max = 300.0;
+  }
+  p.with_motors = 1;
+  stewart_complete(&p);
+  return p;
+}
+
+/// Motors: those of stewart_step; feedback is a force through the drive; held, they stand.
+void test_motors()
+{
+  const stewart_platform p = driven();
+  FeedForward feed_forward(p, guess(), kTimeout), with_feedback(p, guess(), kTimeout);
+  const Six wrench = {10.0, -20.0, 30.0, 1.0, 2.0, -3.0};
+  const Six feedback = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
+  stewart_state state{};
+  stewart_output expected;
+  stewart_motion motion;
+  Command command, other;
+  int clipped = 0, too_fast = 0;
+  for (int n = 0; n < 1000; ++n) {
+    const PlatformReference reference = swing(1e-3 * n);
+    CHECK(feed_forward.update(reference, wrench, {}, n * kCycle, command) == STEWART_OK);
+    CHECK(with_feedback.update(reference, wrench, feedback, n * kCycle, other) == STEWART_OK);
+    CHECK(stewart_rotation(reference.orientation.data(), motion.rotation) == STEWART_OK);
+    std::copy_n(reference.position.begin(), 3, motion.position);
+    std::copy_n(reference.linear_velocity.begin(), 3, motion.linear_velocity);
+    std::copy_n(reference.angular_velocity.begin(), 3, motion.angular_velocity);
+    std::copy_n(reference.linear_acceleration.begin(), 3, motion.linear_acceleration);
+    std::copy_n(reference.angular_acceleration.begin(), 3, motion.angular_acceleration);
+    CHECK(
+      stewart_step(&p, &motion, wrench.data(), nullptr, n * kCycle, &state, &expected) ==
+      STEWART_OK);
+    stewart_motors motors;
+    CHECK(stewart_motor_torques(&p, &motion, other.efforts.data(), &motors) == STEWART_OK);
+    for (std::size_t leg = 0; leg < 6; ++leg) {
+      const double speed = expected.motors.speeds[leg], torque = expected.motors.commands[leg];
+      CHECK(command.torques[leg] == torque);
+      CHECK(other.torques[leg] == motors.commands[leg]);
+      CHECK(command.motor_velocities[leg] == std::clamp(speed, -300.0, 300.0));
+      CHECK(feed_forward.rises()[leg] == state.rises[leg]);
+      clipped += std::fabs(torque) == 0.8;
+      too_fast += std::fabs(speed) > 300.0;
+    }
+  }
+  CHECK(clipped > 100 && clipped < 5900);
+  CHECK(too_fast > 100);
+  CHECK(state.rises[0] > 0.0);
+
+  // Held: the torques at rest of the same pose, and windings that heat up by them.
+  PlatformReference resting = swing(0.999), bad = resting;
+  resting.linear_velocity = resting.angular_velocity = {};
+  resting.linear_acceleration = resting.angular_acceleration = {};
+  bad.position[0] = kNaN;
+  for (int n = 1000; n < 1100; ++n) {
+    CHECK(feed_forward.update(bad, wrench, feedback, n * kCycle, command) == STEWART_NOT_FINITE);
+    CHECK(with_feedback.update(resting, wrench, feedback, n * kCycle, other) == STEWART_OK);
+    CHECK(close(command.torques, other.torques, 0.0));
+    CHECK(close(command.motor_velocities, {}, 0.0));
+    for (std::size_t leg = 0; leg < 6; ++leg) {
+      CHECK(feed_forward.rises()[leg] == with_feedback.rises()[leg]);
+    }
+  }
+  feed_forward.start();
+  CHECK(feed_forward.rises()[0] == 0.0);
 }
 
 /// References of the legs, from the motion of the platform, give the efforts of that motion.
@@ -507,6 +589,7 @@ void test_rotation()
 int main()
 {
   test_platform();
+  test_motors();
   test_legs();
   test_bad_input();
   test_bad_legs();

@@ -9,9 +9,10 @@
  * other than STEWART_OK), one with a leg outside limits.length_min and limits.length_max, and one
  * with a leg farther from the last command than limits.velocity_max allows in the timeout. Then
  * the platform is held: positions are those of the last reference that was followed, velocities
- * zero, and efforts what keeps the platform at rest there, under the wrench of that reference.
- * So position and effort always belong together, and no effort is kept from a motion that has
- * ended. The caller ends it after the timeout.
+ * zero, and efforts what keeps the platform at rest there, under the wrench of that reference;
+ * motors stand, with the torques of those efforts. So position and effort always belong together,
+ * and no effort is kept from a motion that has ended. The caller ends it after the timeout.
+ * Windings go on: they heat up by the efforts that hold the platform.
  *
  * After a gap (cycles that did not come, references that did not, a hold) the reference has gone
  * on: positions go from the last command to it with at most limits.velocity_max in each cycle.
@@ -51,6 +52,9 @@ struct Command
   Six positions;   // length - zero_length [m]
   Six velocities;  // clipped to velocity_max [m/s]
   Six efforts;     // clipped to force_max [N]
+  // Of the motors, zero without drive.*; + extends:
+  Six torques;           // give the efforts; clipped to torque_max and torque_speed [N m]
+  Six motor_velocities;  // clipped to speed_max, and to velocity_max times the ratio [rad/s]
 };
 
 /// Return the row-by-row rotation Rz(gamma) Ry(beta) Rx(alpha).
@@ -65,11 +69,11 @@ public:
     const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout,
     std::int64_t period = 0);
 
-  /// Forget earlier references: the singularity warning and the last pose.
+  /// Forget earlier references: the singularity warning, the last pose, the heat of windings.
   void start();
 
-  /// Use other parameters from now on; the state of the singularity warning is kept.
-  void change(const stewart_platform & hexapod) {hexapod_ = hexapod;}
+  /// Use other parameters from now on; warning and temperatures of the windings are kept.
+  void change(const stewart_platform & hexapod);
 
   /// Compute the command of a reference at a time [ns], which rises from call to call.
   /// feedback: efforts that are added, before the limit force_max.
@@ -105,6 +109,8 @@ public:
 
   /// Return the result of the last cycle with valid input.
   const stewart_result & result() const {return output_.result;}
+  /// Return the rises of the temperatures of the windings by what was commanded so far [K].
+  const double * rises() const {return state_.rises;}
   bool warning() const {return state_.warning != STEWART_NO_WARNING;}
 
 private:
@@ -120,10 +126,13 @@ private:
     const stewart_motion & motion, const Six & wrench, const Six & feedback, std::int64_t now,
     Command & command);
   int check_lengths();
-  void hold(const Six & feedback, Command & command) const;
+  int put_loads(
+    const stewart_motion & motion, const stewart_output & output, const Six & feedback,
+    Command & command) const;
+  void hold(const Six & feedback, std::int64_t now, Command & command);
   int reject(int code, const char * rule, int leg = 0);
 
-  stewart_platform hexapod_;
+  stewart_platform hexapod_, unsuppressed_;  // the same for a platform that is held
   stewart_pose guess_;
   std::int64_t timeout_, period_, updated_at_ = 0, followed_at_ = 0;
   bool started_ = false, catching_up_ = false;

@@ -60,11 +60,13 @@ private:
   /// Name of the leg that is rejected, for the log; empty if the rule is not one of a leg.
   const char * leg_text() const;
   bool write(const std::string & interface, const Six & values);
+  bool write_all_but_positions(const Command & command);
 
   std::shared_ptr<ParamListener> parameter_listener_;
   Params parameters_;  // of on_configure: not written while the controller is active
   std::optional<FeedForward> feed_forward_;
   Command command_;  // the last one
+  Six per_newton_metre_;  // per mille of the rated torques [1/(N m)]
   std::array<std::string, 6> leg_texts_;
   /// The hexapod of parameters that were set since the last cycle.
   realtime_tools::RealtimeThreadSafeBox<std::optional<stewart_platform>> changed_;
