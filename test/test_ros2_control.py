@@ -181,7 +181,8 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_steps_have_the_bits_of_the_node(program: Path) -> None:
     """Forces, torques of motors, heat, limits: all numbers of each step, whatever is given."""
-    random, seen = rng(55), set()
+    random = rng(55)
+    seen: set[int | str] = set()
     for _ in range(40):
         # The controller has all numbers of a setpoint in one cycle: no tolerance of stamps.
         p, count = limited(random).replaced({'setpoint.sync_tolerance': 0.0}), 20
@@ -212,7 +213,8 @@ def test_steps_have_the_bits_of_the_node(program: Path) -> None:
         for name in expected.dtype.names:
             assert found[name].tobytes() == expected[name].tobytes(), name
         seen |= {bits for bits in OF_ALL if (found['exceeded'] & bits).any()}
-        seen |= {'motors'} if np.isfinite(found['motors']['commands']).all() else set()
+        if np.isfinite(found['motors']['commands']).all():
+            seen.add('motors')
     assert seen == {*OF_ALL, 'motors'}
 
 
@@ -242,7 +244,7 @@ def test_steps_have_the_bits_of_the_node(program: Path) -> None:
 def test_rules_in_one_line(program: Path, changes: dict[str, Any], message: str) -> None:
     """A rule that is broken is named with its parameter, and the leg; nothing is computed."""
     p = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
-    bare = {'drive.torque_max': [], 'actuator.screw_lead': []}
+    bare: dict[str, Any] = {'drive.torque_max': [], 'actuator.screw_lead': []}
     done = subprocess.run([program], input=as_text(p, bare | changes) + '0', capture_output=True,
                           text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (1, '', f'{message}\n')
