@@ -611,5 +611,3 @@ def test_hexapods_without_a_home_pose_are_exported_unless_axes_need_one(
     with snapshot.raises(StewartError):
         c_project(p.replaced({'limits.base_joint_angle_max': 0.5}), 'rig')
     assert check_name('rig_2') == 'rig_2'
-
-

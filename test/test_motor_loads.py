@@ -19,7 +19,7 @@ from scipy.integrate import trapezoid
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.drives.motors import (
-    BREAKAWAY_TORQUES, Motors, MOTORS, SPEEDS)
+    BREAKAWAY_TORQUES, MOTORS, Motors, SPEEDS)
 from stewart_dynamics.mechanics.limits import OF_LEGS
 from stewart_dynamics.replay.index import row_of, write_fleet
 from stewart_dynamics.replay.motor_charts import Deliverable, motor_charts, OperatingPoints

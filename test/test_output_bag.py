@@ -13,11 +13,11 @@ import struct
 from typing import Any
 import zlib
 
+from checked_results import part_of
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
-from checked_results import part_of
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -14,9 +14,9 @@ import statistics
 import tracemalloc
 from typing import Any
 
+from checked_results import part_of
 from hypothesis import given
 from hypothesis import strategies as st
-from checked_results import part_of
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -57,6 +57,7 @@ LEG_SHAPE = 'legs.cylinder.radius', 'legs.cylinder.length', 'legs.piston.radius'
 BASE_OUTLINE, PLATFORM_OUTLINE = OUTLINES = 'geometry.base_outline', 'geometry.platform_outline'
 """Parameters of the plates that the clearance counts for."""
 
+
 def _legs(text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Any:
     """Declare a value of each leg, or one for all."""
     return declare(text, unit, default, sizes=(1, 6), **rule)
