@@ -202,7 +202,8 @@ def test_the_file_is_for_stewart_trajectory(
     assert lines[0] == ('predicted 95 % intervals: 8 s, white noise of 5 N in efforts at 500 Hz')
     assert lines[1].split()[:2] == ['platform.mass', '+-']
     assert lines[12].split()[0] == 'actuator.coulomb_friction'
-    assert f'motion: {folder / "trajectory.yaml"}' in lines[-1]
+    assert lines[-1].startswith('motion: stewart_trajectory --ros-args --params-file ')
+    assert str(folder / 'trajectory.yaml') in lines[-1]
     head = (folder / 'trajectory.yaml').read_text(encoding='utf-8')
     assert head.startswith('# Designed to identify platform, friction, seed 0.')
     # Existing files are not replaced without --force.

@@ -138,9 +138,9 @@ def test_a_row_with_an_empty_cell_is_a_lost_sample(tmp_path: Path) -> None:
     table = NamedTable(path, MOTION)
     assert table.lines == [2, 4, 6]
     assert table.notices[-1] == '2 of 5 rows are left out: lost samples, with empty cells'
-    path.write_text('t,ax,ay,az\n0,0,0,9.8\n1,,0,9.8\n2,0,0,9.8\n')
+    path.write_text('t,ax,ay,az\n0,0,0,9.8\n0.1,,0,9.8\n0.2,0,0,9.8\n')
     vehicle = read_vehicle(path, None)
-    assert vehicle.times.tolist() == [0.0, 2.0] and 'lost samples' in vehicle.notices[0]
+    assert vehicle.times.tolist() == [0.0, 0.2] and 'lost samples' in vehicle.notices[0]
     rows = [','.join(['0.1'] * 6 + ['0', '0', '1', '0', '0', '0', '1' if n != 3 else ''])
             for n in range(6)]
     names = ','.join((*JOINTS, *POSITION.columns, *QUATERNION.columns))

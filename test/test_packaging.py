@@ -44,8 +44,9 @@ KEYS = {
     'pxr': '', 'pyarrow': '', 'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',
     'scipy': 'python3-scipy', 'setuptools': 'python3-setuptools',
     'sphinx': 'python3-sphinx', 'tqdm': 'python3-tqdm',
-    'websockets': '', 'yaml': 'python3-yaml',
-    'zstandard': ''}
+    'websockets': '', 'yaml': 'python3-yaml', 'zstandard': '',
+    # Engines and readers of descriptions: tests that need them are skipped without them.
+    'pydrake': '', 'pytransform3d': '', 'urchin': '', 'yourdfpy': ''}
 # Modules that are imported where an option asks for them, and the extra that brings them.
 OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'matplotlib': 'plot',
             'mujoco': 'mujoco', 'pandas': 'pandas', 'pxr': 'usd', 'pyarrow': 'parquet',

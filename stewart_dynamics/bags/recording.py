@@ -22,8 +22,7 @@ from stewart_dynamics.mechanics.kinematics.pose_mistakes import PoseByAngles
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import PARAMETERS
-from stewart_dynamics.tables.named_table import is_table
-from stewart_dynamics.tables.reading import Reading
+from stewart_dynamics.tables.reading import is_table, Reading
 import zstandard
 
 _SQLITE = b'SQLite format 3\0'

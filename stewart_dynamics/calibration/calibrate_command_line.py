@@ -99,7 +99,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.calibration.tracked_poses import read_tracked
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
-    from stewart_dynamics.tables.named_table import is_table
+    from stewart_dynamics.tables.reading import is_table
 
     interrupt_on_signals()
     millimeters = Millimeters(given.mm or given.mm_positions, given.mm or given.mm_legs)

@@ -67,7 +67,7 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
             'other frames: --frames unknown calibrates them as well')))
     best, mistake = min(tried, key=lambda each: each[0])
     if best >= _BETTER * given:
-        tried = list(_of_scale(parameters, equations, unknown_frames))
+        tried = list(_of_scale(parameters, equations, unknown_frames)) or tried
         best, mistake = min(tried, key=lambda each: each[0])
     if best < _BETTER * given:
         # Symmetric hexapods: a mirrored frame is another order of the legs.
@@ -96,6 +96,8 @@ def _of_scale(parameters: Parameters, equations: Equations, unknown_frames: bool
                 parameters, scaled(math.exp(logarithm)), unknown_frames), _WORST),
             bounds=(-_LARGEST_SCALE, _LARGEST_SCALE), method='bounded',
             options={'xatol': _SCALE_STEP})
+        if abs(found.x) > _LARGEST_SCALE - 10.0 * _SCALE_STEP:
+            continue  # any larger one would do: poses that do not determine the frames
         yield float(found.fun), LikelyMistake(what, words.format(math.exp(found.x)))
 
 

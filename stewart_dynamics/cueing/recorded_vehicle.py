@@ -18,8 +18,8 @@ from stewart_dynamics.messages import type_names
 from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.tables.column_names import ACCELERATION, ANGULAR_VELOCITY, TIME
-from stewart_dynamics.tables.named_table import is_table, NamedTable
-from stewart_dynamics.tables.reading import Reading
+from stewart_dynamics.tables.named_table import NamedTable
+from stewart_dynamics.tables.reading import is_table, Reading
 from stewart_dynamics.tables.source_axes import axes_matrix, turned
 
 # A motion between samples farther apart is not known, and takes long to compute [s, Hz].

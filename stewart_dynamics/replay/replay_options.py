@@ -12,8 +12,7 @@ import shlex
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from stewart_dynamics.program import DONE, NODE, PARTLY_READ, STRICT
-from stewart_dynamics.tables.named_table import is_table
-from stewart_dynamics.tables.reading import Reading
+from stewart_dynamics.tables.reading import is_table, Reading
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters

@@ -34,8 +34,6 @@ from stewart_dynamics.tables.reading import Reading
 from stewart_dynamics.tables.source_axes import axes_matrix, turned
 from stewart_dynamics.tables.tracker_exports import Export, find_export
 
-# Suffixes of the files that are read as tables.
-TABLES = ('.csv', '.tsv', '.txt')
 _LARGEST = 1 << 28  # of a file [bytes]
 # Columns that are not read are listed up to this number.
 _LISTED = 8
@@ -45,11 +43,6 @@ _SLOW, _SEVERAL = 1.0, 10
 _OF_ROTATION = ('roll', 'pitch', 'yaw', 'rot', 'quat', 'angle', 'euler', 'heading', 'orient',
                 'alpha', 'beta', 'gamma')
 _OF_TURNING = ('gyr', 'rate', 'omega', 'angular', 'roll', 'pitch', 'yaw', 'spin')
-
-
-def is_table(path: Path) -> bool:
-    """Return whether a file is a table, by its name."""
-    return path.suffix.lower() in TABLES
 
 
 class Rotations(NamedTuple):

@@ -7,9 +7,18 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 from stewart_dynamics.program import AXES
+
+# Suffixes of the files that are read as tables.
+TABLES = ('.csv', '.tsv', '.txt')
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a file is a table, by its name."""
+    return path.suffix.lower() in TABLES
 
 
 class Reading(NamedTuple):

@@ -49,7 +49,8 @@ class Angles(NamedTuple):
     """Angles whose unit is not given, and their rotations, base axes."""
 
     largest: float  # as a number
-    half: Array  # rotation (3, 3) of half the numbers in radians
+    half: Array | None
+    """Rotation (3, 3) of half the numbers in radians; None: small numbers are not judged."""
     in_degrees: Array  # rotation (3, 3) of the numbers in degrees
 
 
@@ -65,7 +66,7 @@ def typed_pose_mistake(parameters: Parameters, pose: Sequence[float]) -> str:
     """Return the likely mistake in a pose X Y Z ALPHA BETA GAMMA as a user types it."""
     angles = np.array(pose[3:])
     return pose_mistake(parameters, np.append(pose[:3], from_euler(angles)), angles=Angles(
-        float(np.abs(angles).max()), from_euler(0.5 * angles), from_euler(np.radians(angles))))
+        float(np.abs(angles).max()), None, from_euler(np.radians(angles))))
 
 
 def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
@@ -112,7 +113,8 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
                     continue  # no platform turns so far
                 turned = np.reshape(from_quaternion(x, y, z, w), (3, 3))
             if IN_DEGREES in each:
-                if angles is None or angles.largest < _TILTED and is_possible(at, angles.half):
+                if angles is None or angles.largest < _TILTED and (
+                        angles.half is None or is_possible(at, angles.half)):
                     continue  # such an angle is not far from those that are reached
                 turned = angles.in_degrees
             if _FROM_HOME in each:
