@@ -513,6 +513,7 @@ class DynamicsNode:
         self.platform = StewartPlatform.from_yaml(process.file)
         self._statuses: dict[str, DiagnosticStatus] = {}
         self._reported: list[DiagnosticStatus] = []
+        self.time = 0  # of the last diagnostics [ns]
         self._decoded: dict[str, list[Any]] = defaultdict(list)
         self._clients = {name: self.peer.node.create_client(kind, f'{NODE}/{name}')
                          for name, kind in SERVICES.items()}
@@ -547,6 +548,7 @@ class DynamicsNode:
         return self._process.program
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        self.time = nanoseconds(message.header.stamp)
         for status in message.status:
             self._statuses[status.name.rpartition(': ')[2]] = status
             self._reported.append(status)

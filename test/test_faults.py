@@ -182,20 +182,26 @@ def test_a_clock_that_jumps_back_by_little_is_followed(begin: Start) -> None:
     clock = node.peer.writer('/clock', Clock)
     node.until(lambda: clock.get_subscription_count() > 0, 'it hears the clock')
 
-    def until_answered(stamp: int, condition: str) -> None:
-        def answered() -> bool:
-            clock.publish(Clock(clock=Time(nanoseconds=stamp).to_msg()))
+    def until(time: int, condition: Callable[[], Any], what: str) -> None:
+        def met() -> bool:
+            clock.publish(Clock(clock=Time(nanoseconds=time).to_msg()))
             node.peer.spin(0.1)
-            return any(nanoseconds(state.header.stamp) == stamp
-                       for state in node.received('leg_states'))
+            return bool(condition())
 
-        node.until(answered, condition)
+        node.until(met, what)
 
-    for stamp in (1_050_000_000, 1_000_000_000):
-        node.send(MOVING, stamp)
-        until_answered(stamp, f'{stamp} ns is answered')
-    for topic in SEPARATE:  # until the clock had come
+    def is_answered(stamp: int) -> bool:
+        return any(nanoseconds(state.header.stamp) == stamp
+                   for state in node.received('leg_states'))
+
+    late, early = 1_050_000_000, 1_000_000_000
+    node.send(MOVING, late)
+    until(late, lambda: is_answered(late) and node.time == late, 'it is answered at its time')
+    node.send(MOVING, early)
+    for topic in SEPARATE:
         node.rejects(topic, 'older than the last used')
+    node.until_counted()
+    until(early, lambda: is_answered(early), 'it is answered once the clock has jumped')
 
 
 def test_in_simulated_time_a_late_subscriber_gets_the_last_answer(begin: Start) -> None:
