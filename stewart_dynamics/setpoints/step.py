@@ -249,7 +249,7 @@ class Outputs(NamedTuple):
 
     @property
     def records(self) -> Records:
-        """The rows as structures ``stewart_output`` (N,)."""
+        """Return the rows as structures ``stewart_output`` (N,)."""
         return self.rows.view(_OUTPUT_RECORD)[:, 0]
 
     @property
@@ -292,7 +292,7 @@ class Outputs(NamedTuple):
         return Singularity.of(self.states[n].tolist())
 
     def values(self) -> dict[str, Array]:
-        """Return the values (N, 6) of the limits, those that are computed."""
+        """Return the (N, 6) values of the limits, those that are computed."""
         motors = self.computed.motors and self.rows[:, FINITE_MOTORS].all()
         found = {*OF_RESULTS, *(ANGLES if self.computed.joint_angles else ()),
                  *([CLEARANCE_MIN] if self.computed.clearances else ()),
