@@ -59,7 +59,7 @@ def row(name: str, several: Sequence[Judged], axes: int) -> tuple[str, ...]:
 
 
 HEAD = ('', 'truth in bands', 'half of a band by the gain', '-3 dB off by at most',
-        'delay off by at most', 'axes stated', 'cross terms stated (there are none)')
+        'delay off by at most', 'axes stated', 'false cross terms')
 
 
 def study(seeds: int, only: str) -> list[str]:

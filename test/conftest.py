@@ -24,7 +24,7 @@ from snapshot import Snapshot
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
-    from running import DynamicsNode, NodeProcess
+    from running import DynamicsNode, NodeProcess, Peer
 
 # Before numpy is imported, in this process and those that it starts: with matrices as small as
 # these, waiting threads cost as much again, and other processes need the cores.
@@ -185,6 +185,14 @@ def domain(ros_environment: None) -> Iterator[int]:
     from running import own_domain
     with own_domain() as number:
         yield number
+
+
+@pytest.fixture
+def peer(domain: int) -> Iterator[Peer]:
+    """Return a participant in a domain that only this test has."""
+    from running import Peer
+    with closing(Peer(domain)) as each:
+        yield each
 
 
 @pytest.fixture(scope='module')

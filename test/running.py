@@ -326,6 +326,7 @@ class Peer:
     """A ROS node in this process that talks with the program under test."""
 
     def __init__(self, domain: int, name: str = 'peer') -> None:
+        self.domain = domain
         self.context = Context()
         rclpy.init(args=[], context=self.context, domain_id=domain)
         self.node = rclpy.create_node(name, context=self.context)

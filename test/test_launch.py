@@ -17,7 +17,7 @@ import pytest
 pytest.importorskip('launch_ros', reason='launch_ros comes with a ROS installation')
 
 from rclpy.serialization import deserialize_message  # noqa: E402
-from running import executable, own_domain, Peer, Program, ROOT  # noqa: E402
+from running import executable, Peer, Program, ROOT  # noqa: E402
 from sensor_msgs.msg import Imu, JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
 
@@ -55,18 +55,6 @@ def prefix(tmp_path: Path) -> Path:
     for name in ('stewart_cueing', 'stewart_dynamics', 'stewart_simulator', 'stewart_trajectory'):
         (scripts / name).symlink_to(executable(name))
     return folder
-
-
-@pytest.fixture
-def peer(ros_environment: None) -> Iterator[Peer]:
-    """Return a participant in a domain of its own."""
-    with own_domain() as domain:
-        each = Peer(domain)
-        each.domain = domain
-        try:
-            yield each
-        finally:
-            each.close()
 
 
 @pytest.fixture

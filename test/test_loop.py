@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
+from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from running import (
@@ -139,8 +140,20 @@ def test_a_run_with_bad_options_is_rejected_in_one_line(
     snapshot(line)
 
 
+def controlled(peer: Peer, folder: Path, timeout: float,
+               ) -> tuple[Program, list[bytes], Publisher, Publisher]:
+    """Start the controller; return its commands, and publishers of measured and desired legs."""
+    peer.watched = Program(
+        [sys.executable, CONTROLLER, '--ros-args', '-p', f'timeout:={timeout}', '-p',
+         f'params_file:={PLATFORM}', '-p', 'proportional_gain:=4e5', '-p',
+         'derivative_gain:=1.6e4'], peer.domain, folder)
+    return (peer.watched, peer.listen('/stewart_simulator/commands', Float64MultiArray),
+            peer.writer('/stewart_simulator/leg_states', JointState),
+            peer.writer('/stewart_dynamics/leg_states', JointState))
+
+
 def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
-        domain: int, tmp_path: Path) -> None:
+        peer: Peer, tmp_path: Path) -> None:
     """The plant waits for each command, so that the result is that of a fast computer."""
     plant = Plant(SimulatorParameters({
         **read_yaml(PLATFORM, 'stewart_simulator'),
@@ -154,14 +167,7 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
     pose = platform.forward_kinematics(start + 5e-3 + zero, platform.home_pose())
     weight = platform.inverse_dynamics(Motion.from_pose(pose)).forces
     held = JointState(name=joints, position=moving.position, velocity=[0.0] * 6, effort=weight)
-    program = Program([sys.executable, CONTROLLER, '--ros-args', '-p', 'timeout:=1.0', '-p',
-                       f'params_file:={PLATFORM}', '-p', 'proportional_gain:=4e5', '-p',
-                       'derivative_gain:=1.6e4'], domain, tmp_path)
-    peer = Peer(domain)
-    peer.watched = program
-    commands = peer.listen('/stewart_simulator/commands', Float64MultiArray)
-    measured, desired = (peer.writer(f'/{node}/leg_states', JointState)
-                         for node in ('stewart_simulator', 'stewart_dynamics'))
+    program, commands, measured, desired = controlled(peer, tmp_path, 1.0)
 
     def commanded(target: JointState) -> Any:
         """Return the command to the present state once it is the one for a desired state."""
@@ -200,22 +206,14 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
         assert_only_log_lines(program.stderr)
     finally:
         program.kill()
-        peer.close()
 
 
 def test_after_a_gap_the_controller_returns_slowly_and_within_the_limits_of_force(
-        domain: int, tmp_path: Path) -> None:
+        peer: Peer, tmp_path: Path) -> None:
     """The desired lengths have gone on by 150 mm: stiffness times distance is 60 kN."""
     limit = StewartPlatform.from_yaml(PLATFORM).parameters.limits.force_max[0]
     names = StewartPlatform.from_yaml(PLATFORM).parameters.joints
-    program = Program([sys.executable, CONTROLLER, '--ros-args', '-p', 'timeout:=0.5', '-p',
-                       f'params_file:={PLATFORM}', '-p', 'proportional_gain:=4e5', '-p',
-                       'derivative_gain:=1.6e4'], domain, tmp_path)
-    peer = Peer(domain)
-    peer.watched = program
-    commands = peer.listen('/stewart_simulator/commands', Float64MultiArray)
-    measured, desired = (peer.writer(f'/{node}/leg_states', JointState)
-                         for node in ('stewart_simulator', 'stewart_dynamics'))
+    program, commands, measured, desired = controlled(peer, tmp_path, 0.5)
 
     def state(position: float) -> JointState:
         return JointState(name=names, position=[position] * 6, velocity=[0.0] * 6,
@@ -250,7 +248,6 @@ def test_after_a_gap_the_controller_returns_slowly_and_within_the_limits_of_forc
             until_commanded(0.3, 300.0, 1e-6)
     finally:
         program.kill()
-        peer.close()
 
 
 COMMANDS: dict[str, list[str | Path]] = {

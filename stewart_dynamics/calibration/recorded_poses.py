@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +14,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses, METERS, Millimeters
+from stewart_dynamics.calibration.rests import find_rests, mean_pose, SETTLING, SHORTEST
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.messages import setpoint, type_names
@@ -25,9 +25,8 @@ from stewart_dynamics.parameters.tolerances import is_unit
 from stewart_dynamics.replay.bag_topics import find_calibrated_legs
 from stewart_dynamics.tables.reading import Reading
 
-# Legs are at rest while no position changes by more than this part of the characteristic length,
-# for at least this time [s], of which this part at each end is left out: the platform settles.
-_STILL, _SHORTEST, _SETTLING = 3e-4, 0.5, 0.2
+# Legs are at rest while no position changes by more than this part of the characteristic length.
+_STILL = 3e-4
 
 
 class RecordedPoses(NamedTuple):
@@ -87,39 +86,21 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
     seen = np.array([values for _, values in poses])
     seen[:, :3] *= of_positions
     rows, names = [], []
-    for first, last in _rests(stamps, lengths,
-                              _STILL * parameters.singularity.characteristic_length):
-        margin = round(_SETTLING * (stamps[last] - stamps[first]))
+    for first, last in find_rests(
+            stamps, lengths, _STILL * parameters.singularity.characteristic_length, SECOND):
+        margin = round(SETTLING * (stamps[last] - stamps[first]))
         begin, end = stamps[first] + margin, stamps[last] - margin
         part = seen[np.searchsorted(at, begin):np.searchsorted(at, end, 'right')]
         legs = lengths[np.searchsorted(stamps, begin):np.searchsorted(stamps, end, 'right')]
         if len(part) and len(legs):
-            turns = part[:, 3:] * np.sign(part[:, 3:] @ part[0, 3:])[:, None]
-            mean = turns.mean(axis=0)
-            rows.append(np.concatenate([legs.mean(axis=0), part[:, :3].mean(axis=0),
-                                        mean / np.linalg.norm(mean)]))
+            rows.append(np.concatenate([legs.mean(axis=0), mean_pose(part)]))
             names.append(f't = {(begin - stamps[0]) / SECOND:.1f} s')
     if not rows:
         raise BagError(
-            f'{path}: no pose was measured while the legs were at rest for {_SHORTEST:g} s; '
+            f'{path}: no pose was measured while the legs were at rest for {SHORTEST:g} s; '
             f'legs from {stamps[0] / SECOND:.1f} to {stamps[-1] / SECOND:.1f} s, poses from '
             f'{at[0] / SECOND:.1f} to {at[-1] / SECOND:.1f} s')
     table = np.array(rows)
     return RecordedPoses(MeasuredPoses(
         table[:, :6], Pose.from_quaternion(table[:, 6:9], table[:, 9:]), tuple(names),
         topics=(legs_topic, pose_topic), notices=tuple(notices)), missing)
-
-
-def _rests(stamps: Stamps, lengths: Array, tolerance: float) -> Iterator[tuple[int, int]]:
-    """Yield first and last index of each time at rest."""
-    first, low, high = 0, lengths[0], lengths[0]
-    for n in range(1, len(stamps) + 1):
-        if n < len(stamps):
-            lower, upper = np.minimum(low, lengths[n]), np.maximum(high, lengths[n])
-            if np.all(upper - lower <= tolerance):
-                low, high = lower, upper
-                continue
-        if stamps[n - 1] - stamps[first] >= _SHORTEST * SECOND:
-            yield first, n - 1
-        if n < len(stamps):
-            first, low, high = n, lengths[n], lengths[n]

@@ -12,6 +12,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses, Millimeters
+from stewart_dynamics.calibration.rests import find_rests, mean_pose, SETTLING, SHORTEST
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.parameters.table import Parameters
@@ -20,8 +21,8 @@ from stewart_dynamics.tables.named_table import NamedTable
 from stewart_dynamics.tables.reading import Reading
 
 # A device sees the platform at rest while no coordinate changes by more than this part of the
-# characteristic length, for at least this time [s], of which this part at each end is left out.
-_STILL, _SHORTEST, _SETTLING = 2e-3, 0.5, 0.2
+# characteristic length.
+_STILL = 2e-3
 
 
 def read_tracked(path: Path, tracked: Path, parameters: Parameters, millimeters: Millimeters,
@@ -53,14 +54,14 @@ def read_tracked(path: Path, tracked: Path, parameters: Parameters, millimeters:
     if len(rows) != len(lengths):
         times = poses.times()
         size = parameters.singularity.characteristic_length
-        rests = list(_rests(times, rows, _STILL * size))
+        rests = list(_parts(times, rows, _STILL * size))
         extra = len(rests) - len(lengths)
         if extra not in (0, 1):
             raise StewartError(
-                f'{tracked}: the platform is at rest {len(rests)} times for {_SHORTEST:g} s or '
+                f'{tracked}: the platform is at rest {len(rests)} times for {SHORTEST:g} s or '
                 f'more, {path} has {len(lengths)} rows: they must be equal, or one rest more, at '
                 'home before the first pose')
-        rows = np.array([_mean(rows[rest]) for rest in rests[extra:]])
+        rows = np.array([mean_pose(rows[rest]) for rest in rests[extra:]])
         names = [f'{name}, t = {times[rest.start]:.1f} s'
                  for name, rest in zip(names, rests[extra:], strict=True)]
     return MeasuredPoses(
@@ -68,28 +69,12 @@ def read_tracked(path: Path, tracked: Path, parameters: Parameters, millimeters:
         topics=(str(path), str(tracked)), notices=tuple(poses.notices))
 
 
-def _rests(times: Array, rows: Array, tolerance: float) -> Iterator[slice]:
+def _parts(times: Array, rows: Array, tolerance: float) -> Iterator[slice]:
     """Yield the samples of each time at rest, without the margins in which it settles."""
     size = tolerance / _STILL
     signs = np.sign(np.sum(rows[:, 3:] * rows[:1, 3:], axis=1))[:, None]
     values = np.hstack([rows[:, :3], size * (signs * rows[:, 3:])])
-    first, low, high = 0, values[0], values[0]
-    for n in range(1, len(values) + 1):
-        if n < len(values):
-            lower, upper = np.minimum(low, values[n]), np.maximum(high, values[n])
-            if np.all(upper - lower <= tolerance):
-                low, high = lower, upper
-                continue
-        if times[n - 1] - times[first] >= _SHORTEST:
-            margin = _SETTLING * (times[n - 1] - times[first])
-            begin, end = np.searchsorted(times, [times[first] + margin, times[n - 1] - margin])
-            yield slice(int(begin), max(int(end), int(begin) + 1))
-        if n < len(values):
-            first, low, high = n, values[n], values[n]
-
-
-def _mean(rows: Array) -> Array:
-    """Return the mean of poses (N, 7) that differ by little."""
-    turns = rows[:, 3:] * np.sign(rows[:, 3:] @ rows[0, 3:])[:, None]
-    mean = turns.mean(axis=0)
-    return np.concatenate([rows[:, :3].mean(axis=0), mean / np.linalg.norm(mean)])
+    for first, last in find_rests(times, values, tolerance):
+        margin = SETTLING * (times[last] - times[first])
+        begin, end = np.searchsorted(times, [times[first] + margin, times[last] - margin])
+        yield slice(int(begin), max(int(end), int(begin) + 1))

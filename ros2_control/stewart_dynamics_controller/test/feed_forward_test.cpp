@@ -111,6 +111,18 @@ PlatformReference swing(double time)
   return at;
 }
 
+stewart_motion motion_of(const PlatformReference & reference)
+{
+  stewart_motion motion;
+  CHECK(stewart_rotation(reference.orientation.data(), motion.rotation) == STEWART_OK);
+  std::copy_n(reference.position.begin(), 3, motion.position);
+  std::copy_n(reference.linear_velocity.begin(), 3, motion.linear_velocity);
+  std::copy_n(reference.angular_velocity.begin(), 3, motion.angular_velocity);
+  std::copy_n(reference.linear_acceleration.begin(), 3, motion.linear_acceleration);
+  std::copy_n(reference.angular_acceleration.begin(), 3, motion.angular_acceleration);
+  return motion;
+}
+
 bool close(const Six & a, const Six & b, double tolerance)
 {
   for (std::size_t n = 0; n < 6; ++n) {
@@ -134,14 +146,8 @@ void test_platform()
     const PlatformReference reference = swing(1e-3 * n);
     Command command;
     CHECK(feed_forward.update(reference, wrench, feedback, n * kCycle, command) == STEWART_OK);
-    stewart_motion motion;
+    const stewart_motion motion = motion_of(reference);
     stewart_output expected;
-    CHECK(stewart_rotation(reference.orientation.data(), motion.rotation) == STEWART_OK);
-    std::copy_n(reference.position.begin(), 3, motion.position);
-    std::copy_n(reference.linear_velocity.begin(), 3, motion.linear_velocity);
-    std::copy_n(reference.angular_velocity.begin(), 3, motion.angular_velocity);
-    std::copy_n(reference.linear_acceleration.begin(), 3, motion.linear_acceleration);
-    std::copy_n(reference.angular_acceleration.begin(), 3, motion.angular_acceleration);
     CHECK(
       stewart_step(&p, &motion, wrench.data(), nullptr, n * kCycle, &state, &expected) ==
       STEWART_OK);
@@ -185,19 +191,13 @@ void test_motors()
   const Six feedback = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
   stewart_state state{};
   stewart_output expected;
-  stewart_motion motion;
   Command command, other;
   int clipped = 0, too_fast = 0;
   for (int n = 0; n < 1000; ++n) {
     const PlatformReference reference = swing(1e-3 * n);
     CHECK(feed_forward.update(reference, wrench, {}, n * kCycle, command) == STEWART_OK);
     CHECK(with_feedback.update(reference, wrench, feedback, n * kCycle, other) == STEWART_OK);
-    CHECK(stewart_rotation(reference.orientation.data(), motion.rotation) == STEWART_OK);
-    std::copy_n(reference.position.begin(), 3, motion.position);
-    std::copy_n(reference.linear_velocity.begin(), 3, motion.linear_velocity);
-    std::copy_n(reference.angular_velocity.begin(), 3, motion.angular_velocity);
-    std::copy_n(reference.linear_acceleration.begin(), 3, motion.linear_acceleration);
-    std::copy_n(reference.angular_acceleration.begin(), 3, motion.angular_acceleration);
+    const stewart_motion motion = motion_of(reference);
     CHECK(
       stewart_step(&p, &motion, wrench.data(), nullptr, n * kCycle, &state, &expected) ==
       STEWART_OK);
