@@ -25,9 +25,13 @@ def find_rests(times: Array | Stamps, values: Array, tolerance: float,
     Parameters
     ----------
     times : array (N,)
-        In order; ``second`` of their units are a second.
+        In order, in any unit.
     values : array (N, K)
-        At rest, none of the K changes by more than ``tolerance``.
+        Coordinates at these times.
+    tolerance : float
+        At rest, none of the K changes by more.
+    second : int
+        Number of units of ``times`` in a second.
 
     """
     first, low, high = 0, values[0], values[0]
