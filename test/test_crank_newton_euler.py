@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The references for hexapods with cranks: against published states and identities."""
+"""The references for hexapods with cranks: against published states, and against one another."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import Any
 from crank_machines import random_machine, random_state, within
 from crank_newton_euler import (
     Answer, Array, CrankHexapod, forward_dynamics, inverse_dynamics, machine_of, State, state_of)
+from crank_pinocchio import CrankPinocchio
 import numpy as np
 import pytest
 from referees import derivative, relative, rng, rotation_about
@@ -49,6 +50,28 @@ def test_newton_euler_has_the_published_states(numbers: dict[str, Any]) -> None:
     assert_agree(inverse_dynamics(rig(), state), numbers, 1e-12)
     found = forward_dynamics(rig(), state, np.array(numbers['torques']))
     assert np.allclose(found, np.hstack([state.a, state.al]), rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize('numbers', RIG['states'])
+def test_pinocchio_has_the_published_states(numbers: dict[str, Any]) -> None:
+    pytest.importorskip('pinocchio')
+    state = state_of(numbers)
+    referee = CrankPinocchio(rig(), np.array([1.0, -2.0, 3.0]))
+    assert_agree(referee.inverse_dynamics(state), numbers, 1e-12)
+    found = referee.forward_dynamics(state, np.array(numbers['torques']))
+    assert np.allclose(found, np.hstack([state.a, state.al]), rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize('seed', range(MACHINES))
+def test_newton_euler_is_pinocchio(seed: int) -> None:
+    pytest.importorskip('pinocchio')
+    machine, states = case(seed)
+    referee = CrankPinocchio(machine, rng(seed).uniform(-10.0, 10.0, 3))
+    for state in states:
+        truth = referee.inverse_dynamics(state)
+        assert_agree(inverse_dynamics(machine, state), truth._asdict(), 1e-12)
+        acceleration = np.hstack([state.a, state.al])
+        assert relative(referee.forward_dynamics(state, truth.torques), acceleration) < 1e-11
 
 
 @pytest.mark.parametrize('seed', range(MACHINES))
