@@ -40,7 +40,7 @@ from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
-    ACCELERATION, DETERMINANT, FORCES, MOTION, POSE, RESULT, TWIST)
+    ACCELERATION, DETERMINANT, FORCES, MOTION, POSE, TWIST)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, NaturalModes
 
@@ -700,7 +700,7 @@ class Capability:
         Lengths, clearance, joint angles, and the condition number; a determinant of the other sign
         than at the first sample is beyond a singularity.
         """
-        results, motions = solved.rows.reshape(-1, RESULT), motion_rows(motion)
+        results, motions = solved.rows.reshape(-1, solved.rows.shape[-1]), motion_rows(motion)
         of_poses = self._pose_limits
         values = of_poses.values(motions, results)
         exceeded = [(limits.short_name(name), self._limits.exceeds(name, values[name]))

@@ -17,7 +17,7 @@ from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS, Drives, MOTORS, Motors, SPEEDS)
 from stewart_dynamics.mechanics.limits import (
     short_name, TORQUE_MAX, TORQUE_SPEED)
-from stewart_dynamics.mechanics.rows import MOTION, RESULT
+from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.parameters.table import Parameters, six_of
 
 # Ratio of a torque to none that is available: finite, for searches.
@@ -72,7 +72,7 @@ class MotorBounds:
         """Return the motors for rows (..., MOTION) and (..., RESULT)."""
         shape = results.shape[:-1]
         rows = np.broadcast_to(motions, (*shape, MOTION)).reshape(-1, MOTION)
-        motors = self._drives(rows, results.reshape(-1, RESULT)).reshape(*shape, MOTORS)
+        motors = self._drives(rows, results.reshape(-1, results.shape[-1])).reshape(*shape, MOTORS)
         accelerations = motors[..., ACCELERATIONS]
         return MovingMotors(motors[..., SPEEDS], self.inertia * accelerations,
                             self._mass / self.ratio * accelerations)

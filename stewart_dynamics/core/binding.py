@@ -45,7 +45,12 @@ class LimitRow(NamedTuple):
     field: str  # of stewart_leg
     depends: str  # what its quantity depends on: POSE, TWIST, LOAD or MOTOR
     quantity: str  # field of stewart_output
-    minimum: bool
+    kind: str  # MINIMUM, MAXIMUM, or LARGEST magnitude
+
+    @property
+    def minimum(self) -> bool:
+        """Return whether the quantity must be at least the limit."""
+        return self.kind == 'MINIMUM'
 
 
 class Rule(NamedTuple):
@@ -58,9 +63,9 @@ class Rule(NamedTuple):
 
 _HEADERS = header('stewart_dynamics.h') + header('library.h')
 LIMIT_ROWS = tuple(
-    LimitRow(int(bit), name, field, depends, quantity, kind == 'MINIMUM')
+    LimitRow(int(bit), name, field, depends, quantity, kind)
     for kind, bit, name, field, depends, quantity in re.findall(
-        r'(M\w+IMUM)\((\d+), (\w+), (\w+), (\w+), ([\w.]+)\)', _HEADERS))
+        r'(MINIMUM|MAXIMUM|LARGEST)\((\d+), (\w+), (\w+), (\w+), ([\w.]+)\)', _HEADERS))
 """The limits of the legs."""
 RULES = {int(code): Rule(name, tuple(names.split(', ')), text) for code, name, names, text in
          re.findall(r'RULE\((\d+), (\w+), "([^"]*)",[\s\\]*"([^"]*)"\)', _HEADERS)}
@@ -72,9 +77,9 @@ def _declarations() -> str:
     text = re.sub(r'/\*.*?\*/', ' ', _HEADERS, flags=re.DOTALL)
     text = re.sub(r'^#(?:.*\\\n)*.*$', ' ', text, flags=re.MULTILINE)
     for use, lines in (
-            ('STEWART_LIMITS(STEWART_BIT, STEWART_BIT)',
+            ('STEWART_LIMITS(STEWART_BIT, STEWART_BIT, STEWART_BIT)',
              [f'STEWART_{row.name} = {row.bit},' for row in LIMIT_ROWS]),
-            ('STEWART_LIMITS(STEWART_FIELD, STEWART_FIELD)',
+            ('STEWART_LIMITS(STEWART_FIELD, STEWART_FIELD, STEWART_FIELD)',
              [f'double {row.field};' for row in LIMIT_ROWS]),
             ('STEWART_RULES(STEWART_RULE_CODE)',
              [f'STEWART_RULE_{rule.name} = {code},' for code, rule in RULES.items()])):
@@ -83,6 +88,10 @@ def _declarations() -> str:
 
 
 _TEXT = _declarations()
+
+KINDS = {name: int(number) for number, name in re.findall(
+    r'KIND\((\d+), (\w+), \w+, function, arguments\)', _HEADERS)}
+"""The kinds of legs by name: TELESCOPIC, ..."""
 
 CODES = {name: int(value) for enum in re.findall(r'enum \{(.*?)\};', _TEXT, re.DOTALL)
          for name, value in re.findall(r'(\w+) = (\d+)', enum)}

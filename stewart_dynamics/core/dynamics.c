@@ -47,6 +47,18 @@ static void add_row(system6 * work, const double row[6], double push, double mas
   }
 }
 
+/* Add the coupling of a row with the motion of a point in a direction. */
+static void add_coupling(
+  system6 * work, const double row[6], vector arm, vector coupling, double per_size) {
+  double of_point[6];
+  put3(of_point, coupling), put3(of_point + 3, scale(per_size, cross(arm, coupling)));
+  for (int i = 0; i < 6; i++) {
+    for (int k = 0; k <= i; k++) {
+      work->mass[i][k] += row[i] * of_point[k] + of_point[i] * row[k];
+    }
+  }
+}
+
 /* Solve the positive definite system in place: L L^T x = right. */
 static void cholesky(system6 * work) {
   for (int n = 0; n < 6; n++) {
@@ -67,12 +79,12 @@ static void cholesky(system6 * work) {
   }
 }
 
-/* Write the acceleration of a motion under leg forces. */
+/* Write the acceleration of a motion under efforts of the drives. */
 FLAT static void accelerate(
-  const stewart_platform * platform, stewart_motion * motion, const double forces[6],
+  const stewart_platform * platform, stewart_motion * motion, const double efforts[6],
   const double wrench[6], const stewart_base * base) {
   double per_size = 1.0 / platform->characteristic_length, inertia[6];
-  int turning = platform->legs[0].pitch != 0.0, moving = moves(base);
+  int turns = moves(base);
   const double * r = motion->rotation;
   system6 work = {{{0.0}}, {0.0}};
   for (int n = 0; n < 3; n++) {
@@ -85,31 +97,30 @@ FLAT static void accelerate(
   load rest = load_of(wrench), moved = move_platform(platform, motion);
   rest.force = subtract(rest.force, moved.force);
   rest.moment = subtract(rest.moment, moved.moment);
-  if (moving) {
-    load carried = carry(platform, motion, base);
+  moving_base moving;
+  if (turns) {
+    moving = base_of(platform, base);
+    load carried = carry(platform, motion, &moving);
     rest.force = subtract(rest.force, carried.force);
     rest.moment = subtract(rest.moment, carried.moment);
   }
+  leg_motion legs[6];
+  leg_mass masses[6];
+  move_legs(platform, motion, turns ? &moving : NULL, legs);
+  put_masses(platform, motion, legs, masses);
   for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &platform->legs[i];
-    double length, rate, actuator, row[6], row_rate[6];
-    leg_pose at = pose_of(leg, motion->position, r);
-    load own = move_leg(platform, i, motion, &length, &rate, &actuator, row, row_rate);
-    mass += at.across_mass;
-    moment = add(moment, scale(at.across_mass, at.arm));
-    add_point(inertia, at.across_mass, at.arm);
-    rest.force = subtract(rest.force, own.force);
-    rest.moment = subtract(rest.moment, own.moment);
-    if (turning) {
-      double drive_row[6];
-      drive_motion drive = move_drive(leg, motion);
-      turning_row(platform, i, motion, drive_row);
-      add_row(&work, row, 0.0, leg->piston_mass - at.across_mass);
-      add_row(&work, drive_row, forces[i] - move_actuator(leg, drive.rate, drive.acceleration),
-              leg->reflected_mass);
-    } else {
-      add_row(&work, row, forces[i] - actuator,
-              leg->piston_mass + leg->reflected_mass - at.across_mass);
+    const leg_motion * of = &legs[i];
+    const leg_mass * own = &masses[i];
+    vector arm = rotate(r, read3(platform->legs[i].platform_joint));
+    mass += own->point;
+    moment = add(moment, scale(own->point, arm));
+    add_point(inertia, own->point, arm);
+    rest.force = subtract(rest.force, of->moved.force);
+    rest.moment = subtract(rest.moment, of->moved.moment);
+    if (own->line != 0.0) {add_row(&work, of->row, 0.0, own->line);}
+    add_row(&work, own->row, efforts[i] - own->effort, own->drive);
+    if (dot(own->coupling, own->coupling) != 0.0) {
+      add_coupling(&work, own->row, arm, own->coupling, per_size);
     }
   }
   add_body(&work, mass, moment, inertia, per_size);
@@ -130,94 +141,15 @@ int64_t forward_dynamics_one(const stewart_platform * platform, one_motion * sam
 
 void forward_dynamics_many(
   const stewart_platform * platform, int64_t count, stewart_motion * motions,
-  const double * forces, int64_t n_wrenches, const double * wrenches, int64_t n_bases,
+  const double * efforts, int64_t n_wrenches, const double * wrenches, int64_t n_bases,
   const stewart_base * bases) {
   for (int64_t n = 0; n < count; n++) {
-    accelerate(platform, &motions[n], &forces[6 * n], &wrenches[n_wrenches == 1 ? 0 : 6 * n],
+    accelerate(platform, &motions[n], &efforts[6 * n], &wrenches[n_wrenches == 1 ? 0 : 6 * n],
                &bases[n_bases == 1 ? 0 : n]);
   }
 }
 
-/* ---- motion in axes that do not turn -------------------------------------------------------- */
-
-/* Return W' x r + W x (W x r): the acceleration of a point fixed to a turning body. */
-static vector carried_along(vector spin, vector spin_rate, vector arm)
-{return add(cross(spin_rate, arm), cross(spin, cross(spin, arm)));}
-
-/* A platform and a base in motion: velocities less that of the base's origin, accelerations as
-   they are felt, less gravity. */
-typedef struct { vector position, velocity, omega, acceleration, alpha, felt, spin, spin_rate; }
-  absolute_motion;
-
-static absolute_motion absolute_of(const stewart_motion * motion, const stewart_base * base) {
-  absolute_motion of;
-  vector velocity = read3(motion->linear_velocity), omega = read3(motion->angular_velocity);
-  of.position = read3(motion->position);
-  of.spin = read3(base->angular_velocity), of.spin_rate = read3(base->angular_acceleration);
-  of.felt = subtract(read3(base->linear_acceleration), read3(base->gravity));
-  of.velocity = add(velocity, cross(of.spin, of.position));
-  of.acceleration = add(
-    add(read3(motion->linear_acceleration), carried_along(of.spin, of.spin_rate, of.position)),
-    scale(2.0, cross(of.spin, velocity)));
-  of.acceleration = add(of.acceleration, of.felt);
-  of.omega = add(omega, of.spin);
-  of.alpha = add(add(read3(motion->angular_acceleration), of.spin_rate), cross(of.spin, omega));
-  return of;
-}
-
-/* A leg's vector L s, and its derivatives in these axes; joint: its base joint's acceleration. */
-typedef struct {
-  leg_pose at;
-  double rate, acceleration;            /* of the length */
-  vector joint, s_rate, s_acceleration;
-  vector across;                        /* the part of s'' across the leg */
-} absolute_leg;
-
-static absolute_leg leg_of(
-  const stewart_leg * leg, const stewart_motion * motion, const absolute_motion * of) {
-  absolute_leg found;
-  leg_pose at = pose_of(leg, motion->position, motion->rotation);
-  vector s = at.direction, base_joint = read3(leg->base_joint);
-  vector rate = subtract(add(of->velocity, cross(of->omega, at.arm)), cross(of->spin, base_joint));
-  found.joint = add(of->felt, carried_along(of->spin, of->spin_rate, base_joint));
-  vector acceleration = subtract(
-    add(of->acceleration, carried_along(of->omega, of->alpha, at.arm)), found.joint);
-  found.at = at, found.rate = dot(s, rate);
-  found.s_rate = scale(at.per_length, subtract(rate, scale(found.rate, s)));
-  double along = dot(s, acceleration), turning = dot(found.s_rate, found.s_rate);
-  found.acceleration = along + at.length * turning;
-  vector sliding = scale(2.0 * found.rate, found.s_rate);
-  found.s_acceleration = scale(at.per_length, subtract(
-    subtract(acceleration, scale(found.acceleration, s)), sliding));
-  found.across = scale(at.per_length, subtract(subtract(acceleration, scale(along, s)), sliding));
-  return found;
-}
-
 /* ---- base wrench ---------------------------------------------------------------------------- */
-
-/* Return the rates of a leg's momentum, and of its moment of momentum about the base's origin. */
-static load leg_momentum_rate(
-  const stewart_leg * leg, const stewart_motion * motion, const absolute_motion * of) {
-  load rates;
-  absolute_leg found = leg_of(leg, motion, of);
-  vector s = found.at.direction;
-  double center = leg->cylinder_center_of_mass, distance =
-    found.at.length - leg->piston_center_of_mass;  /* of the piston's from the base joint */
-  double inertia =
-    leg->cylinder_mass * (center * center) + leg->cylinder_inertia + leg->piston_inertia;
-  double moment = leg->cylinder_mass * center + leg->piston_mass * distance;
-  vector sliding = scale(2.0 * leg->piston_mass * found.rate, found.s_rate);
-  rates.force = add(
-    add(scale(leg->cylinder_mass + leg->piston_mass, found.joint),
-        scale(moment, found.s_acceleration)),
-    add(sliding, scale(leg->piston_mass * found.acceleration, s)));
-  vector turning = add(
-    add(scale(moment, found.joint),
-        scale(inertia + leg->piston_mass * distance * distance, found.s_acceleration)),
-    scale(distance, sliding));
-  rates.moment = add(cross(read3(leg->base_joint), rates.force), cross(s, turning));
-  return rates;
-}
 
 static load platform_momentum_rate(
   const stewart_platform * platform, const stewart_motion * motion, const absolute_motion * of) {
@@ -245,7 +177,7 @@ FLAT void base_wrenches_many(
     rest.force = subtract(rest.force, rates.force);
     rest.moment = subtract(rest.moment, rates.moment);
     for (int i = 0; i < 6; i++) {
-      rates = leg_momentum_rate(&platform->legs[i], motion, &of);
+      rates = leg_momentum_rate(platform, i, motion, &of);
       rest.force = subtract(rest.force, rates.force);
       rest.moment = subtract(rest.moment, rates.moment);
     }
@@ -261,40 +193,10 @@ int64_t base_wrench_one(const stewart_platform * platform, one_motion * sample) 
 
 /* ---- regressor ------------------------------------------------------------------------------ */
 
-/* Columns of the regressor, six numbers each from CYLINDER_MASS on, one for each leg: the order of
-   dynamics/linear_parameters.py. */
-enum {
-  MASS = 0, FIRST_MOMENT = 1, INERTIA = 4, CYLINDER_MASS = 10, CYLINDER_FIRST = 16,
-  CYLINDER_SECOND = 22, PISTON_MASS = 28, PISTON_FIRST = 34, PISTON_SECOND = 40,
-  REFLECTED_MASS = 46, VISCOUS_FRICTION = 52, COULOMB_FRICTION = 58, OFFSET = 64, LINEAR = 70
-};
-
-/* The forces at a leg's platform joint for a unit of its parameters; its drive's motion. */
-typedef struct {
-  vector arm, of_first, of_second, of_piston, of_piston_first;
-  double rate, acceleration;
-} leg_columns;
-
-static leg_columns columns_of(
-  const stewart_leg * leg, const stewart_motion * motion, const absolute_motion * of) {
-  leg_columns columns;
-  absolute_leg found = leg_of(leg, motion, of);
-  vector s = found.at.direction;
-  double turning = dot(found.s_rate, found.s_rate), length = found.at.length;
-  vector sliding = scale(2.0 * found.rate, found.s_rate);
-  vector hanging = subtract(found.joint, scale(dot(s, found.joint), s));
-  columns.arm = found.at.arm;
-  columns.of_first = scale(found.at.per_length, hanging);
-  columns.of_second = scale(found.at.per_length, found.across);
-  /* with c = L - S: m c^2 + I = m L^2 - 2 L m S + J */
-  columns.of_piston = add(
-    add(hanging, add(scale(length, found.across), sliding)),
-    scale(dot(s, found.joint) + found.acceleration - length * turning, s));
-  columns.of_piston_first = subtract(scale(turning, s), add(
-    columns.of_first, add(scale(2.0, found.across), scale(found.at.per_length, sliding))));
-  columns.rate = found.rate, columns.acceleration = found.acceleration;
-  return columns;
-}
+/* Columns of the regressor: ten of the platform; of the legs, from LEGS on, six numbers each of
+   their masses and moments, then of the reflected mass, viscous and Coulomb friction, offset of
+   each: the order of dynamics/linear_parameters.py. */
+enum { MASS = 0, FIRST_MOMENT = 1, INERTIA = 4, LEGS = 10, OF_DRIVES = 24 };
 
 /* Write the ten numbers of the platform, for a force of a leg u, with the moment h. */
 static void put_platform(
@@ -319,42 +221,39 @@ static void put_platform(
   inertia[5] = p.z * dw.z + q.z * w.z;
 }
 
-static void put_regressor(
+/* Write a regressor; returns how many numbers it has. */
+static int64_t put_regressor(
   const stewart_platform * platform, const stewart_motion * motion, const absolute_motion * of,
   double * rows) {
   double inverse[6][6], per_size = 1.0 / platform->characteristic_length;
   leg_columns columns[6];
+  int count = 0;
   for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &platform->legs[i];
-    leg_pose at = pose_of(leg, motion->position, motion->rotation);
-    double row[6];
-    columns[i] = columns_of(leg, motion, of);
-    put3(row, at.direction), put3(row + 3, scale(per_size, cross(at.arm, at.direction)));
-    if (leg->pitch != 0.0) {
-      drive_motion drive = move_drive(leg, motion);
-      turning_row(platform, i, motion, row);
-      columns[i].rate = drive.rate, columns[i].acceleration = drive.acceleration;
-    }
-    for (int n = 0; n < 6; n++) {inverse[n][i] = row[n];}
+    count = put_columns(platform, i, motion, of, &columns[i]);
+    for (int n = 0; n < 6; n++) {inverse[n][i] = columns[i].row[n];}
   }
   invert(inverse);
+  int width = LEGS + 6 * count + OF_DRIVES, drives = LEGS + 6 * count;
   for (int i = 0; i < 6; i++) {
-    double * row = &rows[LINEAR * i];
-    vector u = read3(inverse[i]), h = scale(per_size, read3(inverse[i] + 3));
-    for (int n = 0; n < LINEAR; n++) {row[n] = 0.0;}
+    const leg_columns * own = &columns[i];
+    double * row = &rows[width * i];
+    vector u = scale(own->lever, read3(inverse[i]));
+    vector h = scale(own->lever, scale(per_size, read3(inverse[i] + 3)));
+    for (int n = 0; n < width; n++) {row[n] = 0.0;}
     put_platform(motion, of, u, h, row);
     for (int k = 0; k < 6; k++) {
       vector by = add(u, cross(h, columns[k].arm));
-      row[CYLINDER_FIRST + k] = dot(by, columns[k].of_first);
-      row[CYLINDER_SECOND + k] = row[PISTON_SECOND + k] = dot(by, columns[k].of_second);
-      row[PISTON_MASS + k] = dot(by, columns[k].of_piston);
-      row[PISTON_FIRST + k] = dot(by, columns[k].of_piston_first);
+      for (int n = 0; n < count; n++) {
+        row[LEGS + 6 * n + k] =
+          dot(by, columns[k].of_mass[n]) + (k == i ? own->effort[n] : 0.0);
+      }
     }
-    row[REFLECTED_MASS + i] = columns[i].acceleration;
-    row[VISCOUS_FRICTION + i] = columns[i].rate;
-    row[COULOMB_FRICTION + i] = slip(columns[i].rate / platform->legs[i].coulomb_velocity);
-    row[OFFSET + i] = 1.0;
+    row[drives + i] = own->acceleration;
+    row[drives + 6 + i] = own->rate;
+    row[drives + 12 + i] = slip(own->rate / platform->legs[i].coulomb_velocity);
+    row[drives + 18 + i] = 1.0;
   }
+  return 6 * width;
 }
 
 FLAT void regressors_many(
@@ -365,7 +264,7 @@ FLAT void regressors_many(
     const stewart_base * base = &bases[n_bases == 1 ? 0 : n];
     put3(still.gravity, read3(platform->gravity));
     absolute_motion of = absolute_of(&motions[n], moves(base) ? base : &still);
-    put_regressor(platform, &motions[n], &of, &results[6 * LINEAR * n]);
+    results += put_regressor(platform, &motions[n], &of, results);
   }
 }
 
@@ -375,30 +274,21 @@ FLAT void regressors_many(
 static void add_external_wrench(
   const stewart_platform * platform, const double position[3], const double rotation[9],
   const double model[6], const double measured[6], double weight, double wrench[6]) {
-  stewart_motion motion;
-  put3(motion.position, read3(position));
-  put_matrix(motion.rotation, read3(rotation), read3(rotation + 3), read3(rotation + 6));
   for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &platform->legs[i];
-    double row[6], force = weight * (model[i] - measured[i]);
-    leg_pose at = pose_of(leg, position, rotation);
-    put3(row, at.direction), put3(row + 3, cross(at.arm, at.direction));
-    if (leg->pitch != 0.0) {
-      turning_row(platform, i, &motion, row);
-      for (int n = 3; n < 6; n++) {row[n] *= platform->characteristic_length;}
-    }
-    for (int n = 0; n < 6; n++) {wrench[n] += force * row[n];}
+    double row[6], effort = weight * (model[i] - measured[i]);
+    put_drive_row(platform, i, position, rotation, 1.0, row);
+    for (int n = 0; n < 6; n++) {wrench[n] += effort * row[n];}
   }
 }
 
 void external_wrenches_many(
   const stewart_platform * platform, int64_t count, const stewart_pose * poses,
-  const double * model_forces, const double * measured_forces, double * wrenches) {
+  const double * model_efforts, const double * measured_efforts, double * wrenches) {
   for (int64_t n = 0; n < count; n++) {
     for (int i = 0; i < 6; i++) {wrenches[6 * n + i] = 0.0;}
     add_external_wrench(
-      platform, poses[n].position, poses[n].rotation, &model_forces[6 * n],
-      &measured_forces[6 * n], 1.0, &wrenches[6 * n]);
+      platform, poses[n].position, poses[n].rotation, &model_efforts[6 * n],
+      &measured_efforts[6 * n], 1.0, &wrenches[6 * n]);
   }
 }
 
@@ -408,24 +298,26 @@ static void add_end(
   const stewart_base * base) {
   stewart_result result;
   solve_sample(platform, motion, m->known, base, &result);
-  add_external_wrench(platform, motion->position, motion->rotation, result.forces, m->forces, 0.5,
-                      m->after);
-  for (int i = 0; i < 6; i++) {m->differences[i] += 0.5 * (m->forces[i] - result.forces[i]);}
+  const double * model = efforts_of(platform, &result);
+  add_external_wrench(
+    platform, motion->position, motion->rotation, model, m->forces, 0.5, m->after);
+  for (int i = 0; i < 6; i++) {m->differences[i] += 0.5 * (m->forces[i] - model[i]);}
 }
 
 void estimate_one(const stewart_platform * platform, one_measurement * m) {
   double rows[6][6], inverse[6][6], dt = m->interval;
-  leg_pose legs[6];
+  leg_line lines[6];
   int steps;
   stewart_motion * before = &m->motion, * now = &m->motion_after;
   *now = *before;
-  m->across = scaled_jacobian(
-    platform, before->position, before->rotation, legs, rows, inverse) * m->target < 0.0;
+  lines_at(platform, before->position, before->rotation, lines);
+  m->across = scaled_jacobian(platform, lines, rows, inverse) * m->target < 0.0;
   m->code = find_pose(platform, m->lengths, (stewart_pose *)now, &steps, &m->residual);
   m->steps = steps;
   if (m->code != STEWART_OK) {return;}
-  scaled_jacobian(platform, now->position, now->rotation, legs, rows, inverse);
-  from_legs(platform, inverse, m->rates, now->linear_velocity, now->angular_velocity);
+  lines_at(platform, now->position, now->rotation, lines);
+  scaled_jacobian(platform, lines, rows, inverse);
+  put_twist(platform, lines, inverse, m->rates, now);
   for (int n = 0; n < 3; n++) {
     now->linear_acceleration[n] = before->linear_acceleration[n] =
       dt > 0.0 ? (now->linear_velocity[n] - before->linear_velocity[n]) / dt : 0.0;

@@ -129,7 +129,7 @@ static double find_condition(
   const governed * on, const stewart_motion * motion, const stewart_result * known, double * to) {
   const stewart_platform * platform = on->platform;
   double enough = CERTAIN * on->limits->condition_max;
-  leg_pose at[6];
+  leg_line at[6];
   double rows[6][6], inverse[6][6], of_rows = 6.0, of_inverse = 0.0;
   if (known && platform->legs[0].pitch == 0.0) {
     for (int i = 0; i < 6; i++) {
@@ -140,8 +140,8 @@ static double find_condition(
     *to = sqrt(of_rows * of_inverse);
     if (*to < enough) {return known->determinant;}
   }
-  double determinant = scaled_jacobian(
-    platform, motion->position, motion->rotation, at, rows, inverse);
+  lines_at(platform, motion->position, motion->rotation, at);
+  double determinant = scaled_jacobian(platform, at, rows, inverse);
   *to = CONDITION_OF(rows, inverse);
   return determinant;
 }
@@ -156,7 +156,8 @@ static int find_room(
   unsigned exceeded = 0;
   for (int i = 0; i < 6; i++) {
     to->lengths[i] =
-      known ? known->lengths[i] : pose_of(&legs[i], motion->position, motion->rotation).length;
+      known ? known->lengths[i] :
+      line_of(on->platform, i, motion->position, motion->rotation).length;
   }
   if (kind == SINGULARITIES) {
     double determinant = find_condition(on, motion, known, &to->condition);
@@ -306,7 +307,7 @@ static int inadmissible(const governed * on, const coordinates * state) {
       put_motion(on->limits, &at, &stop.motions[n]);
     }
     solve_many(platform, SAMPLES_AT_ONCE, &stop.motions[first], 1, no_wrench, 1, &still, 0,
-               &stop.results[first]);
+               NUMBERS(stewart_result), (double *)&stop.results[first]);
     for (int n = first; n < first + SAMPLES_AT_ONCE && !found; n++) {
       found = overloads(on, &stop.motions[n], &stop.results[n]);
     }

@@ -4,23 +4,24 @@
  * Lengths, poses, twists; angles of the joints and clearance of the legs.
  */
 
-void lengths_many(
-  const stewart_platform * platform, int64_t count, const stewart_pose * poses, double * lengths) {
+void positions_many(
+  const stewart_platform * platform, int64_t count, const stewart_pose * poses,
+  double * positions) {
   for (int64_t n = 0; n < count; n++) {
     for (int i = 0; i < 6; i++) {
-      lengths[6 * n + i] =
-        pose_of(&platform->legs[i], poses[n].position, poses[n].rotation).length;
+      positions[6 * n + i] =
+        position_of(platform, i, poses[n].position, poses[n].rotation);
     }
   }
 }
 
 FLAT void forward_kinematics_many(
-  const stewart_platform * platform, int64_t count, const double * lengths,
+  const stewart_platform * platform, int64_t count, const double * positions,
   stewart_motion * motions, int64_t * codes, int64_t * steps, double * residuals) {
   for (int64_t n = 0; n < count; n++) {
     int taken;
     codes[n] = find_pose(
-      platform, &lengths[6 * n], (stewart_pose *)&motions[n], &taken, &residuals[n]);
+      platform, &positions[6 * n], (stewart_pose *)&motions[n], &taken, &residuals[n]);
     steps[n] = taken;
   }
 }
@@ -36,10 +37,11 @@ void twists_many(
   stewart_motion * motions) {
   for (int64_t n = 0; n < count; n++) {
     stewart_motion * at = &motions[n];
-    leg_pose legs[6];
+    leg_line lines[6];
     double rows[6][6], inverse[6][6];
-    scaled_jacobian(platform, at->position, at->rotation, legs, rows, inverse);
-    from_legs(platform, inverse, &rates[6 * n], at->linear_velocity, at->angular_velocity);
+    lines_at(platform, at->position, at->rotation, lines);
+    scaled_jacobian(platform, lines, rows, inverse);
+    put_twist(platform, lines, inverse, &rates[6 * n], at);
   }
 }
 
@@ -59,7 +61,7 @@ void joint_haversines_many(
     vector omega = read3(motions[n].angular_velocity);
     for (int i = 0; i < 6; i++) {
       const stewart_leg * leg = &platform->legs[i];
-      leg_pose at = pose_of(leg, motions[n].position, r);
+      leg_line at = line_of(platform, i, motions[n].position, r);
       vector s = at.direction;
       double known = 0.0 < at.length && at.length < HUGE_VAL ? 1.0 : NAN;
       vector x_rate = add(read3(motions[n].linear_velocity), cross(omega, at.arm));

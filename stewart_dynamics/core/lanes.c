@@ -69,6 +69,7 @@ typedef struct {
 typedef struct {
   real lengths[6], rates[6], forces[6];
   real determinant, determinant_rate, condition_number, unit_load_forces[6], joint_forces[6];
+  real angles[6], speeds[6], torques[6], levers[6];
 } results;
 
 #define stewart_motion motions
@@ -110,33 +111,45 @@ static void spread(real * to, int width, lane_rows rows, int64_t first, int64_t 
   }
 }
 
+/* Set the motion of the bases that are still to zero. */
+static void hold_still(choice moving, moving_base * base) {
+  real * numbers = (real *)base;
+  for (size_t n = 0; n < sizeof *base / sizeof *numbers; n++) {
+    numbers[n] = choose(moving, numbers[n], number(0.0));
+  }
+}
+
 void NAMED(solve_lanes_, SUFFIX)(
   const stewart_platform * platform, int64_t count, lane_rows of_motions, lane_rows of_wrenches,
-  lane_rows of_bases, int conditioned, double * result_rows, int64_t result_stride) {
-  enum {MOTION = sizeof(motions) / sizeof(real), BASE = sizeof(bases) / sizeof(real),
-    RESULT = sizeof(results) / sizeof(real)};
+  lane_rows of_bases, int conditioned, double * result_rows, int64_t result_stride,
+  int64_t width) {
+  enum {MOTION = sizeof(motions) / sizeof(real), BASE = sizeof(bases) / sizeof(real)};
+  results result;
+  for (size_t n = 0; n < sizeof result / sizeof(real); n++) {((real *)&result)[n] = number(0.0);}
   for (int64_t first = 0; first < count; first += LANES) {
     motions motion;
     bases base;
-    results result;
     real wrench[6];
     spread((real *)&motion, MOTION, of_motions, first, count);
     spread(wrench, 6, of_wrenches, first, count);
     spread((real *)&base, BASE, of_bases, first, count);
     load external = {read3(wrench), read3(wrench + 3)};
     choice moving = base.gravity[0] == base.gravity[0];  /* else nan: the base is still */
+    moving_base of_base;
     if (any(moving)) {
-      load carried = carry(platform, &motion, &base);
+      of_base = base_of(platform, &base);
+      load carried = carry(platform, &motion, &of_base);
       real change[6], loaded[6];
       put3(change, carried.force), put3(change + 3, carried.moment);
       for (int n = 0; n < 6; n++) {loaded[n] = choose(moving, wrench[n] - change[n], wrench[n]);}
       external.force = read3(loaded), external.moment = read3(loaded + 3);
+      hold_still(moving, &of_base);
     }
-    solve(platform, &motion, external, conditioned, &result);
+    solve(platform, &motion, external, any(moving) ? &of_base : NULL, conditioned, &result);
     const real * numbers = (const real *)&result;
     for (int k = 0; k < LANES && first + k < count; k++) {
       double * row = result_rows + result_stride * (first + k);
-      for (int n = 0; n < RESULT; n++) {row[n] = numbers[n][k];}
+      for (int64_t n = 0; n < width; n++) {row[n] = numbers[n][k];}
     }
   }
 }

@@ -12,10 +12,11 @@
 /* Rows of numbers for many samples: the first, and the distance to the next; 0: one for all. */
 typedef struct { const double * first; int64_t stride; } lane_rows;
 
-/* See solve_many in library.h; for each kind of processor. */
+/* See solve_many in library.h; for each kind of processor. Of each result the first numbers, as
+   many as the width says. */
 typedef void lanes_function(
   const stewart_platform * platform, int64_t count, lane_rows motions, lane_rows wrenches,
-  lane_rows bases, int conditioned, double * results, int64_t result_stride);
+  lane_rows bases, int conditioned, double * results, int64_t result_stride, int64_t width);
 
 lanes_function solve_lanes_baseline;
 #if defined(__x86_64__) || defined(_M_X64)

@@ -40,12 +40,12 @@ static lanes_function * solve_lanes(void) {
 void solve_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
   int64_t n_wrenches, const double * wrenches, int64_t n_bases, const stewart_base * bases,
-  int64_t conditioned, stewart_result * results) {
+  int64_t conditioned, int64_t width, double * results) {
   lane_rows of_motions = {(const double *)motions, NUMBERS(stewart_motion)};
   lane_rows of_wrenches = {wrenches, n_wrenches == 1 ? 0 : 6};
   lane_rows of_bases = {(const double *)bases, n_bases == 1 ? 0 : NUMBERS(stewart_base)};
-  solve_lanes()(platform, count, of_motions, of_wrenches, of_bases, conditioned != 0,
-                (double *)results, NUMBERS(stewart_result));
+  solve_lanes()(platform, count, of_motions, of_wrenches, of_bases, conditioned != 0, results,
+                width, width);
 }
 
 /* Whether a base adds a load: one of nan adds none. */
@@ -61,12 +61,15 @@ FLAT static void solve_sample(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
   const stewart_base * base, stewart_result * result) {
   load external = load_of(wrench);
+  moving_base moving;
   if (moves(base)) {
-    load carried = carry(platform, motion, base);
+    moving = base_of(platform, base);
+    load carried = carry(platform, motion, &moving);
     external.force = subtract(external.force, carried.force);
     external.moment = subtract(external.moment, carried.moment);
   }
-  solve(platform, motion, external, 1, result);
+  clear_result(result);
+  solve(platform, motion, external, moves(base) ? &moving : NULL, 1, result);
 }
 
 int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
@@ -75,6 +78,7 @@ int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
   return all_finite(result, sizeof *result) && result->condition_number < UNSOLVABLE_CONDITION;
 }
 
+#include "legs.c"
 #include "kinematics.c"
 #include "dynamics.c"
 #include "motors.c"

@@ -81,7 +81,7 @@ typedef struct {
 typedef struct { double value[6], rate[6], acceleration[6]; } coordinates;
 
 /* Where governor_state.held has the singularity; bit n of stewart_output.exceeded is there n. */
-enum { GOVERNED_SINGULARITY = 18 };
+enum { GOVERNED_SINGULARITY = 24 };
 
 /* What a governor keeps besides the limits of the platform's legs: see mechanics/governor.py. All
    have its margins, which stand here by themselves for lengths, clearance [m] and angles [rad]. */
@@ -101,7 +101,7 @@ typedef struct {
 typedef struct {
   coordinates now;
   double share[6];                    /* of the demand, at last */
-  double held[19];                    /* time in which each limit held the demand back [s] */
+  double held[25];                    /* time in which each limit held the demand back [s] */
   double following;
   double stopping;                    /* it is brought to rest, whatever the demand is */
 } governor_state;
@@ -151,11 +151,12 @@ void cue_many(
 void felt_many(
   const double * head, int64_t count, const stewart_motion * motions, double * felt);
 
-/* Inverse dynamics; without `conditioned` the condition numbers, half of the work, are zero. */
+/* Inverse dynamics; without `conditioned` the condition numbers, half of the work, are zero. Rows of
+   results (count, width) have the first numbers of stewart_result. */
 void solve_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
   int64_t n_wrenches, const double * wrenches, int64_t n_bases, const stewart_base * bases,
-  int64_t conditioned, stewart_result * results);
+  int64_t conditioned, int64_t width, double * results);
 
 /* One sample: results; accelerations into the motion; the wrench on the base. They return whether
    all is finite and, of the first, J_inv can be solved. The last returns a code. */
@@ -207,24 +208,26 @@ void write_messages(
   const message_condition * conditions, int64_t width, int64_t count, const int64_t * stamps,
   const double * rows, uint8_t * messages, uint8_t * having, int64_t * numbers);
 
-/* Leg lengths (count, 6) of poses [m]. */
-void lengths_many(
-  const stewart_platform * platform, int64_t count, const stewart_pose * poses, double * lengths);
+/* Positions of the drives (count, 6) in poses: leg lengths [m] or angles of cranks [rad], nan where
+   a rod does not reach. */
+void positions_many(
+  const stewart_platform * platform, int64_t count, const stewart_pose * poses,
+  double * positions);
 
-/* Poses of lengths (count, 6) [m] into motions, which have the guesses. */
+/* Poses of positions of the drives (count, 6) into motions, which have the guesses. */
 void forward_kinematics_many(
-  const stewart_platform * platform, int64_t count, const double * lengths,
+  const stewart_platform * platform, int64_t count, const double * positions,
   stewart_motion * motions, int64_t * codes, int64_t * steps, double * residuals);
 
-/* Twists of leg rates (count, 6) [m/s] into motions. */
+/* Twists of rates of the drives (count, 6) into motions. */
 void twists_many(
   const stewart_platform * platform, int64_t count, const double * rates,
   stewart_motion * motions);
 
-/* Accelerations under leg forces (count, 6) [N] into motions. */
+/* Accelerations under efforts of the drives (count, 6) into motions. */
 void forward_dynamics_many(
   const stewart_platform * platform, int64_t count, stewart_motion * motions,
-  const double * forces, int64_t n_wrenches, const double * wrenches, int64_t n_bases,
+  const double * efforts, int64_t n_wrenches, const double * wrenches, int64_t n_bases,
   const stewart_base * bases);
 
 /* Wrenches of the hexapod on its base, at its origin, base axes (count, 6) [N, N m]. */
@@ -233,7 +236,7 @@ void base_wrenches_many(
   int64_t n_wrenches, const double * wrenches, int64_t n_bases, const stewart_base * bases,
   double * results);
 
-/* Regressors (count, 6, LINEAR): see dynamics/regressor.py. */
+/* Regressors (count, 6, columns): see dynamics/regressor.py. */
 void regressors_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
   int64_t n_bases, const stewart_base * bases, double * results);
@@ -271,15 +274,15 @@ void without_losses_many(
   const stewart_platform * platform, int64_t count, const double * forces, const double * rates,
   const double * accelerations, double * loads);
 
-/* Motors of motions, with demanded forces in the results, for published forces (count, 6) [N]. */
+/* Motors of motions, for demanded and published efforts of the drives (count, 6). */
 void motors_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
-  const stewart_result * results, const double * forces, stewart_motors * rows);
+  const double * demanded, const double * published, stewart_motors * rows);
 
-/* External wrenches (count, 6) of model forces and measured ones (count, 6), in poses. */
+/* External wrenches (count, 6) of efforts of the model and measured ones (count, 6), in poses. */
 void external_wrenches_many(
   const stewart_platform * platform, int64_t count, const stewart_pose * poses,
-  const double * model_forces, const double * measured_forces, double * wrenches);
+  const double * model_efforts, const double * measured_efforts, double * wrenches);
 void estimate_one(const stewart_platform * platform, one_measurement * measurement);
 
 /* A period of the simulated hexapod; without steps, its state as it is. */

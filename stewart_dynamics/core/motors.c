@@ -40,8 +40,8 @@ void without_losses_many(
 
 void motors_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
-  const stewart_result * results, const double * forces, stewart_motors * rows) {
+  const double * demanded, const double * published, stewart_motors * rows) {
   for (int64_t k = 0; k < count; k++) {
-    put_motors(platform, &motions[k], results[k].forces, &forces[6 * k], &rows[k]);
+    put_motors(platform, &motions[k], &demanded[6 * k], &published[6 * k], &rows[k]);
   }
 }

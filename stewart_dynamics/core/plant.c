@@ -21,7 +21,7 @@ static void accelerate_by_torques(
     motion->linear_acceleration[k] = motion->angular_acceleration[k] = 0.0;
   }
   for (int i = 0; i < 6; i++) {
-    double rate = move_drive(&platform->legs[i], motion).rate;
+    double rate = drive_of(platform, i, motion).rate;
     double most = curve_torque(platform, platform->legs[i].motor_ratio * rate);
     torques[i] = clipped(torques[i], least(platform->legs[i].torque_max, most));
     power[i] = torques[i] * rate;
@@ -29,7 +29,7 @@ static void accelerate_by_torques(
   for (int attempt = 0, settled = 0; attempt < MOST_ATTEMPTS && !settled; attempt++) {
     for (int i = 0; i < 6; i++) {
       const stewart_leg * leg = &platform->legs[i];
-      factor[i] = factor_of(leg, power[i], move_drive(leg, motion).rate);
+      factor[i] = factor_of(leg, power[i], drive_of(platform, i, motion).rate);
       changed.legs[i].reflected_mass = leg->reflected_mass / factor[i];
       pushes[i] = leg->motor_ratio * torques[i] / factor[i] + others[i];
     }
@@ -37,7 +37,7 @@ static void accelerate_by_torques(
     settled = 1;
     for (int i = 0; i < 6; i++) {
       const stewart_leg * leg = &platform->legs[i];
-      drive_motion of = move_drive(leg, motion);
+      drive_motion of = drive_of(platform, i, motion);
       double inertial = leg->reflected_mass * of.acceleration;
       double through = (leg->motor_ratio * torques[i] - inertial) / factor[i];
       forces[i] = through + inertial;
@@ -92,12 +92,15 @@ static driven_motion differentiate(
   put3(of.motion.position, read3(state->position));
   put_rotation(state->quaternion, of.motion.rotation);
   put3(of.motion.linear_velocity, velocity), put3(of.motion.angular_velocity, omega);
+  for (int k = 0; k < 3; k++) {
+    of.motion.linear_acceleration[k] = of.motion.angular_acceleration[k] = 0.0;
+  }
   for (int k = 0; k < 6; k++) {load_of_all[k] = plant->wrench[k];}
   for (int i = 0; i < 6; i++) {
-    leg_pose at = pose_of(&platform->legs[i], of.motion.position, of.motion.rotation);
-    double rate = dot(at.direction, add(velocity, cross(omega, at.arm)));
-    stop[i] = stop_force(&plant->stops, i, at.length, rate);
+    measured_leg leg = measured_of(platform, i, &of.motion);
+    stop[i] = stop_force(&plant->stops, i, leg.position, leg.rate);
     if (by_wrench) {
+      leg_line at = line_of(platform, i, of.motion.position, of.motion.rotation);
       double row[6];
       put3(row, at.direction), put3(row + 3, cross(at.arm, at.direction));
       for (int k = 0; k < 6; k++) {load_of_all[k] += stop[i] * row[k];}
@@ -122,20 +125,20 @@ static driven_motion differentiate(
   return of;
 }
 
-/* Write lengths and rates of the legs; return the largest of the angular speed and the speeds of
-   the platform joints by their legs' lengths [1/s]; infinite where a leg has no length. */
+/* Write the positions and rates of the legs; return the largest of the angular speed and of how fast
+   they change [1/s]; infinite where a leg has no length. */
 static double write_legs(
   const stewart_platform * platform, const plant_state * state, one_plant * plant) {
-  double rotation[9];
-  vector velocity = read3(state->twist), omega = read3(state->twist + 3);
-  double fastest = sqrt(dot(omega, omega));
-  put_rotation(state->quaternion, rotation);
+  stewart_motion motion = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}};
+  vector omega = read3(state->twist + 3);
+  double fastest = norm(omega);
+  put3(motion.position, read3(state->position));
+  put3(motion.linear_velocity, read3(state->twist)), put3(motion.angular_velocity, omega);
+  put_rotation(state->quaternion, motion.rotation);
   for (int i = 0; i < 6; i++) {
-    leg_pose at = pose_of(&platform->legs[i], state->position, rotation);
-    vector joint = add(velocity, cross(omega, at.arm));
-    plant->lengths[i] = at.length, plant->rates[i] = dot(at.direction, joint);
-    fastest = 0.0 < at.length && at.length < HUGE_VAL ?
-      largest(fastest, at.per_length * sqrt(dot(joint, joint))) : HUGE_VAL;
+    measured_leg leg = measured_of(platform, i, &motion);
+    plant->lengths[i] = leg.position, plant->rates[i] = leg.rate;
+    fastest = largest(fastest, leg.pace);
   }
   return fastest;
 }

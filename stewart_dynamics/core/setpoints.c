@@ -20,7 +20,7 @@ void solve_setpoints(
   lane_rows wrenches = {setpoints->wrench, NUMBERS(setpoint)};
   lane_rows bases = {(const double *)&setpoints->base, NUMBERS(setpoint)};
   solve_lanes()(platform, count, motions, wrenches, bases, 1, (double *)&outputs->result,
-                NUMBERS(stewart_output));
+                NUMBERS(stewart_output), NUMBERS(stewart_result));
   complete_outputs(platform, count, setpoints, outputs);
 }
 

@@ -34,6 +34,7 @@
 #define RESIDUAL 1e-12             /* of lengths found by the forward kinematics [m] */
 #define NEWTON_STEPS 50            /* 6 at most from nearly everywhere */
 #define HOMOTOPY_STEPS 200         /* of Newton's method in all */
+#define RIGHT_ANGLE 1e-3           /* cosine below which two directions are perpendicular */
 
 /* ---- numbers -------------------------------------------------------------------------------- */
 
@@ -100,31 +101,6 @@ static void put_matrix(real to[9], vector row0, vector row1, vector row2)
 
 /* ---- the forces that move each leg and the platform ----------------------------------------- */
 
-typedef struct {
-  vector arm, direction;      /* a = R p, and s from base joint to platform joint */
-  real length, per_length;    /* L [m], and 1 / L, 0 where L is 0 */
-  real piston_moment;         /* m2 c2 with c2 = L - S2 [kg m] */
-  real across_mass;           /* effective mass across the leg, I_e / L^2 + m_ce [kg] */
-  real gravity_mass;          /* m_ge [kg] */
-} leg_pose;
-
-static leg_pose pose_of(const stewart_leg * leg, const real position[3], const real r[9]) {
-  leg_pose at;
-  double center = leg->cylinder_center_of_mass;
-  double inertia =
-    leg->cylinder_mass * (center * center) + leg->cylinder_inertia + leg->piston_inertia;
-  at.arm = rotate(r, fixed3(leg->platform_joint));
-  vector along = subtract(add(read3(position), at.arm), fixed3(leg->base_joint));
-  at.length = root(dot(along, along));
-  at.per_length = choose(at.length > 0.0, 1.0 / at.length, number(0.0));
-  at.direction = scale(at.per_length, along);
-  real piston_distance = at.length - leg->piston_center_of_mass;
-  at.piston_moment = leg->piston_mass * piston_distance;
-  at.across_mass = (inertia + at.piston_moment * piston_distance) * at.per_length * at.per_length;
-  at.gravity_mass = (leg->cylinder_mass * center + at.piston_moment) * at.per_length;
-  return at;
-}
-
 typedef struct { vector force, moment; } load;  /* moment about the platform's origin */
 
 /* Return Coulomb friction by its full force, at a rate by that below which it is linear. */
@@ -136,111 +112,11 @@ static real move_actuator(const stewart_leg * leg, real rate, real acceleration)
     leg->coulomb_friction * slip(rate / leg->coulomb_velocity);
 }
 
-/* Return the load that moves leg i; write its length, its rate, the force that moves its actuator,
-   and its row of J_inv, moments divided by the characteristic length, with the row's rate. */
-static load move_leg(
-  const stewart_platform * platform, int i, const stewart_motion * motion, real * length,
-  real * rate, real * actuator, real row[6], real row_rate[6]) {
-  const stewart_leg * leg = &platform->legs[i];
-  load moved;
-  vector omega = read3(motion->angular_velocity);
-  leg_pose at = pose_of(leg, motion->position, motion->rotation);
-  real per_length = at.per_length;
-  double inverse_size = 1.0 / platform->characteristic_length;
-  vector a = at.arm, s = at.direction, gravity = fixed3(platform->gravity);
-
-  /* the platform joint's velocity and acceleration (x_i', x_i''), along and across the leg */
-  vector a_rate = cross(omega, a);
-  vector x_rate = add(read3(motion->linear_velocity), a_rate);
-  *length = at.length, *rate = dot(s, x_rate);
-  vector across = subtract(x_rate, scale(*rate, s));
-  real across_squared = dot(across, across);
-  vector turning = cross(read3(motion->angular_acceleration), a);
-  vector x_acc = add(add(read3(motion->linear_acceleration), turning), cross(omega, a_rate));
-  real along_acc = dot(s, x_acc);
-  vector across_acc = subtract(x_acc, scale(along_acc, s));
-  real along_gravity = dot(s, gravity);
-  vector across_gravity = subtract(gravity, scale(along_gravity, s));
-
-  /* M_i, C_i, G_i; skew(s)^2 y is -(y across the leg) */
-  real coriolis_mass = at.piston_moment * per_length - at.across_mass;
-  real along = leg->piston_mass * (along_acc - along_gravity + leg->piston_center_of_mass *
-    per_length * per_length * across_squared);
-  moved.force = scale(at.across_mass, across_acc);
-  moved.force = subtract(moved.force, scale(at.gravity_mass, across_gravity));
-  moved.force = add(moved.force, scale(2.0 * coriolis_mass * *rate * per_length, across));
-  moved.force = add(moved.force, scale(along, s));
-  moved.moment = cross(a, moved.force);
-
-  *actuator = move_actuator(leg, *rate, along_acc + across_squared * per_length);
-
-  vector s_rate = scale(per_length, across);
-  put3(row, s), put3(row + 3, times(inverse_size, cross(a, s))), put3(row_rate, s_rate);
-  put3(row_rate + 3, times(inverse_size, add(cross(a_rate, s), cross(a, s_rate))));
-  return moved;
-}
-
-/* ---- screws that turn with their legs ------------------------------------------------------- */
-
 /* Write the first and return the second derivative of a vector that turns with the platform. */
 static vector turned(vector a, const stewart_motion * motion, vector * rate) {
   vector omega = read3(motion->angular_velocity);
   *rate = cross(omega, a);
   return add(cross(read3(motion->angular_acceleration), a), cross(omega, *rate));
-}
-
-/* q of a drive: the length of its leg, less the extension by the turn of its leg. */
-typedef struct { real position, rate, acceleration; } drive_motion;
-
-static drive_motion move_drive(const stewart_leg * leg, const stewart_motion * motion) {
-  drive_motion drive;
-  leg_pose at = pose_of(leg, motion->position, motion->rotation);
-  vector s = at.direction, a_rate, a_acc = turned(at.arm, motion, &a_rate);
-  vector x_rate = add(read3(motion->linear_velocity), a_rate);
-  vector x_acc = add(read3(motion->linear_acceleration), a_acc);
-  real rate = dot(s, x_rate);
-  double pitch = leg->pitch;
-  vector s_rate = scale(at.per_length, subtract(x_rate, scale(rate, s)));
-  real acc = dot(s, x_acc) + at.length * dot(s_rate, s_rate);
-  drive.position = at.length, drive.rate = rate, drive.acceleration = acc;
-  if (pitch == 0.0) {return drive;}
-  vector s_acc = subtract(subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate));
-  s_acc = scale(at.per_length, s_acc);
-  vector u = fixed3(leg->base_universal_axis), w_rate;
-  vector w = rotate(motion->rotation, fixed3(leg->platform_universal_axis));
-  vector w_acc = turned(w, motion, &w_rate);
-  real us = dot(u, s), us_rate = dot(u, s_rate), us_acc = dot(u, s_acc);
-  real ws = dot(w, s), ws_rate = dot(w_rate, s) + dot(w, s_rate);
-  real ws_acc = dot(w_acc, s) + 2.0 * dot(w_rate, s_rate) + dot(w, s_acc);
-  vector n = cross(u, w), n_rate = cross(u, w_rate), n_acc = cross(u, w_acc);
-  real y = dot(s, n), y_rate = dot(s_rate, n) + dot(s, n_rate);
-  real y_acc = dot(s_acc, n) + 2.0 * dot(s_rate, n_rate) + dot(s, n_acc);
-  real x = dot(u, w) - us * ws, x_turn = dot(u, w_rate) - us_rate * ws - us * ws_rate;
-  real x_turn_rate = dot(u, w_acc) - us_acc * ws - 2.0 * us_rate * ws_rate - us * ws_acc;
-  real inverse = 1.0 / (x * x + y * y);
-  real twist_rate = (x * y_rate - y * x_turn) * inverse;
-  real twist_acc = (x * y_acc - y * x_turn_rate -
-    2.0 * (x * x_turn + y * y_rate) * twist_rate) * inverse;
-  drive.position += pitch * angle(y, x);
-  drive.rate += pitch * twist_rate;
-  drive.acceleration += pitch * twist_acc;
-  return drive;
-}
-
-/* Write the row of J_q of a leg whose screw turns, moments by the characteristic length. */
-static void turning_row(
-  const stewart_platform * platform, int i, const stewart_motion * motion, real row[6]) {
-  const stewart_leg * leg = &platform->legs[i];
-  leg_pose at = pose_of(leg, motion->position, motion->rotation);
-  vector s = at.direction, u = fixed3(leg->base_universal_axis);
-  vector w = rotate(motion->rotation, fixed3(leg->platform_universal_axis));
-  real us = dot(u, s), ws = dot(w, s);
-  double pitch = leg->pitch;
-  real of_u = pitch / (1.0 - us * us), of_w = pitch / (1.0 - ws * ws);
-  vector turn = subtract(scale(us * of_u, cross(s, u)), scale(ws * of_w, cross(s, w)));
-  vector h = add(s, scale(at.per_length, turn));
-  vector moment = add(cross(at.arm, h), scale(of_w, subtract(s, scale(ws, w))));
-  put3(row, h), put3(row + 3, times(1.0 / platform->characteristic_length, moment));
 }
 
 static load move_platform(const stewart_platform * platform, const stewart_motion * motion) {
@@ -278,31 +154,6 @@ static moving_base base_of(const stewart_platform * platform, const stewart_base
   return b;
 }
 
-/* With q = W x s, y the velocity of the platform joint across the leg, and A_b the acceleration of
-   the base joint, less the gravity that is not in g, the force at the platform joint is
-   m_ge A_b + (m2 - m_ge) (s . A_b) s + (I_e / L^2 + m_ce) L (W' x s + W x q + |q|^2 s)
-   - m2 c2 |q|^2 s + 2 m2 c2 / L (L' q - (y . q) s) + 2 (I_e / L^2 + m_ce) (W . s) s x y. */
-static load carry_leg(
-  const stewart_leg * leg, const stewart_motion * motion, const moving_base * base) {
-  load carried;
-  leg_pose at = pose_of(leg, motion->position, motion->rotation);
-  vector s = at.direction, omega = read3(motion->angular_velocity);
-  vector x_rate = add(read3(motion->linear_velocity), cross(omega, at.arm));
-  vector joint = add(base->felt, rotate(base->carrying, fixed3(leg->base_joint)));
-  vector q = cross(base->spin, s);
-  real q_squared = dot(q, q);
-  vector turning = add(rotate(base->carrying, s), scale(q_squared, s));
-  vector coriolis = add(
-    scale(2.0 * at.piston_moment * at.per_length * dot(s, x_rate), q),
-    scale(2.0 * at.across_mass * dot(base->spin, s), cross(s, x_rate)));
-  real along = (leg->piston_mass - at.gravity_mass) * dot(s, joint) -
-    at.piston_moment * (q_squared + 2.0 * at.per_length * dot(x_rate, q));
-  carried.force = add(scale(at.gravity_mass, joint), scale(along, s));
-  carried.force = add(add(carried.force, scale(at.across_mass * at.length, turning)), coriolis);
-  carried.moment = cross(at.arm, carried.force);
-  return carried;
-}
-
 static load carry_platform(
   const stewart_platform * platform, const stewart_motion * motion, const moving_base * base) {
   load carried;
@@ -321,19 +172,6 @@ static load carry_platform(
   carried.force = add(carried.force, times(2.0, cross(base->spin, com_rate)));
   carried.force = times(platform->mass, carried.force);
   carried.moment = add(rotate(r, moment), cross(com, carried.force));
-  return carried;
-}
-
-/* Return the load of the base: it moves platform and legs along with it. */
-static load carry(
-  const stewart_platform * platform, const stewart_motion * motion, const stewart_base * base) {
-  moving_base moving = base_of(platform, base);
-  load carried = carry_platform(platform, motion, &moving);
-  for (int i = 0; i < 6; i++) {
-    load leg = carry_leg(&platform->legs[i], motion, &moving);
-    carried.force = add(carried.force, leg.force);
-    carried.moment = add(carried.moment, leg.moment);
-  }
   return carried;
 }
 
@@ -448,59 +286,9 @@ static real condition_of(real a[6][6], real inverse[6][6]) {
 }
 #endif
 
-/* ---- inverse dynamics ----------------------------------------------------------------------- */
-
-/* Write the result of a motion under a wrench, unchecked; the condition number, half of the work,
-   only if it is wanted. */
-static void solve(
-  const stewart_platform * platform, const stewart_motion * motion, load wrench,
-  int conditioned, stewart_result * result) {
-  real rows[6][6], row_rates[6][6], inverse[6][6], actuators[6], balanced[6];
-  double size = platform->characteristic_length;
-  load moved = move_platform(platform, motion);
-  moved.force = subtract(moved.force, wrench.force);
-  moved.moment = subtract(moved.moment, wrench.moment);
-  for (int i = 0; i < 6; i++) {
-    load leg = move_leg(platform, i, motion, &result->lengths[i], &result->rates[i],
-                        &actuators[i], rows[i], row_rates[i]);
-    moved.force = add(moved.force, leg.force), moved.moment = add(moved.moment, leg.moment);
-    for (int j = 0; j < 6; j++) {inverse[j][i] = rows[i][j];}
-  }
-
-  /* With J the scaled J_inv, row n of (J^T)^-1 maps the wrench to the force of leg n, its length
-     is the largest force of that leg under a unit load, and d(det)/dt = det tr(J^-1 J') is the
-     sum of its products with the rows of J'. */
-  real determinant = invert(inverse), change = number(0.0);
-  put3(balanced, moved.force), put3(balanced + 3, times(1.0 / size, moved.moment));
-  for (int i = 0; i < 6; i++) {
-    result->joint_forces[i] = dot6(inverse[i], balanced);
-    result->forces[i] = result->joint_forces[i] + actuators[i];
-    result->unit_load_forces[i] = root(dot6(inverse[i], inverse[i]));
-    change += dot6(inverse[i], row_rates[i]);
-  }
-  determinant *= size * size * size;
-  result->determinant = determinant, result->determinant_rate = determinant * change;
-  result->condition_number = conditioned ? CONDITION_OF(rows, inverse) : number(0.0);
-  if (platform->legs[0].pitch == 0.0) {return;}
-
-  /* Screws that turn with their legs: J_q^T f = wrench, by virtual work f q'. */
-  for (int i = 0; i < 6; i++) {
-    turning_row(platform, i, motion, rows[i]);
-    for (int j = 0; j < 6; j++) {inverse[j][i] = rows[i][j];}
-  }
-  invert(inverse);
-  for (int i = 0; i < 6; i++) {
-    drive_motion drive = move_drive(&platform->legs[i], motion);
-    result->joint_forces[i] = dot6(inverse[i], balanced);
-    result->forces[i] = result->joint_forces[i] +
-      move_actuator(&platform->legs[i], drive.rate, drive.acceleration);
-    result->unit_load_forces[i] = root(dot6(inverse[i], inverse[i]));
-  }
-}
-
 #ifndef STEWART_LANES
 
-/* ---- one sample: checks --------------------------------------------------------------------- */
+/* ---- one sample: numbers -------------------------------------------------------------------- */
 
 static double least(double a, double b) {return b < a ? b : a;}
 static double largest(double a, double b) {return b > a ? b : a;}
@@ -512,6 +300,260 @@ static int all_finite(const void * doubles, size_t size) {
   while (n < size / sizeof(double) && isfinite(numbers[n])) {n++;}
   return n == size / sizeof(double);
 }
+
+static double norm(vector a) {return sqrt(dot(a, a));}
+
+/* Whether an inertia xx xy xz yy yz zz, with a part of its trace added, is positive definite. */
+static int is_definite(const double i[6], double part) {
+  double added = part * (i[0] + i[3] + i[5]);
+  double xx = i[0] + added, yy = i[3] + added, zz = i[5] + added;
+  double y = yy - i[1] * i[1] / xx, yz = i[4] - i[1] * i[2] / xx;
+  return xx > 0.0 && y > 0.0 && zz - i[2] * i[2] / xx - yz * yz / y > 0.0;
+}
+
+/* Give an axis unit length, unless it has that or is not set. */
+static void put_unit(double axis[3]) {
+  double size = largest(fabs(axis[0]), largest(fabs(axis[1]), fabs(axis[2])));
+  if (!(size > 0.0 && fabs(norm(read3(axis)) - 1.0) > 1e-15)) {return;}
+  vector scaled = make(axis[0] / size, axis[1] / size, axis[2] / size);
+  double length = norm(scaled);
+  put3(axis, make(scaled.x / length, scaled.y / length, scaled.z / length));
+}
+
+/* Whether an axis has a direction, or is not set. */
+static int has_direction(const double axis[3])
+{return axis[0] != 0.0 || axis[1] != 0.0 || axis[2] != 0.0;}
+
+#endif
+
+/* ---- legs ----------------------------------------------------------------------------------- */
+
+/* The line along which a leg pushes the platform joint: a = R p, and the direction d toward it. */
+typedef struct {
+  vector arm, direction;
+  real length, per_length;  /* of the leg, or of its rod [m], and 1 / length, 0 where that is 0 */
+  real lever;               /* effort of the drive by the push along the line */
+} leg_line;
+
+typedef struct { real position, rate, acceleration; } drive_motion;
+
+/* What moves a leg: the load at its platform joint, and the effort of its drive, lever * push +
+   effort. The push along the line differs at its ends. */
+typedef struct {
+  load moved;
+  real position, rate, lever, effort;
+  real near_platform, near_base;  /* added to the push */
+  real row[6], row_rate[6];       /* of J_d, moments by the characteristic length, and its rate */
+} leg_motion;
+
+/* Return the line to the platform joint from an anchor. */
+static leg_line line_from(
+  vector anchor, const stewart_leg * leg, const real position[3], const real r[9]) {
+  leg_line at;
+  at.arm = rotate(r, fixed3(leg->platform_joint));
+  vector along = subtract(add(read3(position), at.arm), anchor);
+  at.length = root(dot(along, along));
+  at.per_length = choose(at.length > 0.0, 1.0 / at.length, number(0.0));
+  at.direction = scale(at.per_length, along);
+  at.lever = number(1.0);
+  return at;
+}
+
+/* A kind of legs is a file of these functions, whose names begin with its prefix:
+   line: the line of force in a pose.
+   move: what moves the leg; base: NULL where it is still.
+   carry: the load at the platform joint that the motion of the base adds to that.
+   drive: the motion of the drive.
+   put, finish: write the numbers of the leg, and of all legs, for pushes along the lines.
+   anchor: where the line begins at a position of the drive; returns its length.
+   straight: the part of a drive's acceleration, times the lever, that is linear in the
+     acceleration of the platform.
+   missing: distance by which the leg misses its platform joint [m].
+   positions, efforts, commands: of the drives, among the results and the outputs.
+   rate_max, lever_ratio: limit of the drive's rate; magnitude of the lever by its largest.
+   complete, check: see stewart_complete, stewart_check.
+   For the library, in the second part of the file: see legs.c. */
+#include "telescopic.h"
+#include "crank.h"
+
+#define CALL(number, NAME, prefix, function, arguments) \
+  case number: prefix ## _ ## function arguments; break;
+#define CALL_EACH(number, NAME, prefix, function, arguments) \
+  case number: for (int i = 0; i < 6; i++) {prefix ## _ ## function arguments;} break;
+#define RETURN(number, NAME, prefix, function, arguments) \
+  case number: return prefix ## _ ## function arguments;
+
+/* Write what moves the legs; all legs at once, so that the loop is that of one kind. */
+static void move_legs(
+  const stewart_platform * platform, const stewart_motion * motion, const moving_base * base,
+  leg_motion legs[6]) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(CALL_EACH, move, (platform, i, motion, base, &legs[i]))
+  }
+}
+
+static load carry_leg(
+  const stewart_platform * platform, int i, const stewart_motion * motion,
+  const moving_base * base) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, carry, (&platform->legs[i], motion, base))
+  }
+}
+
+/* Write the numbers of the legs for pushes along the lines. */
+static void put_legs(
+  const stewart_platform * platform, const leg_motion legs[6], const real pushes[6],
+  stewart_result * result) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(CALL_EACH, put, (platform, i, &legs[i], pushes[i], result))
+  }
+}
+
+static void finish_legs(
+  const stewart_platform * platform, const stewart_motion * motion, const real balanced[6],
+  stewart_result * result) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(CALL, finish, (platform, motion, balanced, result))
+  }
+}
+
+#ifndef STEWART_LANES
+
+static leg_line line_of(
+  const stewart_platform * platform, int i, const real position[3], const real r[9]) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, line, (&platform->legs[i], position, r))
+  }
+}
+
+static drive_motion drive_of(
+  const stewart_platform * platform, int i, const stewart_motion * motion) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, drive, (&platform->legs[i], motion))
+  }
+}
+
+static double anchor_of(
+  const stewart_platform * platform, int i, double position, vector * anchor) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, anchor, (&platform->legs[i], position, anchor))
+  }
+}
+
+static double straight_of(
+  const stewart_platform * platform, int i, const stewart_motion * motion, vector x_rate,
+  double rate, double acceleration) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, straight, (
+      &platform->legs[i], motion->position, motion->rotation, x_rate, rate, acceleration))
+  }
+}
+
+static double missing_distance(
+  const stewart_platform * platform, int i, const double position[3], const double r[9]) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, missing, (&platform->legs[i], position, r))
+  }
+}
+
+static double * positions_of(const stewart_platform * platform, stewart_result * result) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, positions, (result))
+  }
+}
+
+static double * efforts_of(const stewart_platform * platform, stewart_result * result) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, efforts, (result))
+  }
+}
+
+static double * commands_of(const stewart_platform * platform, stewart_output * output) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, commands, (output))
+  }
+}
+
+static double rate_max_of(const stewart_platform * platform, int i) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, rate_max, (&platform->legs[i]))
+  }
+}
+
+static double lever_ratio_of(const stewart_platform * platform, int i, double lever) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, lever_ratio, (&platform->legs[i], lever))
+  }
+}
+
+static void complete_leg(int kind, stewart_leg * leg) {
+  switch (kind) {
+    default: STEWART_LEG_KINDS(CALL, complete, (leg))
+  }
+}
+
+static int check_kind(const stewart_platform * platform, const stewart_leg * leg) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, check, (platform, leg))
+  }
+}
+
+#endif
+
+/* ---- inverse dynamics ----------------------------------------------------------------------- */
+
+/* Return the load that the motion of the base adds to what moves platform and legs. */
+static load carry(
+  const stewart_platform * platform, const stewart_motion * motion, const moving_base * base) {
+  load carried = carry_platform(platform, motion, base);
+  for (int i = 0; i < 6; i++) {
+    load leg = carry_leg(platform, i, motion, base);
+    carried.force = add(carried.force, leg.force);
+    carried.moment = add(carried.moment, leg.moment);
+  }
+  return carried;
+}
+
+/* Write the result of a motion under a wrench, unchecked; the condition number, half of the work,
+   only if it is wanted. base: NULL, or one whose load on platform and legs is in the wrench.
+   Numbers that other kinds of legs have are not written. */
+static void solve(
+  const stewart_platform * platform, const stewart_motion * motion, load wrench,
+  const moving_base * base, int conditioned, stewart_result * result) {
+  leg_motion legs[6];
+  real rows[6][6], inverse[6][6], balanced[6], pushes[6];
+  double size = platform->characteristic_length;
+  load moved = move_platform(platform, motion);
+  moved.force = subtract(moved.force, wrench.force);
+  moved.moment = subtract(moved.moment, wrench.moment);
+  move_legs(platform, motion, base, legs);
+  for (int i = 0; i < 6; i++) {
+    const leg_motion * leg = &legs[i];
+    moved.force = add(moved.force, leg->moved.force);
+    moved.moment = add(moved.moment, leg->moved.moment);
+    for (int j = 0; j < 6; j++) {inverse[j][i] = rows[i][j] = leg->row[j];}
+  }
+
+  /* With J the scaled J_d, row n of (J^T)^-1 maps the wrench to the push of leg n, its length
+     is the largest push of that leg under a unit load, and d(det)/dt = det tr(J^-1 J') is the
+     sum of its products with the rows of J'. */
+  real determinant = invert(inverse), change = number(0.0);
+  put3(balanced, moved.force), put3(balanced + 3, times(1.0 / size, moved.moment));
+  for (int i = 0; i < 6; i++) {
+    pushes[i] = dot6(inverse[i], balanced);
+    result->unit_load_forces[i] = root(dot6(inverse[i], inverse[i]));
+    change += dot6(inverse[i], legs[i].row_rate);
+  }
+  put_legs(platform, legs, pushes, result);
+  determinant *= size * size * size;
+  result->determinant = determinant, result->determinant_rate = determinant * change;
+  result->condition_number = conditioned ? CONDITION_OF(rows, inverse) : number(0.0);
+  finish_legs(platform, motion, balanced, result);
+}
+
+#ifndef STEWART_LANES
+
+/* ---- one sample: checks --------------------------------------------------------------------- */
 
 static int check_rotation(const double r[9]) {
   vector x = column(r, 0), y = column(r, 1), z = column(r, 2);
@@ -533,14 +575,6 @@ int stewart_rotation(const double quaternion[4], double rotation[9]) {
     make(2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
     make(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)));
   return STEWART_OK;
-}
-
-/* Whether an inertia xx xy xz yy yz zz, with a part of its trace added, is positive definite. */
-static int is_definite(const double i[6], double part) {
-  double added = part * (i[0] + i[3] + i[5]);
-  double xx = i[0] + added, yy = i[3] + added, zz = i[5] + added;
-  double y = yy - i[1] * i[1] / xx, yz = i[4] - i[1] * i[2] / xx;
-  return xx > 0.0 && y > 0.0 && zz - i[2] * i[2] / xx - yz * yz / y > 0.0;
 }
 
 int stewart_add_payload(
@@ -576,6 +610,34 @@ int stewart_add_payload(
 
 /* ---- one sample: inverse dynamics ----------------------------------------------------------- */
 
+/* Whether all legs reach their platform joints. */
+static int reaches(
+  const stewart_platform * platform, const double position[3], const double r[9]) {
+  int reached = 1;
+  for (int i = 0; i < 6; i++) {
+    reached = reached && !(missing_distance(platform, i, position, r) > 0.0);
+  }
+  return reached;
+}
+
+int stewart_missing_distances(
+  const stewart_platform * platform, const stewart_pose * pose, double distances[6]) {
+  if (!platform || !pose || !distances) {return STEWART_NULL;}
+  if (!all_finite(pose, sizeof *pose)) {return STEWART_NOT_FINITE;}
+  int code = check_rotation(pose->rotation);
+  for (int i = 0; code == STEWART_OK && i < 6; i++) {
+    distances[i] = missing_distance(platform, i, pose->position, pose->rotation);
+  }
+  return code;
+}
+
+/* Set the numbers that some kinds of legs do not have to zero. */
+static void clear_result(stewart_result * result) {
+  for (int i = 0; i < 6; i++) {
+    result->angles[i] = result->speeds[i] = result->torques[i] = result->levers[i] = 0.0;
+  }
+}
+
 int stewart_inverse_dynamics(
   const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
   const stewart_base * base, stewart_result * result) {
@@ -588,16 +650,24 @@ int stewart_inverse_dynamics(
   int code = check_rotation(motion->rotation);
   if (code != STEWART_OK) {return code;}
   if (wrench) {external.force = read3(wrench), external.moment = read3(wrench + 3);}
+  moving_base moving;
   if (base) {
-    load carried = carry(platform, motion, base);
+    moving = base_of(platform, base);
+    load carried = carry(platform, motion, &moving);
     external.force = subtract(external.force, carried.force);
     external.moment = subtract(external.moment, carried.moment);
   }
-  solve(platform, motion, external, 1, &found);
-  if (!all_finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
+  clear_result(&found);
+  solve(platform, motion, external, base ? &moving : NULL, 1, &found);
+  if (!all_finite(&found, sizeof found)) {
+    return reaches(platform, motion->position, motion->rotation) ? STEWART_OUT_OF_RANGE :
+      STEWART_UNREACHABLE;
+  }
   *result = found;
   if (found.condition_number < UNSOLVABLE_CONDITION) {return STEWART_OK;}
-  for (int i = 0; i < 6; i++) {result->forces[i] = result->joint_forces[i] = 0.0;}
+  for (int i = 0; i < 6; i++) {
+    result->forces[i] = result->joint_forces[i] = result->torques[i] = 0.0;
+  }
   return STEWART_SINGULAR;
 }
 
@@ -620,7 +690,7 @@ static vector shortest_of(vector gap, vector s, vector t, double u, double u_end
 
 /* Distance between the surfaces of two legs [m], a cylinder and a thinner piston each. */
 static double clearance_of(
-  const stewart_leg * a, const stewart_leg * b, const leg_pose * p, const leg_pose * q) {
+  const stewart_leg * a, const stewart_leg * b, const leg_line * p, const leg_line * q) {
   vector s = p->direction, t = q->direction, normal = cross(s, t);
   vector gap = subtract(read3(a->base_joint), read3(b->base_joint));
   double square = dot(normal, normal), clearance = HUGE_VAL;
@@ -636,8 +706,6 @@ static double clearance_of(
   }
   return clearance;
 }
-
-static double norm(vector a) {return sqrt(dot(a, a));}
 
 /* Return the shortest vector from a segment q to a segment p. */
 static vector between(vector p, vector p_end, vector q, vector q_end) {
@@ -697,7 +765,7 @@ static void keep_nearest(
 /* A plate limits the clearance of parts that are not joined to it: the moving one that of the
    cylinders, the one of the base that of the pistons, from the end of the cylinder on. */
 static void put_plates(
-  const stewart_platform * platform, const stewart_motion * motion, const leg_pose at[6],
+  const stewart_platform * platform, const stewart_motion * motion, const leg_line at[6],
   double clearances[6], int64_t nearest[6]) {
   for (int i = 0; i < 6; i++) {
     const stewart_leg * leg = &platform->legs[i];
@@ -726,9 +794,9 @@ static void put_plates(
 static void put_clearances(
   const stewart_platform * platform, const stewart_motion * motion, double clearances[6],
   int64_t nearest[6]) {
-  leg_pose at[6];
+  leg_line at[6];
   for (int i = 0; i < 6; i++) {
-    at[i] = pose_of(&platform->legs[i], motion->position, motion->rotation);
+    at[i] = line_of(platform, i, motion->position, motion->rotation);
     clearances[i] = HUGE_VAL, nearest[i] = i;
   }
   for (int i = 0; i < 6; i++) {
@@ -747,7 +815,7 @@ static void put_joint_angles(
   double platform_angles[6]) {
   for (int i = 0; i < 6; i++) {
     const stewart_leg * leg = &platform->legs[i];
-    vector s = pose_of(leg, motion->position, motion->rotation).direction;
+    vector s = line_of(platform, i, motion->position, motion->rotation).direction;
     base_angles[i] = joint_angle(leg->base_joint_axis, s);
     platform_angles[i] = joint_angle(
       leg->platform_joint_axis, rotate_back(motion->rotation, s));
@@ -785,13 +853,13 @@ static double curve_torque(const stewart_platform * platform, double speed) {
 static double clipped(double value, double most)
 {return value > most ? most : value < -most ? -most : value;}
 
-/* Write the motors of demanded forces; commands are those of the forces to command. */
+/* Write the motors of demanded efforts; their commands are those of the efforts to command. */
 static void put_motors(
   const stewart_platform * platform, const stewart_motion * motion, const double demanded[6],
-  const double forces[6], stewart_motors * motors) {
+  const double commands[6], stewart_motors * motors) {
   for (int i = 0; i < 6; i++) {
     const stewart_leg * leg = &platform->legs[i];
-    drive_motion of = move_drive(leg, motion);
+    drive_motion of = drive_of(platform, i, motion);
     double ratio = leg->motor_ratio, mass = leg->reflected_mass, speed = ratio * of.rate;
     double acceleration = ratio * of.acceleration, own = mass / ratio / ratio * acceleration;
     double through = demanded[i] - mass * of.acceleration;
@@ -802,7 +870,7 @@ static void put_motors(
       breakaway = fabs(other) > fabs(breakaway) ? other : breakaway;
     }
     double available = least(leg->torque_max, curve_torque(platform, speed));
-    double command = own + screw_torque(leg, forces[i] - mass * of.acceleration, of.rate);
+    double command = own + screw_torque(leg, commands[i] - mass * of.acceleration, of.rate);
     double current = torque / leg->torque_constant;
     double heat = leg->resistance * current * current;
     motors->angles[i] = ratio * (of.position - leg->zero_length);
@@ -819,12 +887,12 @@ static void put_motors(
 }
 
 int stewart_motor_torques(
-  const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
+  const stewart_platform * platform, const stewart_motion * motion, const double efforts[6],
   stewart_motors * motors) {
   stewart_motors found;
-  if (!platform || !motion || !forces || !motors) {return STEWART_NULL;}
-  if (!(platform->legs[0].screw_lead > 0.0)) {return STEWART_NO_MOTORS;}
-  put_motors(platform, motion, forces, forces, &found);
+  if (!platform || !motion || !efforts || !motors) {return STEWART_NULL;}
+  if (isnan(platform->legs[0].motor_ratio)) {return STEWART_NO_MOTORS;}
+  put_motors(platform, motion, efforts, efforts, &found);
   if (!all_finite(found.angles, sizeof found.angles) ||
       !all_finite(found.speeds, sizeof found.speeds) ||
       !all_finite(found.torques, sizeof found.torques) ||
@@ -842,10 +910,10 @@ static double warmed(
 
 /* Return the bit of a limit if a value is past it, above rounding errors; nan never is. */
 static unsigned above(double value, double most, unsigned bit)
-{return value > most * (1.0 + LIMIT_TOLERANCE) ? bit : 0u;}
+{return value > most * (1.0 + copysign(LIMIT_TOLERANCE, most)) ? bit : 0u;}
 
 static unsigned below(double value, double minimum, unsigned bit)
-{return value < minimum * (1.0 - LIMIT_TOLERANCE) ? bit : 0u;}
+{return value < minimum * (1.0 - copysign(LIMIT_TOLERANCE, minimum)) ? bit : 0u;}
 
 enum { POSE, TWIST, LOAD, MOTOR };  /* what the quantity of a limit depends on */
 
@@ -863,11 +931,14 @@ static unsigned check_leg(
 #define MINIMUM(bit, NAME, field, DEPENDS, quantity) \
   exceeded |= below(found->quantity[i], leg->field, bit);
 #define MAXIMUM(bit, NAME, field, DEPENDS, quantity) \
+  exceeded |= above(found->quantity[i], leg->field, bit);
+#define LARGEST(bit, NAME, field, DEPENDS, quantity) \
   exceeded |= above(fabs(found->quantity[i]), leg->field, bit); \
   of_motors |= DEPENDS == MOTOR ? bit : 0u;
-  STEWART_LIMITS(MINIMUM, MAXIMUM)
+  STEWART_LIMITS(MINIMUM, MAXIMUM, LARGEST)
 #undef MINIMUM
 #undef MAXIMUM
+#undef LARGEST
   return found->finite_motors > 0.0 ? exceeded : exceeded & ~of_motors;
 }
 
@@ -906,9 +977,13 @@ static void complete_loads(
   to->solved = known && result->condition_number < UNSOLVABLE_CONDITION;
   for (int i = 0; i < 6; i++) {
     const stewart_leg * leg = &platform->legs[i];
-    if (to->solved == 0.0) {result->forces[i] = result->joint_forces[i] = NAN;}
-    to->positions[i] = result->lengths[i] - leg->zero_length;
+    if (to->solved == 0.0) {
+      result->forces[i] = result->joint_forces[i] = efforts_of(platform, result)[i] = NAN;
+    }
+    to->positions[i] = positions_of(platform, result)[i] - leg->zero_length;
+    to->lever_ratios[i] = lever_ratio_of(platform, i, result->levers[i]);
     to->forces[i] = clipped(result->forces[i], leg->force_max);
+    to->torques[i] = clipped(result->torques[i], leg->crank_torque_max);
     to->base_joint_angles[i] = to->platform_joint_angles[i] = to->clearances[i] = NAN;
     to->rises[i] = NAN, to->nearest[i] = i, to->exceeded[i] = 0;
   }
@@ -917,7 +992,7 @@ static void complete_loads(
     fill_nan(to->motors.angles, sizeof to->motors);
     return;
   }
-  put_motors(platform, motion, result->forces, to->forces, &to->motors);
+  put_motors(platform, motion, efforts_of(platform, result), commands_of(platform, to), &to->motors);
   int finite = all_finite(to->motors.angles, sizeof to->motors.angles) &&
     all_finite(to->motors.speeds, sizeof to->motors.speeds);
   for (int i = 0; i < 6; i++) {finite = finite && !isinf(to->motors.breakaway_torques[i]);}
@@ -949,11 +1024,14 @@ static void heat_windings(
 }
 
 /* Keep an output as the one before the next. */
-static void keep_output(const stewart_output * from, int64_t stamp, stewart_state * state) {
+static void keep_output(
+  const stewart_platform * platform, stewart_output * from, int64_t stamp,
+  stewart_state * state) {
+  const double * positions = positions_of(platform, &from->result);
   state->followed = 1, state->stamp = stamp;
   for (int i = 0; i < 6; i++) {
     double heat = from->motors.copper_heat[i];
-    state->lengths[i] = from->result.lengths[i], state->rises[i] = from->rises[i];
+    state->lengths[i] = positions[i], state->rises[i] = from->rises[i];
     state->copper_heat[i] = isfinite(heat) ? heat : state->copper_heat[i];
   }
 }
@@ -983,18 +1061,19 @@ static void advance_step(
   }
   if (platform->with_motors) {heat_windings(platform, since, state, to);}
   unsigned any = 0;
+  const double * positions = positions_of(platform, &to->result);
   for (int i = 0; i < 6; i++) {
-    double way = first ? (double)NAN : to->result.lengths[i] - state->lengths[i];
+    double way = first ? (double)NAN : positions[i] - state->lengths[i];
     to->mean_rates[i] = way / elapsed;
     to->exceeded[i] = check_leg(platform, to, i) |
-      above(fabs(way), platform->legs[i].velocity_max * elapsed, STEWART_JUMP);
+      above(fabs(way), rate_max_of(platform, i) * elapsed, STEWART_JUMP);
     any |= to->exceeded[i];
   }
   to->jumped = (any & STEWART_JUMP) != 0, to->exceeding = any != 0;
-  if (to->jumped == 0.0) {keep_output(to, stamp, state);}
+  if (to->jumped == 0.0) {keep_output(platform, to, stamp, state);}
   if (to->solved == 0.0 || (state->stopped && platform->suppress_near_singularity) ||
       ((any & ~(unsigned)STEWART_CLIPPED) && platform->suppress_at_limits)) {
-    for (int i = 0; i < 6; i++) {to->forces[i] = to->motors.commands[i] = NAN;}
+    for (int i = 0; i < 6; i++) {to->forces[i] = to->torques[i] = to->motors.commands[i] = NAN;}
   }
 }
 
@@ -1010,8 +1089,10 @@ int stewart_step(
   advance_step(platform, stamp, JITTER + platform->sync_tolerance, 0, state, &found);
   if (code == STEWART_OK && isnan(found.forces[0])) {code = STEWART_SUPPRESSED;}
   for (int i = 0; code != STEWART_OK && i < 6; i++) {
-    found.forces[i] = found.motors.commands[i] = 0.0;
-    if (code == STEWART_SINGULAR) {found.result.forces[i] = found.result.joint_forces[i] = 0.0;}
+    found.forces[i] = found.torques[i] = found.motors.commands[i] = 0.0;
+    if (code == STEWART_SINGULAR) {
+      found.result.forces[i] = found.result.joint_forces[i] = found.result.torques[i] = 0.0;
+    }
   }
   *output = found;
   return code;
@@ -1045,34 +1126,18 @@ static double mean_radius(const stewart_platform * platform, double * extent) {
   return sum / 6.0;
 }
 
-/* Give an axis unit length, unless it has that or is not set. */
-static void put_unit(double axis[3]) {
-  double size = largest(fabs(axis[0]), largest(fabs(axis[1]), fabs(axis[2])));
-  if (!(size > 0.0 && fabs(norm(read3(axis)) - 1.0) > 1e-15)) {return;}
-  vector scaled = make(axis[0] / size, axis[1] / size, axis[2] / size);
-  double length = norm(scaled);
-  put3(axis, make(scaled.x / length, scaled.y / length, scaled.z / length));
-}
-
 void stewart_complete(stewart_platform * platform) {
   double extent, radius = mean_radius(platform, &extent);
   if (!(platform->characteristic_length > 0.0)) {platform->characteristic_length = radius;}
   platform->with_joint_angles = 0;
+  platform->leg_kind = platform->legs[0].crank_length > 0.0 ? STEWART_CRANK : STEWART_TELESCOPIC;
   platform->with_clearance = isfinite(platform->leg_clearance_min);
   for (int i = 0; i < 6; i++) {
     stewart_leg * leg = &platform->legs[i];
-    double gear = leg->gear_ratio, ratio = leg->screw_lead > 0.0 ?
-      2.0 * PI * gear / leg->screw_lead : (double)NAN;
     if (isnan(leg->back_driving_efficiency)) {
       leg->back_driving_efficiency = 2.0 - 1.0 / leg->efficiency;
     }
-    if (leg->screw_lead > 0.0 && (leg->motor_inertia > 0.0 || leg->screw_inertia > 0.0)) {
-      leg->reflected_mass =
-        ratio * ratio * (leg->motor_inertia + leg->screw_inertia / (gear * gear));
-    }
-    leg->motor_ratio = ratio;
-    leg->pitch = leg->twist_ratio == 0.0 ? 0.0 :
-      leg->twist_ratio * leg->screw_lead / (2.0 * PI * gear);
+    complete_leg(platform->leg_kind, leg);
     leg->driving_loss = 1.0 / leg->efficiency - 1.0;
     leg->driven_loss = leg->back_driving_efficiency - 1.0;
     leg->loss_velocity = leg->coulomb_velocity;
@@ -1117,12 +1182,7 @@ static int check_plate(int count, const double (* plate)[3]) {
   return least_turn < -FLATNESS || around > 3.0 * PI ? STEWART_RULE_CONVEX : STEWART_VALID;
 }
 
-/* Whether an axis has a direction, or is not set. */
-static int has_direction(const double axis[3])
-{return axis[0] != 0.0 || axis[1] != 0.0 || axis[2] != 0.0;}
-
-static int check_drive(const stewart_platform * platform, const stewart_leg * leg) {
-  if (platform->with_motors && !(leg->screw_lead > 0.0)) {return STEWART_RULE_SCREW_LEAD;}
+static int check_drive(const stewart_leg * leg) {
   if (!(leg->efficiency > 0.0 && leg->efficiency <= 1.0)) {return STEWART_RULE_EFFICIENCY;}
   if (isfinite(leg->resistance) && isnan(leg->torque_constant)) {return STEWART_RULE_RESISTANCE;}
   if (isfinite(leg->thermal_resistance) &&
@@ -1135,35 +1195,31 @@ static int check_drive(const stewart_platform * platform, const stewart_leg * le
   if (isfinite(leg->temperature_rise_max) && isnan(leg->thermal_resistance)) {
     return STEWART_RULE_TEMPERATURE_RISE;
   }
-  if (!has_direction(leg->base_universal_axis)) {return STEWART_RULE_BASE_UNIVERSAL;}
-  return has_direction(leg->platform_universal_axis) ? STEWART_VALID :
-    STEWART_RULE_PLATFORM_UNIVERSAL;
+  return STEWART_VALID;
 }
 
 static int check_leg_rules(const stewart_platform * platform, const stewart_leg * leg) {
   int limits = 1;
-#define MINIMUM(bit, NAME, field, DEPENDS, quantity) limits = limits && leg->field >= 0.0;
-#define MAXIMUM(bit, NAME, field, DEPENDS, quantity) limits = limits && leg->field > 0.0;
-  STEWART_LIMITS(MINIMUM, MAXIMUM)
-#undef MINIMUM
-#undef MAXIMUM
-  if (!all_finite(leg->base_joint, 6 * sizeof(double)) || !isfinite(leg->zero_length) ||
-      !isfinite(leg->cylinder_center_of_mass) || !isfinite(leg->piston_center_of_mass)) {
+#define BOUND(bit, NAME, field, DEPENDS, quantity) limits = limits && !isnan(leg->field);
+#define LARGEST(bit, NAME, field, DEPENDS, quantity) limits = limits && leg->field > 0.0;
+  STEWART_LIMITS(BOUND, BOUND, LARGEST)
+#undef BOUND
+#undef LARGEST
+  if (!all_finite(leg->base_joint, 6 * sizeof(double)) || !isfinite(leg->zero_length)) {
     return STEWART_RULE_FINITE;
   }
-  if (!(leg->cylinder_mass >= 0.0 && leg->piston_mass >= 0.0 && leg->cylinder_inertia >= 0.0 &&
-        leg->piston_inertia >= 0.0)) {return STEWART_RULE_LEG_MASS;}
   if (!(leg->reflected_mass >= 0.0 && leg->viscous_friction >= 0.0 &&
         leg->coulomb_friction >= 0.0)) {return STEWART_RULE_ACTUATOR;}
   if (!(leg->coulomb_velocity > 0.0)) {return STEWART_RULE_COULOMB_VELOCITY;}
   if (!limits) {return STEWART_RULE_LIMIT;}
-  if (!(leg->length_min < leg->length_max)) {return STEWART_RULE_LENGTHS;}
-  if (platform->with_clearance && !(leg->cylinder_radius >= 0.0 && leg->cylinder_length >= 0.0 &&
-                                    leg->piston_radius >= 0.0)) {return STEWART_RULE_SHAPE;}
-  if (leg->piston_radius > leg->cylinder_radius) {return STEWART_RULE_RADII;}
+  if ((leg->crank_length > 0.0) != (platform->legs[0].crank_length > 0.0)) {
+    return STEWART_RULE_KIND;
+  }
+  int rule = check_kind(platform, leg);
+  if (rule != STEWART_VALID) {return rule;}
   if (!has_direction(leg->base_joint_axis)) {return STEWART_RULE_BASE_AXIS;}
   if (!has_direction(leg->platform_joint_axis)) {return STEWART_RULE_PLATFORM_AXIS;}
-  return check_drive(platform, leg);
+  return check_drive(leg);
 }
 
 /* Whether an array of this size has room for a count of points, each of some numbers. */
@@ -1214,15 +1270,20 @@ int stewart_check(const stewart_platform * platform, int * where) {
 
 /* ---- twist and acceleration from the legs --------------------------------------------------- */
 
-/* Write the scaled J_inv, its inverse and the legs at a pose; return the determinant. */
-static double scaled_jacobian(
+static void lines_at(
   const stewart_platform * platform, const double position[3], const double rotation[9],
-  leg_pose legs[6], double rows[6][6], double inverse[6][6]) {
+  leg_line lines[6]) {
+  for (int i = 0; i < 6; i++) {lines[i] = line_of(platform, i, position, rotation);}
+}
+
+/* Write the scaled J_d of lines, and its inverse; return the determinant. */
+static double scaled_jacobian(
+  const stewart_platform * platform, const leg_line lines[6], double rows[6][6],
+  double inverse[6][6]) {
   double per_size = 1.0 / platform->characteristic_length;
   for (int i = 0; i < 6; i++) {
-    legs[i] = pose_of(&platform->legs[i], position, rotation);
-    put3(rows[i], legs[i].direction);
-    put3(rows[i] + 3, scale(per_size, cross(legs[i].arm, legs[i].direction)));
+    put3(rows[i], lines[i].direction);
+    put3(rows[i] + 3, scale(per_size, cross(lines[i].arm, lines[i].direction)));
     for (int j = 0; j < 6; j++) {inverse[i][j] = rows[i][j];}
   }
   return invert(inverse);
@@ -1238,18 +1299,27 @@ static int solvable(double rows[6][6], double inverse[6][6]) {
   return sqrt(of_rows * of_inverse) < UNSOLVABLE_CONDITION;
 }
 
-/* Write the linear and the angular part whose product with J_inv is six numbers of the legs. */
-static void from_legs(
-  const stewart_platform * platform, double inverse[6][6], const double of_legs[6],
+/* Write the linear and the angular part whose product with J_d is six numbers of the lines. */
+static void from_lines(
+  const stewart_platform * platform, double inverse[6][6], const double of_lines[6],
   double linear[3], double angular[3]) {
   double per_size = 1.0 / platform->characteristic_length;
   for (int n = 0; n < 3; n++) {
-    linear[n] = dot6(inverse[n], of_legs);
-    angular[n] = per_size * dot6(inverse[3 + n], of_legs);
+    linear[n] = dot6(inverse[n], of_lines);
+    angular[n] = per_size * dot6(inverse[3 + n], of_lines);
   }
 }
 
-/* J_inv X' = L', and J_inv X'' = L'' - |x' across the leg|^2 / L - s . (w x (w x a)). */
+/* Write the twist of rates of the drives: J_d X' = lever q'. */
+static void put_twist(
+  const stewart_platform * platform, const leg_line lines[6], double inverse[6][6],
+  const double rates[6], stewart_motion * motion) {
+  double along[6];
+  for (int i = 0; i < 6; i++) {along[i] = lines[i].lever * rates[i];}
+  from_lines(platform, inverse, along, motion->linear_velocity, motion->angular_velocity);
+}
+
+/* J_d X'' = straight part of q'' - d . (w x (w x a)). */
 int stewart_motion_of_legs(
   const stewart_platform * platform, const double rates[6], const double accelerations[6],
   stewart_motion * motion) {
@@ -1259,21 +1329,22 @@ int stewart_motion_of_legs(
       !all_finite(motion, sizeof(stewart_pose))) {return STEWART_NOT_FINITE;}
   int code = check_rotation(motion->rotation);
   if (code != STEWART_OK) {return code;}
-  leg_pose legs[6];
+  if (!reaches(platform, motion->position, motion->rotation)) {return STEWART_UNREACHABLE;}
+  leg_line lines[6];
   stewart_motion found = *motion;
   double rows[6][6], inverse[6][6], straight[6];
-  scaled_jacobian(platform, found.position, found.rotation, legs, rows, inverse);
+  lines_at(platform, found.position, found.rotation, lines);
+  scaled_jacobian(platform, lines, rows, inverse);
   if (!solvable(rows, inverse)) {return STEWART_SINGULAR;}
-  from_legs(platform, inverse, rates, found.linear_velocity, found.angular_velocity);
+  put_twist(platform, lines, inverse, rates, &found);
   vector omega = read3(found.angular_velocity);
   for (int i = 0; i < 6; i++) {
-    vector of_joint = cross(omega, legs[i].arm);
+    vector of_joint = cross(omega, lines[i].arm);
     vector x_rate = add(read3(found.linear_velocity), of_joint);
-    double along = dot(legs[i].direction, x_rate);
-    straight[i] = accelerations[i] - (dot(x_rate, x_rate) - along * along) * legs[i].per_length -
-      dot(legs[i].direction, cross(omega, of_joint));
+    straight[i] = straight_of(platform, i, &found, x_rate, rates[i], accelerations[i]) -
+      dot(lines[i].direction, cross(omega, of_joint));
   }
-  from_legs(platform, inverse, straight, found.linear_acceleration, found.angular_acceleration);
+  from_lines(platform, inverse, straight, found.linear_acceleration, found.angular_acceleration);
   if (!all_finite(&found, sizeof found)) {return STEWART_OUT_OF_RANGE;}
   *motion = found;
   return STEWART_OK;
@@ -1306,22 +1377,24 @@ static void turn_by(vector turn, const double r[9], double turned[9]) {
   }
 }
 
-/* Newton's method from a pose, which becomes the one found; adds its steps to the count, and
-   writes by how much a length differs at most [m]. */
+/* Newton's method from a pose, which becomes the one found, for lines of these lengths; adds its
+   steps to the count, and writes by how much a length differs at most [m]. */
 static int newton(
-  const stewart_platform * platform, const double lengths[6], stewart_pose * pose, int * count,
-  double * largest_error) {
+  const stewart_platform * platform, const vector anchors[6], const double lengths[6],
+  stewart_pose * pose, int * count, double * largest_error) {
   double per_size = 1.0 / platform->characteristic_length;
   stewart_pose from = *pose, at = *pose;  /* the last pose accepted, and the one tried */
   double before = HUGE_VAL, residual = HUGE_VAL, side = 0.0, part = 1.0;
   *largest_error = residual;
   double step[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   for (int steps = 0; steps < NEWTON_STEPS; steps++, ++*count) {
-    leg_pose legs[6];
+    leg_line lines[6];
     double rows[6][6], inverse[6][6], error[6];
-    double determinant = scaled_jacobian(
-      platform, at.position, at.rotation, legs, rows, inverse);
-    for (int i = 0; i < 6; i++) {error[i] = lengths[i] - legs[i].length;}
+    for (int i = 0; i < 6; i++) {
+      lines[i] = line_from(anchors[i], &platform->legs[i], at.position, at.rotation);
+      error[i] = lengths[i] - lines[i].length;
+    }
+    double determinant = scaled_jacobian(platform, lines, rows, inverse);
     double squares = dot6(error, error);
     /* Rejected: on the other side of a singularity, or much farther from the lengths. A long
        first step may overshoot and still be the fastest. */
@@ -1346,21 +1419,24 @@ static int newton(
   return STEWART_NO_POSE;
 }
 
-/* Find the pose of lengths from a guess; write the steps of Newton's method, and by how much a
-   length differs at most [m]. */
+/* Find the pose of the drives' positions from a guess; write the steps of Newton's method, and by
+   how much the length of a line differs at most [m]. */
 static int find_pose(
-  const stewart_platform * platform, const double lengths[6], stewart_pose * pose, int * steps,
+  const stewart_platform * platform, const double positions[6], stewart_pose * pose, int * steps,
   double * residual) {
-  double squares[6], done = 0.0, way = 0.25, error;
+  double lengths[6], squares[6], done = 0.0, way = 0.25, error;
+  vector anchors[6];
   stewart_pose found = *pose;
   orthonormalize(found.rotation);
   orthonormalize(found.rotation);  /* twice: a guess may be 1e-6 off */
   for (int i = 0; i < 6; i++) {
-    double length = pose_of(&platform->legs[i], found.position, found.rotation).length;
+    lengths[i] = anchor_of(platform, i, positions[i], &anchors[i]);
+    double length =
+      line_from(anchors[i], &platform->legs[i], found.position, found.rotation).length;
     squares[i] = length * length;
   }
   *steps = 0;
-  int code = newton(platform, lengths, &found, steps, residual), more = 0;
+  int code = newton(platform, anchors, lengths, &found, steps, residual), more = 0;
   /* Where it does not converge, the lengths are led from those of the guess to those given in
      parts, along a straight line of their squares (homotopy); a part that fails is halved. */
   while (code == STEWART_NO_POSE && way >= 1.0 / 256.0 && more < HOMOTOPY_STEPS) {
@@ -1369,9 +1445,10 @@ static int find_pose(
       between[i] = reached == 1.0 ? lengths[i] :
         sqrt(squares[i] + reached * (lengths[i] * lengths[i] - squares[i]));
     }
-    int reaches = newton(platform, between, &found, &more, &error) == STEWART_OK;
-    done = reaches ? reached : done;
-    way *= reaches ? 2.0 : 0.5;
+    int converged =
+      newton(platform, anchors, between, &found, &more, &error) == STEWART_OK;
+    done = converged ? reached : done;
+    way *= converged ? 2.0 : 0.5;
     if (done == 1.0) {code = STEWART_OK, *residual = error;}
   }
   *steps += more;

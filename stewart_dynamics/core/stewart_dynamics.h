@@ -11,6 +11,8 @@
  * Units are SI. The base frame is fixed to the base, the platform frame to the platform; vectors
  * are in base axes unless the text says platform axes. Legs are in the order of the parameter
  * file, from their base joint to their platform joint; a positive force pushes (extends the leg).
+ * Legs are telescopic, or cranks with rods: each has a drive, whose position is the length of the
+ * leg [m] or the angle of the crank [rad], and whose effort is a force [N] or a torque [N m].
  *
  * Each cycle: fill a stewart_motion with the setpoint, call stewart_step, and command the forces
  * of the stewart_output if it returns STEWART_OK. docs/real_time.md has examples.
@@ -37,8 +39,17 @@ enum {
   STEWART_SUPPRESSED = 7,     /* by singularity.action or limits.action: forces are zero */
   STEWART_NO_POSE = 8,        /* no pose with these lengths found from this guess */
   STEWART_NO_MOTORS = 9,      /* actuator.screw_lead is not in the parameters */
-  STEWART_BROKEN_RULE = 10    /* of the hexapod: stewart_check says which */
+  STEWART_BROKEN_RULE = 10,   /* of the hexapod: stewart_check says which */
+  STEWART_UNREACHABLE = 11    /* a rod does not reach from its crank to the platform */
 };
+
+/* Kinds of legs, a line each: number, name, and prefix of its functions. */
+#define STEWART_LEG_KINDS(KIND, function, arguments) \
+  KIND(0, TELESCOPIC, telescopic, function, arguments) \
+  KIND(1, CRANK, crank, function, arguments)
+#define STEWART_KIND_NUMBER(number, NAME, prefix, function, arguments) STEWART_ ## NAME = number,
+
+enum { STEWART_LEG_KINDS(STEWART_KIND_NUMBER, , ) };
 
 /* Why the singularity warning is on: stewart_state.warning. */
 enum {
@@ -50,41 +61,54 @@ enum {
 
 /* The limits of a leg, a line each: bit of stewart_output.exceeded, name, field of stewart_leg;
  * what the quantity depends on: pose, twist or load of the motion, or motor; its numbers in
- * stewart_output, whose magnitudes must be at least a MINIMUM or at most a MAXIMUM. */
-#define STEWART_LIMITS(MINIMUM, MAXIMUM) \
+ * stewart_output, which must be at least a MINIMUM or at most a MAXIMUM, or have magnitudes of at
+ * most a LARGEST. */
+#define STEWART_LIMITS(MINIMUM, MAXIMUM, LARGEST) \
   MINIMUM(1, LENGTH_MIN, length_min, POSE, result.lengths) \
   MAXIMUM(2, LENGTH_MAX, length_max, POSE, result.lengths) \
-  MAXIMUM(4, VELOCITY_MAX, velocity_max, TWIST, result.rates) \
-  MAXIMUM(8, FORCE_MAX, force_max, LOAD, result.forces) \
-  MAXIMUM(16, BASE_JOINT_ANGLE_MAX, base_joint_angle_max, POSE, base_joint_angles) \
-  MAXIMUM(32, PLATFORM_JOINT_ANGLE_MAX, platform_joint_angle_max, POSE, platform_joint_angles) \
-  MAXIMUM(256, JOINT_FORCE_MAX, joint_force_max, LOAD, result.joint_forces) \
-  MAXIMUM(512, TORQUE_MAX, torque_max, MOTOR, motors.breakaway_torques) \
-  MAXIMUM(2048, SPEED_MAX, speed_max, MOTOR, motors.speeds) \
-  MAXIMUM(4096, TEMPERATURE_RISE_MAX, temperature_rise_max, MOTOR, rises)
+  LARGEST(4, VELOCITY_MAX, velocity_max, TWIST, result.rates) \
+  LARGEST(8, FORCE_MAX, force_max, LOAD, result.forces) \
+  LARGEST(16, BASE_JOINT_ANGLE_MAX, base_joint_angle_max, POSE, base_joint_angles) \
+  LARGEST(32, PLATFORM_JOINT_ANGLE_MAX, platform_joint_angle_max, POSE, platform_joint_angles) \
+  LARGEST(256, JOINT_FORCE_MAX, joint_force_max, LOAD, result.joint_forces) \
+  LARGEST(512, TORQUE_MAX, torque_max, MOTOR, motors.breakaway_torques) \
+  LARGEST(2048, SPEED_MAX, speed_max, MOTOR, motors.speeds) \
+  LARGEST(4096, TEMPERATURE_RISE_MAX, temperature_rise_max, MOTOR, rises) \
+  MINIMUM(8192, ANGLE_MIN, angle_min, POSE, result.angles) \
+  MAXIMUM(16384, ANGLE_MAX, angle_max, POSE, result.angles) \
+  LARGEST(32768, CRANK_SPEED_MAX, crank_speed_max, TWIST, result.speeds) \
+  LARGEST(65536, CRANK_TORQUE_MAX, crank_torque_max, LOAD, result.torques) \
+  LARGEST(131072, ROD_FORCE_MAX, rod_force_max, LOAD, result.joint_forces) \
+  MINIMUM(262144, LEVER_MIN, lever_min, POSE, lever_ratios)
 #define STEWART_BIT(bit, NAME, field, DEPENDS, quantity) STEWART_ ## NAME = bit,
 #define STEWART_FIELD(bit, NAME, field, DEPENDS, quantity) double field;
 
 /* Limits that a leg exceeds: bits of stewart_output.exceeded. To those in _CLIPPED, forces and
  * torques to command are clipped; while another is exceeded, limits.action may suppress them. */
 enum {
-  STEWART_LIMITS(STEWART_BIT, STEWART_BIT)
+  STEWART_LIMITS(STEWART_BIT, STEWART_BIT, STEWART_BIT)
   STEWART_LEG_CLEARANCE_MIN = 64, /* stewart_platform.leg_clearance_min */
-  STEWART_JUMP = 128,             /* too far from the last setpoint for limits.velocity_max */
+  STEWART_JUMP = 128,             /* too far from the last setpoint for limits.velocity_max, or
+                                     of cranks limits.speed_max */
   STEWART_TORQUE_SPEED = 1024,    /* stewart_platform.torque_speed */
-  STEWART_CLIPPED = 1544          /* STEWART_FORCE_MAX, _TORQUE_MAX, _TORQUE_SPEED */
+  STEWART_CLIPPED = 67080         /* STEWART_FORCE_MAX, _TORQUE_MAX, _TORQUE_SPEED,
+                                     _CRANK_TORQUE_MAX */
 };
 
-/* A leg, with the names of the parameter file; its inertias are transverse, about the CoM.
- * Not set: NAN; a limit: infinite, length_min: 0; screw_lead: 0. */
+/* A leg, with the names of the parameter file; its inertias are transverse, about the CoM. A crank
+ * has the axes [e n u]: along the crank, in the direction in which its end moves where it turns in
+ * the positive sense, along the motor's axis. Reflected mass, friction and losses of a crank are
+ * those at its shaft: [kg m^2], [N m s/rad], [N m], [rad/s].
+ * Not set: NAN; a limit: infinite, with its sign; length_min, lever_min: 0; screw_lead: 0. */
 typedef struct {
-  double base_joint[3], platform_joint[3]; /* base frame; platform frame [m] */
+  double base_joint[3], platform_joint[3]; /* base frame; platform frame [m]; of a crank: where the
+                                              plane in which its end moves cuts the motor's axis */
   double zero_length;                      /* where the published position is zero [m] */
   double cylinder_mass, cylinder_center_of_mass, cylinder_inertia; /* CoM from base joint */
   double piston_mass, piston_center_of_mass, piston_inertia;       /* CoM from platform joint */
   double reflected_mass, viscous_friction, coulomb_friction;       /* [kg], [N s/m], [N] */
   double coulomb_velocity; /* rate below which Coulomb friction is linear [m/s], above 0 */
-  STEWART_LIMITS(STEWART_FIELD, STEWART_FIELD)      /* length_min, length_max, ... */
+  STEWART_LIMITS(STEWART_FIELD, STEWART_FIELD, STEWART_FIELD) /* length_min, length_max, ... */
   double base_joint_axis[3], platform_joint_axis[3]; /* unit vectors, base axes; platform axes */
   double cylinder_radius, cylinder_length, piston_radius; /* for leg_clearance_min [m] */
   double screw_lead, gear_ratio;                          /* [m/turn] */
@@ -94,10 +118,23 @@ typedef struct {
   double thermal_resistance, thermal_time_constant;   /* [K/W], [s] */
   double twist_ratio; /* turns of the motor by turn of the leg, 0 where the screw is guided */
   double base_universal_axis[3], platform_universal_axis[3];
+  double crank_length, rod_length;         /* [m]; 0: the leg is telescopic */
+  double crank_axis[3], crank_direction[3]; /* unit vectors, base axes: of the motor; of the crank
+                                               at the angle 0 */
+  double branch;                           /* sign of the lever: 1 or -1 */
+  double crank_mass, crank_center_of_mass[3], crank_inertia[6]; /* [e n u], from the motor's axis;
+                                                                   xx xy xz yy yz zz */
+  double rod_mass, rod_center_of_mass, rod_inertia; /* CoM from the end of the crank; by default of
+                                                       a uniform rod */
   /* Written by stewart_complete: turn of the motor by metre [rad/m]; metres by turn of the leg
    * [m/rad]; losses of a motor that drives, and is driven, less 1; rate below which they are
    * linear [m/s]. */
   double motor_ratio, pitch, driving_loss, driven_loss, loss_velocity;
+  /* Of a crank: the rod as two points with a coupling, at the crank and at the platform [kg]; the
+   * moment of mass along e and n [kg m] and the inertia [kg m^2] of the crank and the point at its
+   * end, about the base joint; the middle of the allowed angles [rad]. */
+  double crank_end_mass, coupling_mass, platform_end_mass;
+  double turning_moment[2], turning_inertia[6], middle_angle;
 } stewart_leg;
 
 /* A hexapod, constant while it is used: all that the parameter file says of its forces.
@@ -120,6 +157,7 @@ typedef struct {
   int suppress_near_singularity;                 /* singularity.action is suppress_forces */
   int suppress_at_limits;                        /* limits.action is suppress_forces */
   int with_joint_angles, with_clearance;         /* a limit needs them: stewart_complete */
+  int leg_kind;                                  /* STEWART_TELESCOPIC, ...: stewart_complete */
 } stewart_platform;
 
 /* Pose of the platform frame in the base frame; rotation: platform to base axes, row by row. */
@@ -145,7 +183,13 @@ typedef struct {
   double determinant_rate;     /* its time derivative [m^3/s] */
   double condition_number;     /* of J_inv, at least 1 */
   double unit_load_forces[6];  /* largest force of each leg under a unit load on the platform */
-  double joint_forces[6];      /* along the legs, in joints and rods: without the actuators' own */
+  double joint_forces[6];      /* along the legs, in joints and rods: without the actuators' own;
+                                  of a rod the larger one of both ends */
+  /* Of cranks, else zero. Their lengths and rates are those of the rods, their forces those of the
+   * rods at the platform, + pushes. */
+  double angles[6], speeds[6]; /* [rad], [rad/s] */
+  double torques[6];           /* of the drives, before any limit [N m] */
+  double levers[6];            /* torque by the force of the rod [m]; zero at a dead centre */
 } stewart_result;
 
 /* Motors: zero where the published leg position is zero, + extends; nan where drive.* does not
@@ -170,7 +214,7 @@ typedef struct {
   double determinant;      /* the last that was not zero [m^3] */
   double time_to_crossing; /* of det(J) = 0 at its present rate [s]; infinite: never */
   int64_t stamp;           /* of the last setpoint that was not a jump [ns] */
-  double lengths[6];       /* at that setpoint [m] */
+  double lengths[6];       /* positions of the drives at that setpoint: lengths [m] or angles */
   double rises[6];         /* of the temperatures of the windings at it [K] */
   double copper_heat[6];   /* since then [W] */
   double restarting;       /* flag: time has jumped back before a setpoint without a result */
@@ -180,8 +224,11 @@ typedef struct {
 typedef struct {
   stewart_result result;
   double forces[6];        /* to command [N]: clipped to force_max; zero unless STEWART_OK */
-  double positions[6];     /* of the joints: lengths less zero_length [m] */
-  double mean_rates[6];    /* from the last setpoint that was not a jump [m/s]; nan at the first */
+  double torques[6];       /* likewise of cranks [N m]: clipped to crank_torque_max; else zero */
+  double positions[6];     /* of the joints: lengths less zero_length [m], or angles [rad] */
+  double lever_ratios[6];  /* lever of a crank by its length, 0 to 1; 1 of a telescopic leg */
+  double mean_rates[6];    /* of the drives from the last setpoint that was not a jump [m/s] or
+                              [rad/s]; nan at the first */
   double base_joint_angles[6], platform_joint_angles[6]; /* [rad] */
   double clearances[6];    /* from the nearest other leg or plate [m] */
   stewart_motors motors;
@@ -240,7 +287,16 @@ typedef struct {
   RULE(30, CONVEX, "geometry.base_outline, geometry.platform_outline", \
        "must be convex, its corners in order around it") \
   RULE(31, POINTS, "drive.torque_speed, geometry.base_outline, geometry.platform_outline", \
-       "more points than the structure holds")
+       "more points than the structure holds") \
+  RULE(32, KIND, "legs.crank.length", "all legs or none must have a crank") \
+  RULE(33, ROD_LENGTH, "legs.rod.length", "must be more than 0") \
+  RULE(34, CRANK_AXIS, "geometry.crank_axes", "a direction must not be 0, 0, 0") \
+  RULE(35, CRANK_DIRECTION, "geometry.crank_directions", \
+       "must be perpendicular to geometry.crank_axes, to 0.001 rad") \
+  RULE(36, BRANCH, "geometry.crank_branch", "must be positive or negative") \
+  RULE(37, CRANK_INERTIA, "legs.crank.inertia", "must be positive semidefinite") \
+  RULE(38, ANGLES, "limits.angle_min", "must be less than limits.angle_max") \
+  RULE(39, LEVER, "limits.lever_min", "must be less than 1")
 #define STEWART_RULE_CODE(code, NAME, parameters, rule) STEWART_RULE_ ## NAME = code,
 
 enum { STEWART_RULES(STEWART_RULE_CODE) STEWART_VALID = 0 };
@@ -284,7 +340,8 @@ int stewart_motor_torques(
   const stewart_platform * platform, const stewart_motion * motion, const double forces[6],
   stewart_motors * motors);
 
-/* Forward kinematics: the pose of six lengths [m], on the guess's side of singularities.
+/* Forward kinematics: the pose of six lengths [m], or angles of cranks [rad], on the guess's side
+ * of singularities.
  *
  * pose: the guess (the last pose, or the one commanded), then the answer, with STEWART_OK alone;
  * its lengths are within 1e-12 m of those given. */
@@ -292,7 +349,7 @@ int stewart_forward_kinematics(
   const stewart_platform * platform, const double lengths[6], stewart_pose * pose);
 
 /* The twist and the acceleration of the platform that give leg rates [m/s] and their time
- * derivatives [m/s^2] at the motion's pose; written with STEWART_OK alone. */
+ * derivatives [m/s^2], or those of cranks, at the motion's pose; written with STEWART_OK alone. */
 int stewart_motion_of_legs(
   const stewart_platform * platform, const double rates[6], const double accelerations[6],
   stewart_motion * motion);
@@ -304,6 +361,10 @@ int stewart_motion_of_legs(
 int stewart_add_payload(
   stewart_platform * platform, double mass, const double center_of_mass[3],
   const double inertia[6]);
+
+/* Writes by how much each leg misses the platform joint of a pose [m]; 0: it reaches it. */
+int stewart_missing_distances(
+  const stewart_platform * platform, const stewart_pose * pose, double distances[6]);
 
 /* The rotation, row by row, of a quaternion x y z w; written with STEWART_OK alone. */
 int stewart_rotation(const double quaternion[4], double rotation[9]);

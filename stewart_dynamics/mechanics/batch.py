@@ -17,12 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from stewart_dynamics.arrays import Array, Integers, Records
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import SingularityError
+from stewart_dynamics.legs import KINDS
 from stewart_dynamics.mechanics.arguments import (
     common_shape, copies, optional_array, place, wrong_type)
 from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, MOTION, NO_BASE, POSE, POSITION, RESULT, WRENCH)
+    CONDITION, MOTION, NO_BASE, POSE, POSITION, WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 
 # Samples for one thread at least: a millisecond of work, far more than the start of a thread.
@@ -30,6 +31,8 @@ _SAMPLES_FOR_A_THREAD = 4096
 _PARTS_OF_A_THREAD = 8
 _CPUS = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
 
+WIDTHS = {kind.number: kind.width for kind in KINDS}
+"""Numbers in a row of results by the kind of legs."""
 _NO_WRENCH = np.zeros((1, WRENCH))
 _NO_BASE: Array = np.array([NO_BASE])
 
@@ -66,7 +69,7 @@ def solve(hexapod: Records, motions: Array, wrenches: Array | None = None,
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     bases = _NO_BASE if bases is None else compact(bases)
-    results = np.empty((len(motions), RESULT))
+    results = np.empty((len(motions), WIDTHS[int(hexapod['leg_kind'])]))
     in_parts(_solve, (hexapod, condition), motions, wrenches, bases, results)
     return results
 
@@ -74,7 +77,7 @@ def solve(hexapod: Records, motions: Array, wrenches: Array | None = None,
 def _solve(hexapod: Records, condition: bool, motions: Array, wrenches: Array, bases: Array,
            results: Array) -> None:
     function('solve_many')(hexapod, len(motions), motions, len(wrenches), wrenches, len(bases),
-                           bases, condition, results)
+                           bases, condition, results.shape[1], results)
 
 
 def find_unsolvable(
@@ -97,7 +100,7 @@ def leg_lengths(hexapod: Records, poses: Array) -> Array:
     """Return the lengths (..., 6) [m] of the legs in poses (..., POSE) or more, unchecked."""
     shape = poses.shape[:-1]
     lengths = np.empty((*shape, 6))
-    function('lengths_many')(hexapod, math.prod(shape), compact(poses[..., POSE]), lengths)
+    function('positions_many')(hexapod, math.prod(shape), compact(poses[..., POSE]), lengths)
     return lengths
 
 

@@ -37,9 +37,9 @@ NO_BASE: tuple[float, ...] = (math.nan,) * BASE
 DETERMINANT: int
 DETERMINANT_RATE: int
 CONDITION: int
-(LENGTHS, RATES, FORCES, DETERMINANT, DETERMINANT_RATE, CONDITION,
- UNIT_LOAD_FORCES, JOINT_FORCES) = places('stewart_result').values()
-RESULT: int = JOINT_FORCES.stop
+(LENGTHS, RATES, FORCES, DETERMINANT, DETERMINANT_RATE, CONDITION, UNIT_LOAD_FORCES,
+ JOINT_FORCES, ANGLES, SPEEDS, TORQUES, LEVERS) = places('stewart_result').values()
+RESULT: int = LEVERS.stop
 
 # A row of joint angles, see ``joint_angles``.
 BASE_JOINT_ANGLES, PLATFORM_JOINT_ANGLES = slice(0, 6), slice(6, 12)

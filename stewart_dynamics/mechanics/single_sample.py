@@ -18,6 +18,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import function, places, record
+from stewart_dynamics.mechanics.batch import WIDTHS
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
@@ -52,6 +53,9 @@ def _dynamics(hexapod: Records, name: str, result: str) -> Callable[
         [Motion, Any, Any, BaseMotion | None], Array | None]:
     """Return the call of a function of motion, forces, wrench and base."""
     where, pushed = places('one_motion'), result == 'motion'
+    of_result = where[result]
+    if result == 'result':
+        of_result = slice(of_result.start, of_result.start + WIDTHS[int(hexapod['leg_kind'])])
     # As much memory as there are calls at the same time, on a base at rest and on one that moves.
     at_rest: list[tuple[Any, ...]] = []
     moving: list[tuple[Any, ...]] = []
@@ -60,7 +64,7 @@ def _dynamics(hexapod: Records, name: str, result: str) -> Callable[
         solve, numbers = _bound(hexapod, name, 'one_motion')
         numbers[where['base']] = NO_BASE
         return (solve, *(numbers[where[field]].data for field in (
-            'motion', 'forces', 'wrench', 'base')), numbers[where[result]])
+            'motion', 'forces', 'wrench', 'base')), numbers[of_result])
 
     def call(motion: Motion, forces: Any, wrench: Any, base: BaseMotion | None) -> Array | None:
         if type(motion) is not Motion or (base is not None and type(base) is not BaseMotion):

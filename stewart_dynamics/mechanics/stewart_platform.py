@@ -37,7 +37,7 @@ from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
     FORCES, GRAVITY, JOINT_ANGLES, JOINT_FORCES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE,
-    POSITION, RESULT, TWIST, WRENCH)
+    POSITION, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
 from stewart_dynamics.parameters.table import mean_radius, Parameters
@@ -143,7 +143,7 @@ class StewartPlatform:
         _, _, results, unsolvable, shape = self._solved(motion, wrench, base, singular)
         for forces in FORCES, JOINT_FORCES:
             results[unsolvable, forces] = np.nan
-        return InverseDynamics(results.reshape(*shape, RESULT))
+        return InverseDynamics(results.reshape(*shape, -1))
 
     def _solved(
             self, motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
@@ -151,7 +151,7 @@ class StewartPlatform:
         """Return rows of motion, of wrenches and base, of results; the unsolvable; the shape."""
         rows, wrenches, bases, shape = batch.loaded(motion, wrench, base)
         results = self.solve(rows, wrenches, bases)
-        check_finite('motion', results.reshape(*shape, RESULT), len(shape))
+        check_finite('motion', results.reshape(*shape, -1), len(shape))
         unsolvable = batch.find_unsolvable(rows, results, shape, singular)
         return rows, (wrenches, bases), results, unsolvable, shape
 
@@ -181,7 +181,7 @@ class StewartPlatform:
         shape = results.shape[:-1]
         if self._drives is None:
             self._drives = Drives(self.parameters)
-        rows = self._drives(copies(motion.rows, shape), results.reshape(-1, RESULT))
+        rows = self._drives(copies(motion.rows, shape), results.reshape(-1, results.shape[-1]))
         rows = rows.reshape(*shape, MOTORS)
         if self.parameters.actuator.screw_lead is not None:
             check_finite('motion', rows[..., MECHANICAL], len(shape))

@@ -53,7 +53,7 @@ class Parameter(NamedTuple):
     default: Any = None  # the value if it is not given; an empty tuple: no value, unlimited
     required: bool = False
     sizes: tuple[int, ...] = ()
-    """The lengths that an array may have, empty for a single value; an array of length 1 or 6
+    """The lengths that an array may have, empty for a single value; an array of length 1 or more
     may also be given as a single value, for all legs."""
     repeated: bool = False
     """Whether an array has any number of rows, one after the other, of its one length each."""
@@ -129,11 +129,11 @@ def checked(parameter: Parameter, value: Any, source: str) -> Any:
         return entries[0]
     if parameter.kind != 'double':
         return tuple(entries)
-    array = np.array(entries * 6 if len(entries) == 1 else entries)
+    array = np.array(entries * 6 if len(entries) == 1 and parameter.sizes == (1, 6) else entries)
     if parameter.repeated:
         array = array.reshape(-1, parameter.sizes[0])
-    elif len(array) == 18:
-        array = array.reshape(6, 3)
+    elif len(array) in (18, 36):
+        array = array.reshape(6, -1)
     array.setflags(write=False)
     return array
 
@@ -151,7 +151,8 @@ def check_shape(parameter: Parameter, value: Any, source: str) -> None:
         return  # no array: the check of entries rejects it
     if len(shape) < 2:
         return
-    row = parameter.sizes[0] if parameter.repeated else 3 if 18 in parameter.sizes else 0
+    row = parameter.sizes[0] if parameter.repeated else max(parameter.sizes) // 6
+    row = row if row > 1 else 0
     rows = None if parameter.repeated else 6
     if len(shape) == 2 and shape[1] == row and rows in (None, shape[0]):
         return

@@ -17,31 +17,31 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.core.binding import function, LIMIT_ROWS, record, Rule, RULES
+from stewart_dynamics.core.binding import (
+    function, LIMIT_ROWS, LimitRow, record, Rule, RULES)
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
+def limit_name(row: LimitRow) -> str:
+    """Return the parameter of a limit of the legs; those of drives have names of their own in C."""
+    group = 'drive' if row.depends == 'MOTOR' else 'limits'
+    return f'{group}.{row.field.removeprefix("crank_")}'
+
+
 LEG_FIELDS: Mapping[str, str] = {
     'base_joint': 'geometry.base_joints', 'platform_joint': 'geometry.platform_joints',
-    'zero_length': 'geometry.zero_length', 'cylinder_mass': 'legs.cylinder.mass',
-    'cylinder_center_of_mass': 'legs.cylinder.center_of_mass',
-    'cylinder_inertia': 'legs.cylinder.inertia', 'piston_mass': 'legs.piston.mass',
-    'piston_center_of_mass': 'legs.piston.center_of_mass',
-    'piston_inertia': 'legs.piston.inertia', 'reflected_mass': 'actuator.reflected_mass',
     'viscous_friction': 'actuator.viscous_friction',
     'coulomb_friction': 'actuator.coulomb_friction',
     'coulomb_velocity': 'actuator.coulomb_velocity',
-    **{row.field: f'{"drive" if row.depends == "MOTOR" else "limits"}.{row.field}'
-       for row in LIMIT_ROWS},
-    'cylinder_radius': 'legs.cylinder.radius', 'cylinder_length': 'legs.cylinder.length',
-    'piston_radius': 'legs.piston.radius', 'screw_lead': 'actuator.screw_lead',
+    **{row.field: limit_name(row) for row in LIMIT_ROWS}, 'screw_lead': 'actuator.screw_lead',
     **{name: f'drive.{name}' for name in (
         'gear_ratio', 'efficiency', 'back_driving_efficiency', 'motor_inertia', 'screw_inertia',
         'torque_constant', 'resistance', 'thermal_resistance', 'thermal_time_constant')},
     **{f'{end}_joint_axis': f'geometry.{end}_joint_axes' for end in ('base', 'platform')},
     **{f'{end}_universal_axis': f'drive.{end}_universal_axes' for end in ('base', 'platform')}}
-"""Fields of ``stewart_leg`` and the parameters that they hold; others follow from these."""
+"""Fields of ``stewart_leg`` and the parameters that they hold; others follow from these, or are
+fields of a kind of legs."""
 PLATFORM_FIELDS: Mapping[str, str] = {
     'gravity': 'gravity', 'mass': 'platform.mass', 'center_of_mass': 'platform.center_of_mass',
     'inertia': 'platform.inertia', 'leg_clearance_min': 'limits.leg_clearance_min',
@@ -54,9 +54,11 @@ LISTS: Mapping[str, str] = {
     'torque_speed': 'drive.torque_speed', 'base_outline': 'geometry.base_outline',
     'platform_outline': 'geometry.platform_outline'}
 """Fields that hold points, as many as the field ``n_...`` counts."""
-_IF_NOT_SET = {'limits.length_min': 0.0, 'limits.leg_clearance_min': -math.inf,
-               'actuator.screw_lead': 0.0, 'singularity.characteristic_length': 0.0,
-               **{LEG_FIELDS[row.field]: math.inf for row in LIMIT_ROWS if not row.minimum}}
+_IF_NOT_SET = {**{LEG_FIELDS[row.field]: -math.inf if row.minimum else math.inf
+                  for row in LIMIT_ROWS},
+               'limits.length_min': 0.0, 'limits.lever_min': 0.0,
+               'limits.leg_clearance_min': -math.inf, 'actuator.screw_lead': 0.0,
+               'singularity.characteristic_length': 0.0, 'legs.crank.length': 0.0}
 
 
 MOST_POINTS = 32
@@ -71,10 +73,12 @@ def structure_of(parameters: Parameters, with_motors: bool, suppressing: str) ->
     """
     hexapod: Any = np.zeros((), record('stewart_platform'))
     legs = hexapod['legs']
-    for fields, of in ((LEG_FIELDS, legs), (PLATFORM_FIELDS, hexapod)):
+    kind = parameters.leg_kind
+    for fields, of in ((LEG_FIELDS, legs), (kind.fields, legs), (PLATFORM_FIELDS, hexapod)):
         for field, name in fields.items():
             value = parameters[name]
             of[field] = _IF_NOT_SET.get(name, math.nan) if value is None else value
+    kind.write_fields(legs, parameters)
     for field, name in LISTS.items():
         points = parameters[name]
         if points is not None:

@@ -20,6 +20,9 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import CONSTANTS, Rule
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.legs import kind_of, KINDS
+from stewart_dynamics.legs.crank import BRANCHES
+from stewart_dynamics.legs.kind import check_foreign, LegKind
 from stewart_dynamics.parameters.body import Body, BodyError
 from stewart_dynamics.parameters.circles import (
     BODIES, circle_names, joints_of, without_other)
@@ -133,6 +136,21 @@ class GeometryGroup(ParameterGroup):
         '', AUTO, choices=(AUTO, POSITIVE, NEGATIVE))
     zero_length: Array = _legs(
         'length of a leg at which its published position is zero', 'm', minimum=0.0)
+    crank_angles: Array | None = declare(
+        'heading of each crank at its angle 0, about the z axis of the base, from x toward y; the '
+        'axes of the motors are level, and a positive angle lifts the end of the crank', 'rad', (),
+        sizes=(6,), minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
+    crank_axes: Array | None = declare(
+        'x y z of the axis of each motor, of any length, base axes: angles are positive by the '
+        'right-hand rule; with geometry.crank_directions in place of geometry.crank_angles', '',
+        (), sizes=(18,))
+    crank_directions: Array | None = declare(
+        'x y z of the direction of each crank at its angle 0, of any length, base axes, '
+        'perpendicular to its axis within 0.001 rad', '', (), sizes=(18,))
+    crank_branch: tuple[str, ...] = declare(
+        'sign of the lever of each crank: positive: a positive angle pushes the platform joint '
+        'away; auto: the one whose angle at home is within the limits and nearer to zero than a '
+        'quarter turn', '', (AUTO,), sizes=(1, 6), choices=BRANCHES)
 
 
 class PlatformGroup(ParameterGroup):
@@ -208,11 +226,42 @@ class PistonGroup(LegPartGroup):
         'm', (), minimum=0.0)
 
 
+class CrankGroup(ParameterGroup):
+    """The cranks, which the motors turn."""
+
+    length: Array | None = _legs(
+        'length of a crank, from the axis of its motor to its end; with it, the hexapod has '
+        'cranks', 'm', (), minimum=0.0, above=True)
+    mass: Array = _legs('mass of a crank', 'kg', minimum=0.0)
+    center_of_mass: Array = declare(
+        'center of mass of a crank from the axis of its motor: along the crank, or x y z along '
+        'the crank, in the direction of positive angles, and along the axis', 'm', (0.0,),
+        sizes=(1, 3, 6, 18))
+    inertia: Array = declare(
+        'inertia of a crank about its center of mass: about the axis of the motor, or xx xy xz yy '
+        'yz zz in the axes of its center of mass', 'kg m^2', (0.0,), sizes=(1, 6, 36))
+
+
+class RodGroup(ParameterGroup):
+    """The rods between cranks and platform."""
+
+    length: Array | None = _legs(
+        'length of a rod, between the centers of its joints', 'm', (), minimum=0.0, above=True)
+    mass: Array = _legs('mass of a rod', 'kg', minimum=0.0)
+    center_of_mass: Array | None = _legs(
+        'distance of its center of mass from the end of the crank; default: the middle', 'm', ())
+    inertia: Array | None = _legs(
+        'transverse inertia about its center of mass; default: of a uniform rod, m L^2 / 12',
+        'kg m^2', (), minimum=0.0)
+
+
 class LegsGroup(ParameterGroup):
     """The parts of the legs."""
 
     cylinder: CylinderGroup
     piston: PistonGroup
+    crank: CrankGroup
+    rod: RodGroup
 
     @property
     def parts(self) -> dict[str, LegPartGroup]:
@@ -225,11 +274,16 @@ class ActuatorGroup(ParameterGroup):
 
     reflected_mass: Array = _legs(
         'inertia of rotor and screw along the leg, J (2 pi / lead)^2', 'kg', minimum=0.0)
-    viscous_friction: Array = _legs('viscous friction along the leg', 'N s/m', minimum=0.0)
-    coulomb_friction: Array = _legs('Coulomb friction along the leg', 'N', minimum=0.0)
+    reflected_inertia: Array = _legs(
+        'inertia of rotor and gear at the shaft of a crank', 'kg m^2', minimum=0.0)
+    viscous_friction: Array = _legs(
+        'viscous friction along the leg; of cranks at their shafts, in N m s/rad', 'N s/m',
+        minimum=0.0)
+    coulomb_friction: Array = _legs(
+        'Coulomb friction along the leg; of cranks at their shafts, in N m', 'N', minimum=0.0)
     coulomb_velocity: Array = _legs(
-        'rate of the leg below which Coulomb friction is linear', 'm/s', (1e-3,), minimum=0.0,
-        above=True)
+        'rate of the leg below which Coulomb friction is linear; of cranks in rad/s, 0.01 by '
+        'default', 'm/s', (1e-3,), minimum=0.0, above=True)
     screw_lead: Array | None = _legs(
         'travel of a leg in one turn of its screw; needed by drive.*', 'm', (), minimum=0.0,
         above=True)
@@ -302,6 +356,7 @@ class DriveGroup(ParameterGroup):
     platform_universal_axes: Array | None = _universal_axes('platform')
 
 
+_ANGLES: dict[str, Any] = {'title': 'Crank angles', 'usual': True}
 _LENGTHS: dict[str, Any] = {
     'title': 'Leg lengths', 'note': 'between the joint centers', 'usual': True}
 
@@ -330,6 +385,26 @@ class LimitsGroup(ParameterGroup):
     platform_joint_angle_max: Array | None = _limit(
         'maximum angle between a leg and its geometry.platform_joint_axes', 'rad',
         'platform joint angle', 'joint angle at the platform', maximum=math.pi)
+    angle_min: Array | None = _limit(
+        'smallest angle of a crank', 'rad', 'angle', 'smallest angle of a crank',
+        minimum=-math.inf, above=False, **_ANGLES)
+    angle_max: Array | None = _limit(
+        'largest angle of a crank', 'rad', 'angle', 'largest angle of a crank',
+        minimum=-math.inf, above=False, **_ANGLES)
+    speed_max: Array | None = _limit(
+        'maximum speed of a crank', 'rad/s', 'speed', 'speed of a crank', title='Crank speeds',
+        usual=True)
+    torque_max: Array | None = _limit(
+        'maximum torque of a crank at its shaft, to which torques are clipped', 'N m', 'torque',
+        'torque of a crank', title='Crank torques',
+        note='demanded by the motion, + drives the angle up', usual=True)
+    rod_force_max: Array | None = _limit(
+        'maximum force along a rod, at either end', 'N', 'rod force', 'force of a rod',
+        title='Forces in the rods', note='along the rods, at the end where they are larger')
+    lever_min: Array | None = _limit(
+        'smallest magnitude of the lever of a crank, by the length of the crank: 0 at a dead '
+        'centre, 1 at the best; 0.1 by default', '', 'lever', 'lever of a crank', above=False,
+        maximum=1.0)
     leg_clearance_min: float | None = declare(
         'minimum distance of the surface of a leg, a cylinder and a thinner piston, from that of '
         'another leg, and from the outlines of geometry that are given; unlimited if not set',
@@ -602,6 +677,7 @@ class Parameters(ParameterSet):
                  *(circle_names(body)[2] for body in BODIES))
     drives: tuple[str, ...]  # names of drive.* that are given; without them no motors are computed
     carried: Body  # by the legs: platform and payload as one
+    leg_kind: LegKind
     structure: Records  # () for the functions in C, without axes of joints: ``hexapod_structure``
 
     def _check_together(self, source: str) -> None:
@@ -619,6 +695,9 @@ class Parameters(ParameterSet):
             if self[name] is not None and len(self[name]) > MOST_POINTS:
                 raise ParameterError(
                     f'{source}: {name}: {len(self[name])} points: must be at most {MOST_POINTS}')
+        self.leg_kind = kind_of(self)
+        check_foreign(self, self.leg_kind, KINDS, source)
+        self.leg_kind.check(self, source)
         self._check_drives(source)
         self.structure = structure_of(self, bool(self.drives), SUPPRESS_FORCES)
         self._check_reflected_mass(source)
@@ -661,21 +740,26 @@ class Parameters(ParameterSet):
                            CENTER_UNCERTAINTY * self.singularity.characteristic_length)
         if self.drive.back_driving_efficiency is None:
             self._complete('drive.back_driving_efficiency', legs['back_driving_efficiency'].copy())
-        self._complete('actuator.reflected_mass', legs['reflected_mass'].copy())
+        self._complete(self.leg_kind.fields['reflected_mass'], legs['reflected_mass'].copy())
+        for field, name in self.leg_kind.fields.items():
+            if self[name] is None and np.isfinite(legs[field]).all():
+                self._complete(name, legs[field].copy())
 
     def _check_reflected_mass(self, source: str) -> None:
-        """Check the reflected mass that is given against the one that follows from drive.*."""
-        follows = self.structure['legs']['reflected_mass']
-        given = self.actuator.reflected_mass
+        """Check the reflected inertia that is given against the one that follows from drive.*."""
+        name, unit = self.leg_kind.fields['reflected_mass'], self.leg_kind.inertia_unit
+        causes = ' and '.join(
+            each for each in DRIVE_INERTIAS if not each.startswith(self.leg_kind.foreign))
+        follows, given = self.structure['legs']['reflected_mass'], self[name]
         wrong = np.abs(given - follows) > REFLECTED_MASS_TOLERANCE * follows
-        if 'actuator.reflected_mass' in self.given and wrong.any():
+        if name in self.given and wrong.any():
             leg = int(np.argmax(wrong))
             raise ParameterError(
-                f'{source}: actuator.reflected_mass: {given[leg]:g} kg: contradicts '
-                f'{MOTOR_INERTIA} and {SCREW_INERTIA}, with which it is {follows[leg]:.6g} kg')
+                f'{source}: {name}: {given[leg]:g} {unit}: contradicts {causes}, with which it is '
+                f'{follows[leg]:.6g} {unit}')
         if not np.isfinite(follows).all():
-            raise ParameterError(f'{source}: actuator.reflected_mass: {follows.tolist()} kg '
-                                 f'from {MOTOR_INERTIA} and {SCREW_INERTIA}: must be finite')
+            raise ParameterError(f'{source}: {name}: {follows.tolist()} {unit} from {causes}: '
+                                 'must be finite')
 
     def _carry_payload(self, source: str) -> None:
         """Set ``carried``, and put it into the structure."""
@@ -723,19 +807,19 @@ class Parameters(ParameterSet):
 
     def _check_drives(self, source: str) -> None:
         """Check drive.*, and set ``drives``."""
-        lead = self.actuator.screw_lead
+        missing = self.leg_kind.ratio and self[self.leg_kind.ratio] is None
         with np.errstate(over='ignore'):
             driven_back = 2.0 - 1.0 / self.drive.efficiency
         given = tuple(name for name in self.given
                       if name.startswith('drive.') and self[name] is not None)
-        self.drives = () if lead is None else given
+        self.drives = () if missing else given
         # A whole set of parameters, as dict(parameters), gives the defaults, too.
         defaults = {'drive.back_driving_efficiency': driven_back}
-        for name in given if lead is None else ():
+        for name in given if missing else ():
             default = defaults.get(name, self.table[name].default)
             if np.size(default) == 0 or not np.all(self[name] == default):
                 raise ParameterError(
-                    f'{source}: actuator.screw_lead: not set: needed by {name}')
+                    f'{source}: {self.leg_kind.ratio}: not set: needed by {name}')
         continuous, most = self.drive.torque_continuous, self.drive.torque_max
         if continuous is not None and most is not None and np.any(continuous > most):
             raise ParameterError(

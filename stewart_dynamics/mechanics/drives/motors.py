@@ -143,12 +143,12 @@ class Drives:
     def __call__(self, motions: Array, results: Array) -> Array:
         """Return rows (N, MOTORS) for rows of motion and results, unchecked."""
         rows = np.empty((len(motions), MOTORS))
-        batch.in_parts(self._write, (), *map(batch.compact, (
-            motions, results, results[:, FORCES])), rows)
+        efforts = batch.compact(results[:, FORCES])
+        batch.in_parts(self._write, (), batch.compact(motions), efforts, rows)
         return rows
 
-    def _write(self, motions: Array, results: Array, forces: Array, rows: Array) -> None:
-        function('motors_many')(self._hexapod, len(motions), motions, results, forces, rows)
+    def _write(self, motions: Array, efforts: Array, rows: Array) -> None:
+        function('motors_many')(self._hexapod, len(motions), motions, efforts, efforts, rows)
 
 
 def motor_ratio(parameters: Parameters) -> Array:

@@ -15,7 +15,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.leg_columns import columns, data_frame, LEGS
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, RATES, RESULT,
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, RATES,
     UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
@@ -60,7 +60,7 @@ class InverseDynamics:
         three columns of J_inv are divided by the characteristic length first.
     time_to_crossing : (...)
         Time after which det(J) is zero at its present rate [s]; inf: never.
-    rows : (..., RESULT)
+    rows : (..., width)
         All numbers of each sample in a row, laid out as ``mechanics.rows`` says; the other
         attributes are views of them.
 
@@ -98,7 +98,7 @@ class InverseDynamics:
 
         Leading shapes are flattened; SI units. The columns of the legs end in _1 to _6.
         """
-        rows = self.rows.reshape(-1, RESULT)
+        rows = self.rows.reshape(-1, self.rows.shape[-1])
         legs = columns({'length': self.lengths, 'rate': self.rates, 'force': self.forces,
                         'joint_force': self.joint_forces,
                         'unit_load_force': self.unit_load_forces})

@@ -98,9 +98,7 @@ def home_pose(parameters: Parameters) -> Pose:
             'limits.length_min and limits.length_max on the '
             f'{POSITIVE if home.side > 0.0 else NEGATIVE} side of the base')
     if home.length is None:
-        raise ParameterError(
-            f'{parameters.source}: home pose: limits.length_min and limits.length_max, or '
-            'geometry.zero_length, must give a length that the legs can have in a level pose')
+        raise ParameterError(f'{parameters.source}: home pose: {parameters.leg_kind.home_rule}')
     positions, rotations = home.poses(parameters)
     return Pose(positions[0], rotations[0])
 
@@ -135,7 +133,7 @@ def homes(parameters: Parameters) -> tuple[Array, Array]:
 
 
 def shape_of(p: Parameters) -> Shape:
-    base, platform = p.geometry.base_joints, p.geometry.platform_joints
+    base, platform = p.leg_kind.home_legs(p).anchors, p.geometry.platform_joints
     around, carried = base - base.mean(axis=0), platform - platform.mean(axis=0)
     axes = level_axes(around)
     return Shape(around @ axes.T, carried @ axes.T, axes, mean_norm(around),
@@ -167,7 +165,7 @@ def is_too_long(p: Parameters, name: str, shape: Shape) -> bool:
 def home_of(p: Parameters) -> Home:
     """Return the level poses within the limits of length, and the possible heights at home."""
     with np.errstate(all='ignore'):
-        shape = shape_of(p)
+        lines, shape = p.leg_kind.home_legs(p), shape_of(p)
         offsets = (turns_about(2, _YAWS) @ shape.platform.T).swapaxes(-1, -2) - shape.base
         above, below = (_reached(p, offsets, side) for side in (1.0, -1.0))
         given = p.geometry.platform_side
@@ -178,11 +176,9 @@ def home_of(p: Parameters) -> Home:
         yaw = float(_YAWS[np.argmin(np.where(reached, angles, np.inf))]) if reached.any() else 0.0
         across = float(np.linalg.norm(offsets[..., :2], axis=-1).max())
         longest = math.hypot(HEIGHTS[-1] * shape.radius, across)
-        low, high = p.limits.length_min, p.limits.length_max
+        high, length = lines.longest, lines.length
         if high is not None and not is_too_long(p, 'limits.length_max', shape):
             longest = float(high.max())
-        length = float(np.mean(p.geometry.zero_length if low is None or high is None
-                               else 0.5 * (low + high)))
         legs = shape.platform @ turns_about(2, np.array([yaw]))[0].T - shape.base  # at no height
         known = mean_norm(legs) < length < _LENGTH_RATIO * shape.radius
         heights = [each * _height(shape, each, legs, length) for each in (side, -side)] if (
@@ -198,7 +194,8 @@ def _reached(p: Parameters, offsets: Array, side: float) -> Flags:
 
     offsets (turns, 6, 3): the legs while the center of the platform is at that of the base [m].
     """
-    low, high = six_of(p.limits.length_min, 0.0), six_of(p.limits.length_max, np.inf)
+    lines = p.leg_kind.home_legs(p)
+    low, high = six_of(lines.shortest, 0.0), six_of(lines.longest, np.inf)
     across, along = np.linalg.norm(offsets[..., :2], axis=-1), side * offsets[..., 2]
     # The height of a leg is that of the platform plus the platform joint's own.
     least = np.sqrt(np.maximum(low ** 2 - across ** 2, 0.0)) - along
@@ -229,7 +226,7 @@ def poses_of(p: Parameters, shape: Shape, heights: Array, rotations: Array,
     """Return positions (N, 3) and rotations (N, 3, 3) at these heights and turns of the shape."""
     middle = p.geometry.platform_joints.mean(axis=0)
     rotations = shape.axes.T @ rotations @ shape.axes
-    positions = (p.geometry.base_joints.mean(axis=0) - rotations @ middle
+    positions = (p.leg_kind.home_legs(p).anchors.mean(axis=0) - rotations @ middle
                  + heights[:, None] * shape.axes[2])
     return positions, rotations
 

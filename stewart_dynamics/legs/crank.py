@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Cranks, turned by motors on the base, with rods to the platform: ``core/crank.h``."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import places
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters.table import Parameters
+
+AUTO, POSITIVE, NEGATIVE = BRANCHES = 'auto', 'positive', 'negative'  # geometry.crank_branch
+LEVER_MIN = 0.1
+"""Default of ``limits.lever_min``: the lever near a dead centre by its largest value."""
+COULOMB_VELOCITY = 0.01
+"""Default of ``actuator.coulomb_velocity`` for cranks [rad/s]."""
+HEADINGS, AXES, DIRECTIONS = (
+    'geometry.crank_angles', 'geometry.crank_axes', 'geometry.crank_directions')
+_UPRIGHT = 0.5 * math.pi  # from its zero, farther than which no crank is at home by itself [rad]
+
+
+class Crank(LegKind):
+    """Cranks with rods, whose drives turn the cranks."""
+
+    name = 'crank'
+    marker = 'legs.crank.length'
+    position = Named('angle', 'angles', 'rad')
+    rate = Named('speed', 'speeds', 'rad/s')
+    effort = Named('torque', 'torques', 'N m', '+ drives the angle up')
+    commands = 'torques'
+    width = places('stewart_result')['levers'].stop
+    own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
+           'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
+           'limits.lever_min')
+    fields = {
+        'crank_length': 'legs.crank.length', 'rod_length': 'legs.rod.length',
+        'crank_axis': AXES, 'crank_direction': DIRECTIONS, 'crank_mass': 'legs.crank.mass',
+        'rod_mass': 'legs.rod.mass', 'rod_center_of_mass': 'legs.rod.center_of_mass',
+        'rod_inertia': 'legs.rod.inertia', 'reflected_mass': 'actuator.reflected_inertia'}
+    masses = (
+        *(LegMass(f'legs.crank.first_moment.{axis}', 'kg m') for axis in 'enu'),
+        *(LegMass(f'legs.crank.inertia_about_axis.{axes}', 'kg m^2')
+          for axes in ('ee', 'en', 'eu', 'nn', 'nu', 'uu')),
+        *(LegMass(f'legs.rod.{name}', 'kg')
+          for name in ('crank_end_mass', 'coupling_mass', 'platform_end_mass')))
+    massless = {
+        'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
+        'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
+    inertia_unit = 'kg m^2'
+    home_rule = ('no level pose has all rods at the cranks\' middle angles: legs.rod.length is '
+                 'shorter than the gap, or a length is in other units')
+    friction_units = 'N m s/rad', 'N m'
+
+    def check(self, parameters: Parameters, source: str) -> None:
+        """Complete axes and directions, and defaults that differ from those of other legs."""
+        _complete_axes(parameters, source)
+        given = parameters.given
+        if parameters['legs.rod.length'] is None:
+            raise ParameterError(f'{source}: legs.rod.length: not set: needed by {self.marker}')
+        if parameters.limits.lever_min is None:
+            parameters._complete('limits.lever_min', np.full(6, LEVER_MIN))
+        if 'actuator.coulomb_velocity' not in given:
+            parameters._complete('actuator.coulomb_velocity', np.full(6, COULOMB_VELOCITY))
+
+    def write_fields(self, legs: Records, parameters: Parameters) -> None:
+        """Write centers of mass and inertias of the cranks, and the branches that are given."""
+        of: Any = legs
+        of['crank_center_of_mass'], of['crank_inertia'] = crank_bodies(parameters)
+        of['branch'] = [-1.0 if each == NEGATIVE else 1.0 for each in _branches(parameters)]
+
+    def mass_values(self, parameters: Parameters) -> Array:
+        """Return moments and inertias of the cranks, and the masses of the rods (12, 6)."""
+        legs: Any = parameters.structure['legs']
+        centers, inertias = crank_bodies(parameters)
+        mass = parameters['legs.crank.mass']
+        x, y, z = centers.T
+        about = np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
+        return np.concatenate([mass * centers.T, inertias.T + mass * about, np.stack([
+            legs[name] for name in ('crank_end_mass', 'coupling_mass', 'platform_end_mass')])])
+
+    def home_legs(self, parameters: Parameters) -> HomeLegs:
+        """Return the rods, from the ends of the cranks at the middle of their angles."""
+        low, high = parameters.limits.angle_min, parameters.limits.angle_max
+        middle = np.zeros(6) if low is None or high is None else 0.5 * (low + high)
+        return HomeLegs(crank_ends(parameters, middle), None, None,
+                        float(np.mean(parameters['legs.rod.length'])))
+
+    def choose_branch(self, legs: Records, parameters: Parameters, home: Any) -> None:
+        """Take the branch whose angle at home is within the limits and a quarter turn of zero."""
+        wanted, of = _branches(parameters), legs
+        if AUTO not in wanted:
+            return
+        position, rotation = home()
+        for leg, branch in enumerate(wanted):
+            if branch != AUTO:
+                continue
+            angles = _angles_at(parameters, leg, position, rotation)
+            name = parameters.joints[leg]
+            if angles is None:
+                raise ParameterError(
+                    f'{parameters.source}: geometry.crank_branch: auto: the rod of {name} does '
+                    'not reach the platform at home: a length of legs.rod or legs.crank, or a '
+                    'height')
+            possible = [_is_allowed(parameters, leg, angle) for angle in angles]
+            if possible[0] == possible[1]:
+                words = 'both are possible' if possible[0] else 'neither is likely'
+                raise ParameterError(
+                    f'{parameters.source}: geometry.crank_branch: auto: {name} has an angle of '
+                    f'{angles[0]:.4g} rad at home with the branch positive, {angles[1]:.4g} rad '
+                    f'with negative: {words}: give the branch, or limits of the angle')
+            of['branch'][leg] = 1.0 if possible[0] else -1.0
+
+
+def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
+    """Return centers of mass (6, 3) [m] and inertias about them (6, 6), both in [e n u]."""
+    given = parameters['legs.crank.center_of_mass']
+    centers = np.zeros((6, 3))
+    if given.shape in ((1,), (6,)):
+        centers[:, 0] = given  # along the crank alone
+    else:
+        centers[:] = given
+    given = parameters['legs.crank.inertia']
+    inertias = np.zeros((6, 6))
+    if given.shape == (1,):
+        inertias[:, 5] = given  # about the axis alone
+    else:
+        inertias[:] = given
+    return centers, inertias
+
+
+def crank_ends(parameters: Parameters, angles: Array) -> Array:
+    """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
+    u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
+    along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
+    ends: Array = parameters.geometry.base_joints + parameters['legs.crank.length'][:, None] * along
+    return ends
+
+
+def _unit(vectors: Array) -> Array:
+    with np.errstate(all='ignore'):
+        units: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return units
+
+
+def _branches(parameters: Parameters) -> tuple[str, ...]:
+    given: tuple[str, ...] = parameters['geometry.crank_branch']
+    return given * 6 if len(given) == 1 else given
+
+
+def _complete_axes(parameters: Parameters, source: str) -> None:
+    """Set axes and directions that follow from headings; level axes lift at a positive angle."""
+    headings, axes, directions = (parameters[name] for name in (HEADINGS, AXES, DIRECTIONS))
+    if headings is None:
+        for name, other in ((AXES, DIRECTIONS), (DIRECTIONS, AXES)):
+            if parameters[name] is None:
+                needed = (f'{other}' if parameters[other] is not None else Crank.marker)
+                raise ParameterError(f'{source}: {name}: not set: needed by {needed}; or give '
+                                     f'{HEADINGS}')
+        for name, given in ((AXES, axes), (DIRECTIONS, directions)):
+            if not np.linalg.norm(given, axis=-1).all():
+                leg = int(np.argmin(np.linalg.norm(given, axis=-1)))
+                raise ParameterError(f'{source}: {name}: {given[leg].tolist()}: a direction must '
+                                     'not be 0, 0, 0')
+        return
+    cosine, sine, level = np.cos(headings), np.sin(headings), np.zeros(6)
+    found = {AXES: np.stack([sine, -cosine, level], axis=-1),
+             DIRECTIONS: np.stack([cosine, sine, level], axis=-1)}
+    for name, value in found.items():
+        if parameters[name] is not None and not np.array_equal(parameters[name], value):
+            raise ParameterError(f'{source}: {name}: given as well as {HEADINGS}: leave out one '
+                                 'of them')
+        parameters._complete(name, value)
+
+
+def _angles_at(parameters: Parameters, leg: int, position: Array, rotation: Array,
+               ) -> tuple[float, float] | None:
+    """Return the angles of a crank with both branches in a pose [rad]; None: out of reach."""
+    u, z = (_unit(parameters[name])[leg] for name in (AXES, DIRECTIONS))
+    line = position + rotation @ parameters.geometry.platform_joints[leg] - (
+        parameters.geometry.base_joints[leg])
+    size, rod = parameters['legs.crank.length'][leg], parameters['legs.rod.length'][leg]
+    x, y = float(line @ z), float(line @ np.cross(u, z))
+    g = (float(line @ line) + size * size - rod * rod) / (2.0 * size)
+    square = x * x + y * y - g * g
+    if not square >= 0.0:
+        return None
+    h = math.sqrt(square)
+    return math.atan2(y * g - x * h, x * g + y * h), math.atan2(y * g + x * h, x * g - y * h)
+
+
+def _is_allowed(parameters: Parameters, leg: int, angle: float) -> bool:
+    """Return whether an angle at home is within the limits, and likely."""
+    low, high = parameters.limits.angle_min, parameters.limits.angle_max
+    lowest = -_UPRIGHT if low is None else float(low[leg])
+    highest = _UPRIGHT if high is None else float(high[leg])
+    middle = 0.5 * (lowest + highest)
+    turned = middle + math.remainder(angle - middle, 2.0 * math.pi)
+    return lowest <= turned <= highest
+
+
+CRANK = Crank()

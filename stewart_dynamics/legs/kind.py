@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+A kind of legs: what the package asks of it.
+
+The mechanics of a kind stand in ``core/<name>.h``. A leg has a drive, whose position, rate and
+effort are numbers of a row of results; the rest of the package reads where they are, what they are
+called, and which parameters belong to them.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, TYPE_CHECKING
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.core.binding import KINDS, places
+from stewart_dynamics.errors import ParameterError
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters.table import Parameters
+
+_RESULT, _OUTPUT = places('stewart_result'), places('stewart_output')
+
+
+class Named(NamedTuple):
+    """A quantity of a drive."""
+
+    name: str  # 'length'
+    field: str  # of stewart_result, and the attribute of a result: 'lengths'
+    unit: str
+    positive: str = ''  # what a positive one does: '+ extends'
+
+    @property
+    def columns(self) -> slice:
+        """Return where its six numbers are in a row of results."""
+        place: slice = _RESULT[self.field]
+        return place
+
+
+class LegMass(NamedTuple):
+    """A mass or moment of each leg in which the efforts are linear."""
+
+    name: str  # as in the names of linear parameters
+    unit: str
+
+
+class HomeLegs(NamedTuple):
+    """Lines from the base to the platform joints by which a home pose is found."""
+
+    anchors: Array  # where they begin (6, 3) [m]
+    shortest: Array | None  # (6,) [m]
+    longest: Array | None
+    length: float  # of the mean line at home [m]; 0: not known
+
+
+class LegKind(ABC):
+    """
+    A kind of legs.
+
+    Attributes
+    ----------
+    name : str
+        Its name in C, in lower case.
+    marker : str
+        The parameter that a file gives for this kind alone; empty: the kind of all other files.
+    position, rate, effort : Named
+        Quantities of the drive.
+    commands : str
+        Field of ``stewart_output`` with the efforts to command.
+    width : int
+        Numbers in a row of results: those of ``stewart_result`` up to the last of this kind.
+    ratio : str
+        The parameter without which there are no motors; empty: none is needed.
+    own : tuple of str
+        Parameters, or beginnings of their names, that have no meaning for other kinds.
+    fields : mapping
+        Fields of ``stewart_leg`` that hold parameters of this kind.
+    masses : tuple of LegMass
+        Masses and moments in the regressor, in the order of the columns in C.
+    massless : mapping
+        Values of parameters with which the legs and the drives have no mass.
+
+    """
+
+    name: str
+    marker: str = ''
+    position: Named
+    rate: Named
+    effort: Named
+    commands: str
+    width: int = _RESULT['joint_forces'].stop
+    ratio: str = ''
+    own: tuple[str, ...]
+    foreign: tuple[str, ...]  # the ``own`` of other kinds
+    fields: Mapping[str, str]
+    masses: tuple[LegMass, ...]
+    massless: Mapping[str, Any]
+    home_rule: str  # what a file lacks that gives no home pose
+    inertia_unit: str  # of the reflected inertia of a drive
+    friction_units: tuple[str, str]  # viscous and Coulomb
+
+    @property
+    def number(self) -> int:
+        """Return ``stewart_platform.leg_kind``."""
+        return KINDS[self.name.upper()]
+
+    @property
+    def published(self) -> slice:
+        """Return where the efforts to command are in a row of outputs."""
+        place: slice = _OUTPUT[self.commands]
+        return place
+
+    def check(self, parameters: Parameters, source: str) -> None:
+        """Check the rules between the parameters of this kind, and complete them."""
+
+    @abstractmethod
+    def write_fields(self, legs: Records, parameters: Parameters) -> None:
+        """Write fields of ``stewart_leg`` (6,) that hold no parameter as it is given."""
+
+    @abstractmethod
+    def mass_values(self, parameters: Parameters) -> Array:
+        """Return the values of ``masses`` (n, 6), SI units."""
+
+    @abstractmethod
+    def home_legs(self, parameters: Parameters) -> HomeLegs:
+        """Return the lines by which the home pose is found."""
+
+    def choose_branch(self, legs: Records, parameters: Parameters, home: Any) -> None:
+        """
+        Write which of several assemblies the legs have, where the parameters leave it open.
+
+        home: a function that returns position (3,) and rotation (3, 3) at home.
+        """
+
+
+def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind],
+                  source: str) -> None:
+    """Raise ParameterError for a parameter that has a meaning for other kinds alone."""
+    for name, value in parameters.given.items():
+        owner = next((each for each in kinds if each is not kind and name.startswith(each.own)),
+                     None)
+        default = parameters.table[name].default
+        # A whole set of parameters, as dict(parameters), gives the defaults, too.
+        if owner is None or np.size(default) > 0 and np.all(value == np.asarray(default)):
+            continue
+        if kind.marker:
+            raise ParameterError(
+                f'{source}: {name}: of hexapods without {kind.marker}, which is given')
+        raise ParameterError(f'{source}: {name}: {owner.marker} is not set: needed by it')
