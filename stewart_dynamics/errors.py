@@ -59,5 +59,9 @@ class SingularityError(StewartError):
     """A pose in which leg forces cannot balance the load."""
 
 
+class ReachError(SingularityError):
+    """A pose that a rod does not reach: names the leg and the missing distance."""
+
+
 class BagError(StewartError):
     """A bag that cannot be read or written."""

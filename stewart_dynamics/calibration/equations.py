@@ -22,6 +22,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, cross
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.legs.lines import Lines
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import euler_rate_matrix, from_euler
@@ -100,7 +101,7 @@ class Equations(NamedTuple):
             rotation = to_target @ turned
             arms_of_platform = platform @ np.swapaxes(rotation, 1, 2)
             of_drives = lagrange.drive_jacobian(
-                lagrange.Legs(sizes, s, arms_of_platform), rotation, self.screws)
+                Lines(sizes, s, arms_of_platform), rotation, self.screws)
             sizes = sizes + self.screws[:, PITCH] * self.turns(values)
             s = of_drives[..., :3]
             moment = of_drives[..., 3:] - cross(arms_of_platform, s)

@@ -15,6 +15,17 @@ void positions_many(
   }
 }
 
+void missing_many(
+  const stewart_platform * platform, int64_t count, const stewart_pose * poses,
+  double * distances) {
+  for (int64_t n = 0; n < count; n++) {
+    for (int i = 0; i < 6; i++) {
+      distances[6 * n + i] =
+        missing_distance(platform, i, poses[n].position, poses[n].rotation);
+    }
+  }
+}
+
 FLAT void forward_kinematics_many(
   const stewart_platform * platform, int64_t count, const double * positions,
   stewart_motion * motions, int64_t * codes, int64_t * steps, double * residuals) {

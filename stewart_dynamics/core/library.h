@@ -214,6 +214,11 @@ void positions_many(
   const stewart_platform * platform, int64_t count, const stewart_pose * poses,
   double * positions);
 
+/* Distances (count, 6) by which legs miss the platform joints of poses [m]; 0: they reach them. */
+void missing_many(
+  const stewart_platform * platform, int64_t count, const stewart_pose * poses,
+  double * distances);
+
 /* Poses of positions of the drives (count, 6) into motions, which have the guesses. */
 void forward_kinematics_many(
   const stewart_platform * platform, int64_t count, const double * positions,

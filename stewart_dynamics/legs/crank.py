@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, TYPE_CHECKING
+from collections.abc import Callable
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named
+from stewart_dynamics.legs.lines import (
+    AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -36,6 +39,8 @@ class Crank(LegKind):
     position = Named('angle', 'angles', 'rad')
     rate = Named('speed', 'speeds', 'rad/s')
     effort = Named('torque', 'torques', 'N m', '+ drives the angle up')
+    position_limits = 'limits.angle_min', 'limits.angle_max'
+    rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
     commands = 'torques'
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
@@ -87,6 +92,82 @@ class Crank(LegKind):
         return np.concatenate([mass * centers.T, inertias.T + mass * about, np.stack([
             legs[name] for name in ('crank_end_mass', 'coupling_mass', 'platform_end_mass')])])
 
+    def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
+        """Return the rods, whose anchors are the ends of the cranks: A(q) = c + L1 e(q)."""
+        at = _angle_of(parameters, position, rotation)
+        tangents, curvatures = at.size * at.normal, -at.size * at.along
+        rods = parameters['legs.rod.length']
+        directions = (at.line + curvatures) / rods[:, None]
+        return Lines(np.broadcast_to(rods, at.missing.shape), directions, at.arms,
+                     AnchorPath(tangents, curvatures))
+
+    def missing_distances(self, parameters: Parameters, position: Array, rotation: Array) -> Array:
+        """Return how far each platform joint is from the nearest point that its rod reaches."""
+        return _angle_of(parameters, position, rotation).missing
+
+    def leg_mass(self, parameters: Parameters, at: Lines) -> Array:
+        """Return M_i = I r r^T + m_ab (t r^T + r t^T) + m_b, q' = r . x', A' = t q', r = d / k."""
+        inertia, _, coupling, end = _of_legs(parameters)
+        t, r = _tangent_and_row(at)
+        couple = t[..., :, None] * r[..., None, :]
+        mass: Array = (per_leg(inertia) * (r[..., :, None] * r[..., None, :])
+                       + per_leg(coupling) * (couple + transposed(couple))
+                       + per_leg(end) * np.eye(3))
+        return mass
+
+    def leg_coriolis(self, parameters: Parameters, at: Lines, joint_rates: Array,
+                     christoffel: bool) -> Array:
+        """
+        Return C_i = I r r'^T + m_ab (t' r^T + t r'^T).
+
+        As q and A are functions of x_i alone, these are the Christoffel symbols of M_i.
+        """
+        inertia, _, coupling, _ = _of_legs(parameters)
+        assert at.path is not None
+        t, r = _tangent_and_row(at)
+        speeds, anchor_rates = at.anchor_rates(joint_rates)
+        t_rate = speeds * at.path.curvatures
+        d_rate = (joint_rates - anchor_rates) / at.lengths[..., None]
+        lever_rate = dot(d_rate, t) + dot(at.directions, t_rate)
+        r_rate = (d_rate - lever_rate * r) / at.levers()[..., None]
+        c: Array = (per_leg(inertia) * (r[..., :, None] * r_rate[..., None, :])
+                    + per_leg(coupling) * (t_rate[..., :, None] * r[..., None, :]
+                                           + t[..., :, None] * r_rate[..., None, :]))
+        return c
+
+    def leg_gravity(self, parameters: Parameters, at: Lines) -> Array:
+        """Return what holds crank and rod at rest under gravity."""
+        g = parameters.gravity
+        at_all = np.broadcast_to(-g, at.directions.shape)
+        return _forces_at_rest(parameters, at, at_all, at_all, at_all)
+
+    def base_coriolis(self, parameters: Parameters, at: Lines, spin: Array) -> Array:
+        """Return 2 m_ab (skew(W) t r^T + r t^T skew(W)) + 2 m_b skew(W)."""
+        _, _, coupling, end = _of_legs(parameters)
+        t, r = _tangent_and_row(at)
+        turn = skew(spin)[..., None, :, :]
+        couple = t[..., :, None] * r[..., None, :]
+        c: Array = (per_leg(2.0 * coupling) * (turn @ couple + transposed(couple) @ turn)
+                    + per_leg(2.0 * end) * turn)
+        return c
+
+    def base_gravity(self, parameters: Parameters, at: Lines, position: Array,
+                     felt: Callable[[Array], Array], spin: Array, spin_rate: Array) -> Array:
+        """Return the same at rest on a base, and r u . (I W' + W x I W) of the crank."""
+        assert at.path is not None
+        centers = parameters.geometry.base_joints
+        joints = position[..., None, :] + at.arms
+        forces = _forces_at_rest(parameters, at, felt(centers), felt(centers - at.path.curvatures),
+                                 felt(joints))
+        axes = _crank_axes(parameters, at)
+        w, w_rate = (np.einsum('...kij,...j->...ki', axes, each) for each in (spin, spin_rate))
+        inertia = symmetric_matrices(turning_inertias(parameters))
+        torque = (np.einsum('kij,...kj->...ki', inertia, w_rate)
+                  + np.cross(w, np.einsum('kij,...kj->...ki', inertia, w)))[..., 2:]
+        _, r = _tangent_and_row(at)
+        on_legs: Array = forces + torque * r
+        return on_legs
+
     def home_legs(self, parameters: Parameters) -> HomeLegs:
         """Return the rods, from the ends of the cranks at the middle of their angles."""
         low, high = parameters.limits.angle_min, parameters.limits.angle_max
@@ -94,11 +175,12 @@ class Crank(LegKind):
         return HomeLegs(crank_ends(parameters, middle), None, None,
                         float(np.mean(parameters['legs.rod.length'])))
 
-    def choose_branch(self, legs: Records, parameters: Parameters, home: Any) -> None:
+    def choose_branch(self, legs: Records, parameters: Parameters,
+                      home: Callable[[], tuple[Array, Array]]) -> bool:
         """Take the branch whose angle at home is within the limits and a quarter turn of zero."""
         wanted, of = _branches(parameters), legs
         if AUTO not in wanted:
-            return
+            return False
         position, rotation = home()
         for leg, branch in enumerate(wanted):
             if branch != AUTO:
@@ -118,6 +200,85 @@ class Crank(LegKind):
                     f'{angles[0]:.4g} rad at home with the branch positive, {angles[1]:.4g} rad '
                     f'with negative: {words}: give the branch, or limits of the angle')
             of['branch'][leg] = 1.0 if possible[0] else -1.0
+        return True
+
+
+class _Angle(NamedTuple):
+    """The crank of each leg at a pose."""
+
+    arms: Array  # (..., 6, 3) [m]
+    line: Array  # from base joint to platform joint (..., 6, 3) [m]
+    along: Array  # e (..., 6, 3)
+    normal: Array  # n
+    size: Array  # length (6, 1) [m]
+    missing: Array  # distance by which the rod misses the platform joint (..., 6) [m]
+
+
+def _angle_of(parameters: Parameters, position: Array, rotation: Array) -> _Angle:
+    legs: Any = parameters.structure['legs']
+    u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
+    n0 = np.cross(u, z)
+    size, rod = parameters['legs.crank.length'], parameters['legs.rod.length']
+    arms = joint_arms(rotation, parameters.geometry.platform_joints)
+    line = position[..., None, :] + arms - parameters.geometry.base_joints
+    x, y, height = (dot(line, axis)[..., 0] for axis in (z, n0, u))
+    square = x * x + y * y
+    g = (square + height * height + size * size - rod * rod) / (2.0 * size)
+    h = legs['branch'] * np.sqrt(square - g * g)
+    cosine, sine = ((x * g + y * h) / square)[..., None], ((y * g - x * h) / square)[..., None]
+    radius = np.sqrt(square)
+    missing = np.maximum(np.hypot(radius - size, height) - rod,
+                         rod - np.hypot(radius + size, height))
+    return _Angle(arms, line, z * cosine + n0 * sine, n0 * cosine - z * sine, size[:, None],
+                  np.maximum(missing, 0.0))
+
+
+def _of_legs(parameters: Parameters) -> tuple[Array, Array, Array, Array]:
+    """Return inertia about the axis, mass at the crank's end, coupling, mass at the platform."""
+    legs: Any = parameters.structure['legs']
+    return (legs['turning_inertia'][:, 5], legs['crank_end_mass'], legs['coupling_mass'],
+            legs['platform_end_mass'])
+
+
+def _tangent_and_row(at: Lines) -> tuple[Array, Array]:
+    """Return t = dA/dq and r = dq/dx = d / k (..., 6, 3)."""
+    assert at.path is not None
+    return at.path.tangents, at.directions / at.levers()[..., None]
+
+
+def _crank_axes(parameters: Parameters, at: Lines) -> Array:
+    """Return the axes e, n, u of the cranks (..., 6, 3, 3), row by row."""
+    assert at.path is not None
+    size = parameters['legs.crank.length'][:, None]
+    e, n = -at.path.curvatures / size, at.path.tangents / size
+    return np.stack([e, n, np.broadcast_to(_unit(parameters[AXES]), e.shape)], axis=-2)
+
+
+def _forces_at_rest(parameters: Parameters, at: Lines, at_center: Array, at_tip: Array,
+                    at_end: Array) -> Array:
+    """Return forces at the platform joints (..., 6, 3) [N] for what the points feel at rest."""
+    _, _, coupling, end = _of_legs(parameters)
+    t, r = _tangent_and_row(at)
+    axes = _crank_axes(parameters, at)
+    legs: Any = parameters.structure['legs']
+    moment = legs['turning_moment']
+    torque = dot(moment[:, :1] * axes[..., 1, :] - moment[:, 1:] * axes[..., 0, :], at_center)
+    torque = torque + coupling[:, None] * dot(t, at_end)
+    forces: Array = (torque * r + coupling[:, None] * at_tip + end[:, None] * at_end)
+    return forces
+
+
+def turning_inertias(parameters: Parameters) -> Array:
+    """Return inertias (6, 6) of cranks and the points at their ends, about the base joints."""
+    legs: Any = parameters.structure['legs']
+    inertias: Array = legs['turning_inertia']
+    return inertias
+
+
+def symmetric_matrices(six: Array) -> Array:
+    """Return matrices (..., 3, 3) of xx xy xz yy yz zz."""
+    matrices: Array = six[..., [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+    return matrices
 
 
 def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ called, and which parameters belong to them.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import KINDS, places
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.legs.lines import Lines
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -70,6 +71,10 @@ class LegKind(ABC):
         The parameter that a file gives for this kind alone; empty: the kind of all other files.
     position, rate, effort : Named
         Quantities of the drive.
+    position_limits : tuple of str
+        Limits of the drive's position, the smallest and the largest.
+    rate_limit, effort_limit : str
+        Limits of its rate, and of its effort, to which commands are clipped.
     commands : str
         Field of ``stewart_output`` with the efforts to command.
     width : int
@@ -92,6 +97,9 @@ class LegKind(ABC):
     position: Named
     rate: Named
     effort: Named
+    position_limits: tuple[str, str]
+    rate_limit: str
+    effort_limit: str
     commands: str
     width: int = _RESULT['joint_forces'].stop
     ratio: str = ''
@@ -127,15 +135,52 @@ class LegKind(ABC):
         """Return the values of ``masses`` (n, 6), SI units."""
 
     @abstractmethod
+    def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
+        """Return the lines of force in poses (...); not finite where a leg does not reach."""
+
+    def missing_distances(self, parameters: Parameters, position: Array, rotation: Array,
+                          ) -> Array | None:
+        """Return by how much each leg misses its platform joint (..., 6) [m]; None: never."""
+
+    @abstractmethod
+    def leg_mass(self, parameters: Parameters, at: Lines) -> Array:
+        """Return M_i (..., 6, 3, 3) [kg], in coordinates x_i of the platform joints."""
+
+    @abstractmethod
+    def leg_coriolis(self, parameters: Parameters, at: Lines, joint_rates: Array,
+                     christoffel: bool) -> Array:
+        """Return C_i (..., 6, 3, 3) [kg/s] under the platform joints' velocities x_i'."""
+
+    @abstractmethod
+    def leg_gravity(self, parameters: Parameters, at: Lines) -> Array:
+        """Return G_i (..., 6, 3) [N]."""
+
+    @abstractmethod
+    def base_coriolis(self, parameters: Parameters, at: Lines, spin: Array) -> Array:
+        """Return what an angular velocity W (..., 3) of the base adds to C_i, a skew matrix."""
+
+    @abstractmethod
+    def base_gravity(self, parameters: Parameters, at: Lines, position: Array,
+                     felt: Callable[[Array], Array], spin: Array, spin_rate: Array) -> Array:
+        """
+        Return G_i (..., 6, 3) [N] on a moving base.
+
+        felt: acceleration less gravity of points (..., k, 3) at rest on the base. spin, spin_rate
+        (..., 3): angular velocity and acceleration of the base.
+        """
+
+    @abstractmethod
     def home_legs(self, parameters: Parameters) -> HomeLegs:
         """Return the lines by which the home pose is found."""
 
-    def choose_branch(self, legs: Records, parameters: Parameters, home: Any) -> None:
+    def choose_branch(self, legs: Records, parameters: Parameters,
+                      home: Callable[[], tuple[Array, Array]]) -> bool:
         """
-        Write which of several assemblies the legs have, where the parameters leave it open.
+        Write which of several assemblies the legs have, and return whether any was open.
 
         home: a function that returns position (3,) and rotation (3, 3) at home.
         """
+        return False
 
 
 def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind],

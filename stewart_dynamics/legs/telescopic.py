@@ -5,12 +5,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named
+from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -23,6 +25,8 @@ class Telescopic(LegKind):
     position = Named('length', 'lengths', 'm')
     rate = Named('rate', 'rates', 'm/s', '+ extends')
     effort = Named('force', 'forces', 'N', '+ pushes')
+    position_limits = 'limits.length_min', 'limits.length_max'
+    rate_limit, effort_limit = 'limits.velocity_max', 'limits.force_max'
     commands = 'forces'
     ratio = 'actuator.screw_lead'
     own = ('legs.cylinder.', 'legs.piston.', 'actuator.reflected_mass', 'actuator.screw_lead',
@@ -60,12 +64,114 @@ class Telescopic(LegKind):
             part.mass, part.mass * part.center_of_mass,
             part.inertia + part.mass * part.center_of_mass ** 2)])
 
+    def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
+        """Return the legs: (1), (2)."""
+        arms = joint_arms(rotation, parameters.geometry.platform_joints)
+        vectors = position[..., None, :] + arms - parameters.geometry.base_joints
+        lengths = np.linalg.norm(vectors, axis=-1)
+        return Lines(lengths, vectors / lengths[..., None], arms)
+
+    def leg_mass(self, parameters: Parameters, at: Lines) -> Array:
+        """Return M_i = m2 s s^T - (I_e / L^2 + m_ce) skew(s)^2."""
+        terms = _terms(parameters, at)
+        mass: Array = (per_leg(parameters.legs.piston.mass) * terms.along
+                       + per_leg(terms.inertia) * terms.across)
+        return mass
+
+    def leg_coriolis(self, parameters: Parameters, at: Lines, joint_rates: Array,
+                     christoffel: bool) -> Array:
+        """
+        Return C_i under the platform joints' velocities.
+
+        The matrix of the paper is ``-(2/L) m_co L' skew(s)^2 - (m2 S2/L^2) s x_i'^T skew(s)^2``.
+        With ``christoffel`` it consists of the Christoffel symbols of M_i in x_i: the same force
+        C_i x_i', and M_i' - 2 C_i is skew.
+        """
+        terms = _terms(parameters, at)
+        piston_mass = parameters.legs.piston.mass
+        rate = np.sum(at.directions * joint_rates, axis=-1)
+        across_rate = joint_rates - at.directions * rate[..., None]
+        outer = at.directions[..., :, None] * across_rate[..., None, :]  # s u^T
+        m_co = piston_mass * terms.piston_distance / at.lengths - terms.inertia
+        slope = 2.0 / at.lengths * m_co  # d/dL of I_e / L^2 + m_ce
+        c: Array
+        if christoffel:
+            c = (per_leg(0.5 * slope * rate) * terms.across
+                 + per_leg((piston_mass - terms.inertia) / at.lengths) * outer
+                 - per_leg(0.5 * slope) * (outer - transposed(outer)))
+        else:
+            s2 = parameters.legs.piston.center_of_mass
+            c = (per_leg(slope * rate) * terms.across
+                 + per_leg(piston_mass * s2 / at.lengths ** 2) * outer)
+        return c
+
+    def leg_gravity(self, parameters: Parameters, at: Lines) -> Array:
+        """Return G_i = (m_ge skew(s)^2 - m2 s s^T) g."""
+        g: Array = -_weight(parameters, at) @ parameters.gravity
+        return g
+
+    def base_coriolis(self, parameters: Parameters, at: Lines, spin: Array) -> Array:
+        """Return 2 m2 c2 / L (q s^T - s q^T) + 2 (I_e / L^2 + m_ce) (W . s) skew(s), q = W x s."""
+        terms = _terms(parameters, at)
+        q = np.cross(spin[..., None, :], at.directions)
+        outer = q[..., :, None] * at.directions[..., None, :]
+        piston = parameters.legs.piston.mass * terms.piston_distance / at.lengths
+        along = np.sum(spin[..., None, :] * at.directions, axis=-1)
+        of_legs: Array = (per_leg(2.0 * piston) * (outer - transposed(outer))
+                          + per_leg(2.0 * terms.inertia * along) * skew(at.directions))
+        return of_legs
+
+    def base_gravity(self, parameters: Parameters, at: Lines, position: Array,
+                     felt: Callable[[Array], Array], spin: Array, spin_rate: Array) -> Array:
+        """
+        Return ``-G_i(A_b) + (I_e / L^2 + m_ce) L across - m2 c2 |q|^2 s``.
+
+        With A_b of the leg's base joint and across the part of ``W' x s + W x q`` across the leg,
+        q = W x s.
+        """
+        terms = _terms(parameters, at)
+        field = skew(spin_rate) + skew(spin) @ skew(spin)
+        q_squared = np.sum(np.cross(spin[..., None, :], at.directions) ** 2, axis=-1)
+        carried = np.einsum('...ij,...kj->...ki', field, at.directions)
+        moment = parameters.legs.piston.mass * terms.piston_distance
+        on_legs: Array = (
+            (_weight(parameters, at) @ felt(parameters.geometry.base_joints)[..., None])[..., 0]
+            + (per_leg(terms.inertia * at.lengths) * terms.across @ carried[..., None])[..., 0]
+            - (moment * q_squared)[..., None] * at.directions)
+        return on_legs
+
     def home_legs(self, parameters: Parameters) -> HomeLegs:
         """Return the legs, with the mean one halfway between its limits or of zero length."""
         low, high = parameters.limits.length_min, parameters.limits.length_max
         length = float(np.mean(parameters.geometry.zero_length if low is None or high is None
                                else 0.5 * (low + high)))
         return HomeLegs(parameters.geometry.base_joints, low, high, length)
+
+
+class _Terms(NamedTuple):
+    along: Array  # s s^T (..., 6, 3, 3)
+    across: Array  # 1 - s s^T = -skew(s)^2
+    piston_distance: Array  # c2 = L - S2 (..., 6)
+    inertia: Array  # I_e / L^2 + m_ce: effective mass across the leg [kg]
+
+
+def _terms(parameters: Parameters, at: Lines) -> _Terms:
+    along = at.directions[..., :, None] * at.directions[..., None, :]
+    piston_distance = at.lengths - parameters.legs.piston.center_of_mass
+    inertia = (parameters.legs.cylinder.inertia + parameters.legs.piston.inertia
+               + parameters.legs.cylinder.mass * parameters.legs.cylinder.center_of_mass ** 2
+               + parameters.legs.piston.mass * piston_distance ** 2) / at.lengths ** 2
+    return _Terms(along, np.eye(3) - along, piston_distance, inertia)
+
+
+def _weight(parameters: Parameters, at: Lines) -> Array:
+    """Return the masses m_ge across and m2 along the legs (..., 6, 3, 3) [kg]."""
+    terms = _terms(parameters, at)
+    piston_mass = parameters.legs.piston.mass
+    m_ge = (parameters.legs.cylinder.mass * parameters.legs.cylinder.center_of_mass
+            + piston_mass * terms.piston_distance) / at.lengths
+    weight: Array = per_leg(m_ge) * terms.across + per_leg(piston_mass) * terms.along
+    return weight
 
 
 TELESCOPIC = Telescopic()

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import math
 import os
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stewart_dynamics.arrays import Array, Integers, Records
 from stewart_dynamics.core.binding import function
-from stewart_dynamics.errors import SingularityError
+from stewart_dynamics.errors import ReachError, SingularityError
 from stewart_dynamics.legs import KINDS
 from stewart_dynamics.mechanics.arguments import (
     common_shape, copies, optional_array, place, wrong_type)
@@ -96,12 +96,47 @@ def find_unsolvable(
     return unsolvable
 
 
-def leg_lengths(hexapod: Records, poses: Array) -> Array:
-    """Return the lengths (..., 6) [m] of the legs in poses (..., POSE) or more, unchecked."""
+def drive_positions(hexapod: Records, poses: Array) -> Array:
+    """Return the drives' positions (..., 6) in poses (..., POSE) or more, unchecked."""
     shape = poses.shape[:-1]
-    lengths = np.empty((*shape, 6))
-    function('positions_many')(hexapod, math.prod(shape), compact(poses[..., POSE]), lengths)
-    return lengths
+    positions = np.empty((*shape, 6))
+    function('positions_many')(hexapod, math.prod(shape), compact(poses[..., POSE]), positions)
+    return positions
+
+
+def missing_distances(hexapod: Records, poses: Array) -> Array:
+    """Return by how much legs miss the platform joints (..., 6) [m] of poses (..., POSE)."""
+    shape = poses.shape[:-1]
+    distances = np.empty((*shape, 6))
+    function('missing_many')(hexapod, math.prod(shape), compact(poses[..., POSE]), distances)
+    return distances
+
+
+def find_unreachable(hexapod: Records, joints: Sequence[str], rows: Array, results: Array,
+                     shape: tuple[int, ...], singular: str = 'raise') -> Integers:
+    """
+    Return the samples that a leg does not reach; ReachError if that is to raise.
+
+    rows (N, POSE) or more; results (N, ...): not finite in such samples.
+    """
+    bad = (~np.isfinite(results).all(axis=-1)).nonzero()[0]
+    if not len(bad):
+        return bad
+    missing = missing_distances(hexapod, rows[bad])
+    unreachable: Integers = bad[(missing > 0.0).any(axis=-1)]
+    if singular == 'raise' and len(unreachable):
+        at = int(unreachable[0])
+        where = f'sample {place(at, shape)}: ' if shape else ''
+        distances = missing_distances(hexapod, rows[at])
+        raise ReachError(f'{where}{unreached(joints, distances)}; position '
+                         f'{rows[at, POSITION].tolist()} m')
+    return unreachable
+
+
+def unreached(joints: Sequence[str], distances: Array) -> str:
+    """Return which leg misses its platform joint most, by distances (6,) [m]."""
+    leg = int(np.argmax(distances))
+    return f'{joints[leg]} cannot reach: {1e3 * float(distances[leg]):.3g} mm missing'
 
 
 def in_parts(compute: Callable[..., object], constants: tuple[Any, ...], *arrays: NDArray[Any],

@@ -33,6 +33,7 @@ def hexapod_structure(parameters: Parameters, screws: Array | None = None,
 
     Raises ParameterError: axes that are needed are not given, and there is no home pose.
     """
+    parameters.choose_branch(partial(home_at, parameters))
     hexapod: Any = parameters.structure.copy()
     legs = hexapod['legs']
     if parameters.drive.screw_rotation == UNIVERSAL:
@@ -42,7 +43,6 @@ def hexapod_structure(parameters: Parameters, screws: Array | None = None,
         legs['platform_universal_axis'] = screws[:, PLATFORM_AXIS]
     if axes:
         legs['base_joint_axis'], legs['platform_joint_axis'] = joint_axes(parameters, axes)
-    parameters.leg_kind.choose_branch(legs, parameters, partial(home_at, parameters))
     function('stewart_complete')(hexapod)
     hexapod['with_joint_angles'] = bool(axes)
     return hexapod  # type: ignore[no-any-return]

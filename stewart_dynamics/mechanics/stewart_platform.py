@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
+from stewart_dynamics.legs.lines import Lines
 from stewart_dynamics.mechanics import batch, stiffness
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, optional_array, place, wrong_type)
@@ -23,7 +24,7 @@ from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, l
 from stewart_dynamics.mechanics.dynamics.force_breakdown import (
     ForceBreakdown, ForceBreakdownRows, SOURCES)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    LINEAR, linear_parameters, names_of)
+    linear_parameters, names_of)
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
@@ -32,7 +33,7 @@ from stewart_dynamics.mechanics.frames.motion import (
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
-from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, Limits
+from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
@@ -84,6 +85,7 @@ class StewartPlatform:
         self.structure = hexapod_structure(parameters, self.screws)
         self.solve = partial(batch.solve, self.structure)
         self._single = SingleSample(self.structure)
+        self._kind = parameters.leg_kind
         self._breakdown: ForceBreakdownRows | None = None
         self._home: Pose | None = None
         self._joint_angles: JointAngles | None = None
@@ -141,7 +143,7 @@ class StewartPlatform:
             if result is not None:
                 return InverseDynamics(result)
         _, _, results, unsolvable, shape = self._solved(motion, wrench, base, singular)
-        for forces in FORCES, JOINT_FORCES:
+        for forces in FORCES, JOINT_FORCES, self._kind.effort.columns:
             results[unsolvable, forces] = np.nan
         return InverseDynamics(results.reshape(*shape, -1))
 
@@ -151,8 +153,12 @@ class StewartPlatform:
         """Return rows of motion, of wrenches and base, of results; the unsolvable; the shape."""
         rows, wrenches, bases, shape = batch.loaded(motion, wrench, base)
         results = self.solve(rows, wrenches, bases)
+        unreachable = batch.find_unreachable(
+            self.structure, self.parameters.joints, rows, results, shape, singular)
+        results[unreachable] = 0.0
         check_finite('motion', results.reshape(*shape, -1), len(shape))
         unsolvable = batch.find_unsolvable(rows, results, shape, singular)
+        results[unreachable] = np.nan
         return rows, (wrenches, bases), results, unsolvable, shape
 
     def force_breakdown(
@@ -201,7 +207,7 @@ class StewartPlatform:
         parameters; their linear parameters are zero.
         """
         rows, (_, bases), _, _, shape = self._solved(motion, None, base, 'raise')
-        matrix = self.regressors(rows, bases).reshape(*shape, 6, LINEAR)
+        matrix = self.regressors(rows, bases).reshape(*shape, 6, -1)
         names = names_of(self.parameters)
         if tilt:
             columns = self._tilt_columns(rows, base, shape).reshape(*shape, 6, 2)
@@ -218,9 +224,9 @@ class StewartPlatform:
                          for axis in np.eye(3)[:2]], axis=-1)
 
     def regressors(self, rows: Array, bases: Array | None = None) -> Array:
-        """Return ``regressor`` (N, 6, LINEAR) of rows of motion, unchecked, see ``solve``."""
+        """Return ``regressor`` (N, 6, n) of rows of motion, unchecked, see ``solve``."""
         bases = np.array([NO_BASE]) if bases is None else bases
-        matrices = np.empty((len(rows), 6, LINEAR))
+        matrices = np.empty((len(rows), 6, len(names_of(self.parameters))))
         batch.in_parts(regressor.regressors, (self.structure,), *map(
             batch.compact, (rows, bases)), matrices)
         return matrices
@@ -300,22 +306,34 @@ class StewartPlatform:
         return Motion.of_rows(rows)
 
     def inverse_kinematics(self, pose: Pose | Motion) -> Array:
-        """Return the six leg lengths at a pose, (..., 6) [m]."""
+        """
+        Return the six leg lengths at a pose, (..., 6) [m]; of cranks their angles [rad].
+
+        Raises
+        ------
+        ReachError
+            A rod does not reach the platform: names leg and missing distance.
+
+        """
         check_kind(pose, Pose, Motion)
-        lengths = batch.leg_lengths(self.structure, pose.rows)
-        return check_finite('leg lengths', lengths, len(pose.shape))
+        positions = batch.drive_positions(self.structure, pose.rows)
+        rows = pose.rows.reshape(-1, pose.rows.shape[-1])
+        batch.find_unreachable(self.structure, self.parameters.joints, rows,
+                               positions.reshape(-1, 6), pose.shape)
+        return check_finite(f'leg {self._kind.position.field}', positions, len(pose.shape))
 
     def forward_kinematics(self, lengths: ArrayLike, guess: Pose | Motion | None = None) -> Pose:
         """
-        Return the pose of six leg lengths, on the guess's side of singularities.
+        Return the pose of six leg lengths, or angles of cranks, on the guess's side.
 
-        The leading shapes of lengths and guess broadcast against each other. The lengths of the
-        pose returned differ by less than 1e-12 m from those given.
+        The side is that of singularities. The leading shapes of lengths and guess broadcast
+        against each other. The lengths of legs or rods in the pose returned differ by less than
+        1e-12 m from those given.
 
         Parameters
         ----------
         lengths : (..., 6)
-            [m]
+            [m]; angles of cranks [rad]
         guess : Pose or Motion, optional
             Where to begin: the last pose, or the one commanded; by default home. From 20 % of the
             platform's height and 0.2 rad away it converges nearly always (benchmarks/README.md).
@@ -336,7 +354,7 @@ class StewartPlatform:
         row = self._single.forward_kinematics(lengths, guess)
         if row is not None:
             return Pose.of_rows(row)
-        wanted = as_array('lengths', lengths, (6,))
+        wanted = as_array(self._kind.position.field, lengths, (6,))
         check_kind(guess, Pose, Motion, name='guess')
         shape = common_shape(lengths=wanted.shape[:-1], guess=guess.shape)
         wanted, rows = copies(wanted, shape), motion_rows(guess, shape)
@@ -347,9 +365,10 @@ class StewartPlatform:
         if codes.any():
             at = int(np.argmax(codes > 0))
             outside = Limits(self.parameters).exceeded(
-                dict.fromkeys((LENGTH_MIN, LENGTH_MAX), wanted[at].tolist()))
+                dict.fromkeys(self._kind.position_limits, wanted[at].tolist()))
             reason = f'{outside[0].words(self.parameters.joints)}; ' if outside else ''
-            where = (f'sample {place(at, shape)}: lengths {listed(wanted[at])} m from the guess '
+            where = (f'sample {place(at, shape)}: {self._kind.position.field} {listed(wanted[at])} '
+                     f'{self._kind.position.unit} from the guess '
                      f'{listed(rows[at, POSITION].round(9))} m: {reason}')
             if codes[at] == forward_kinematics.SINGULAR:
                 raise SingularityError(f'{where}a singular pose after {steps[at]} iterations: '
@@ -363,17 +382,21 @@ class StewartPlatform:
         """
         Return the twist [v; w] (..., 6) of leg rates (..., 6) [m/s] at a pose, base axes.
 
+        Of cranks the rates are speeds [rad/s].
+
         Raises
         ------
         SingularityError
-            J_inv cannot be solved.
+            J_inv cannot be solved, or a rod does not reach.
 
         """
         check_kind(pose, Pose, Motion)
         given = as_array('rates', rates, (6,))
         shape = common_shape(pose=pose.shape, rates=given.shape[:-1])
         given, rows = copies(given, shape), motion_rows(pose, shape)
-        batch.find_unsolvable(rows, self.solve(rows), shape, 'raise')
+        results = self.solve(rows)
+        batch.find_unreachable(self.structure, self.parameters.joints, rows, results, shape)
+        batch.find_unsolvable(rows, results, shape, 'raise')
         forward_kinematics.twists(self.structure, given, rows)
         return check_finite('twist', rows[:, TWIST].reshape(*shape, 6).copy(), len(shape))
 
@@ -427,10 +450,10 @@ class StewartPlatform:
 
     def drive_rates(self, motions: Array, leg_rates: Array) -> Array:
         """
-        Return the rates of the drives (..., 6) [m/s] of rows of motion, unchecked.
+        Return the rates of the drives (..., 6) of rows of motion, unchecked.
 
-        ``leg_rates`` (..., 6) are those of ``inverse_dynamics``; with guided screws they are the
-        drives' rates as well.
+        ``leg_rates`` (..., 6) are those of ``inverse_dynamics``, of cranks their speeds; but with
+        screws that turn with their legs they are the drives' rates as well.
         """
         if not self.screws.any():
             return leg_rates
@@ -556,6 +579,6 @@ class StewartPlatform:
         """Return likely mistakes in the parameters, each in one line."""
         return likely_mistakes(self.parameters)
 
-    def _legs(self, pose: Pose | Motion) -> lagrange.Legs:
+    def _legs(self, pose: Pose | Motion) -> Lines:
         check_kind(pose, Pose, Motion)
         return lagrange.legs(self.parameters, pose.position, pose.rotation)

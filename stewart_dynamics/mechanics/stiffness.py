@@ -23,7 +23,8 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
-from stewart_dynamics.mechanics.dynamics.lagrange import drive_jacobian_rate, Legs
+from stewart_dynamics.legs.lines import Lines
+from stewart_dynamics.mechanics.dynamics.lagrange import drive_jacobian_rate
 from stewart_dynamics.parameters.table import DRIVE_INERTIAS
 
 HELD_MOTORS = {'actuator.reflected_mass': 0.0, **dict.fromkeys(DRIVE_INERTIAS)}
@@ -72,7 +73,7 @@ def platform_stiffness(drive_jacobian: Array, leg_stiffness: Array) -> Array:
     return stiffness
 
 
-def geometric_stiffness(legs: Legs, forces: Array, rotation: Array, screws: Array) -> Array:
+def geometric_stiffness(legs: Lines, forces: Array, rotation: Array, screws: Array) -> Array:
     """
     Return the part (..., 6, 6) of K that is due to the forces of the legs.
 

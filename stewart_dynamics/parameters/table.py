@@ -10,7 +10,7 @@ check, the node's declaration, ``--help`` and the documents are all made from it
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -779,6 +779,20 @@ class Parameters(ParameterSet):
         (self.structure['mass'], self.structure['center_of_mass'],
          self.structure['inertia']) = self.carried
         self.structure.setflags(write=False)
+
+    def choose_branch(self, home: Callable[[], tuple[Array, Array]]) -> None:
+        """
+        Set the assembly of the legs in ``structure`` that the parameters leave open.
+
+        home: a function that returns position (3,) and rotation (3, 3) at home.
+        Raises ParameterError: home does not decide it.
+        """
+        legs: Any = self.structure['legs'].copy()
+        if self.leg_kind.choose_branch(legs, self, home):
+            hexapod = self.structure.copy()
+            hexapod['legs'] = legs
+            hexapod.setflags(write=False)
+            self.structure = hexapod
 
     def replaced(self, changes: Mapping[str, Any], source: str = '', *,
                  exact_types: bool = False) -> Self:

@@ -139,11 +139,12 @@ class Drives:
 
     def __init__(self, parameters: Parameters) -> None:
         self._hexapod = hexapod_structure(parameters)
+        self._efforts = parameters.leg_kind.effort.columns
 
     def __call__(self, motions: Array, results: Array) -> Array:
         """Return rows (N, MOTORS) for rows of motion and results, unchecked."""
         rows = np.empty((len(motions), MOTORS))
-        efforts = batch.compact(results[:, FORCES])
+        efforts = batch.compact(results[:, self._efforts])
         batch.in_parts(self._write, (), batch.compact(motions), efforts, rows)
         return rows
 

@@ -23,9 +23,9 @@ from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.dynamics.lagrange import drive_rates
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.rows import (
-    ACCELERATION, CONDITION, FORCES, GRAVITY, MOTION, RATES, TWIST)
+    ACCELERATION, CONDITION, GRAVITY, MOTION, TWIST)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
-from stewart_dynamics.parameters.table import DRIVE_INERTIAS, FIXED, Parameters
+from stewart_dynamics.parameters.table import FIXED, Parameters
 
 
 class ForceBreakdown(NamedTuple):
@@ -76,10 +76,6 @@ SOURCES = ('gravity', 'platform inertia', 'leg inertia', 'velocity terms', 'fric
 
 _NO_GRAVITY = {'gravity': [0.0, 0.0, 0.0]}
 _NO_FRICTION = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
-# The reflected mass of the actuators is part of the inertia of the legs.
-_NO_LEGS = {'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.piston.mass': 0.0,
-            'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0,
-            **dict.fromkeys(DRIVE_INERTIAS)}
 
 # Samples computed at once: they fit into the processor's cache.
 _TOGETHER = 1024
@@ -99,8 +95,11 @@ class ForceBreakdownRows:
         self._whole = hexapod_structure(parameters)
         self._weightless = hexapod_structure(
             parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION}))
-        self._platform_only = hexapod_structure(
-            parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION, **_NO_LEGS}))
+        # The reflected inertia of the drives is part of the inertia of the legs.
+        self._platform_only = hexapod_structure(parameters.replaced(
+            {**_NO_GRAVITY, **_NO_FRICTION, **parameters.leg_kind.massless}))
+        self._efforts = parameters.leg_kind.effort.columns
+        self._rates = parameters.leg_kind.rate.columns
 
     def __call__(self, motions: Array, wrenches: Array, bases: Array | None = None) -> Array:
         """
@@ -135,27 +134,27 @@ class ForceBreakdownRows:
             gravity[:, GRAVITY.stop:] *= 0.0  # nan stays nan
             bases[:, GRAVITY] *= 0.0
         results = batch.solve(self._whole, rows, None, gravity)
-        by.gravity[:] = results[:, FORCES]
+        by.gravity[:] = results[:, self._efforts]
         unknown = ~(results[:, CONDITION] < UNSOLVABLE_CONDITION)
         if bases is not None:
             unknown = unknown | np.isnan(bases[:, -1])
         solve = partial(batch.solve, condition=False)
         by.wrench[:] = 0.0 if wrenches is None else solve(
-            self._weightless, rows, wrenches)[:, FORCES]
+            self._weightless, rows, wrenches)[:, self._efforts]
 
         rows[:, ACCELERATION] = motions[:, ACCELERATION]
-        by.platform_inertia[:] = solve(self._platform_only, rows)[:, FORCES]
-        by.leg_inertia[:] = (solve(self._weightless, rows)[:, FORCES]
+        by.platform_inertia[:] = solve(self._platform_only, rows)[:, self._efforts]
+        by.leg_inertia[:] = (solve(self._weightless, rows)[:, self._efforts]
                              - by.platform_inertia)
 
         rows[:, ACCELERATION] = 0.0
         rows[:, TWIST] = motions[:, TWIST]
         results = solve(self._weightless, rows)
-        by.velocity[:] = results[:, FORCES]
+        by.velocity[:] = results[:, self._efforts]
         # By the friction law: as a difference it would lose its digits near a singularity.
-        rates = results[:, RATES].copy() if not self._screws.any() else drive_rates(
+        rates = results[:, self._rates].copy() if not self._screws.any() else drive_rates(
             self._parameters, rows, self._screws)
         by.friction[:] = self._friction.forces(rates)
         by.base_motion[:] = 0.0 if bases is None else (
-            solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)
+            solve(self._weightless, rows, None, bases)[:, self._efforts] - by.velocity)
         forces[unknown] = np.nan

@@ -15,42 +15,30 @@ Every function takes any leading shape of samples.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.errors import MotionError
+from stewart_dynamics.errors import MotionError, ReachError
+from stewart_dynamics.legs.lines import dot, Lines, skew, transposed
+from stewart_dynamics.mechanics.batch import unreached
 from stewart_dynamics.mechanics.rows import (
     BASE_AXIS, PITCH, PLATFORM_AXIS, POSITION, ROTATION, TWIST)
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 
 
-class Legs(NamedTuple):
-    """The six legs at a pose; the axis of the legs precedes the axes of vectors."""
-
-    lengths: Array  # (..., 6) [m]
-    directions: Array  # s_i (..., 6, 3), from base joint to platform joint
-    arms: Array  # a_i = R p_i (..., 6, 3) [m]
-
-
-def skew(vector: NDArray[np.floating[Any]]) -> Array:
-    """Return S (..., 3, 3) with S b = vector x b."""
-    x, y, z = np.moveaxis(vector, -1, 0)
-    zero = np.zeros_like(x)
-    return np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1),
-                     np.stack([-y, x, zero], -1)], -2)
-
-
-def legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
+def legs(parameters: Parameters, position: Array, rotation: Array) -> Lines:
     """
     Return lengths, directions and arms at a pose: (1), (2).
 
-    Raises MotionError: a length is 0 or overflows.
+    Raises MotionError: a length is 0 or overflows. ReachError: a rod does not reach.
     """
     with np.errstate(all='ignore'):
         at = unchecked_legs(parameters, position, rotation)
+    missing = parameters.leg_kind.missing_distances(parameters, position, rotation)
+    if missing is not None and (missing > 0.0).any():
+        sample = tuple(map(int, np.argwhere((missing > 0.0).any(axis=-1))[0]))
+        raise ReachError(unreached(parameters.joints, missing[sample])
+                         + (f' in sample {list(sample)}' if sample else ''))
     bad = ~((at.lengths > 0.0) & np.isfinite(at.lengths))
     if bad.any():
         where = tuple(map(int, np.argwhere(bad)[0]))
@@ -59,29 +47,28 @@ def legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
     return at
 
 
-def unchecked_legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
-    """Return the same; directions are not finite where a length is 0."""
-    arms = np.einsum('...jk,ik->...ij', rotation, parameters.geometry.platform_joints)
-    vectors = position[..., None, :] + arms - parameters.geometry.base_joints
-    lengths = np.linalg.norm(vectors, axis=-1)
-    return Legs(lengths, vectors / lengths[..., None], arms)
+def unchecked_legs(parameters: Parameters, position: Array, rotation: Array) -> Lines:
+    """Return the same; not finite where a leg has no length, or does not reach."""
+    return parameters.leg_kind.lines(parameters, position, rotation)
 
 
-def inverse_jacobian(at: Legs) -> Array:
+def inverse_jacobian(at: Lines) -> Array:
     """Return J_inv (..., 6, 6), row i [s_i, a_i x s_i]: leg rates = J_inv [v; w]: (3)."""
     return np.concatenate([at.directions, np.cross(at.arms, at.directions)], axis=-1)
 
 
-def determinant(at: Legs) -> Array:
+def determinant(at: Lines) -> Array:
     """Return det(J), the determinant of J_inv (...) [m^3]."""
     found: Array = np.linalg.det(inverse_jacobian(at))
     return found
 
 
-def inverse_jacobian_rate(at: Legs, velocity: Array, omega: Array) -> Array:
+def inverse_jacobian_rate(at: Lines, velocity: Array, omega: Array) -> Array:
     """Return dJ_inv/dt (..., 6, 6) under a twist."""
     arm_rates = np.cross(omega[..., None, :], at.arms)
     joint_rates = velocity[..., None, :] + arm_rates
+    if at.path is not None:
+        joint_rates = joint_rates - at.anchor_rates(joint_rates)[1]
     along = np.sum(at.directions * joint_rates, axis=-1, keepdims=True)
     direction_rates = (joint_rates - at.directions * along) / at.lengths[..., None]
     return np.concatenate([
@@ -89,18 +76,21 @@ def inverse_jacobian_rate(at: Legs, velocity: Array, omega: Array) -> Array:
         np.cross(arm_rates, at.directions) + np.cross(at.arms, direction_rates)], axis=-1)
 
 
-def drive_jacobian(at: Legs, rotation: Array, screws: Array | None = None) -> Array:
+def drive_jacobian(at: Lines, rotation: Array, screws: Array | None = None) -> Array:
     """
     Return J_q (..., 6, 6): rates of the drives = J_q [v; w], J_q^T forces = wrench.
 
     screws (6, SCREW): constants of the screws, see ``turning_screws``; by default they are guided,
         and J_q is J_inv.
     """
+    if at.path is not None:
+        by_lever: Array = inverse_jacobian(at) / at.levers()[..., None]
+        return by_lever
     if screws is None or not screws.any():
         return inverse_jacobian(at)
     pitch, u, w = _screws(rotation, screws)
     s = at.directions
-    u_s, w_s = _dot(u, s), _dot(w, s)
+    u_s, w_s = dot(u, s), dot(w, s)
     h = s + pitch / at.lengths[..., None] * (
         u_s / (1.0 - u_s ** 2) * np.cross(s, u) - w_s / (1.0 - w_s ** 2) * np.cross(s, w))
     d = (s - w_s * w) / (1.0 - w_s ** 2)
@@ -110,13 +100,23 @@ def drive_jacobian(at: Legs, rotation: Array, screws: Array | None = None) -> Ar
 def leg_twists(directions: Array, rotation: Array, screws: Array) -> Array:
     """Return the twists (..., 6) of legs between their universal joints [rad]."""
     _, u, w = _screws(rotation, screws)
-    u_s, w_s = _dot(u, directions), _dot(w, directions)
-    return np.asarray(np.arctan2(_dot(directions, np.cross(u, w)), _dot(u, w) - u_s * w_s)[..., 0])
+    u_s, w_s = dot(u, directions), dot(w, directions)
+    return np.asarray(np.arctan2(dot(directions, np.cross(u, w)), dot(u, w) - u_s * w_s)[..., 0])
 
 
-def drive_jacobian_rate(at: Legs, rotation: Array, velocity: Array, omega: Array,
+def drive_jacobian_rate(at: Lines, rotation: Array, velocity: Array, omega: Array,
                         screws: Array | None = None) -> Array:
     """Return dJ_q/dt (..., 6, 6) under a twist."""
+    if at.path is not None:
+        spin = np.cross(omega[..., None, :], at.arms)
+        joint_rates = velocity[..., None, :] + spin
+        speeds, anchor_rates = at.anchor_rates(joint_rates)
+        direction_rates = (joint_rates - anchor_rates) / at.lengths[..., None]
+        lever_rates = dot(direction_rates, at.path.tangents) + speeds * dot(
+            at.directions, at.path.curvatures)
+        by_path: Array = (inverse_jacobian_rate(at, velocity, omega)
+                          - lever_rates * drive_jacobian(at, rotation)) / at.levers()[..., None]
+        return by_path
     if screws is None or not screws.any():
         return inverse_jacobian_rate(at, velocity, omega)
     pitch, u, w = _screws(rotation, screws)
@@ -124,10 +124,10 @@ def drive_jacobian_rate(at: Legs, rotation: Array, velocity: Array, omega: Array
     spin = omega[..., None, :]
     arm_rate, w_rate = np.cross(spin, at.arms), np.cross(spin, w)
     joint_rate = velocity[..., None, :] + arm_rate
-    rate = _dot(s, joint_rate)
+    rate = dot(s, joint_rate)
     s_rate = (joint_rate - s * rate) / length
-    u_s, w_s = _dot(u, s), _dot(w, s)
-    u_s_rate, w_s_rate = _dot(u, s_rate), _dot(w_rate, s) + _dot(w, s_rate)
+    u_s, w_s = dot(u, s), dot(w, s)
+    u_s_rate, w_s_rate = dot(u, s_rate), dot(w_rate, s) + dot(w, s_rate)
     of_u, of_w = u_s / (1.0 - u_s ** 2), w_s / (1.0 - w_s ** 2)
     of_u_rate, of_w_rate = ((1.0 + c ** 2) / (1.0 - c ** 2) ** 2 * c_rate
                             for c, c_rate in ((u_s, u_s_rate), (w_s, w_s_rate)))
@@ -159,11 +159,6 @@ def _screws(rotation: Array, screws: Array) -> tuple[Array, Array, Array]:
         '...jk,ik->...ij', rotation, screws[:, PLATFORM_AXIS])
 
 
-def _dot(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Array:
-    product: Array = np.sum(a * b, axis=-1, keepdims=True)
-    return product
-
-
 def _joint_jacobian(arms: Array) -> Array:
     """Return J_i = [1, -skew(a_i)] (..., 6, 3, 6): x_i' = J_i [v; w]; with a_i = R p_i."""
     return np.concatenate([np.broadcast_to(np.eye(3), (*arms.shape, 3)), -skew(arms)], axis=-1)
@@ -175,76 +170,29 @@ def _joint_jacobian_rate(arms: Array, omega: Array) -> Array:
     return np.concatenate([np.zeros((*arms.shape, 3)), -skew(rates)], axis=-1)
 
 
-def _transposed(matrix: Array) -> Array:
-    return np.swapaxes(matrix, -1, -2)
 
 
-class _LegTerms(NamedTuple):
-    along: Array  # s s^T (..., 6, 3, 3)
-    across: Array  # 1 - s s^T = -skew(s)^2
-    piston_distance: Array  # c2 = L - S2 (..., 6)
-    inertia: Array  # I_e / L^2 + m_ce: effective mass across the leg [kg]
 
-
-def _leg_terms(parameters: Parameters, at: Legs) -> _LegTerms:
-    along = at.directions[..., :, None] * at.directions[..., None, :]
-    piston_distance = at.lengths - parameters.legs.piston.center_of_mass
-    inertia = (parameters.legs.cylinder.inertia + parameters.legs.piston.inertia
-               + parameters.legs.cylinder.mass * parameters.legs.cylinder.center_of_mass ** 2
-               + parameters.legs.piston.mass * piston_distance ** 2) / at.lengths ** 2
-    return _LegTerms(along, np.eye(3) - along, piston_distance, inertia)
-
-
-def _each(scalars: Array) -> Array:
-    """Return a number for each leg, shaped to multiply a (..., 6, 3, 3)."""
-    return scalars[..., None, None]
-
-
-def leg_mass(parameters: Parameters, at: Legs) -> Array:
-    """Return M_i = m2 s s^T - (I_e / L^2 + m_ce) skew(s)^2, (..., 6, 3, 3) [kg]."""
-    terms = _leg_terms(parameters, at)
-    mass: Array = (_each(parameters.legs.piston.mass) * terms.along
-                   + _each(terms.inertia) * terms.across)
-    return mass
+def leg_mass(parameters: Parameters, at: Lines) -> Array:
+    """Return M_i (..., 6, 3, 3) [kg] of the legs, in coordinates of their platform joints."""
+    return parameters.leg_kind.leg_mass(parameters, at)
 
 
 def leg_coriolis(
-        parameters: Parameters, at: Legs, joint_rates: Array, christoffel: bool = False,
+        parameters: Parameters, at: Lines, joint_rates: Array, christoffel: bool = False,
 ) -> Array:
-    """
-    Return C_i (..., 6, 3, 3) [kg/s] under the platform joints' velocities x_i'.
-
-    The matrix of the paper is ``-(2/L) m_co L' skew(s)^2 - (m2 S2/L^2) s x_i'^T skew(s)^2``. With
-    ``christoffel`` it consists of the Christoffel symbols of M_i in x_i: the same force
-    C_i x_i', and M_i' - 2 C_i is skew.
-    """
-    terms = _leg_terms(parameters, at)
-    piston_mass = parameters.legs.piston.mass
-    rate = np.sum(at.directions * joint_rates, axis=-1)
-    across_rate = joint_rates - at.directions * rate[..., None]
-    outer = at.directions[..., :, None] * across_rate[..., None, :]  # s u^T
-    m_co = piston_mass * terms.piston_distance / at.lengths - terms.inertia
-    slope = 2.0 / at.lengths * m_co  # d/dL of I_e / L^2 + m_ce
-    c: Array
-    if christoffel:
-        c = (_each(0.5 * slope * rate) * terms.across
-             + _each((piston_mass - terms.inertia) / at.lengths) * outer
-             - _each(0.5 * slope) * (outer - _transposed(outer)))
-    else:
-        s2 = parameters.legs.piston.center_of_mass
-        c = (_each(slope * rate) * terms.across
-             + _each(piston_mass * s2 / at.lengths ** 2) * outer)
-    return c
+    """Return C_i (..., 6, 3, 3) [kg/s] under the platform joints' velocities x_i'."""
+    return parameters.leg_kind.leg_coriolis(parameters, at, joint_rates, christoffel)
 
 
-def leg_gravity(parameters: Parameters, at: Legs) -> Array:
-    """Return G_i = (m_ge skew(s)^2 - m2 s s^T) g, (..., 6, 3) [N]."""
-    terms = _leg_terms(parameters, at)
-    m_ge = (parameters.legs.cylinder.mass * parameters.legs.cylinder.center_of_mass
-            + parameters.legs.piston.mass * terms.piston_distance) / at.lengths
-    g: Array = -(_each(m_ge) * terms.across
-                 + _each(parameters.legs.piston.mass) * terms.along) @ parameters.gravity
-    return g
+def leg_gravity(parameters: Parameters, at: Lines) -> Array:
+    """Return G_i (..., 6, 3) [N]."""
+    return parameters.leg_kind.leg_gravity(parameters, at)
+
+
+def _reflected(parameters: Parameters) -> Array:
+    reflected: Array = parameters[parameters.leg_kind.fields['reflected_mass']]
+    return reflected
 
 
 def _center_of_mass(parameters: Parameters, rotation: Array) -> Array:
@@ -254,7 +202,7 @@ def _center_of_mass(parameters: Parameters, rotation: Array) -> Array:
 
 def _platform_inertia(parameters: Parameters, rotation: Array) -> Array:
     local = inertia_matrix(parameters.carried.inertia)
-    inertia: Array = rotation @ local @ _transposed(rotation)
+    inertia: Array = rotation @ local @ transposed(rotation)
     return inertia
 
 
@@ -271,10 +219,10 @@ def mass_matrix(parameters: Parameters, position: Array, rotation: Array,
     j = _joint_jacobian(at.arms)
     j_q = drive_jacobian(at, rotation, screws)
     m: Array = (
-        parameters.carried.mass * _transposed(j_com) @ j_com
+        parameters.carried.mass * transposed(j_com) @ j_com
         + _turning(_platform_inertia(parameters, rotation))
-        + np.sum(_transposed(j) @ leg_mass(parameters, at) @ j, axis=-3)
-        + _transposed(j_q) @ (parameters.actuator.reflected_mass[:, None] * j_q))
+        + np.sum(transposed(j) @ leg_mass(parameters, at) @ j, axis=-3)
+        + transposed(j_q) @ (_reflected(parameters)[:, None] * j_q))
     return m
 
 
@@ -292,11 +240,11 @@ def coriolis_matrix(
     joint_rates = velocity[..., None, :] + np.cross(omega[..., None, :], at.arms)
     c = leg_coriolis(parameters, at, joint_rates, christoffel)
     coriolis: Array = (
-        parameters.carried.mass * _transposed(_joint_jacobian(com)) @ j_com_rate
+        parameters.carried.mass * transposed(_joint_jacobian(com)) @ j_com_rate
         + _turning(skew(omega) @ _platform_inertia(parameters, rotation))
-        + np.sum(_transposed(j) @ (leg_mass(parameters, at) @ j_rate + c @ j), axis=-3)
-        + _transposed(drive_jacobian(at, rotation, screws)) @ (
-            parameters.actuator.reflected_mass[:, None]
+        + np.sum(transposed(j) @ (leg_mass(parameters, at) @ j_rate + c @ j), axis=-3)
+        + transposed(drive_jacobian(at, rotation, screws)) @ (
+            _reflected(parameters)[:, None]
             * drive_jacobian_rate(at, rotation, velocity, omega, screws)))
     return coriolis
 
@@ -318,23 +266,16 @@ def base_coriolis_matrix(
     Return the part of C due to the angular velocity W of a base, (..., 6, 6): a skew matrix.
 
     Platform: ``2 m J_c^T skew(W) J_c``, and ``I skew(W) + skew(W) I - skew(I W)`` of its turning.
-    Leg: ``2 m2 c2 / L (q s^T - s q^T) + 2 (I_e / L^2 + m_ce) (W . s) skew(s)`` with q = W x s.
     """
     at = legs(parameters, position, rotation)
-    terms = _leg_terms(parameters, at)
     inertia, turn = _platform_inertia(parameters, rotation), skew(spin)
     turning = inertia @ turn + turn @ inertia - skew((inertia @ spin[..., None])[..., 0])
     j_com = _joint_jacobian(_center_of_mass(parameters, rotation))
     j = _joint_jacobian(at.arms)
-    q = np.cross(spin[..., None, :], at.directions)
-    outer = q[..., :, None] * at.directions[..., None, :]
-    piston = parameters.legs.piston.mass * terms.piston_distance / at.lengths
-    along = np.sum(spin[..., None, :] * at.directions, axis=-1)
-    of_legs = (_each(2.0 * piston) * (outer - _transposed(outer))
-               + _each(2.0 * terms.inertia * along) * skew(at.directions))
+    of_legs = parameters.leg_kind.base_coriolis(parameters, at, spin)
     coriolis: Array = (
-        2.0 * parameters.carried.mass * _transposed(j_com) @ turn @ j_com
-        + _turning(turning) + np.sum(_transposed(j) @ of_legs @ j, axis=-3))
+        2.0 * parameters.carried.mass * transposed(j_com) @ turn @ j_com
+        + _turning(turning) + np.sum(transposed(j) @ of_legs @ j, axis=-3))
     return coriolis
 
 
@@ -345,16 +286,12 @@ def base_gravity_vector(
     Return G on a moving base, (..., 6) [N, N m]: the wrench that holds platform and legs on it.
 
     At a point at rest on the base, at r, ``a_B - g + W' x r + W x (W x r)`` replaces -g.
-    Leg: ``-G_i(A_b)`` with A_b of the leg's base joint, and
-    ``(I_e / L^2 + m_ce) L across - m2 c2 |q|^2 s`` with across the part of ``W' x s + W x q``
-    across the leg, q = W x s.
     """
     at = legs(parameters, position, rotation)
-    terms = _leg_terms(parameters, at)
     field = skew(spin_rate) + skew(spin) @ skew(spin)
 
     def felt(arm: Array) -> Array:
-        """Return acceleration less gravity of points (..., k, 3) fixed to the base."""
+        """Return acceleration less gravity of points (..., k, 3) at rest on the base."""
         field_at: Array = np.einsum('...ij,...kj->...ki', field, arm)
         return (acceleration - gravity)[..., None, :] + field_at
 
@@ -365,16 +302,7 @@ def base_gravity_vector(
     moment = (np.cross(com, force) + (inertia @ spin_rate[..., None])[..., 0]
               + np.cross(spin, momentum))
 
-    piston_mass = parameters.legs.piston.mass
-    m_ge = (parameters.legs.cylinder.mass * parameters.legs.cylinder.center_of_mass
-            + piston_mass * terms.piston_distance) / at.lengths
-    weight = _each(m_ge) * terms.across + _each(piston_mass) * terms.along
-    q_squared = np.sum(np.cross(spin[..., None, :], at.directions) ** 2, axis=-1)
-    carried = np.einsum('...ij,...kj->...ki', field, at.directions)
-    on_legs = (
-        (weight @ felt(parameters.geometry.base_joints)[..., None])[..., 0]
-        + (_each(terms.inertia * at.lengths) * terms.across @ carried[..., None])[..., 0]
-        - (piston_mass * terms.piston_distance * q_squared)[..., None] * at.directions)
+    on_legs = parameters.leg_kind.base_gravity(parameters, at, position, felt, spin, spin_rate)
     force = force + np.sum(on_legs, axis=-2)
     moment = moment + np.sum(np.cross(at.arms, on_legs), axis=-2)
     return np.concatenate([force, moment], axis=-1)

@@ -62,20 +62,23 @@ _ROUNDING = 1e-9
 
 def names_of(p: Parameters) -> tuple[str, ...]:
     """Return the names of the parameters; names of leg parameters end with the leg's name."""
-    return (*_OF_PLATFORM, *(f'{kind}.{leg}' for kind in _OF_LEGS for leg in p.joints))
+    of_legs = [*(each.name for each in p.leg_kind.masses), *_of_drives(p)]
+    return (*_OF_PLATFORM, *(f'{name}.{leg}' for name in of_legs for leg in p.joints))
+
+
+def _of_drives(p: Parameters) -> dict[str, str]:
+    """Return the parameters of drives in which efforts are linear, with their units."""
+    kind, (viscous, coulomb) = p.leg_kind, p.leg_kind.friction_units
+    return {kind.fields['reflected_mass']: kind.inertia_unit,
+            'actuator.viscous_friction': viscous, 'actuator.coulomb_friction': coulomb,
+            'effort_offset': kind.effort.unit}
 
 
 def linear_parameters(p: Parameters) -> Array:
-    """Return theta (LINEAR,) of a hexapod, SI units."""
-    theta = np.zeros(LINEAR)
-    theta[PLATFORM] = inertial_parameters(p.carried)
-    for name, of_mass, first, second in _PARTS:
-        part = p.legs.parts[name]
-        theta[of_mass], theta[first] = part.mass, part.mass * part.center_of_mass
-        theta[second] = part.inertia + part.mass * part.center_of_mass ** 2
-    for name, where in _OF_ACTUATORS.items():
-        theta[where] = p[name]
-    return theta
+    """Return theta (n,) of a hexapod, SI units; n is LINEAR with telescopic legs."""
+    of_drives = [p[name] for name in _of_drives(p) if name in p]
+    return np.concatenate([inertial_parameters(p.carried), p.leg_kind.mass_values(p).ravel(),
+                           *of_drives, np.zeros(6)])
 
 
 def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:

@@ -15,7 +15,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.leg_columns import columns, data_frame, LEGS
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, RATES,
+    ANGLES, CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, LEVERS, RATES,
+    SPEEDS, TORQUES,
     UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
@@ -48,6 +49,13 @@ class InverseDynamics:
         Forces that rods and joints carry along the legs [N], + pushes: ``forces`` without
         reflected mass and friction of the actuators. A thrust rating of a cylinder bounds these;
         the drive gives ``forces``.
+    angles, speeds : (..., 6)
+        Of cranks [rad], [rad/s]; without cranks (..., 0), as the next two. ``lengths`` are those
+        of the rods then, ``rates`` zero, ``forces`` those of the rods at the platform.
+    torques : (..., 6)
+        Torques of the drives at the shafts of the cranks [N m].
+    levers : (..., 6)
+        Torque by the push of the rod [m]; zero at a dead centre.
     unit_load_forces : (..., 6)
         Largest force of each leg under a unit load on the platform: any force F and moment M
         with F^2 + (M / l)^2 = 1, l the characteristic length.
@@ -75,6 +83,10 @@ class InverseDynamics:
     joint_forces: Array = _column(JOINT_FORCES, 'Forces of rods and joints [N], (..., 6).')
     unit_load_forces: Array = _column(
         UNIT_LOAD_FORCES, 'Largest forces under a unit load, (..., 6).')
+    angles: Array = _column(ANGLES, 'Angles of cranks [rad], (..., 6).')
+    speeds: Array = _column(SPEEDS, 'Speeds of cranks [rad/s], (..., 6).')
+    torques: Array = _column(TORQUES, 'Torques of the drives of cranks [N m], (..., 6).')
+    levers: Array = _column(LEVERS, 'Levers of cranks [m], (..., 6).')
     determinant: Array = _column(DETERMINANT, 'det(J) [m^3], (...).')
     determinant_rate: Array = _column(DETERMINANT_RATE, 'd(det(J))/dt [m^3/s], (...).')
     condition_number: Array = _column(CONDITION, 'Condition number of J_inv, (...).')
@@ -99,7 +111,9 @@ class InverseDynamics:
         Leading shapes are flattened; SI units. The columns of the legs end in _1 to _6.
         """
         rows = self.rows.reshape(-1, self.rows.shape[-1])
-        legs = columns({'length': self.lengths, 'rate': self.rates, 'force': self.forces,
+        drives = {'angle': self.angles, 'speed': self.speeds, 'torque': self.torques,
+                  'lever': self.levers} if self.angles.size else {}
+        legs = columns({**drives, 'length': self.lengths, 'rate': self.rates, 'force': self.forces,
                         'joint_force': self.joint_forces,
                         'unit_load_force': self.unit_load_forces})
         return {**legs, 'determinant': rows[:, DETERMINANT],
