@@ -425,7 +425,7 @@ def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: i
 
 def test_values_of_a_sample_are_those_of_their_limits() -> None:
     row = np.arange(float(RESULT))
-    found = {name: values.tolist() for name, values in result_values(row).items()}
+    found = {name: values.tolist() for name, values in result_values(PARAMETERS, row).items()}
     assert found == {
         LENGTH_MIN: row[LENGTHS].tolist(), LENGTH_MAX: row[LENGTHS].tolist(),
         VELOCITY_MAX: row[RATES].tolist(), FORCE_MAX: row[FORCES].tolist(),
@@ -449,7 +449,7 @@ def test_unknown_forces_exceed_no_limit() -> None:
         assert checked(limited, result)[1]
         assert not checked(limited, result, base_known=False)[1]
         result[LIMITS[limit].columns] = np.nan
-        assert limits.exceeded(result_values(result)) == ()
+        assert limits.exceeded(result_values(PARAMETERS, result)) == ()
 
 
 @pytest.mark.parametrize(('exceedance', 'words'), [

@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
+import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
@@ -302,7 +302,8 @@ def crank_ends(parameters: Parameters, angles: Array) -> Array:
     """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
     u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
     along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
-    ends: Array = parameters.geometry.base_joints + parameters['legs.crank.length'][:, None] * along
+    sizes = parameters['legs.crank.length'][:, None]
+    ends: Array = parameters.geometry.base_joints + sizes * along
     return ends
 
 

@@ -125,6 +125,7 @@ class LegKind(ABC):
 
     def check(self, parameters: Parameters, source: str) -> None:
         """Check the rules between the parameters of this kind, and complete them."""
+        del parameters, source
 
     @abstractmethod
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
@@ -141,6 +142,8 @@ class LegKind(ABC):
     def missing_distances(self, parameters: Parameters, position: Array, rotation: Array,
                           ) -> Array | None:
         """Return by how much each leg misses its platform joint (..., 6) [m]; None: never."""
+        del parameters, position, rotation
+        return None
 
     @abstractmethod
     def leg_mass(self, parameters: Parameters, at: Lines) -> Array:

@@ -35,7 +35,7 @@ class Lines(NamedTuple):
         return dot(self.directions, self.path.tangents)[..., 0]
 
     def anchor_rates(self, joint_rates: Array) -> tuple[Array, Array]:
-        """Return rates of the drives (..., 6, 1), and of the anchors, by the joints' velocities."""
+        """Return rates of the drives (..., 6, 1) and of anchors, by velocities of joints."""
         assert self.path is not None
         speeds = dot(self.directions, joint_rates) / self.levers()[..., None]
         return speeds, speeds * self.path.tangents

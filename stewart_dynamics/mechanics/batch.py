@@ -119,7 +119,8 @@ def find_unreachable(hexapod: Records, joints: Sequence[str], rows: Array, resul
 
     rows (N, POSE) or more; results (N, ...): not finite in such samples.
     """
-    bad = (~np.isfinite(results).all(axis=-1)).nonzero()[0]
+    finite: Any = np.isfinite(results).all(axis=-1)
+    bad: Integers = np.flatnonzero(~finite)
     if not len(bad):
         return bad
     missing = missing_distances(hexapod, rows[bad])

@@ -367,9 +367,9 @@ class StewartPlatform:
             outside = Limits(self.parameters).exceeded(
                 dict.fromkeys(self._kind.position_limits, wanted[at].tolist()))
             reason = f'{outside[0].words(self.parameters.joints)}; ' if outside else ''
-            where = (f'sample {place(at, shape)}: {self._kind.position.field} {listed(wanted[at])} '
-                     f'{self._kind.position.unit} from the guess '
-                     f'{listed(rows[at, POSITION].round(9))} m: {reason}')
+            of = self._kind.position
+            where = (f'sample {place(at, shape)}: {of.field} {listed(wanted[at])} {of.unit} from '
+                     f'the guess {listed(rows[at, POSITION].round(9))} m: {reason}')
             if codes[at] == forward_kinematics.SINGULAR:
                 raise SingularityError(f'{where}a singular pose after {steps[at]} iterations: '
                                        'give a guess farther from singularities')

@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
-from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.legs.lines import Lines
+from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.dynamics.lagrange import drive_jacobian_rate
 from stewart_dynamics.parameters.table import DRIVE_INERTIAS
 

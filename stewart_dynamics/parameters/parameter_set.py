@@ -151,7 +151,7 @@ def check_shape(parameter: Parameter, value: Any, source: str) -> None:
         return  # no array: the check of entries rejects it
     if len(shape) < 2:
         return
-    row = parameter.sizes[0] if parameter.repeated else max(parameter.sizes) // 6
+    row = parameter.sizes[0] if parameter.repeated else max(parameter.sizes, default=0) // 6
     row = row if row > 1 else 0
     rows = None if parameter.repeated else 6
     if len(shape) == 2 and shape[1] == row and rows in (None, shape[0]):

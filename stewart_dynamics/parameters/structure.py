@@ -23,8 +23,9 @@ from stewart_dynamics.core.binding import (
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
+
 def limit_name(row: LimitRow) -> str:
-    """Return the parameter of a limit of the legs; those of drives have names of their own in C."""
+    """Return the parameter of a limit of the legs; those of cranks have other names in C."""
     group = 'drive' if row.depends == 'MOTOR' else 'limits'
     return f'{group}.{row.field.removeprefix("crank_")}'
 

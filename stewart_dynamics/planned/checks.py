@@ -121,7 +121,7 @@ class Checks:
             samples = samples.until(n)
         results = samples.results
         self._keep_largest_force(results[:, FORCES])
-        for limit, values in result_values(results).items():
+        for limit, values in result_values(self._parameters, results).items():
             self._check_limit(limit, values, _of_legs(samples.times))
         self._name_mistake(samples)
         self._check_cubics(samples)

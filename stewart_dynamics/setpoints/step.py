@@ -21,8 +21,8 @@ from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, JUMP, limit_bounds, LIMITS, NO_COLUMNS, OF_MOTORS,
-    OF_RESULTS, TORQUE_SPEED, VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, Exceedance, JUMP, limit_bounds, LIMITS, limits_of, NO_COLUMNS, OF_MOTORS,
+    TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, MOTION,
     NO_BASE, RATES, RESULT, UNIT_LOAD_FORCES)
@@ -152,6 +152,7 @@ class Computed(NamedTuple):
     joint_angles: bool
     clearances: bool
     motors: bool
+    limits: tuple[str, ...]  # whose quantities are in rows of results
 
 
 class Outputs(NamedTuple):
@@ -294,7 +295,7 @@ class Outputs(NamedTuple):
     def values(self) -> dict[str, Array]:
         """Return the (N, 6) values of the limits, those that are computed."""
         motors = self.computed.motors and self.rows[:, FINITE_MOTORS].all()
-        found = {*OF_RESULTS, *(ANGLES if self.computed.joint_angles else ()),
+        found = {*self.computed.limits, *(ANGLES if self.computed.joint_angles else ()),
                  *([CLEARANCE_MIN] if self.computed.clearances else ()),
                  *(OF_MOTORS if motors else ())}
         return {name: self.rows[:, limit.columns] for name, limit in LIMITS.items()
@@ -313,8 +314,9 @@ class Step:
         self.parameters = parameters
         hexapod = limited_structure(parameters)
         self._hexapod, self._bounds = hexapod, limit_bounds(parameters)
-        self._computed = Computed(*(bool(hexapod[name]) for name in (
-            'with_joint_angles', 'with_clearance', 'with_motors')))
+        self._computed = Computed(
+            bool(hexapod['with_joint_angles']), bool(hexapod['with_clearance']),
+            bool(hexapod['with_motors']), limits_of(parameters).results)
         self._step = function('step_setpoints').bound(hexapod)
         # A single setpoint is copied to memory that stays: half the time of a call with any.
         self._memory: tuple[Any, ...] = (
@@ -355,11 +357,13 @@ class Step:
         exceeded = [int(bits) for bits in found['exceeded']]
         return tuple(
             Exceedance(name, leg, float(row[limit.columns][leg]), self._bound(name, row, leg),
-                       int(found['nearest'][leg]) if name == CLEARANCE_MIN else -1)
+                       int(found['nearest'][leg]) if name == CLEARANCE_MIN else -1,
+                       self.parameters.leg_kind.rate_limit)
             for name, limit in LIMITS.items() for leg, bits in enumerate(exceeded)
             if bits & limit.bit)
 
     def _bound(self, limit: str, row: Array, leg: int) -> float:
         if limit == TORQUE_SPEED:
             return float(row[_OUTPUT['motors.available_torques']][leg])
-        return float(self._bounds[VELOCITY_MAX if limit == JUMP else limit][leg])
+        rate_limit = self.parameters.leg_kind.rate_limit
+        return float(self._bounds[rate_limit if limit == JUMP else limit][leg])

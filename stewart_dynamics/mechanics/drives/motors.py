@@ -41,7 +41,6 @@ from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.leg_columns import columns, LEGS
-from stewart_dynamics.mechanics.rows import FORCES
 from stewart_dynamics.parameters.table import Parameters
 
 if TYPE_CHECKING:

@@ -170,9 +170,6 @@ def _joint_jacobian_rate(arms: Array, omega: Array) -> Array:
     return np.concatenate([np.zeros((*arms.shape, 3)), -skew(rates)], axis=-1)
 
 
-
-
-
 def leg_mass(parameters: Parameters, at: Lines) -> Array:
     """Return M_i (..., 6, 3, 3) [kg] of the legs, in coordinates of their platform joints."""
     return parameters.leg_kind.leg_mass(parameters, at)
