@@ -21,8 +21,8 @@ from stewart_dynamics.core.binding import function, places, record
 from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, JUMP, limit_bounds, LIMITS, limits_of, NO_COLUMNS, OF_MOTORS,
-    TORQUE_SPEED)
+    ANGLES, CLEARANCE_MIN, Exceedance, JUMP, limit_bounds, LIMITS, limits_of, NO_COLUMNS,
+    OF_MOTORS, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, MOTION,
     NO_BASE, RATES, RESULT, UNIT_LOAD_FORCES)
