@@ -265,9 +265,10 @@ def test_loads_of_the_base(seed: int) -> None:
 @pytest.mark.parametrize('seed', SEEDS)
 def test_without_masses_torques_are_those_of_the_platform(seed: int) -> None:
     machine, _, states = case(seed)
-    nothing = {name: 0.0 for name in (
+    nothing = dict.fromkeys((
         'legs.crank.mass', 'legs.crank.inertia', 'legs.rod.mass', 'legs.rod.inertia',
-        'actuator.reflected_inertia', 'actuator.viscous_friction', 'actuator.coulomb_friction')}
+        'actuator.reflected_inertia', 'actuator.viscous_friction',
+        'actuator.coulomb_friction'), 0.0)
     platform = StewartPlatform(parameters_of(machine, **nothing))
     rest = Motion(states[0].t, states[0].R)
     weight = -machine.m * machine.g
