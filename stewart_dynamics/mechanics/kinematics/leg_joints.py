@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.mechanics.frames.rotation import euler_of, to_euler
-from stewart_dynamics.mechanics.kinematics.home_pose import homes, level_axes
+from stewart_dynamics.mechanics.kinematics.home_pose import home_of, level_axes
 from stewart_dynamics.parameters.table import Parameters
 
 PLATFORM_JOINTS = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
@@ -135,15 +135,8 @@ def joint_names(parameters: Parameters) -> tuple[str, ...]:
 
 def home_directions(parameters: Parameters) -> HomeDirections:
     """Return the directions of the legs at the most likely home pose; see ``homes``."""
-    positions, rotations = homes(parameters)
-    position, rotation = positions[0], rotations[0]
-    legs = (position + parameters.geometry.platform_joints @ rotation.T
-            - parameters.geometry.base_joints)
-    lengths = np.linalg.norm(legs, axis=1, keepdims=True)
-    base = parameters.geometry.base_joints
-    normal = level_axes(base - base.mean(axis=0))[2]
-    along = np.where(lengths > 0.0, legs / np.where(lengths > 0.0, lengths, 1.0), normal)
-    return HomeDirections(along, along @ rotation)
+    home = home_of(parameters)
+    return HomeDirections(home.base_directions, home.platform_directions)
 
 
 def mounts(parameters: Parameters) -> Array:
