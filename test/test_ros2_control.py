@@ -231,11 +231,11 @@ def test_steps_have_the_bits_of_the_node(program: Path) -> None:
         if random.random() < 0.5:
             p = p.replaced({'payload.mass': 40.0, 'payload.center_of_mass': [0.1, -0.1, 0.3],
                             'payload.inertia': [2.0, 0.1, 0.2, 3.0, -0.1, 4.0]})
-        if p.drive.screw_rotation == UNIVERSAL:
-            axes = random.permuted(np.full((6, 2), [0.6, 0.8]), axis=1)
-            p = p.replaced(dict.fromkeys(
+        if p.drive.screw_rotation == UNIVERSAL and random.random() < 0.5:
+            axes = random.normal([2.0, 0.5, 0.0], 0.3, (2, 6, 3))
+            p = p.replaced(dict(zip(
                 ('drive.base_universal_axes', 'drive.platform_universal_axes'),
-                np.column_stack([axes, np.zeros(6)]).ravel()))
+                axes.reshape(2, 18), strict=True)))
         found = assert_steps(program, p, random, count)
         seen |= {bits for bits in OF_ALL if (found['exceeded'] & bits).any()}
         if np.isfinite(found['motors']['commands']).all():
@@ -269,9 +269,10 @@ def test_circles_and_axes_of_the_home_pose_have_the_bits_of_the_node(program: Pa
      'actuator.screw_lead: not set: needed by drive.*: leg or plate 1'),
     ({'drive.torque_speed': [1.0, 2.0, 3.0], 'actuator.screw_lead': [0.01]},
      'drive.torque_speed: must have 2 numbers for each of at most 96 points, has 3'),
-    ({'drive.screw_rotation': 'universal', 'actuator.screw_lead': [0.01]},
-     'drive.base_universal_axes, drive.platform_universal_axes: must be set: needed by '
-     'drive.screw_rotation: universal'),
+    ({'drive.screw_rotation': 'universal', 'actuator.screw_lead': [0.01],
+      'drive.platform_universal_axes': [
+          1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -0.4, 0.9, *[1.0, 0.0, 0.0] * 3]},
+     'drive.platform_universal_axes: along the leg at the home pose: must be across it: leg 3'),
     ({'geometry.base_outline': [0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 'legs.piston.radius': [0.02]},
      'geometry.base_outline, geometry.platform_outline: must have three corners or more: leg or '
      'plate 1'),

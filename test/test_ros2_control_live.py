@@ -37,7 +37,7 @@ REST = np.zeros(6)
 
 
 class Cycle(NamedTuple):
-    """What a cycle of the controller manager brings."""
+    """Inputs of a cycle of the controller manager."""
 
     stamp: int
     reference: Array  # position, quaternion, velocities, accelerations (19,)
@@ -68,7 +68,7 @@ def run(program: Path, p: Parameters, cycles: Sequence[Cycle], period: int = PER
     return np.frombuffer(done.stdout, ANSWER)
 
 
-def references(motion: Motion) -> tuple[Array, Motion]:
+def to_references(motion: Motion) -> tuple[Array, Motion]:
     """Return a motion as references (N, 19), and with the bits of their rotations."""
     quaternions, rotations = to_quaternion(motion.rotation), motion.rotation.copy()
     for quaternion, rotation in zip(quaternions, rotations, strict=True):
@@ -109,7 +109,7 @@ def test_no_limit_is_exceeded_by_any_setpoint(program: Path, wanted: str) -> Non
             except ParameterError:  # home is not within such limits
                 continue
         stamps, demand = from_home(p, *random_demand(random, wanted, p, 1100))
-        numbers, demand = references(demand)
+        numbers, demand = to_references(demand)
         found, motion = governed(program, p, stamps, numbers)
         expected = GovernedStream(p, demand[0]).advance(1e-9 * stamps, demand)
         assert motion.rows.tobytes() == expected.rows.tobytes(), kind
@@ -131,7 +131,7 @@ HEXAPOD = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 def swing(count: int) -> Array:
     """Return references (N, 19) of a motion along x, a cycle each, from rest."""
     w, times = 6.0, 1e-9 * PERIOD * np.arange(count)
-    numbers = np.tile(references(Motion.from_pose(home_pose(HEXAPOD)[None]))[0], (count, 1))
+    numbers = np.tile(to_references(Motion.from_pose(home_pose(HEXAPOD)[None]))[0], (count, 1))
     numbers[:, 0] += 0.03 * (1.0 - np.cos(w * times))
     numbers[:, 7], numbers[:, 13] = 0.03 * w * np.sin(w * times), 0.03 * w * w * np.cos(w * times)
     return numbers
@@ -229,7 +229,7 @@ def test_forces_on_an_imu_have_the_bits_of_the_node(program: Path, every: int) -
         'setpoint.sync_tolerance': 0.0, 'limits.length_min': None, 'limits.length_max': None,
         'limits.velocity_max': None})
     motions = random_motion(p, random, count)
-    numbers, motions = references(motions)
+    numbers, motions = to_references(motions)
     base = BaseInput(p, Rejections(lambda *why: None), lambda text: None)
     cycles, rows = [], []
     reading = np.full(6, np.nan)  # none yet

@@ -27,6 +27,7 @@ typedef struct {
   double count, heights[10];          /* the most likely first; along the normal [m] */
   stewart_pose poses[10];
   double base_directions[6][3], platform_directions[6][3]; /* of the legs in the first of them */
+  double mounts[6][9];                /* of the legs in the URDF: see kinematics/leg_joints.py */
 } home_poses;
 
 /* How an IMU is mounted on the base: position [m], IMU axes to base axes; the rate of the filter,
@@ -85,6 +86,11 @@ void level_axes(int64_t count, const double * around, double * axes);
 
 /* side: that of the platform, 1 or -1; 0: where the limits of length let it be, else 1. */
 void find_home(const stewart_platform * platform, int64_t side, home_poses * home);
+
+/* Gives screws that turn with their legs the axes of their universal joints: those that are set, of
+ * unit length, else those of the mounts. Returns 0; or the leg, from 1, along which at home the axis
+ * of the base is, from 7 that of the platform. */
+int64_t put_universal_axes(const home_poses * home, stewart_platform * platform);
 
 /* The motion of the base of a reading: angular velocity and specific force, IMU axes. */
 void read_imu(

@@ -9,9 +9,17 @@
 #define YAWS 36             /* turns that are tried */
 #define SWEEPS 30           /* of Jacobi's method; 4 are usual */
 #define HEIGHT_HALVINGS 60
+#define UPRIGHT 1e-3        /* a leg this near the normal has the tangent as its mount's x [rad] */
+#define ALONG_A_LEG 0.1     /* least sine between a leg and the fixed axis of its universal joint */
 
 /* Heights that are tried if the parameters do not give one, in larger radii. */
 static const double tried_heights[5] = {0.3, 0.6, 1.0, 1.7, 3.0};
+
+/* A vector of unit length. */
+static vector unit(vector a) {
+  double length = norm(a);
+  return make(a.x / length, a.y / length, a.z / length);
+}
 
 void joints_on_circle(double radius, const double * angles, double height, double * joints) {
   for (int i = 0; i < 6; i++) {
@@ -67,9 +75,7 @@ void level_axes(int64_t count, const double * around, double * axes) {
     nearest = fabs(components[n]) > fabs(components[nearest]) ? n : nearest;
   }
   normal = scale(components[nearest] < 0.0 ? -1.0 : 1.0, normal);
-  vector first = cross(read3(units[(nearest + 2) % 3]), normal);
-  double length = norm(first);
-  first = make(first.x / length, first.y / length, first.z / length);
+  vector first = unit(cross(read3(units[(nearest + 2) % 3]), normal));
   put_matrix(axes, first, cross(normal, first), normal);
 }
 
@@ -179,6 +185,18 @@ static void put_pose(
                            scale(height, read3(home->axes + 6))));
 }
 
+/* Write the rotation from the axes of the mount of a leg to base axes: z along the leg at home, x in
+   the plane of the base joints. */
+static void put_mount(const home_poses * home, int i, vector outward, double mount[9]) {
+  vector normal = read3(home->axes + 6), z = read3(home->base_directions[i]);
+  vector x = cross(normal, z);
+  if (norm(x) < UPRIGHT) {x = cross(normal, outward);}
+  if (x.x == 0.0 && x.y == 0.0 && x.z == 0.0) {x = read3(home->axes);}
+  x = unit(subtract(x, scale(dot(x, z), z)));
+  vector y = unit(cross(z, x));
+  put_matrix(mount, make(x.x, y.x, z.x), make(x.y, y.y, z.y), make(x.z, y.z, z.z));
+}
+
 void find_home(const stewart_platform * platform, int64_t side, home_poses * home) {
   int with_lengths = 1;
   double mean = 0.0, distance = 0.0;
@@ -224,5 +242,32 @@ void find_home(const stewart_platform * platform, int64_t side, home_poses * hom
       : read3(home->axes + 6);
     put3(home->base_directions[i], direction);
     put3(home->platform_directions[i], rotate_back(at->rotation, direction));
+    vector outward = subtract(read3(platform->legs[i].base_joint), base_center);
+    put_mount(home, i, outward, home->mounts[i]);
   }
+}
+
+int64_t put_universal_axes(const home_poses * home, stewart_platform * platform) {
+  const double * r = home->poses[0].rotation;
+  double sines[12];
+  int nearest[2] = {0, 6};
+  for (int i = 0; i < 6; i++) {
+    stewart_leg * leg = &platform->legs[i];
+    vector s = read3(home->base_directions[i]);
+    vector base = isnan(leg->base_universal_axis[0])
+      ? column(home->mounts[i], 0) : read3(leg->base_universal_axis);
+    vector moving = isnan(leg->platform_universal_axis[0])
+      ? rotate_back(r, base) : read3(leg->platform_universal_axis);
+    base = unit(base), moving = unit(moving);
+    vector w = rotate(r, moving);
+    sines[i] = norm(cross(base, s)), sines[i + 6] = norm(cross(w, s));
+    nearest[0] = sines[i] < sines[nearest[0]] ? i : nearest[0];
+    nearest[1] = sines[i + 6] < sines[nearest[1]] ? i + 6 : nearest[1];
+    /* The axis of a joint has no sense: of its two directions the one with the smaller twist. */
+    double cosine = dot(base, w) - dot(base, s) * dot(w, s);
+    put3(leg->base_universal_axis, base);
+    put3(leg->platform_universal_axis, scale(cosine < 0.0 ? -1.0 : 1.0, moving));
+  }
+  return sines[nearest[0]] < ALONG_A_LEG ? nearest[0] + 1
+    : sines[nearest[1]] < ALONG_A_LEG ? nearest[1] + 1 : 0;
 }

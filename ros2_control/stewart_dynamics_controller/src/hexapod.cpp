@@ -148,10 +148,6 @@ stewart_leg leg_of(
     "drive.platform_universal_axes", drive.platform_universal_axes, n,
     leg.platform_universal_axis);
   if (drive.screw_rotation == "universal") {
-    check(
-      !drive.base_universal_axes.empty() && !drive.platform_universal_axes.empty(),
-      "drive.base_universal_axes, drive.platform_universal_axes: must be set: needed by "
-      "drive.screw_rotation: universal");
     leg.twist_ratio = drive.screw_hand == "right" ? -leg.gear_ratio : leg.gear_ratio;
   }
   put_row("geometry.base_joint_axes", p.geometry.base_joint_axes, n, leg.base_joint_axis);
@@ -187,13 +183,17 @@ bool has_drive(const stewart_leg & leg)
          leg.twist_ratio != 0.0;
 }
 
-/// Return the home pose; needed_by: what it is needed by, for the error without one.
-home_poses home_of(
-  const Params & p, const stewart_platform & hexapod, const std::string & needed_by)
+home_poses homes_of(const Params & p, const stewart_platform & hexapod)
 {
   home_poses home;
   const auto & side = p.geometry.platform_side;
   find_home(&hexapod, side == "positive" ? 1 : side == "negative" ? -1 : 0, &home);
+  return home;
+}
+
+/// Check that there is a home pose; needed_by: what it is needed by, for the error without one.
+void check_home(const home_poses & home, const std::string & needed_by)
+{
   check(
     home.reachable != 0.0, ("home pose: no level pose has all legs between limits.length_min and "
     "limits.length_max: " + needed_by).c_str());
@@ -201,21 +201,20 @@ home_poses home_of(
     home.known != 0.0, ("home pose: limits.length_min and limits.length_max, or "
     "geometry.zero_length, must give a length that the legs can have in a level pose: " +
     needed_by).c_str());
-  return home;
 }
 
-/// Give joints whose angles are limited the axes that they have without given ones: their legs at
-/// the home pose.
+/// Give joints whose angles are limited, and screws that turn, the axes that they have without
+/// given ones, which follow from the home pose.
 void put_axes(const Params & p, stewart_platform & hexapod)
 {
+  const home_poses home = homes_of(p, hexapod);
   const auto put = [&](
     const std::vector<double> & given, double stewart_leg::* most,
     double (stewart_leg::* axis)[3], double (home_poses::* directions)[6][3], const char * name) {
       if (!given.empty() || !std::isfinite(hexapod.legs[0].*most)) {
         return;
       }
-      const home_poses home =
-        home_of(p, hexapod, std::string("needed without geometry.") + name);
+      check_home(home, std::string("needed without geometry.") + name);
       for (std::size_t n = 0; n < 6; ++n) {
         std::copy_n((home.*directions)[n], 3, hexapod.legs[n].*axis);
       }
@@ -226,6 +225,12 @@ void put_axes(const Params & p, stewart_platform & hexapod)
   put(
     p.geometry.platform_joint_axes, &stewart_leg::platform_joint_angle_max,
     &stewart_leg::platform_joint_axis, &home_poses::platform_directions, "platform_joint_axes");
+  const std::int64_t along =
+    p.drive.screw_rotation == "universal" ? put_universal_axes(&home, &hexapod) : 0;
+  check(
+    along == 0, (std::string("drive.") + (along <= 6 ? "base" : "platform") + "_universal_axes: "
+    "along the leg at the home pose: must be across it: leg " +
+    std::to_string((along + 5) % 6 + 1)).c_str());
 }
 
 /// Throw the rule that a complete hexapod breaks, with the number of its leg.
@@ -288,7 +293,8 @@ std::optional<Governor> governor_of(const Params & p, const stewart_platform & h
     return std::nullopt;
   }
   check(p.reference == "platform", "governor: needs reference: platform");
-  const home_poses home = home_of(p, hexapod, "needed by governor");
+  const home_poses home = homes_of(p, hexapod);
+  check_home(home, "needed by governor");
   const double head[3] = {0.0, 0.0, 0.0};
   const coordinates at_home{};
   Governor governor;

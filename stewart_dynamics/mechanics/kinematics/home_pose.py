@@ -72,6 +72,7 @@ class Home(NamedTuple):
     rotations: Array  # the same (N, 3, 3)
     base_directions: Array  # of the legs at the first of them, base axes (6, 3)
     platform_directions: Array  # platform axes
+    mounts: Array  # axes of the legs' mounts to base axes (6, 3, 3), see ``leg_joints``
 
     @property
     def turns(self) -> Array:
@@ -138,7 +139,7 @@ def homes(parameters: Parameters) -> tuple[Array, Array]:
 
 
 def shape_of(p: Parameters) -> Shape:
-    found = _found(p)
+    found = found_home(p)
     return Shape(found['base'], found['platform'], found['axes'].reshape(3, 3),
                  float(found['base_radius']), float(found['platform_radius']))
 
@@ -156,7 +157,7 @@ def is_too_long(p: Parameters, name: str, shape: Shape) -> bool:
 
 def home_of(p: Parameters) -> Home:
     """Return the level poses within the limits of length, and the possible heights at home."""
-    found, shape = _found(p), shape_of(p)
+    found, shape = found_home(p), shape_of(p)
     longest = math.hypot(HEIGHTS[-1] * shape.radius, float(found['across']))
     if p.limits.length_max is not None and not is_too_long(p, 'limits.length_max', shape):
         longest = float(p.limits.length_max.max())
@@ -167,10 +168,11 @@ def home_of(p: Parameters) -> Home:
         bool(found['certain']), found['heights'][:count],
         float(found['length']) if found['known'] else None, poses[:, POSITION].copy(),
         poses[:, ROTATION].reshape(-1, 3, 3).copy(), found['base_directions'],
-        found['platform_directions'])
+        found['platform_directions'], found['mounts'].reshape(6, 3, 3))
 
 
-def _found(p: Parameters) -> Any:
+def found_home(p: Parameters) -> Any:
+    """Return the structure ``home_poses`` () of a hexapod."""
     found: Any = np.zeros((), record('home_poses'))
     function('find_home')(p.structure, _SIDES[p.geometry.platform_side], found)
     return found
