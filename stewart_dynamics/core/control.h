@@ -17,6 +17,12 @@
 extern "C" {
 #endif
 
+/* Legs as the home pose is found with them: straight lines from base joints to platform joints, in
+ * the frames of both, between two lengths; length: of the mean leg at home [m]. */
+typedef struct {
+  double base[6][3], platform[6][3], shortest[6], longest[6], length;
+} home_legs;
+
 /* Level poses within the limits of length: see mechanics/kinematics/home_pose.py. */
 typedef struct {
   double axes[9];                     /* the third row: normal to the plane of the base joints */
@@ -84,8 +90,11 @@ void joints_on_circle(double radius, const double * angles, double height, doubl
 /* Two axes in the plane of points (count, 3) from their center, and its normal, row by row. */
 void level_axes(int64_t count, const double * around, double * axes);
 
+/* Telescopic legs: halfway between their limits at home; without these as long as zero_length. */
+void telescopic_legs(const stewart_platform * platform, home_legs * legs);
+
 /* side: that of the platform, 1 or -1; 0: where the limits of length let it be, else 1. */
-void find_home(const stewart_platform * platform, int64_t side, home_poses * home);
+void find_home(const home_legs * legs, int64_t side, home_poses * home);
 
 /* Gives screws that turn with their legs the axes of their universal joints: those that are set, of
  * unit length, else those of the mounts. Returns 0; or the leg, from 1, along which at home the axis

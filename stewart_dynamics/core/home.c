@@ -79,19 +79,30 @@ void level_axes(int64_t count, const double * around, double * axes) {
   put_matrix(axes, first, cross(normal, first), normal);
 }
 
-/* Write joints from their center, in axes; return the center. */
-static vector center_joints(
-  const stewart_platform * platform, int of_base, double around[6][3], double * radius) {
-  const stewart_leg * legs = platform->legs;
-  vector sum = {0.0, 0.0, 0.0}, joints[6];
-  double distances = 0.0;
+void telescopic_legs(const stewart_platform * platform, home_legs * legs) {
+  int given = 1;
+  double mean = 0.0;
   for (int i = 0; i < 6; i++) {
-    joints[i] = read3(of_base ? legs[i].base_joint : legs[i].platform_joint);
-    sum = add(sum, joints[i]);
+    const stewart_leg * leg = &platform->legs[i];
+    put3(legs->base[i], read3(leg->base_joint));
+    put3(legs->platform[i], read3(leg->platform_joint));
+    legs->shortest[i] = leg->length_min, legs->longest[i] = leg->length_max;
+    given = given && leg->length_min > 0.0 && isfinite(leg->length_max);
   }
+  for (int i = 0; i < 6; i++) {
+    mean += given ? 0.5 * (legs->shortest[i] + legs->longest[i]) : platform->legs[i].zero_length;
+  }
+  legs->length = mean / 6.0;
+}
+
+/* Write joints from their center; return the center. */
+static vector center_joints(const double joints[6][3], double around[6][3], double * radius) {
+  vector sum = {0.0, 0.0, 0.0};
+  double distances = 0.0;
+  for (int i = 0; i < 6; i++) {sum = add(sum, read3(joints[i]));}
   vector center = make(sum.x / 6.0, sum.y / 6.0, sum.z / 6.0);
   for (int i = 0; i < 6; i++) {
-    vector from_center = subtract(joints[i], center);
+    vector from_center = subtract(read3(joints[i]), center);
     put3(around[i], from_center), distances += norm(from_center);
   }
   *radius = distances / 6.0;
@@ -114,10 +125,10 @@ static void put_offsets(const home_poses * home, double yaw, vector offsets[6]) 
 }
 
 /* Whether all legs are within their limits at some height, on one side. */
-static int reaches(const stewart_platform * platform, const vector offsets[6], double side) {
+static int reaches(const home_legs * legs, const vector offsets[6], double side) {
   double lowest = -HUGE_VAL, highest = HUGE_VAL;
   for (int i = 0; i < 6; i++) {
-    double low = platform->legs[i].length_min, high = platform->legs[i].length_max;
+    double low = legs->shortest[i], high = legs->longest[i];
     double across = sqrt(offsets[i].x * offsets[i].x + offsets[i].y * offsets[i].y);
     /* The height of a leg is that of the platform plus the platform joint's own. */
     double along = side * offsets[i].z;
@@ -144,13 +155,13 @@ static double height_of(const home_poses * home, double side, const vector legs[
 }
 
 /* Write which turn is nearest to 0 of those at which all legs are within their limits. */
-static void find_yaw(const stewart_platform * platform, int64_t side, home_poses * home) {
+static void find_yaw(const home_legs * legs, int64_t side, home_poses * home) {
   int above[YAWS], below[YAWS], any_above = 0, any_below = 0;
   home->across = 0.0;
   for (int n = 0; n < YAWS; n++) {
     vector offsets[6];
     put_offsets(home, 10.0 * n * (PI / 180.0), offsets);
-    above[n] = reaches(platform, offsets, 1.0), below[n] = reaches(platform, offsets, -1.0);
+    above[n] = reaches(legs, offsets, 1.0), below[n] = reaches(legs, offsets, -1.0);
     any_above = any_above || above[n], any_below = any_below || below[n];
     for (int i = 0; i < 6; i++) {
       vector flat = make(offsets[i].x, offsets[i].y, 0.0);
@@ -197,35 +208,26 @@ static void put_mount(const home_poses * home, int i, vector outward, double mou
   put_matrix(mount, make(x.x, y.x, z.x), make(x.y, y.y, z.y), make(x.z, y.z, z.z));
 }
 
-void find_home(const stewart_platform * platform, int64_t side, home_poses * home) {
-  int with_lengths = 1;
-  double mean = 0.0, distance = 0.0;
-  vector legs[6];
-  vector base_center = center_joints(platform, 1, home->base, &home->base_radius);
-  vector platform_center = center_joints(platform, 0, home->platform, &home->platform_radius);
+void find_home(const home_legs * legs, int64_t side, home_poses * home) {
+  double distance = 0.0;
+  vector flat[6];
+  vector base_center = center_joints(legs->base, home->base, &home->base_radius);
+  vector platform_center = center_joints(legs->platform, home->platform, &home->platform_radius);
   level_axes(6, home->base[0], home->axes);
   for (int i = 0; i < 6; i++) {
     put3(home->base[i], rotate(home->axes, read3(home->base[i])));
     put3(home->platform[i], rotate(home->axes, read3(home->platform[i])));
   }
-  find_yaw(platform, side, home);
-  for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &platform->legs[i];
-    with_lengths = with_lengths && leg->length_min > 0.0 && isfinite(leg->length_max);
-  }
-  put_offsets(home, home->yaw, legs);
-  for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &platform->legs[i];
-    mean += with_lengths ? 0.5 * (leg->length_min + leg->length_max) : leg->zero_length;
-    distance += norm(legs[i]);
-  }
-  home->length = mean / 6.0;
+  find_yaw(legs, side, home);
+  put_offsets(home, home->yaw, flat);  /* at no height */
+  for (int i = 0; i < 6; i++) {distance += norm(flat[i]);}
+  home->length = legs->length;
   double radius = largest(home->base_radius, home->platform_radius);
   home->known = distance / 6.0 < home->length && home->length < LENGTH_RATIO * radius;
   int count = 0, on_a_side = home->known != 0.0 ? 1 : 5;
   for (int n = 0; n < 2 * on_a_side; n++) {
     double of = n < on_a_side ? home->side : -home->side;
-    home->heights[count++] = home->known != 0.0 ? of * height_of(home, of, legs)
+    home->heights[count++] = home->known != 0.0 ? of * height_of(home, of, flat)
       : of * tried_heights[n % on_a_side] * radius;
   }
   home->count = count;
@@ -234,16 +236,12 @@ void find_home(const stewart_platform * platform, int64_t side, home_poses * hom
   }
   const stewart_pose * at = &home->poses[0];
   for (int i = 0; i < 6; i++) {
-    leg_pose leg = pose_of(&platform->legs[i], at->position, at->rotation);
-    vector along = subtract(add(read3(at->position), leg.arm),
-                            read3(platform->legs[i].base_joint));
-    vector direction = leg.length > 0.0
-      ? make(along.x / leg.length, along.y / leg.length, along.z / leg.length)
-      : read3(home->axes + 6);
+    vector end = add(read3(at->position), rotate(at->rotation, read3(legs->platform[i])));
+    vector along = subtract(end, read3(legs->base[i]));
+    vector direction = norm(along) > 0.0 ? unit(along) : read3(home->axes + 6);
     put3(home->base_directions[i], direction);
     put3(home->platform_directions[i], rotate_back(at->rotation, direction));
-    vector outward = subtract(read3(platform->legs[i].base_joint), base_center);
-    put_mount(home, i, outward, home->mounts[i]);
+    put_mount(home, i, subtract(read3(legs->base[i]), base_center), home->mounts[i]);
   }
 }
 

@@ -185,9 +185,11 @@ bool has_drive(const stewart_leg & leg)
 
 home_poses homes_of(const Params & p, const stewart_platform & hexapod)
 {
+  home_legs legs;
   home_poses home;
   const auto & side = p.geometry.platform_side;
-  find_home(&hexapod, side == "positive" ? 1 : side == "negative" ? -1 : 0, &home);
+  telescopic_legs(&hexapod, &legs);
+  find_home(&legs, side == "positive" ? 1 : side == "negative" ? -1 : 0, &home);
   return home;
 }
 

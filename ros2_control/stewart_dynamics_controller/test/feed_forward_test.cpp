@@ -575,10 +575,12 @@ void test_hold_of_legs()
 
 Governor governor_of(const stewart_platform & p)
 {
+  home_legs legs;
   home_poses home;
   Governor governor;
   const double head[3] = {0.0, 0.0, 0.0};
-  find_home(&p, 0, &home);
+  telescopic_legs(&p, &legs);
+  find_home(&legs, 0, &home);
   CHECK(home.known != 0.0);
   put_governor(&p, &home.poses[0], head, &governor.within, &governor.limits);
   return governor;

@@ -173,8 +173,9 @@ def home_of(p: Parameters) -> Home:
 
 def found_home(p: Parameters) -> Any:
     """Return the structure ``home_poses`` () of a hexapod."""
-    found: Any = np.zeros((), record('home_poses'))
-    function('find_home')(p.structure, _SIDES[p.geometry.platform_side], found)
+    legs, found = (np.zeros((), record(name)) for name in ('home_legs', 'home_poses'))
+    function('telescopic_legs')(p.structure, legs)
+    function('find_home')(legs, _SIDES[p.geometry.platform_side], found)
     return found
 
 
