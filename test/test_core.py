@@ -300,7 +300,8 @@ def test_a_broken_rule_is_named_with_its_leg(name: str) -> None:
 
 @pytest.mark.parametrize(('field', 'value', 'rule'), [
     ('crank_length', NOT, 'KIND'), ('crank_length', math.inf, 'FINITE'),
-    ('rod_length', NOT, 'FINITE'), ('crank_center_of_mass', NOT, 'FINITE'), ('crank_mass', -1.0, 'LEG_MASS'),
+    ('rod_length', NOT, 'FINITE'), ('crank_center_of_mass', NOT, 'FINITE'),
+    ('crank_mass', -1.0, 'LEG_MASS'),
     ('rod_mass', NOT, 'LEG_MASS'), ('rod_inertia', -1e-3, 'LEG_MASS'),
     ('crank_inertia', [-1e-3, 0.0, 0.0, 0.0, 0.0, 0.0], 'CRANK_INERTIA'),
     ('crank_direction', 0.0, 'CRANK_DIRECTION'), ('lever_min', -0.1, 'LIMIT'),

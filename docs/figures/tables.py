@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
+from stewart_dynamics.legs import KINDS, TELESCOPIC
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
@@ -53,10 +54,13 @@ CONTROLLER = (
               sizes=(6,)))
 
 PAYLOAD = {each: f'payload.{each}' for each in ('mass', 'center_of_mass', 'inertia')}
-# Parameters of the node that the controller reads: all that the structure in C holds.
+# Parameters of the node that the controller reads: all that the structure in C holds of telescopic
+# legs. It rejects other kinds by their markers.
 CONTROLLER_NAMES = ('joints', 'base_frame', *(
-    name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, LISTS) for name in fields.values()
-    if name != 'setpoint.sync_tolerance'),
+    name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, TELESCOPIC.fields, LISTS)
+    for name in fields.values()
+    if name != 'setpoint.sync_tolerance' and not name.startswith(TELESCOPIC.foreign)),
+    *(kind.marker for kind in KINDS if kind.marker),
     'drive.rated_torque', 'drive.screw_rotation', 'drive.screw_hand', 'singularity.action',
     'limits.action')
 

@@ -992,7 +992,8 @@ static void complete_loads(
     fill_nan(to->motors.angles, sizeof to->motors);
     return;
   }
-  put_motors(platform, motion, efforts_of(platform, result), commands_of(platform, to), &to->motors);
+  put_motors(
+    platform, motion, efforts_of(platform, result), commands_of(platform, to), &to->motors);
   int finite = all_finite(to->motors.angles, sizeof to->motors.angles) &&
     all_finite(to->motors.speeds, sizeof to->motors.speeds);
   for (int i = 0; i < 6; i++) {finite = finite && !isinf(to->motors.breakaway_torques[i]);}

@@ -50,9 +50,14 @@ def check_name(name: str) -> str:
 
 
 def source(file: str) -> str:
-    """Return the text of a file of the library in C, or in this package's folder ``c``."""
+    """
+    Return the text of a file of the library in C, or in this package's folder ``c``.
+
+    The files of the kinds of legs stand in place of the lines that include them.
+    """
     if file in SOURCES:
-        return header(file)
+        return re.sub(r'^#include "(?!stewart_dynamics\.h)(.+)"$', lambda found: header(found[1]),
+                      header(file), flags=re.MULTILINE)
     return files(__package__).joinpath('c', file).read_text(encoding='utf-8')
 
 
@@ -98,6 +103,7 @@ def platform_source(parameters: Parameters, name: str) -> str:
     Raises ParameterError: axes that are needed are not given, and there is no home pose.
     """
     hexapod: Any = limited_structure(parameters)
+    of_legs = {**LEG_FIELDS, **parameters.leg_kind.fields}
     lines = [f'const stewart_platform {name} = {{']
     for field in hexapod.dtype.names:
         if field != 'legs':
@@ -108,7 +114,7 @@ def platform_source(parameters: Parameters, name: str) -> str:
         for leg, joint in enumerate(parameters.joints):
             lines.append(f'    {{  /* leg {leg + 1}: {in_comment(joint)} */')
             of_leg = hexapod['legs'][leg]
-            lines += (_field(LEG_FIELDS.get(each, each), of_leg[each],
+            lines += (_field(of_legs.get(each, each), of_leg[each],
                              '      ') for each in of_leg.dtype.names)
             lines.append('    },')
         lines.append('  },')
