@@ -42,6 +42,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import CODES, function, record
 from stewart_dynamics.errors import MotionError, ParameterError
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds
@@ -91,6 +92,7 @@ class Governor:
     """
 
     def __init__(self, parameters: Parameters, head: Array) -> None:
+        require_kind(parameters, 'motion cueing')
         home = home_pose(parameters)
         within = _within(parameters)
         row = Motion.from_pose(home).rows
