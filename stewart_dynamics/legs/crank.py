@@ -61,7 +61,7 @@ class Crank(LegKind):
         'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
         'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
     inertia_unit = 'kg m^2'
-    home_rule = ('no level pose has all rods at the cranks\' middle angles: legs.rod.length is '
+    home_rule = ("no level pose has all rods at the cranks' middle angles: legs.rod.length is "
                  'shorter than the gap, or a length is in other units')
     friction_units = 'N m s/rad', 'N m'
 
