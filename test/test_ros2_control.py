@@ -25,6 +25,7 @@ from stewart_dynamics import Parameters
 from stewart_dynamics.core.binding import record
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.parameters.table import UNIVERSAL
 from stewart_dynamics.setpoints.step import Batch, Step
@@ -37,7 +38,8 @@ PACKAGE = ROOT / 'ros2_control' / 'stewart_dynamics_controller'
 C_SOURCE = ROOT / 'stewart_dynamics' / 'core'
 NAME = 'stewart_dynamics_controller'
 OUTPUT_FIELDS = record('stewart_output').names or ()
-OF_ALL = {limit.bit for limit in LIMITS.values()}
+OF_ALL = {limit.bit for limit in LIMITS.values()
+          if not limit.name.startswith(TELESCOPIC.foreign)}
 
 
 @pytest.mark.parametrize(('c', 'cpp'), [('gcc', 'g++'), ('clang', 'clang++')])
@@ -298,6 +300,8 @@ def test_circles_and_axes_of_the_home_pose_have_the_bits_of_the_node(program: Pa
      'torque_per_mille and motor_velocity in command_interfaces'),
     ({'command_interfaces': ['torque_per_mille'], 'actuator.screw_lead': [0.01]},
      'drive.rated_torque: not set: needed by torque_per_mille in command_interfaces'),
+    ({'legs.crank.length': [0.2]},
+     'legs.crank.length: stewart_dynamics_controller takes telescopic legs alone'),
     ({'payload.mass': 3.0, 'payload.inertia': [-1.0, 0.0, 0.0, 1.0, 0.0, 1.0]},
      'payload: must be finite, its inertia positive semidefinite')])
 def test_rules_in_one_line(program: Path, changes: dict[str, Any], message: str) -> None:

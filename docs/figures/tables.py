@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
+from stewart_dynamics.legs import KINDS, TELESCOPIC
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.circles import circle_names
@@ -60,12 +61,15 @@ CONTROLLER = (
               'linear_acceleration.x .. are the readings where base.source is imu', '', ''))
 
 PAYLOAD = {each: f'payload.{each}' for each in ('mass', 'center_of_mass', 'inertia')}
-# Parameters of the node that the controller reads: all that the structure in C holds, the circles
-# and the side of the platform from which parts of it follow, and the IMU.
+# Parameters of the node that the controller reads: all that the structure in C holds of telescopic
+# legs, the circles and the side of the platform from which parts of it follow, and the IMU. It
+# rejects other kinds of legs by their markers.
 CONTROLLER_NAMES = ('joints', 'base_frame', *(
-    name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, LISTS) for name in fields.values()
-    if name != 'setpoint.sync_tolerance'),
-    *circle_names('base'), *circle_names('platform'), 'geometry.platform_side',
+    name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, TELESCOPIC.fields, LISTS)
+    for name in fields.values()
+    if name != 'setpoint.sync_tolerance' and not name.startswith(TELESCOPIC.foreign)),
+    *(kind.marker for kind in KINDS if kind.marker), *circle_names('base'),
+    *circle_names('platform'), 'geometry.platform_side',
     'drive.rated_torque', 'drive.screw_rotation', 'drive.screw_hand', 'singularity.action',
     'limits.action', 'base.source', 'base.timeout', 'base.imu.position', 'base.imu.orientation',
     'base.imu.cutoff')

@@ -42,6 +42,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import CODES, function, record
 from stewart_dynamics.errors import MotionError, ParameterError
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, Pose
@@ -73,6 +74,7 @@ class Governor:
     """
 
     def __init__(self, parameters: Parameters, head: Array) -> None:
+        require_kind(parameters, 'motion cueing')
         home = home_pose(parameters)
         within, limits = (np.zeros((), record(name)) for name in (
             'stewart_platform', 'governor_limits'))

@@ -165,9 +165,18 @@ stewart_leg leg_of(
 #define MAXIMUM(bit, NAME, field, DEPENDS, quantity) \
   leg.field = of_leg( \
     NAME_OF(SECTION_ ## DEPENDS, field), p.SECTION_ ## DEPENDS.field, n, kInfinite);
-  STEWART_LIMITS(MINIMUM, MAXIMUM)
+  STEWART_LEG_LIMITS(MINIMUM, MAXIMUM, MAXIMUM)
 #undef MINIMUM
 #undef MAXIMUM
+  // Those of other kinds of legs are not set.
+#define MINIMUM(bit, NAME, field, DEPENDS, quantity) leg.field = -kInfinite;
+#define MAXIMUM(bit, NAME, field, DEPENDS, quantity) leg.field = kInfinite;
+  STEWART_CRANK_LIMITS(MINIMUM, MAXIMUM, MAXIMUM)
+#undef MINIMUM
+#undef MAXIMUM
+  check(
+    p.legs.crank.length.empty(),
+    "legs.crank.length: stewart_dynamics_controller takes telescopic legs alone");
   return leg;
 }
 

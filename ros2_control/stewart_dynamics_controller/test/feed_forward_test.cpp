@@ -70,6 +70,11 @@ stewart_platform hexapod()
     leg.force_max = 5000.0;
     leg.joint_force_max = kInfinite;
     leg.base_joint_angle_max = leg.platform_joint_angle_max = kInfinite;
+#define MINIMUM(bit, NAME, field, DEPENDS, quantity) leg.field = -kInfinite;
+#define MAXIMUM(bit, NAME, field, DEPENDS, quantity) leg.field = kInfinite;
+    STEWART_CRANK_LIMITS(MINIMUM, MAXIMUM, MAXIMUM)
+#undef MINIMUM
+#undef MAXIMUM
   }
   p.leg_clearance_min = -kInfinite;
   p.characteristic_length = 0.6;
