@@ -275,6 +275,10 @@ static int crank_check(const stewart_platform * platform, const stewart_leg * le
   if (!(leg->lever_min >= 0.0)) {return STEWART_RULE_LIMIT;}
   if (!(leg->lever_min < 1.0)) {return STEWART_RULE_LEVER;}
   if (!(leg->angle_min < leg->angle_max)) {return STEWART_RULE_ANGLES;}
+  double at_min = leg->servo_angle_at_min, at_max = leg->servo_angle_at_max;
+  if (isnan(at_min) != isnan(at_max)) {return STEWART_RULE_SERVO_POINTS;}
+  if (at_min == at_max) {return STEWART_RULE_SERVO_ANGLES;}
+  if (!(leg->servo_pulse_min < leg->servo_pulse_max)) {return STEWART_RULE_SERVO_PULSES;}
   return platform->with_clearance ? STEWART_RULE_SHAPE : STEWART_VALID;
 }
 

@@ -45,12 +45,14 @@ class Crank(LegKind):
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
-           'limits.lever_min')
+           'limits.lever_min', 'servo.')
     fields = {
         'crank_length': 'legs.crank.length', 'rod_length': 'legs.rod.length',
         'crank_axis': AXES, 'crank_direction': DIRECTIONS, 'crank_mass': 'legs.crank.mass',
         'rod_mass': 'legs.rod.mass', 'rod_center_of_mass': 'legs.rod.center_of_mass',
-        'rod_inertia': 'legs.rod.inertia', 'reflected_mass': 'actuator.reflected_inertia'}
+        'rod_inertia': 'legs.rod.inertia', 'reflected_mass': 'actuator.reflected_inertia',
+        **{f'servo_{name}': f'servo.{name}' for name in (
+            'pulse_min', 'pulse_max', 'angle_at_min', 'angle_at_max')}}
     masses = (
         *(LegMass(f'legs.crank.first_moment.{axis}', 'kg m') for axis in 'enu'),
         *(LegMass(f'legs.crank.inertia_about_axis.{axes}', 'kg m^2')
