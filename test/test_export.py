@@ -443,6 +443,51 @@ def test_golden_vectors_of_cranks_are_read_as_they_were_computed(exported_cranks
     assert {row['found_code'] for row in rows} == {OK}
 
 
+@pytest.mark.skipif('gcc' not in COMPILERS, reason='needs gcc')
+@pytest.mark.parametrize(('file', 'positions', 'efforts'), [
+    (PLATFORM_FILE, 6e-7, 2e-5), (CRANK_FILE, 4e-6, 1e-4)], ids=['lengths', 'angles'])
+def test_floats_in_place_of_doubles(
+        tmp_path: Path, file: Path, positions: float, efforts: float) -> None:
+    """As on processors whose doubles have 32 bits: errors of positions, efforts by the largest."""
+    p, count = Parameters.from_yaml(file), 5000
+    kind, platform, random = p.leg_kind, StewartPlatform(p), rng(8)
+    for name, text in c_project(p, 'rig').items():
+        if name != 'test_golden.c':
+            single = re.sub(r'\bdouble\b', 'float', text).replace('<math.h>', '<tgmath.h>')
+            (tmp_path / name).write_text(single)
+    (tmp_path / 'calls.c').write_text(
+        '#include "rig.h"\n#include <stddef.h>\n'
+        'int inverse(const stewart_motion * motion, stewart_result * result) {\n'
+        '  return stewart_inverse_dynamics(&rig, motion, NULL, NULL, result);\n}\n')
+    made = compile_c(tmp_path, '-std=c99', '-O2', '-fsingle-precision-constant', '-shared',
+                     '-fPIC', *tmp_path.glob('*.c'), compiler='gcc')
+    inverse = ctypes.CDLL(str(made)).inverse
+    home = platform.home_pose()
+    motions = np.zeros((count, MOTION))
+    motions[:, :3] = home.position + random.uniform(-0.08, 0.08, (count, 3))
+    motions[:, 3:12] = (from_euler(random.uniform(-0.15, 0.15, (count, 3)))
+                        @ home.rotation).reshape(count, 9)
+    motions[:, 12:] = random.normal(0.0, 1.0, (count, 12))
+    with np.errstate(all='ignore'):
+        expected = platform.solve(motions)
+    low, high = (p[name] for name in kind.position_limits)
+    at = expected[:, kind.position.columns]
+    usual = ((at > low) & (at < high)).all(axis=1)
+    if kind.width == RESULT:
+        levers = expected[:, places('stewart_result')['levers']] / p['legs.crank.length']
+        usual &= (np.abs(levers) > p['limits.lever_min']).all(axis=1)
+    found = np.zeros((count, RESULT), np.float32)
+    codes = [inverse(*(ctypes.c_void_p(row.ctypes.data) for row in rows))
+             for rows in zip(motions.astype(np.float32), found, strict=True)]
+    assert usual.sum() > 0.5 * count
+    assert not np.array(codes)[usual].any()
+    errors = np.abs(found[:, :kind.width] - expected)[usual]
+    largest = np.abs(expected[usual][:, kind.effort.columns]).max(axis=1)
+    of_efforts = errors[:, kind.effort.columns].max(axis=1) / largest
+    assert 0.1 * positions < errors[:, kind.position.columns].max() < positions
+    assert 0.1 * efforts < of_efforts.max() < efforts
+
+
 # Servos
 
 SERVOS: dict[str, Any] = {
