@@ -240,7 +240,7 @@ def at_home(text, hexapod):
     root = ET.fromstring(foreign(text))
     joints = {joint.get('name'): joint for joint in root.findall('joint')}
     for leg in hexapod.legs:
-        joints[leg.name].find('origin').set('xyz', f'0 0 {leg.home_length!r}')
+        joints[leg.name].find('origin').set('xyz', f'0 0 {leg.branch.home!r}')
     ET.SubElement(joints['platform_z'], 'origin', {'xyz': f'0 0 {float(hexapod.position[2])!r}'})
     return root, joints
 
@@ -277,10 +277,10 @@ def test_an_open_urdf_in_which_one_leg_carries_the_platform_is_read_and_reported
                 root.remove(link)
         leg = hexapod.legs[0]
         joint = ET.SubElement(root, 'joint', {'name': 'ball', 'type': 'spherical'})
-        ET.SubElement(joint, 'parent', {'link': leg.piston.name})
+        ET.SubElement(joint, 'parent', {'link': leg.last.name})
         ET.SubElement(joint, 'child', {'link': 'platform'})
         # The platform's frame is at its joint: the other joints are read relative to it.
-        turn = to_euler(leg.mount.T)
+        turn = to_euler(leg.branch.links[0].at_home.rotation.T)
         ET.SubElement(joint, 'origin', {'rpy': ' '.join(repr(float(angle)) for angle in turn)})
         return ET.tostring(root, encoding='unicode')
 

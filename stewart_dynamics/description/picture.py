@@ -28,7 +28,7 @@ _SAME = 6.0  # joints as near to each other in a view have their numbers togethe
 _VIEWS = (('From above: x to the right, y up', (0, 1)),
           ('From the front: x to the right, z up', (0, 2)))
 _COLUMNS = (('leg', 20.0), ('base joint x, y, z [m]', 150.0),
-            ('platform joint x, y, z [m]', 425.0), ('length at home [m]', 700.0))
+            ('platform joint x, y, z [m]', 425.0), ('{position} at home [{unit}]', 700.0))
 
 
 def picture(hexapod: Hexapod, name: str) -> str:
@@ -103,13 +103,15 @@ def _origin(root: ET.Element, at: Array, title: str) -> None:
 
 def _table(root: ET.Element, hexapod: Hexapod) -> None:
     top = _VIEW + 80.0
+    position = hexapod.kind.position
     for name, left in _COLUMNS:
-        _text(root, left, top, name, font_weight='bold')
+        words = name.format(position=position.name, unit=position.unit)
+        _text(root, left, top, words, font_weight='bold')
     for n, leg in enumerate(hexapod.legs):
         row = top + (n + 1) * _TABLE
         texts = (f'{n + 1}  {leg.name}', *(
             ',  '.join(map(_number, joint)) for joint in (leg.base_joint, leg.platform_joint)),
-            _number(leg.home_length))
+            _number(leg.branch.home))
         for text, (_, left) in zip(texts, _COLUMNS, strict=True):
             color = LEG_COLORS[n] if left == _COLUMNS[0][1] else ROLES['black']
             _text(root, left, row, text, fill=color)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.description.bounded_process import load_in_process, unusable
-from stewart_dynamics.description.mechanism import (
+from stewart_dynamics.legs.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER,
     Placement, SLIDE, WORLD)
 from stewart_dynamics.description.xml_text import CARRIED, ELEMENT
@@ -143,7 +143,7 @@ def _joints_of(mujoco: Any, model: Any, data: Any, body: int, mechanism: Mechani
                 made.left_out.append('damping that grows with powers of the rate')
         if not _switched_off(mujoco, model, 'FRICTIONLOSS'):
             made.friction = float(model.dof_frictionloss[dof].item())
-        if kind == SLIDE:
+        if kind in (SLIDE, HINGE):
             made.position = float(model.qpos0[model.jnt_qposadr[n]])
             if model.jnt_limited[n] and not _switched_off(mujoco, model, 'LIMIT'):
                 made.lower, made.upper = map(float, model.jnt_range[n])
@@ -220,9 +220,10 @@ def _actuators(mujoco: Any, model: Any, mechanism: Mechanism) -> None:
         if joint is None:
             mechanism.remarks.append(f'{name}: an actuator that acts on no joint is left out')
             continue
-        if joint.kind != SLIDE:
+        if joint.kind not in (SLIDE, HINGE):
             joint.left_out.append(f'actuator {name!r}')
             continue
+        joint.actuators.append(name)
         order.append(joint.name)
         if model.actuator_gear[n, 0] < 0.0:
             mechanism.remarks.append(f'{joint.name}: the gear of its actuator is negative: '
@@ -234,7 +235,7 @@ def _actuators(mujoco: Any, model: Any, mechanism: Mechanism) -> None:
             setattr(joint, key, getattr(joint, key) + square * float(added))
     for n in range(model.njnt):
         joint = joints[_joint_name(model, n)]
-        if joint.kind != SLIDE:
+        if joint.kind not in (SLIDE, HINGE):
             continue
         together = [sum(bounds.get(joint.name, [math.inf]))]
         if model.jnt_actfrclimited[n]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.loops import loops_beside
-from stewart_dynamics.description.mechanism import (
+from stewart_dynamics.legs.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody,
     OTHER, Placement, SLIDE, UNIVERSAL)
 from stewart_dynamics.description.xml_text import CARRIED
