@@ -70,7 +70,7 @@ class Crank(LegKind):
                             for each in ('length', 'mass', 'center_of_mass', 'inertia')))
     shortened = HEADINGS,
     inertia_unit = 'kg m^2'
-    home_rule = ('no level pose has all rods at the cranks\' middle angles: legs.rod.length is '
+    home_rule = ("no level pose has all rods at the cranks' middle angles: legs.rod.length is "
                  'shorter than the gap, or a length is in other units')
     friction_units = 'N m s/rad', 'N m'
 
