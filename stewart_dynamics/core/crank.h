@@ -77,8 +77,8 @@ typedef struct {
   vector arm_rate, tip_rate, end_rate, gap_rate, tip_acc, end_acc;
 } crank_motion;
 
-/* q' = d . B' / k, q'' = (d . B'' + L1 q'^2 d . e + |B' - A'|^2 / L2) / k; at a dead centre 0 where
-   they need not be infinite. */
+/* q' = d . B' / k, q'' = (d . B'' + L1 q'^2 d . e + |B' - A'|^2 / L2) / k; at a dead centre 0
+   where they need not be infinite. */
 static crank_motion crank_motion_of(const stewart_leg * leg, const stewart_motion * motion) {
   crank_motion of;
   crank_pose at = of.at = crank_pose_of(leg, motion->position, motion->rotation);
@@ -100,9 +100,9 @@ static crank_motion crank_motion_of(const stewart_leg * leg, const stewart_motio
   return of;
 }
 
-/* F_A = m_a A(A) + m_ab A(B), F_B = m_ab A(A) + m_b A(B); the torque that moves the shaft without a
-   push of the rod is I_uu q'' + (m e n - m n e) . A(c) + L1 m_ab n . A(B), with the moment of mass
-   and the inertia of the crank and m_a, and what the turning of the base adds. */
+/* F_A = m_a A(A) + m_ab A(B), F_B = m_ab A(A) + m_b A(B); the torque that moves the shaft without
+   a push of the rod is I_uu q'' + (mx n - my e) . A(c) + L1 m_ab n . A(B), with moments of mass
+   mx, my and inertia of the crank and m_a, and what the turning of the base adds. */
 static void crank_move(
   const stewart_platform * platform, int i, const stewart_motion * motion,
   const moving_base * base, leg_motion * to) {
