@@ -21,8 +21,9 @@ def random_hexapod(kind: str, seed: int, count: int) -> tuple[Parameters, Motion
         p = random_parameters(random)
         return p, random_motion(p, rng(seed), count)
     machine = random_machine(random, 1.0)
-    return parameters_of(machine), Motion.of_rows(np.stack([
-        motion_of(random_state(machine, random, moving_base=False)).rows for _ in range(count)]))
+    rows = [motion_of(random_state(machine, random, moving_base=False)).rows
+            for _ in range(count)]
+    return parameters_of(machine), Motion.of_rows(np.reshape(rows, (count, 24)))
 
 
 def efforts_of(p: Parameters, motions: Motion) -> Array:

@@ -21,6 +21,7 @@ from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 mujoco = pytest.importorskip('mujoco')
 
 PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
+SOFT = 1e-2  # of the largest acceleration
 STATIC, MOVING = 1e-3, 5e-3  # parts of the largest force, as the documents promise
 
 
@@ -200,6 +201,20 @@ def test_accelerations_by_mujocos_dynamics_with_closed_loops_are_the_same(seed, 
              for motion, effort in zip(motions, efforts, strict=True)]
     truth = platform.forward_dynamics(motions, efforts).rows[:, 18:]
     assert each_relative(found, truth) < 1e-6
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('seed', range(3))
+def test_accelerations_by_mujocos_soft_constraints_differ_by_their_softness(seed, kind):
+    """The impedance of a constraint is at most 0.9999 in MuJoCo, whatever a file says."""
+    p, motions = random_hexapod(kind, seed, 20)
+    p = p.replaced({'actuator.coulomb_friction': 0.0, 'limits.force_max': None})
+    simulation = Simulation(p)
+    efforts = rng(seed).uniform(-2.0, 2.0, (20, 6)) * np.abs(efforts_of(p, motions))
+    found = [simulation.soft_acceleration(motion, effort)
+             for motion, effort in zip(motions, efforts, strict=True)]
+    truth = StewartPlatform(p).forward_dynamics(motions, efforts).rows[:, 18:]
+    assert 1e-6 < each_relative(found, truth) < SOFT
 
 
 @pytest.mark.parametrize('seed', range(3))

@@ -97,7 +97,7 @@ def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
         values, warnings = _without_masses(values, found.kind), []
     given = {name: value for name, value in values.items() if value is not None}
     remarks += _missing(given, mechanism, found, legs)
-    found.kind.tidy(given)
+    found.kind.tidy(given, mechanism.resolution)
     parameters = found.kind.settled(_with_side(Parameters(given, mechanism.source), [
         leg['direction'] for leg in legs]))
     return Recognized(parameters, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(warnings)))
@@ -233,7 +233,7 @@ def _carried(mechanism: Mechanism, found: Topology, values: Mapping[str, Any],
             if name in of_drive:
                 of_slides = [getattr(slide, of_drive[name]) for slide in slides]
                 present = None if of_slides.count(None) == LEGS else np.array(of_slides, float)
-            size = length if PARAMETERS[name].unit == 'm' else 0.0
+            size = {'m': length, 'rad': 1.0}.get(PARAMETERS[name].unit, 0.0)
             same = _unchanged(present, _value(mechanism, name, of_element), size,
                               mechanism.resolution)
             if not np.all(same):

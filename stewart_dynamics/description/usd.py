@@ -131,7 +131,8 @@ def _elements(hexapod: Hexapod) -> dict[str, Any]:
             hexapod)
     frames = {'base_frame': hexapod.base_body, 'platform_frame': hexapod.platform}
     found |= {name: _prim(frame) for name, frame in frames.items() if _prim(frame) != p[name]}
-    homes = np.array([leg.branch.home for leg in hexapod.legs])
+    # Readers add the position of a joint that is written, and count from home where it is not.
+    homes = np.array([leg.branch.home if kind.zero else 0.0 for leg in hexapod.legs])
     found |= {name: None if p[name] is None else p[name] - (
         homes if name in kind.position_limits else 0.0) for name in kind.drive_limits}
     return found

@@ -256,9 +256,9 @@ class Crank(LegKind):
         return {'legs.crank.center_of_mass': bodies[0], 'legs.crank.inertia': bodies[1]}.get(
             name, parameters[name])
 
-    def tidy(self, values: dict[str, Any]) -> None:
+    def tidy(self, values: dict[str, Any], resolution: float) -> None:
         """Give headings of level axes, and numbers that are the same for all cranks once."""
-        tree.tidy(values)
+        tree.tidy(values, resolution)
 
     def settled(self, parameters: Parameters) -> Parameters:
         """Leave the branches out where they follow from the angles at home."""

@@ -36,8 +36,6 @@ _WIDEST = -_TURN, _TURN  # angles of a crank without limits [rad]
 _LEAST_FREEDOM = 4  # axes of the joints at the ends of a rod
 _TO_X = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])  # turns z to x
 _AT_CRANK, _AT_PLATFORM = 'end of its crank', 'platform'
-AXIAL = 1e-9
-"""Relative size of numbers of a crank in a file that are rounding errors."""
 
 
 class CrankLegs(NamedTuple):
@@ -265,34 +263,34 @@ def read_leg(kind: LegKind, chain: Chain, base: MechanismBody, platform: Mechani
     return leg
 
 
-def _collapsed(rows: Array, size: float, alone: int) -> Array:
+def _collapsed(rows: Array, size: float, alone: int, resolution: float) -> Array:
     """Return rows (6, n) as one where all are equal, and as one number if the rest is zero."""
-    small = AXIAL * max(size, float(np.abs(rows).max()))
+    small = resolution * max(size, float(np.abs(rows).max()))
     if np.abs(rows - rows[0]).max() > small:
         return rows.ravel()
     others = np.delete(rows[0], alone)
     return rows[0, alone:alone + 1] if np.abs(others).max() <= small else rows[0]
 
 
-def tidy(values: dict[str, Any]) -> None:
+def tidy(values: dict[str, Any], resolution: float) -> None:
     """Bring the values of six legs into the shortest form that a parameter file can have."""
     axes, zeros = (np.reshape(values[name], (6, 3)) for name in (
         'geometry.crank_axes', 'geometry.crank_directions'))
     headings = np.arctan2(zeros[:, 1], zeros[:, 0])
     cosine, sine, level = np.cos(headings), np.sin(headings), np.zeros(6)
     if max(np.abs(axes - np.stack([sine, -cosine, level], axis=-1)).max(),
-           np.abs(zeros - np.stack([cosine, sine, level], axis=-1)).max()) <= AXIAL:
+           np.abs(zeros - np.stack([cosine, sine, level], axis=-1)).max()) <= resolution:
         del values['geometry.crank_axes'], values['geometry.crank_directions']
         values['geometry.crank_angles'] = headings
     if 'legs.crank.mass' not in values:
         return
     length = float(np.max(values['legs.crank.length']))
     values['legs.crank.center_of_mass'] = _collapsed(
-        np.reshape(values['legs.crank.center_of_mass'], (6, 3)), length, 0)
+        np.reshape(values['legs.crank.center_of_mass'], (6, 3)), length, 0, resolution)
     values['legs.crank.inertia'] = _collapsed(
-        np.reshape(values['legs.crank.inertia'], (6, 6)), 0.0, 5)
+        np.reshape(values['legs.crank.inertia'], (6, 6)), 0.0, 5, resolution)
     mass, rod = (np.asarray(values[f'legs.rod.{name}']) for name in ('mass', 'length'))
     for name, default in (('center_of_mass', 0.5 * rod), ('inertia', mass * rod ** 2 / 12.0)):
         if np.allclose(np.where(mass > 0.0, values[f'legs.rod.{name}'], default), default,
-                       rtol=AXIAL, atol=0.0):
+                       rtol=resolution, atol=0.0):
             del values[f'legs.rod.{name}']

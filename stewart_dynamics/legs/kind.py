@@ -270,8 +270,12 @@ class LegKind(ABC):
         """Return the value of a parameter, of bodies as ``read_leg`` gives it for six legs."""
         return parameters[name]
 
-    def tidy(self, values: dict[str, Any]) -> None:
-        """Bring parameters of six legs that were read into the shortest form."""
+    def tidy(self, values: dict[str, Any], resolution: float) -> None:
+        """
+        Bring parameters of six legs that were read into the shortest form.
+
+        resolution: numbers that differ by a smaller part are equal.
+        """
 
     def settled(self, parameters: Parameters) -> Parameters:
         """Return parameters that were read, without those that follow from the others."""
