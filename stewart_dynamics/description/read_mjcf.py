@@ -38,11 +38,22 @@ def read_mjcf(source: Path) -> Mechanism:
 
 
 def _mechanism(mujoco: Any, source: Path) -> Mechanism:
-    model = _loaded(mujoco, source)
+    unread = ''
+    try:
+        model = _loaded(mujoco, source, 'load(source)')
+    except DescriptionError as exc:
+        # Meshes of a clone without Git LFS are pointers, and bodies with own masses need none.
+        try:
+            model = _loaded(mujoco, source, 'without_meshes(source)')
+        except DescriptionError:
+            raise exc from None
+        unread = str(exc)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mechanism = Mechanism(str(source), source.stem, _parts(model, data), [],
                           gravity=np.array(model.opt.gravity))
+    if unread:
+        mechanism.remarks.append(f'meshes are left out, all bodies have masses: {unread}')
     _options(mujoco, model, mechanism)
     for body in range(1, model.nbody):
         _joints_of(mujoco, model, data, body, mechanism)
@@ -60,13 +71,32 @@ def _mechanism(mujoco: Any, source: Path) -> Mechanism:
     return mechanism
 
 
-def _loaded(mujoco: Any, source: Path) -> Any:
-    """Return the model that MuJoCo makes of a file; it writes warnings to a MUJOCO_LOG.TXT."""
+_LOADERS = """
+import mujoco
+save, load = mujoco.mj_saveModel, mujoco.MjModel.from_xml_path
+def without_meshes(source):
+    spec = mujoco.MjSpec.from_file(source)
+    if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+        raise ValueError('masses are those of shapes')
+    for geom in [each for each in spec.geoms if each.meshname]:
+        if not geom.parent.explicitinertial and geom.parent.name != 'world':
+            raise ValueError('a mass is that of a mesh')
+        spec.delete(geom)
+    for mesh in [*spec.meshes]:
+        spec.delete(mesh)
+    return spec.compile()
+"""
+
+
+def _loaded(mujoco: Any, source: Path, load: str) -> Any:
+    """
+    Return the model that MuJoCo makes of a file; it writes warnings to a MUJOCO_LOG.TXT.
+
+    load: an expression with the functions of ``_LOADERS``.
+    """
     with tempfile.TemporaryDirectory() as folder:
         model = Path(folder) / 'model.mjb'
-        load_in_process(
-            'MuJoCo', 'import mujoco\nsave, load = mujoco.mj_saveModel, '
-            'mujoco.MjModel.from_xml_path', 'save(load(source), target)', source, model)
+        load_in_process('MuJoCo', _LOADERS, f'save({load}, target)', source, model)
         return mujoco.MjModel.from_binary_path(str(model))
 
 

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+import math
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
@@ -29,9 +31,10 @@ from stewart_dynamics.description.xml_text import NOT_SET
 from stewart_dynamics.errors import one_line
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.legs.mechanism import (
-    Chain, DescriptionError, joined, Mechanism, MechanismBody)
+    Chain, DescriptionError, joined, Mechanism, MechanismBody, Placement)
 from stewart_dynamics.legs.reading import passive
-from stewart_dynamics.mechanics.kinematics.home_pose import home_of
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.kinematics.home_pose import home_of, level_axes
 from stewart_dynamics.parameters.table import (
     mean_radius, NEGATIVE, NO_MASS, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
 from stewart_dynamics.whole_file import read_text
@@ -42,6 +45,8 @@ _COUNTS = dict(enumerate(('no', 'one', 'two', 'three', 'four', 'five', 'six')))
 # Legs whose mean direction has a smaller part along the normal of the base joints' plane point to
 # neither side of it.
 _FLAT = 0.05
+# Cosine of the angle by which level planes and frames may be inclined.
+_LEVEL = math.cos(0.1)
 # Bodies of a smaller part of the platform's mass are only frames.
 _NEGLIGIBLE = 1e-7
 
@@ -68,6 +73,8 @@ def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
         part for chain in found.chains for part in chain.lower + chain.upper)]
     _leave_out_frames(found.platform_parts, parts)
     remarks, warnings = list(mechanism.remarks), list(mechanism.warnings)
+    if not mechanism.carried:
+        found = _leveled(found, remarks)
     legs, of_legs = [], []
     for chain in found.chains:
         said: list[str] = []
@@ -101,6 +108,36 @@ def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
     parameters = found.kind.settled(_with_side(Parameters(given, mechanism.source), [
         leg['direction'] for leg in legs]))
     return Recognized(parameters, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(warnings)))
+
+
+def _leveled(found: Topology, remarks: list[str]) -> Topology:
+    """
+    Return a hexapod whose platform frame is level where the platform is.
+
+    Frames from CAD are at any part of the platform, and turned. Home has parallel axes.
+    """
+    base = found.base.placement
+    below, above = (np.array([getattr(chain.steps[at], side) for chain in found.chains])
+                    for at, side in ((0, 'near'), (-1, 'far')))
+    normals = [level_axes(each - each.mean(axis=0))[2] for each in (below, above)]
+    turned = found.platform.placement.rotation @ (base.rotation.T @ normals[0])
+    if abs(normals[0] @ normals[1]) < _LEVEL or turned @ normals[0] > _LEVEL:
+        return found
+    level = Placement(base.rotation, above.mean(axis=0))
+    given = found.platform.placement
+    name = f'{found.platform.name}_level'
+    x, y, z, w = to_quaternion(given.rotation.T @ level.rotation)
+    x_y_z = ' '.join(f'{each:.9g}' for each in given.inside(level.position))
+    remarks.append(
+        f'platform_frame: {found.platform.name!r} is inclined to {found.base.name!r} while the '
+        f'platform is level: {name!r} has its place, parallel to {found.base.name!r} in the file: '
+        f'in {found.platform.name!r} at {x_y_z} m, quaternion x y z w '
+        f'{x:.9g} {y:.9g} {z:.9g} {w:.9g}')
+    return found._replace(platform=replace(
+        found.platform, name=name, placement=level,
+        center=level.inside(given.point(found.platform.center)),
+        inertia=level.rotation.T @ given.rotation @ found.platform.inertia
+        @ given.rotation.T @ level.rotation))
 
 
 def _leave_out_frames(of_platform: Iterable[MechanismBody], parts: Iterable[MechanismBody],

@@ -13,7 +13,7 @@ stewart_describe.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 import math
 from typing import NamedTuple
 
@@ -36,7 +36,7 @@ class Topology(NamedTuple):
     base: MechanismBody  # whose frame is the base frame
     platform: MechanismBody
     platform_parts: list[MechanismBody]
-    """All bodies that are fixed to the platform, itself included."""
+    """All bodies that are fixed to the platform, or carried by it alone, itself included."""
     chains: list[Chain]
     kind: LegKind
 
@@ -192,8 +192,26 @@ def topology_of(mechanism: Mechanism) -> Topology:
     order = [name for name in mechanism.order if name in chains]
     names = order if len(order) == LEGS else [
         joint.name for joint in mechanism.joints if joint.name in chains]
-    return Topology(groups.main(base), groups.main(platform), groups.parts(platform),
+    carried = _carried_by(groups, base, platform, seen)
+    mechanism.remarks += [
+        f'{part.name}: moves against the platform in the file: taken as fixed to it where it is'
+        for part in carried if part.mass]
+    return Topology(groups.main(base), groups.main(platform), groups.parts(platform) + carried,
                     [chains[name] for name in names], kind)
+
+
+def _carried_by(groups: _Groups, base: str, platform: str, of_legs: Collection[str],
+                ) -> list[MechanismBody]:
+    """Return the bodies that are connected to the platform alone, by joints that move."""
+    found: dict[str, None] = {}
+    for joint in groups.joints[platform]:
+        start = groups.other(joint, platform)
+        if start in of_legs or start in found:
+            continue
+        others = groups.reached(start, (platform,))
+        if base not in others:
+            found |= dict.fromkeys(others)
+    return [part for group in found for part in groups.parts(group)]
 
 
 def _open_ends(groups: _Groups) -> str:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # Smaller parts of the length of a leg, or smaller angles [rad], are rounding errors.
 SMALL = 1e-6
+_OPEN = 1e-5  # of the length of a leg: files have numbers of six digits
 _OFF_AXIS = 1e-3
 _UNEQUAL = 0.01
 _THICK = 0.05
@@ -88,7 +89,7 @@ def platform_joint(steps: Sequence[LegJoint], end: Array) -> Array:
 
 def say_gap(chain: Chain, gap: float, length: float, said: list[str]) -> None:
     """Say that the loop of a leg is open, but in files of stewart_describe."""
-    closed = gap <= SMALL * max(length, np.finfo(float).tiny)
+    closed = gap <= _OPEN * max(length, np.finfo(float).tiny)
     if not closed and not chain.steps[-1].joint.name.startswith(chain.driven.joint.name):
         said.append(f'its end is {gap:.3g} m from its joint on the platform at the positions of '
                     'the file: the loop is open')
