@@ -22,7 +22,7 @@ from stewart_dynamics.legs.mechanism import UNIVERSAL, WORLD
 from stewart_dynamics.legs.tree import (
     BALL, LegBranch, LegLink, PLATE, UNIVERSAL_JOINTS, VisualShape)
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.kinematics.home_pose import homes, level_axes
+from stewart_dynamics.mechanics.kinematics.home_pose import choose_branch, homes, level_axes
 from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
 from stewart_dynamics.parameters.table import inertia_matrix, mean_radius, Parameters
 
@@ -132,6 +132,7 @@ class Hexapod:
         # Platform and payload are one body in all formats.
         self.parameters = parameters = parameters.merged()
         self.joints = joint_names(parameters)
+        choose_branch(parameters)
         positions, rotations = homes(parameters)
         self.position, self.rotation = positions[0], rotations[0]
         self.base, self.platform = parameters.base_frame, parameters.platform_frame

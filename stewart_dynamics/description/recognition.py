@@ -28,12 +28,13 @@ from stewart_dynamics.description.read_urdf import read_urdf
 from stewart_dynamics.description.read_usd import read_usd, SUFFIXES
 from stewart_dynamics.description.topology import LEGS, Topology, topology_of
 from stewart_dynamics.description.xml_text import NOT_SET
-from stewart_dynamics.errors import one_line
+from stewart_dynamics.errors import one_line, ParameterError
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.legs.mechanism import (
     Chain, DescriptionError, joined, Mechanism, MechanismBody, Placement)
 from stewart_dynamics.legs.reading import passive
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of, level_axes
 from stewart_dynamics.parameters.table import (
     mean_radius, NEGATIVE, NO_MASS, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
@@ -105,8 +106,10 @@ def recognized(mechanism: Mechanism, geometry_only: bool = False) -> Recognized:
     given = {name: value for name, value in values.items() if value is not None}
     remarks += _missing(given, mechanism, found, legs)
     found.kind.tidy(given, mechanism.resolution)
-    parameters = found.kind.settled(_with_side(Parameters(given, mechanism.source), [
-        leg['direction'] for leg in legs]))
+    parameters = _with_side(Parameters(given, mechanism.source), [
+        leg['direction'] for leg in legs])
+    if not found.kind.likely.keys() & mechanism.carried.keys():
+        parameters = _without_assembly(parameters, found.kind)
     return Recognized(parameters, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(warnings)))
 
 
@@ -252,6 +255,16 @@ def _with_side(p: Parameters, directions: list[Array]) -> Parameters:
     if abs(height) < _FLAT or height * home.side > 0.0:
         return p
     return p.replaced({'geometry.platform_side': POSITIVE if height > 0.0 else NEGATIVE})
+
+
+def _without_assembly(p: Parameters, kind: LegKind) -> Parameters:
+    """Return parameters without those of the assembly of legs if it follows from the others."""
+    try:
+        found = p.replaced(kind.likely)
+        structures = [hexapod_structure(each)['legs'].tobytes() for each in (p, found)]
+    except ParameterError:
+        return p
+    return found if kind.likely and structures[0] == structures[1] else p
 
 
 def _carried(mechanism: Mechanism, found: Topology, values: Mapping[str, Any],

@@ -18,6 +18,7 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.core.binding import header
 from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.export.golden_vectors import COLUMNS, golden_vectors, PARTS, WHOLE
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
@@ -74,6 +75,7 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
         are not, and there is no home pose.
     """
     check_name(name)
+    require_kind(parameters, 'exported source')
     head = (f'A hexapod, written by stewart_export {__version__}.\n'
             f' * SHA-256 of its parameters: {digest(parameters)}')
     rows = golden_vectors(parameters).tolist()

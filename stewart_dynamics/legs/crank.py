@@ -15,7 +15,7 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.legs import crank_tree as tree
-from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named
+from stewart_dynamics.legs.kind import LegKind, LegMass, Named
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
@@ -69,6 +69,7 @@ class Crank(LegKind):
         AXES, DIRECTIONS, *(f'legs.{part}.{each}' for part in tree.PARTS
                             for each in ('length', 'mass', 'center_of_mass', 'inertia')))
     shortened = HEADINGS,
+    likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
     home_rule = ("no level pose has all rods at the cranks' middle angles: legs.rod.length is "
                  'shorter than the gap, or a length is in other units')
@@ -177,13 +178,6 @@ class Crank(LegKind):
         on_legs: Array = forces + torque * r
         return on_legs
 
-    def home_legs(self, parameters: Parameters) -> HomeLegs:
-        """Return the rods, from the ends of the cranks at the middle of their angles."""
-        low, high = parameters.limits.angle_min, parameters.limits.angle_max
-        middle = np.zeros(6) if low is None or high is None else 0.5 * (low + high)
-        return HomeLegs(crank_ends(parameters, middle), None, None,
-                        float(np.mean(parameters['legs.rod.length'])))
-
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
         """Take the branch whose angle at home is within the limits and a quarter turn of zero."""
@@ -210,10 +204,6 @@ class Crank(LegKind):
                     f'with negative: {words}: give the branch, or limits of the angle')
             of['branch'][leg] = 1.0 if possible[0] else -1.0
         return True
-
-    def anchors(self, parameters: Parameters, position: Array, rotation: Array) -> Array:
-        """Return the ends of the cranks."""
-        return tree.ends_at(parameters, position, rotation)
 
     def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
                  size: float) -> list[LegBranch]:
@@ -259,15 +249,6 @@ class Crank(LegKind):
     def tidy(self, values: dict[str, Any], resolution: float) -> None:
         """Give headings of level axes, and numbers that are the same for all cranks once."""
         tree.tidy(values, resolution)
-
-    def settled(self, parameters: Parameters) -> Parameters:
-        """Leave the branches out where they follow from the angles at home."""
-        try:
-            found = parameters.replaced({'geometry.crank_branch': [AUTO]})
-        except ParameterError:
-            return parameters
-        legs: tuple[Any, Any] = (parameters.structure['legs'], found.structure['legs'])
-        return found if np.array_equal(legs[0]['branch'], legs[1]['branch']) else parameters
 
 
 class _Angle(NamedTuple):
@@ -363,15 +344,6 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
     else:
         inertias[:] = given
     return centers, inertias
-
-
-def crank_ends(parameters: Parameters, angles: Array) -> Array:
-    """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
-    u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
-    along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
-    sizes = parameters['legs.crank.length'][:, None]
-    ends: Array = parameters.geometry.base_joints + sizes * along
-    return ends
 
 
 def _unit(vectors: Array) -> Array:

@@ -56,11 +56,9 @@ def crank_legs(p: Parameters) -> CrankLegs:
     """Return these numbers of a hexapod."""
     u, z = (each / np.linalg.norm(each, axis=-1, keepdims=True) for each in (
         p['geometry.crank_axes'], p['geometry.crank_directions']))
-    low, high = p.limits.angle_min, p.limits.angle_max
-    middle = np.zeros(6) if low is None or high is None else 0.5 * (low + high)
     legs: Any = p.structure['legs']
     return CrankLegs(p.geometry.base_joints, z, np.cross(u, z), u, p['legs.crank.length'],
-                     p['legs.rod.length'], legs['branch'], middle, p.geometry.platform_joints)
+                     p['legs.rod.length'], legs['branch'], legs['home_position'], p.geometry.platform_joints)
 
 
 def angles(legs: CrankLegs, position: Array, rotation: Array) -> tuple[Array, Array]:
@@ -81,24 +79,28 @@ def angles(legs: CrankLegs, position: Array, rotation: Array) -> tuple[Array, Ar
     return q, rods
 
 
-def ends_at(p: Parameters, position: Array, rotation: Array) -> Array:
-    """Return the ends of the cranks in poses (..., 6, 3), base frame [m]."""
-    legs = crank_legs(p)
-    q = angles(legs, position, rotation)[0][..., None]
-    ends: Array = legs.center + legs.crank[:, None] * (
-        legs.zero * np.cos(q) + legs.normal * np.sin(q))
-    return ends
-
-
 def _axes(legs: CrankLegs, n: int, angle: float) -> Array:
     """Return e, n, u of a crank as columns (3, 3), base axes."""
     e = legs.zero[n] * cos(angle) + legs.normal[n] * sin(angle)
     return np.column_stack([e, np.cross(legs.axis[n], e), legs.axis[n]])
 
 
-def _mounts_on_cranks(legs: CrankLegs, q: Array, mounts: Array) -> Array:
-    """Return rotations (6, 3, 3) from the axes of the mounts to those of the cranks."""
-    return np.array([_axes(legs, n, float(q[n])).T @ mounts[n] for n in range(6)])
+def _mounts_on_cranks(legs: CrankLegs, home: tuple[Array, Array], mounts: Array) -> Array:
+    """
+    Return rotations (6, 3, 3) from the axes of the mounts to those of the cranks.
+
+    The mounts' z are turned to the rods at home.
+    """
+    q, rods = angles(legs, *home)
+    found = []
+    for n, rod in enumerate(rods):
+        z = rod / np.linalg.norm(rod)
+        x, y = (_axes(legs, n, float(q[n])).T @ mounts[n])[:, :2].T
+        x, y = (x, y) if abs(x @ z) < abs(y @ z) else (y, -x)
+        x = x - (x @ z) * z
+        x /= np.linalg.norm(x)
+        found.append(np.column_stack([x, np.cross(z, x), z]))
+    return np.array(found)
 
 
 def branches(p: Parameters, bodies: tuple[Array, Array], position: Array, rotation: Array,
@@ -110,7 +112,7 @@ def branches(p: Parameters, bodies: tuple[Array, Array], position: Array, rotati
     """
     legs = crank_legs(p)
     q = angles(legs, position, rotation)[0]
-    on_cranks = _mounts_on_cranks(legs, q, mounts)
+    on_cranks = _mounts_on_cranks(legs, (position, rotation), mounts)
     masses, rod_centers, rod_inertias = (
         p['legs.rod.mass'], *(rod_value(p, name) for name in ('center_of_mass', 'inertia')))
     found = []
@@ -155,7 +157,7 @@ def tree_positions(p: Parameters, mounts: Array, position: Array, rotation: Arra
                    home: tuple[Array, Array]) -> Array:
     """Return the angle of each crank, and two of each universal joint (..., 6, 3) [rad]."""
     legs = crank_legs(p)
-    on_cranks = _mounts_on_cranks(legs, angles(legs, *home)[0], mounts)
+    on_cranks = _mounts_on_cranks(legs, home, mounts)
     q, rods = angles(legs, position, rotation)
     x, y, z = np.moveaxis(np.einsum('iba,...ib->...ia', on_cranks, rods), -1, 0).copy()
     return np.stack([q, np.arctan2(-y, z), np.arctan2(x, np.hypot(y, z))], axis=-1)
@@ -165,7 +167,7 @@ def tree_sampler(p: Parameters, mounts: Array, home: tuple[Array, Array],
                  ) -> Callable[[Sequence[float]], list[float]]:
     """Return the function that computes the same for one pose."""
     numbers = crank_legs(p)
-    on_cranks = _mounts_on_cranks(numbers, angles(numbers, *home)[0], mounts).reshape(6, 9)
+    on_cranks = _mounts_on_cranks(numbers, home, mounts).reshape(6, 9)
     legs = [tuple(np.concatenate([np.ravel(each[n]) for each in (*numbers, on_cranks)]).tolist())
             for n in range(6)]
 

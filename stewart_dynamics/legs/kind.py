@@ -52,15 +52,6 @@ class LegMass(NamedTuple):
     unit: str
 
 
-class HomeLegs(NamedTuple):
-    """Lines from the base to the platform joints by which a home pose is found."""
-
-    anchors: Array  # where they begin (6, 3) [m]
-    shortest: Array | None  # (6,) [m]
-    longest: Array | None
-    length: float  # of the mean line at home [m]; 0: not known
-
-
 class LegKind(ABC):
     """
     A kind of legs.
@@ -100,6 +91,8 @@ class LegKind(ABC):
         elements for.
     shortened : tuple of str
         Parameters that stand for several of ``elements``.
+    likely : mapping
+        Values of parameters that let the assembly of the legs follow from the other ones.
     zero : str
         The parameter by which the zero of the drive is chosen; empty: its joint has that zero.
 
@@ -126,6 +119,7 @@ class LegKind(ABC):
     elements: tuple[str, ...]
     shortened: tuple[str, ...] = ()
     zero: str = ''
+    likely: Mapping[str, Any] = {}
     home_rule: str  # what a file lacks that gives no home pose
     inertia_unit: str  # of the reflected inertia of a drive
     friction_units: tuple[str, str]  # viscous and Coulomb
@@ -202,10 +196,6 @@ class LegKind(ABC):
         (..., 3): angular velocity and acceleration of the base.
         """
 
-    @abstractmethod
-    def home_legs(self, parameters: Parameters) -> HomeLegs:
-        """Return the lines by which the home pose is found."""
-
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
         """
@@ -215,19 +205,14 @@ class LegKind(ABC):
         """
         return False
 
-    def anchors(self, parameters: Parameters, position: Array, rotation: Array) -> Array:
-        """Return where the lines to the platform joints begin in poses, base frame [m]."""
-        del position, rotation
-        joints: Array = parameters.geometry.base_joints
-        return joints
-
     @abstractmethod
     def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
                  size: float) -> list[LegBranch]:
         """
         Return the six legs at a pose at home, as branches of a tree.
 
-        mounts: rotations (6, 3, 3) from axes whose z is along the lines at home to base axes.
+        mounts: rotations (6, 3, 3) from the axes of universal joints at home, z nearly along the
+            lines of force, to base axes.
         size: mean distance of the platform joints from their center, for shapes [m].
         """
 
@@ -276,10 +261,6 @@ class LegKind(ABC):
 
         resolution: numbers that differ by a smaller part are equal.
         """
-
-    def settled(self, parameters: Parameters) -> Parameters:
-        """Return parameters that were read, without those that follow from the others."""
-        return parameters
 
 
 def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind],

@@ -12,7 +12,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.legs import telescopic_tree as tree
-from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named
+from stewart_dynamics.legs.kind import LegKind, LegMass, Named
 from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, SLIDE, UNIVERSAL
 from stewart_dynamics.legs.tree import LegBranch
@@ -148,13 +148,6 @@ class Telescopic(LegKind):
             + (per_leg(terms.inertia * at.lengths) * terms.across @ carried[..., None])[..., 0]
             - (moment * q_squared)[..., None] * at.directions)
         return on_legs
-
-    def home_legs(self, parameters: Parameters) -> HomeLegs:
-        """Return the legs, with the mean one halfway between its limits or of zero length."""
-        low, high = parameters.limits.length_min, parameters.limits.length_max
-        length = float(np.mean(parameters.geometry.zero_length if low is None or high is None
-                               else 0.5 * (low + high)))
-        return HomeLegs(parameters.geometry.base_joints, low, high, length)
 
     def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
                  size: float) -> list[LegBranch]:
