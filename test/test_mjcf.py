@@ -65,16 +65,16 @@ class Simulation:
 
     def _drift(self) -> Array:
         """Return the accelerations (18,) of the gaps at accelerations of zero."""
-        model, data, step = self.model, self.data, 1e-6
-        q, v, nearby = data.qpos.copy(), data.qvel.copy(), []
-        for time in (step, -step):
+        model, data, step = self.model, self.data, 1e-4
+        q, v, drift = data.qpos.copy(), data.qvel.copy(), np.zeros(18)
+        # The first derivative by four differences, of fourth order.
+        for steps, part in ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0)):
             data.qpos[:] = q
-            mujoco.mj_integratePos(model, data.qpos, v, time)
+            mujoco.mj_integratePos(model, data.qpos, v, steps * step)
             mujoco.mj_forward(model, data)
-            nearby.append(self._loops())
+            drift += part / (12.0 * step) * self._loops() @ v
         data.qpos[:], data.qvel[:] = q, v
         mujoco.mj_forward(model, data)
-        drift: Array = (nearby[0] - nearby[1]) @ v / (2.0 * step)
         return drift
 
     def projected_acceleration(self, motion: Motion, efforts: Array) -> Array:
@@ -196,6 +196,11 @@ def test_accelerations_by_mujocos_dynamics_with_closed_loops_are_the_same(seed, 
     p, motions = random_hexapod(kind, seed, 20)
     p = sharp(p)
     platform, simulation = StewartPlatform(p), Simulation(p)
+    # Legs have none about their own axes in the model: as it is written, it changes accelerations
+    # of fast cranks by up to 2e-6.
+    for part in (leg.last.name for leg in Hexapod(p).legs):
+        moments = simulation.model.body_inertia[simulation.model.body(part).id]
+        moments[np.argmin(moments)] *= 1e-3
     efforts = rng(seed).uniform(-2.0, 2.0, (20, 6)) * np.abs(efforts_of(p, motions))
     found = [simulation.projected_acceleration(motion, effort)
              for motion, effort in zip(motions, efforts, strict=True)]

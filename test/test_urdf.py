@@ -16,7 +16,7 @@ from legs_of_all_kinds import efforts_of, KINDS, random_hexapod
 import numpy as np
 import pytest
 from referees import (
-    Array, each_relative, friction, random_motion, random_parameters, reflected, rng,
+    Array, each_relative, friction, random_parameters, reflected, rng,
     rotation_about)
 from snapshot import Snapshot
 

@@ -23,7 +23,7 @@ from stewart_dynamics.legs.tree import (
     BALL, LegBranch, LegLink, PLATE, UNIVERSAL_JOINTS, VisualShape)
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import choose_branch, homes, level_axes
-from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
+from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts
 from stewart_dynamics.parameters.table import inertia_matrix, mean_radius, Parameters
 
 # A body that a tool simulates needs mass and inertia about each axis. What a parameter file gives

@@ -244,7 +244,8 @@ class _Scene:
         """Add the limits and the drive of a joint; unit: of its positions [m, rad]."""
         for schema in (self._physics.PrismaticJoint, self._physics.RevoluteJoint):
             if prim.IsA(schema):
-                ends = schema(prim).GetLowerLimitAttr().Get(), schema(prim).GetUpperLimitAttr().Get()
+                joint = schema(prim)
+                ends = joint.GetLowerLimitAttr().Get(), joint.GetUpperLimitAttr().Get()
                 made.lower, made.upper = (
                     float(end) * unit if math.isfinite(end) else None for end in ends)
         position = prim.GetAttribute(POSITION)

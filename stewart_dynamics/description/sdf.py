@@ -12,8 +12,8 @@ system DetachableJoint fixes to the platform. Drake closes the loops by constrai
 the prefix ``drake``, as the reflected masses.
 
 SDFormat counts the positions of joints from the poses in the file, those of the home pose: the
-position of a leg's joint is its length, or its angle, less that at home, and its limits are counted
-from there, too.
+position of a leg's joint is its length, or its angle, less that at home, and its limits are
+counted from there, too.
 
 The model is turned so that gravity, given in base axes, points along the world's -z. What SDFormat
 has no place for stands in elements with the prefix ``stewart_dynamics``, which other readers

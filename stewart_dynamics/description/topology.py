@@ -137,7 +137,8 @@ class _Groups:
         """
         Return the groups that are connected to one while others are taken away, nearest first.
 
-        closed: a joint that is taken away as well. Each has the group and the joint that lead to it, None for the first.
+        closed: a joint that is taken away as well.
+        Each has the group and the joint that lead to it, None for the first.
         """
         found: dict[str, tuple[str, Joint] | None] = {start: None}
         waiting = deque([start])
@@ -317,7 +318,7 @@ def _chain(groups: _Groups, ends: tuple[str, str], inside: Iterable[str], path: 
            steps: list[LegJoint], kind: LegKind, drive: int) -> Chain:
     """Return a leg with its bodies on both sides of the joint between its parts."""
     at = kind.parting(steps)
-    lower = groups.reached(path[at], ends, steps[at].joint)
-    return Chain(steps, drive, *([part for group in inside if (group in lower) == is_lower
-                                  for part in groups.parts(group)] for is_lower in (True, False)),
-                 kind.places(steps))
+    reached = groups.reached(path[at], ends, steps[at].joint)
+    lower, upper = ([part for group in inside if (group in reached) == is_lower
+                     for part in groups.parts(group)] for is_lower in (True, False))
+    return Chain(steps, drive, lower, upper, kind.places(steps))

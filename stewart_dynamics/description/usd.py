@@ -151,7 +151,8 @@ def _leg(writer: _Writer, hexapod: Hexapod, leg: LegDescription,
                                      link.at_home.position, link.at_home.rotation, np.zeros(3))
             for axis in ('transX', 'transY', 'transZ', 'rotZ'):
                 writer.limit(universal, axis, *_LOCKED)
-            for axis in ('rotX', 'rotY'):  # free in UsdPhysics, but locked in Newton without limits
+            # Free in UsdPhysics, but locked in Newton without limits.
+            for axis in ('rotX', 'rotY'):
                 writer.limit(universal, axis, -_FREE, _FREE)
         else:
             slides = link.joint == SLIDE

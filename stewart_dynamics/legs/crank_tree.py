@@ -58,7 +58,8 @@ def crank_legs(p: Parameters) -> CrankLegs:
         p['geometry.crank_axes'], p['geometry.crank_directions']))
     legs: Any = p.structure['legs']
     return CrankLegs(p.geometry.base_joints, z, np.cross(u, z), u, p['legs.crank.length'],
-                     p['legs.rod.length'], legs['branch'], legs['home_position'], p.geometry.platform_joints)
+                     p['legs.rod.length'], legs['branch'], legs['home_position'],
+                     p.geometry.platform_joints)
 
 
 def angles(legs: CrankLegs, position: Array, rotation: Array) -> tuple[Array, Array]:
@@ -121,9 +122,10 @@ def branches(p: Parameters, bodies: tuple[Array, Array], position: Array, rotati
         at = Placement(on_cranks[n], np.array([length, 0.0, 0.0]))
         across = float(rod_inertias[n])
         found.append(LegBranch((
-            LegLink(CRANK, HINGE, *(Placement(_axes(legs, n, turn), legs.center[n])
-                                    for turn in (angle, 0.0)), float(p['legs.crank.mass'][n]),
-                    bodies[0][n], bodies[1][n][[[0, 1, 2], [1, 3, 4], [2, 4, 5]]], False, length,
+            LegLink(CRANK, HINGE, Placement(_axes(legs, n, angle), legs.center[n]),
+                    Placement(_axes(legs, n, 0.0), legs.center[n]),
+                    float(p['legs.crank.mass'][n]), bodies[0][n],
+                    bodies[1][n][[[0, 1, 2], [1, 3, 4], [2, 4, 5]]], False, length,
                     _crank_shapes(length, size)),
             LegLink(ROD_PART, UNIVERSAL, at, at, float(masses[n]),
                     np.array([0.0, 0.0, float(rod_centers[n])]), np.diag([across, across, 0.0]),

@@ -261,6 +261,7 @@ class LegKind(ABC):
 
         resolution: numbers that differ by a smaller part are equal.
         """
+        del values, resolution
 
 
 def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind],

@@ -83,7 +83,7 @@ def center_of(steps: Sequence[LegJoint], where: str, said: list[str], far: bool 
 
 
 def platform_joint(steps: Sequence[LegJoint], end: Array) -> Array:
-    """Return the point of the platform where a leg ends, that of the leg where loops are closed."""
+    """Return the point of the platform where a leg ends."""
     return end if len(steps) > 1 or steps[-1].joint.child_anchor is None else steps[-1].far
 
 

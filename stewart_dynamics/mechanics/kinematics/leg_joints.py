@@ -15,8 +15,8 @@ the joints have the positions of one pose.
 - A leg, from the base: the joint of its drive, which has the name of the leg in the parameter
   ``joints``, and two revolute joints about x and then y, which together are a universal joint, in
   the order of ``LegKind.joints``. The universal joint has a mount whose z points along the line
-  of force at home, where both angles are zero; its x lies in the plane of the base joints and is at
-  right angles to that line. The position of a prismatic joint is the length less
+  of force at home, where both angles are zero; its x lies in the plane of the base joints and is
+  at right angles to that line. The position of a prismatic joint is the length less
   ``geometry.zero_length``, that of a revolute one the angle of the drive.
 
 Two directions are singular: for the platform a pitch of 90 degrees, for a leg the x of its mount,
