@@ -129,13 +129,12 @@ def _leveled(found: Topology, remarks: list[str]) -> Topology:
     level = Placement(base.rotation, above.mean(axis=0))
     given = found.platform.placement
     name = f'{found.platform.name}_level'
-    x, y, z, w = to_quaternion(given.rotation.T @ level.rotation)
-    x_y_z = ' '.join(f'{each:.9g}' for each in given.inside(level.position))
+    at, turn = (' '.join(f'{round(float(each), 9) + 0.0:.9g}' for each in numbers) for numbers in (
+        given.inside(level.position), to_quaternion(given.rotation.T @ level.rotation)))
     remarks.append(
         f'platform_frame: {found.platform.name!r} is inclined to {found.base.name!r} while the '
         f'platform is level: {name!r} has its place, parallel to {found.base.name!r} in the file: '
-        f'in {found.platform.name!r} at {x_y_z} m, quaternion x y z w '
-        f'{x:.9g} {y:.9g} {z:.9g} {w:.9g}')
+        f'in {found.platform.name!r} at {at} m, quaternion x y z w {turn}')
     return found._replace(platform=replace(
         found.platform, name=name, placement=level,
         center=level.inside(given.point(found.platform.center)),
