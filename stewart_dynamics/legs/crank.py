@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -14,9 +14,12 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.legs import crank_tree as tree
 from stewart_dynamics.legs.kind import LegKind, LegMass, Named
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
+from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
+from stewart_dynamics.legs.tree import LegBranch
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -60,6 +63,13 @@ class Crank(LegKind):
     massless = {
         'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
         'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
+    parts, joints = tree.PARTS, (HINGE, UNIVERSAL)
+    elements = (
+        'actuator.reflected_inertia', 'actuator.viscous_friction', 'actuator.coulomb_friction',
+        AXES, DIRECTIONS, *(f'legs.{part}.{each}' for part in tree.PARTS
+                            for each in ('length', 'mass', 'center_of_mass', 'inertia')))
+    shortened = HEADINGS,
+    likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
     home_rule = ("no level pose has all rods at the cranks' middle angles: legs.rod.length is "
                  'shorter than the gap, or a length is in other units')
@@ -195,6 +205,51 @@ class Crank(LegKind):
             of['branch'][leg] = 1.0 if possible[0] else -1.0
         return True
 
+    def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
+                 size: float) -> list[LegBranch]:
+        """Return cranks and rods."""
+        return tree.branches(parameters, crank_bodies(parameters), position, rotation, mounts,
+                             size)
+
+    def tree_positions(self, parameters: Parameters, mounts: Array, position: Array,
+                       rotation: Array, home: tuple[Array, Array]) -> Array:
+        """Return angles of the cranks and of the universal joints (..., 6, 3)."""
+        return tree.tree_positions(parameters, mounts, position, rotation, home)
+
+    def tree_sampler(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
+                     ) -> Callable[[Sequence[float]], list[float]]:
+        """Return the function for one pose."""
+        return tree.tree_sampler(parameters, mounts, home)
+
+    def drive_of(self, steps: Sequence[LegJoint]) -> int | None:
+        """Return 0 if the first joint turns a crank."""
+        return tree.drive_of(steps)
+
+    def places(self, steps: Sequence[LegJoint]) -> list[str]:
+        """Return at which end of the rod each joint is."""
+        return tree.places(steps)
+
+    def parting(self, steps: Sequence[LegJoint]) -> int:
+        """Return the first joint at the end of the crank."""
+        return 1
+
+    def read_leg(self, chain: Chain, base: MechanismBody, platform: MechanismBody,
+                 said: list[str]) -> dict[str, Any]:
+        """Return the parameters of a leg in a file."""
+        return tree.read_leg(self, chain, base, platform, said)
+
+    def expanded(self, parameters: Parameters, name: str) -> Any:
+        """Return centers of mass and inertias of all bodies in full."""
+        if name in ('legs.rod.center_of_mass', 'legs.rod.inertia'):
+            return tree.rod_value(parameters, name.rpartition('.')[2])
+        bodies = crank_bodies(parameters)
+        return {'legs.crank.center_of_mass': bodies[0], 'legs.crank.inertia': bodies[1]}.get(
+            name, parameters[name])
+
+    def tidy(self, values: dict[str, Any], resolution: float) -> None:
+        """Give headings of level axes, and numbers that are the same for all cranks once."""
+        tree.tidy(values, resolution)
+
 
 class _Angle(NamedTuple):
     """The crank of each leg at a pose."""
@@ -289,15 +344,6 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
     else:
         inertias[:] = given
     return centers, inertias
-
-
-def crank_ends(parameters: Parameters, angles: Array) -> Array:
-    """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
-    u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
-    along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
-    sizes = parameters['legs.crank.length'][:, None]
-    ends: Array = parameters.geometry.base_joints + sizes * along
-    return ends
 
 
 def _unit(vectors: Array) -> Array:

@@ -106,6 +106,19 @@ def home_pose(parameters: Parameters) -> Pose:
     return Pose(home.positions[0], home.rotations[0])
 
 
+def choose_branch(parameters: Parameters) -> None:
+    """
+    Set the assembly of the legs that the parameters leave open.
+
+    Raises ParameterError: there is no home pose, or it does not decide it.
+    """
+    def at_home() -> tuple[Array, Array]:
+        home = home_pose(parameters)
+        return home.position, home.rotation
+
+    parameters.choose_branch(at_home)
+
+
 def determinant_at_home(parameters: Parameters) -> float:
     """Return det(J) at home [m^3]; nan if the parameters give no home pose."""
     try:
