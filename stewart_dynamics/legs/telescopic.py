@@ -51,8 +51,6 @@ class Telescopic(LegKind):
         'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
         'drive.screw_inertia': None}
     inertia_unit = 'kg'
-    home_rule = ('limits.length_min and limits.length_max, or geometry.zero_length, must give a '
-                 'length that the legs can have in a level pose')
     friction_units = 'N s/m', 'N'
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
@@ -146,6 +144,12 @@ class Telescopic(LegKind):
         length = float(np.mean(parameters.geometry.zero_length if low is None or high is None
                                else 0.5 * (low + high)))
         return HomeLegs(parameters.geometry.base_joints, low, high, length)
+
+    def home_rule(self, parameters: Parameters) -> str:
+        """Return that the mean length is missing, or too short."""
+        del parameters
+        return ('home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
+                'must give a length that the legs can have in a level pose')
 
 
 class _Terms(NamedTuple):
