@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.core.binding import places
+from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs import crank_tree as tree
 from stewart_dynamics.legs.kind import LegKind, LegMass, Named
@@ -25,13 +24,13 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
 AUTO, POSITIVE, NEGATIVE = BRANCHES = 'auto', 'positive', 'negative'  # geometry.crank_branch
+_SIGNS = {AUTO: 0.0, POSITIVE: 1.0, NEGATIVE: -1.0}
 LEVER_MIN = 0.1
 """Default of ``limits.lever_min``: the lever near a dead centre by its largest value."""
 COULOMB_VELOCITY = 0.01
 """Default of ``actuator.coulomb_velocity`` for cranks [rad/s]."""
 HEADINGS, AXES, DIRECTIONS = (
     'geometry.crank_angles', 'geometry.crank_axes', 'geometry.crank_directions')
-_UPRIGHT = 0.5 * math.pi  # from its zero, farther than which no crank is at home by itself [rad]
 
 
 class Crank(LegKind):
@@ -202,25 +201,27 @@ class Crank(LegKind):
         if AUTO not in wanted:
             return False
         position, rotation = home()
-        for leg, branch in enumerate(wanted):
-            if branch != AUTO:
-                continue
-            angles = _angles_at(parameters, leg, position, rotation)
-            name = parameters.joints[leg]
-            if angles is None:
-                rod = parameters['legs.rod.length'][leg]
-                raise ParameterError(
-                    f'{parameters.source}: legs.rod.length: {name}: {rod:.6g} m: does not reach '
-                    'the platform joint at home, from which geometry.crank_branch: auto follows')
-            angles = round(angles[0], 9) + 0.0, round(angles[1], 9) + 0.0  # no -3e-16
-            possible = [_is_allowed(parameters, leg, angle) for angle in angles]
-            if possible[0] == possible[1]:
-                words = 'both are possible' if possible[0] else 'neither is likely'
-                raise ParameterError(
-                    f'{parameters.source}: geometry.crank_branch: auto: {name} has an angle of '
-                    f'{angles[0]:.4g} rad at home with the branch positive, {angles[1]:.4g} rad '
-                    f'with negative: {words}: give the branch, or limits of the angle')
-            of['branch'][leg] = 1.0 if possible[0] else -1.0
+        hexapod: Any = parameters.structure.copy()
+        angles = np.empty((6, 2))
+        undecided = function('choose_branches')(
+            hexapod, np.concatenate([position, np.ravel(rotation)]),
+            np.array([_SIGNS[each] for each in wanted]), angles)
+        missing = np.isnan(angles[:, 0]) & [each == AUTO for each in wanted]
+        if missing.any():
+            leg = int(np.argmax(missing))
+            raise ParameterError(
+                f'{parameters.source}: legs.rod.length: {parameters.joints[leg]}: '
+                f'{parameters["legs.rod.length"][leg]:.6g} m: does not reach the platform joint '
+                'at home, from which geometry.crank_branch: auto follows')
+        if undecided:
+            both, leg = divmod(undecided - 1, 6)
+            up, down = (angles[leg].round(9) + 0.0).tolist()  # no -3e-16
+            words = 'both are possible' if both else 'neither is likely'
+            raise ParameterError(
+                f'{parameters.source}: geometry.crank_branch: auto: {parameters.joints[leg]} has '
+                f'an angle of {up:.4g} rad at home with the branch positive, {down:.4g} rad with '
+                f'negative: {words}: give the branch, or limits of the angle')
+        of['branch'] = hexapod['legs']['branch']
         return True
 
     def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
@@ -406,40 +407,13 @@ def _complete_axes(parameters: Parameters, source: str) -> None:
                 raise ParameterError(f'{source}: {name}: {parameters.joints[leg]}: '
                                      f'{given[leg].tolist()}: a direction must not be 0, 0, 0')
         return
-    cosine, sine, level = np.cos(headings), np.sin(headings), np.zeros(6)
-    found = {AXES: np.stack([sine, -cosine, level], axis=-1),
-             DIRECTIONS: np.stack([cosine, sine, level], axis=-1)}
+    found = {AXES: np.empty((6, 3)), DIRECTIONS: np.empty((6, 3))}
+    function('level_cranks')(headings, *found.values())
     for name, value in found.items():
         if parameters[name] is not None and not np.array_equal(parameters[name], value):
             raise ParameterError(f'{source}: {name}: given as well as {HEADINGS}: leave out one '
                                  'of them')
         parameters._complete(name, value)
-
-
-def _angles_at(parameters: Parameters, leg: int, position: Array, rotation: Array,
-               ) -> tuple[float, float] | None:
-    """Return the angles of a crank with both branches in a pose [rad]; None: out of reach."""
-    u, z = (axes[leg] for axes in crank_axes(parameters))
-    line = position + rotation @ parameters.geometry.platform_joints[leg] - (
-        parameters.geometry.base_joints[leg])
-    size, rod = parameters['legs.crank.length'][leg], parameters['legs.rod.length'][leg]
-    x, y = float(line @ z), float(line @ np.cross(u, z))
-    g = (float(line @ line) + size * size - rod * rod) / (2.0 * size)
-    square = x * x + y * y - g * g
-    if not square >= 0.0:
-        return None
-    h = math.sqrt(square)
-    return math.atan2(y * g - x * h, x * g + y * h), math.atan2(y * g + x * h, x * g - y * h)
-
-
-def _is_allowed(parameters: Parameters, leg: int, angle: float) -> bool:
-    """Return whether an angle at home is within the limits, and likely."""
-    low, high = parameters.limits.angle_min, parameters.limits.angle_max
-    lowest = -_UPRIGHT if low is None else float(low[leg])
-    highest = _UPRIGHT if high is None else float(high[leg])
-    middle = 0.5 * (lowest + highest)
-    turned = middle + math.remainder(angle - middle, 2.0 * math.pi)
-    return lowest <= turned <= highest
 
 
 CRANK = Crank()
