@@ -38,6 +38,7 @@ PLATFORM = StewartPlatform(RIG)
 HOME = PLATFORM.home_pose().position
 BEGIN = 2_000_000_000
 NO_LOAD = (0.0,) * 6
+DRIVES = '    drive: {gear_ratio: 30.0, torque_constant: 0.12, efficiency: 0.8}\n'
 LOAD = np.array([40.0, -30.0, -200.0, 8.0, 5.0, -6.0])
 
 
@@ -79,9 +80,19 @@ def test_an_external_wrench_follows_from_angles_and_torques() -> None:
 
 
 def test_angles_without_an_assembly_are_an_error_that_names_them() -> None:
-    angles = (1.0, -1.0, 1.0, -1.0, 1.0, -1.0)
-    with pytest.raises((PoseError, SingularityError), match=r'angles \[1, -1, .*\] rad'):
+    angles = (1.5, 1.5, 1.5, -1.5, -1.5, -1.5)
+    with pytest.raises((PoseError, SingularityError), match=r'angles \[1.5, 1.5, .*\] rad'):
         ExternalWrench(RIG)(Measurement(BEGIN, angles, NO_LOAD, NO_LOAD), None, NO_LOAD, None)
+
+
+def test_angles_beyond_a_dead_centre_are_an_error() -> None:
+    angles = (2.5,) * 6
+    with pytest.raises(PoseError, match=r'angles \[2.5, .*\] rad: the pose is beyond a dead'):
+        step = ExternalWrench(RIG)
+        last = step(measured(np.array([0.0, 0.001]))[0], None, NO_LOAD, None)
+        step(Measurement(BEGIN + 1000, angles, NO_LOAD, NO_LOAD), last, NO_LOAD, None)
+    with pytest.raises(PoseError, match='the pose is beyond a dead centre of a leg'):
+        PLATFORM.forward_kinematics(angles)
 
 
 @pytest.mark.parametrize('factor, words', [
@@ -101,8 +112,8 @@ def test_torques_in_another_unit_are_a_likely_mistake(factor: float, words: str)
 def test_prior_deviations_are_those_of_a_relative_change(masses: float) -> None:
     p = RIG.replaced({'legs.crank.mass': masses, 'uncertainty.leg_mass': 0.1,
                       'legs.crank.center_of_mass': [0.06, 0.01, -0.02] * 6,
-                      'legs.crank.inertia': [0.02 * masses, 0.001 * masses, 0.0, 0.02 * masses, 0.0,
-                                             0.0108 * masses] * 6})
+                      'legs.crank.inertia': [
+                          masses * each for each in (0.02, 0.001, 0.0, 0.02, 0.0, 0.0108)] * 6})
     count = len(linear_parameters(p))
     root = root_of_covariance(p, p.carried, np.zeros(count))
     assert root.shape == (count, count)
@@ -165,14 +176,14 @@ def test_saturated_torques_and_cranks_at_their_ends_are_not_used(saturated: bool
 @pytest.mark.parametrize('option', ['', '--motor-torque', '--motor-current'])
 def test_the_replay_compares_torques_and_currents_of_the_motors(
         option: str, tmp_path: Path) -> None:
-    drives = RIG.replaced({
-        'drive.gear_ratio': 30.0, 'drive.torque_constant': 0.12, 'drive.efficiency': 0.8})
+    params = tmp_path / 'rig.yaml'
+    params.write_text(CRANKS.read_text() + DRIVES)
+    drives = Parameters.from_yaml(params)
     times = 0.005 * np.arange(1000)
     motion, platform = swaying(times), StewartPlatform(drives)
     result, motors = platform.inverse_dynamics(motion), platform.motors(motion)
     efforts = {'': result.torques, '--motor-torque': motors.torques,
                '--motor-current': motors.currents}[option]
-    drives.to_yaml(params := tmp_path / 'rig.yaml')
     stamps = [1_700_000_000_000_000_000 + round(1e9 * time) for time in times]
     joints = JointStateWriter(drives.joints)
     recorded = []

@@ -197,6 +197,10 @@ static double telescopic_anchor(const stewart_leg * leg, double position, vector
 {*anchor = read3(leg->base_joint); return position;}
 
 /* L'' = s . x'' + |x' across the leg|^2 / L. */
+static int telescopic_assembled(
+  const stewart_leg * leg, double position, const double origin[3], const double r[9])
+{(void)leg, (void)position, (void)origin, (void)r; return 1;}
+
 static double telescopic_straight(
   const stewart_leg * leg, const double position[3], const double r[9], vector x_rate,
   double rate, double acceleration) {
@@ -228,6 +232,8 @@ static void telescopic_complete(stewart_leg * leg) {
       ratio * ratio * (leg->motor_inertia + leg->screw_inertia / (gear * gear));
   }
   leg->motor_ratio = ratio;
+  leg->home_position = leg->length_min > 0.0 && isfinite(leg->length_max)
+    ? 0.5 * (leg->length_min + leg->length_max) : leg->zero_length;
   leg->pitch = leg->twist_ratio == 0.0 ? 0.0 :
     leg->twist_ratio * leg->screw_lead / (2.0 * PI * gear);
 }

@@ -246,6 +246,4 @@ def _error(measurement: Measurement, result: _Result, position: Named,
         return MotionError(f'stamp {measurement.stamp} ns')
     if code == forward_kinematics.SINGULAR:
         return SingularityError(given)
-    residual, steps = result.residual, result.steps
-    return PoseError(f'{given}: did not converge: residual {residual:.3g} m after '
-                     f'{steps:.0f} iterations')
+    return PoseError(f'{given}: {forward_kinematics.failure(result.steps, result.residual)}')

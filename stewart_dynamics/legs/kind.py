@@ -53,15 +53,6 @@ class LegMass(NamedTuple):
     unit: str
 
 
-class HomeLegs(NamedTuple):
-    """Lines from the base to the platform joints by which a home pose is found."""
-
-    anchors: Array  # where they begin (6, 3) [m]
-    shortest: Array | None  # (6,) [m]
-    longest: Array | None
-    length: float  # of the mean line at home [m]; 0: not known
-
-
 class Solid(NamedTuple):
     """A cylinder of each leg, as pictures show it."""
 
@@ -237,10 +228,6 @@ class LegKind(ABC):
         felt: acceleration less gravity of points (..., k, 3) at rest on the base. spin, spin_rate
         (..., 3): angular velocity and acceleration of the base.
         """
-
-    @abstractmethod
-    def home_legs(self, parameters: Parameters) -> HomeLegs:
-        """Return the lines by which the home pose is found."""
 
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
