@@ -140,7 +140,8 @@ PUBLISHED = (
           'legs, or `singularity.stop_condition`, about the origin of the platform. It is 0 if '
           'the pose exceeds a limit already; without a limit on the way it is one turn for a '
           'rotation, the largest finite number for a translation. At most '
-          f'{TRAVEL_RATE:g} Hz, computed while somebody subscribes', depth=1),
+          f'{TRAVEL_RATE:g} Hz, computed while somebody subscribes; of '
+          f'{" and ".join(kind.name for kind in CAPABLE)} legs', depth=1),
     Topic(JOINT_STATES, MODEL_TYPES[JOINT_STATES], 'positions of all joints of the URDF, for '
           '[robot_state_publisher](visualization.md#as-a-model); at most `visualization_rate`, '
           'while somebody subscribes'),
