@@ -16,13 +16,19 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from rclpy.serialization import serialize_message  # noqa: E402
+from builtin_interfaces.msg import Time  # noqa: E402
+from geometry_msgs.msg import WrenchStamped  # noqa: E402
+from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from running import (  # noqa: E402
     bits, DynamicsNode, ERROR, NODE, OK, ROOT, Sample, WARN)
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_msgs.msg import Float64MultiArray, Header  # noqa: E402
 from stewart_dynamics import StewartPlatform  # noqa: E402
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.mechanics.batch import missing_distances  # noqa: E402
 from stewart_dynamics.replay.replay_command_line import main as replay  # noqa: E402
 from test_replay import recorded, write_bag  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
 
 CRANKS = ROOT / 'config' / 'crank_platform.yaml'
 PLATFORM = StewartPlatform.from_yaml(CRANKS)
@@ -214,3 +220,95 @@ def test_a_jump_is_one_by_the_largest_speed(node: DynamicsNode) -> None:
     node.answer(Sample((0.0, 0.0, HEIGHT + 0.1)))
     node.until_reported('limits', ERROR, 'above limits.speed_max')
     assert node.values('limits')['jumps'] == '1'
+
+
+def test_motors_behind_gears_have_states_and_torques(start: Start, tmp_path: Path) -> None:
+    file = tmp_path / 'rig.yaml'
+    file.write_text(CRANKS.read_text() + '    drive: {gear_ratio: 30.0, efficiency: 0.8, '
+                                         'torque_max: 4.0}\n')
+    node = start(file=file)
+    states = node.peer.listen(f'{NODE}/motor_states', JointState)
+    torques = node.peer.listen(f'{NODE}/motor_torques', Float64MultiArray)
+    node.until_active()
+    platform = StewartPlatform.from_yaml(file)
+    for n, sample in enumerate((HOME, swaying(3)), start=1):
+        node.answer(sample)
+        node.until(lambda n=n: min(len(torques), len(states)) >= n, 'they come')  # type: ignore
+        motors = platform.motors(sample.motion())
+        state = deserialize_message(states[-1], JointState)
+        clipped = np.clip(motors.torques, -4.0, 4.0)
+        assert bits(state.position) == bits(motors.angles)
+        assert bits(state.velocity) == bits(motors.speeds)
+        assert bits(state.effort) == bits(clipped)
+        assert bits(deserialize_message(torques[-1], Float64MultiArray).data) == bits(clipped)
+        result = platform.inverse_dynamics(sample.motion())
+        assert np.array_equal(motors.speeds, 30.0 * result.speeds)
+
+
+def test_measured_angles_and_torques_show_the_external_wrench(node: DynamicsNode) -> None:
+    answers = node.peer.listen(f'{NODE}/external_wrench', WrenchStamped)
+    writer = node.peer.writer(f'{NODE}/measured_legs', JointState)
+    node.until(lambda: writer.get_subscription_count() == 1, 'the node hears measurements')
+    node.answer(HOME)
+    load = np.array([30.0, -20.0, -150.0, 5.0, -4.0, 3.0])
+    held = PLATFORM.inverse_dynamics(HOME.motion(), load)
+    begin = node.stamp()
+    for n in range(400):
+        stamp = begin + 2_000_000 * n
+        writer.publish(JointState(
+            header=Header(stamp=Time(sec=stamp // 10 ** 9, nanosec=stamp % 10 ** 9)),
+            name=[*JOINTS], position=held.angles.tolist(), velocity=[0.0] * 6,
+            effort=held.torques.tolist()))
+        node.until(lambda n=n: len(answers) >= n, 'each is answered')  # type: ignore[misc]
+    found = deserialize_message(answers[-1], WrenchStamped).wrench
+    wrench = [found.force.x, found.force.y, found.force.z,
+              found.torque.x, found.torque.y, found.torque.z]
+    assert np.abs(np.array(wrench) - load).max() < 1e-6 * np.abs(load).max()
+    node.until(lambda: 'largest measured - model torque of a leg (N m)' in node.values(
+        'external wrench'), 'the difference is reported in its unit')
+
+    # Angles of no assembly are rejected by name; the next measurement is used.
+    for angles in ([3.0, -3.0] * 3, held.angles.tolist()):
+        stamp += 2_000_000
+        writer.publish(JointState(
+            header=Header(stamp=Time(sec=stamp // 10 ** 9, nanosec=stamp % 10 ** 9)),
+            name=[*JOINTS], position=angles, velocity=[0.0] * 6, effort=held.torques.tolist()))
+    node.until_said('measured_legs rejected: ')
+    assert 'angles [3, -3, 3, -3, 3, -3] rad' in node.program.stderr
+    node.until(lambda: len(answers) >= 400, 'the next one is used')
+
+
+def test_markers_show_cranks_and_rods(node: DynamicsNode) -> None:
+    messages = node.peer.listen(f'{NODE}/markers', MarkerArray)
+    node.until(lambda: node.peer.node.count_publishers(f'{NODE}/markers') == 1, 'it is there')
+    sample = swaying(20)
+    node.until(lambda: (node.answer(sample), messages)[1], 'markers come')
+    drawn = {(each.ns, each.id): each for each in deserialize_message(
+        messages[-1], MarkerArray).markers}
+    motion = sample.motion()
+    geometry = PLATFORM.parameters.geometry
+    joints = motion.position + geometry.platform_joints @ motion.rotation.T
+    for n in range(6):
+        crank, rod = drawn['cranks', n], drawn['rods', n]
+        begin, middle = ends_of(crank)
+        other, end = ends_of(rod)
+        near = {'atol': 1e-9}
+        # A cylinder has no direction: its ends may be exchanged.
+        if np.linalg.norm(middle - geometry.base_joints[n]) < 1e-6:
+            begin, middle = middle, begin
+        if np.linalg.norm(end - middle) < 1e-6:
+            other, end = end, other
+        np.testing.assert_allclose(begin, geometry.base_joints[n], **near)
+        np.testing.assert_allclose(other, middle, **near)
+        np.testing.assert_allclose(end, joints[n], **near)
+        assert crank.scale.z == pytest.approx(PLATFORM.parameters['legs.crank.length'][n])
+        assert rod.scale.z == pytest.approx(PLATFORM.parameters['legs.rod.length'][n])
+    text = drawn['singularity', 0].text
+    assert 'vermillion: drives the angle up, blue: drives it down, saturated at 250 N m' in text
+
+
+def ends_of(cylinder: Any) -> list[Any]:
+    """Return both ends of a marker."""
+    at, q, half = cylinder.pose.position, cylinder.pose.orientation, 0.5 * cylinder.scale.z
+    rotation = np.reshape(from_quaternion(q.x, q.y, q.z, q.w), (3, 3))
+    return [np.array([at.x, at.y, at.z]) + side * half * rotation[:, 2] for side in (-1.0, 1.0)]
