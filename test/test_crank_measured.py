@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+import re
 from typing import Any
 
 import messages
@@ -14,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import rng, ROOT
-from stewart_dynamics import Motion, Parameters, PoseError, SingularityError, StewartPlatform
+from stewart_dynamics import (
+    Motion, ParameterError, Parameters, PoseError, SingularityError, StewartPlatform)
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.external_wrench.effort_check import EffortCheck
 from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench, Measurement
-from stewart_dynamics.external_wrench.measured_legs import LegHistory
+from stewart_dynamics.external_wrench.measured_legs import LegHistory, MeasuredLegs
 from stewart_dynamics.external_wrench.payload import identify
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
@@ -205,3 +207,47 @@ def test_the_replay_compares_torques_and_currents_of_the_motors(
     assert found['residual_rms_n_m'] < 1e-9 * np.abs(result.torques).max()
     assert found['likely_mistake'] is None
     assert found['headline'].startswith('measured and computed torques differ by ')
+
+
+@pytest.mark.parametrize('efforts', ['motor_torques', 'motor_currents'])
+@pytest.mark.parametrize('file', [CRANKS, ROOT / 'config' / 'platform.yaml'], ids=['cranks', ''])
+def test_measured_torques_and_currents_of_motors_are_taken(file: Path, efforts: str) -> None:
+    p = Parameters.from_yaml(file).replaced({
+        'drive.gear_ratio': 3.0, 'drive.torque_constant': 0.12, 'drive.efficiency': 0.8,
+        'external_wrench.efforts': efforts, 'external_wrench.cutoff': 50.0,
+        **({'actuator.screw_lead': 0.01} if file != CRANKS else {})})
+    platform, times = StewartPlatform(p), 0.001 * np.arange(1000)
+    home, kind = platform.home_pose().position, p.leg_kind
+
+    def moving(at: Array) -> Motion:
+        rows = swaying(at).rows.copy()
+        rows[:, :3] += home - HOME
+        return Motion.of_rows(rows)
+
+    at, middle = platform.inverse_dynamics(moving(times)), moving(times - 0.0005)
+    motors = platform.motors(middle, LOAD)
+    given = motors.torques if efforts == 'motor_torques' else motors.currents
+    rejected: list[Any] = []
+    follow = MeasuredLegs(p, ExternalWrench(p), lambda *each: rejected.append(each), print)
+    states, found = JointStateWriter(p.joints), None
+    positions, rates = (getattr(at, each.field) for each in (kind.position, kind.rate))
+    for n, time in enumerate(times):
+        found = follow.take(states.write(
+            BEGIN + round(1e9 * time), positions[n] - p.geometry.zero_length, rates[n], given[n],
+            ), NO_LOAD, None)
+    assert found is not None and found.wrench is not None and not rejected
+    assert follow.mistake is None
+    np.testing.assert_allclose(found.wrench, LOAD, atol=0.02 * np.abs(LOAD).max())
+
+
+@pytest.mark.parametrize('file, changes, words', [
+    (CRANKS, {'external_wrench.efforts': 'motor_currents'},
+     'drive.torque_constant: not set: needed by external_wrench.efforts: motor_currents'),
+    (ROOT / 'config' / 'platform.yaml', {'external_wrench.efforts': 'motor_torques'},
+     'actuator.screw_lead: not set: needed by external_wrench.efforts: motor_torques'),
+    (CRANKS, {'external_wrench.efforts': 'motor_torques', 'drive.efficiency': 0.4},
+     'drive.back_driving_efficiency, -0.5, must be more than 0')])
+def test_efforts_of_motors_need_their_parameters(
+        file: Path, changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError, match=re.escape(words)):
+        Parameters.from_yaml(file).replaced(changes)
