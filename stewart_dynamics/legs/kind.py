@@ -19,7 +19,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import KINDS, places
-from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs.lines import Lines
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, UNIVERSAL
 from stewart_dynamics.legs.tree import LegBranch
@@ -120,7 +120,9 @@ class LegKind(ABC):
     shortened: tuple[str, ...] = ()
     zero: str = ''
     likely: Mapping[str, Any] = {}
-    home_rule: str  # what a file lacks that gives no home pose
+    alternatives: tuple[tuple[str, ...], ...] = ()  # parameters, or others in their place
+    units: Mapping[str, str] = {}  # of parameters, other than in the table
+    defaults: Mapping[str, Any] = {}  # the same
     inertia_unit: str  # of the reflected inertia of a drive
     friction_units: tuple[str, str]  # viscous and Coulomb
 
@@ -195,6 +197,10 @@ class LegKind(ABC):
         felt: acceleration less gravity of points (..., k, 3) at rest on the base. spin, spin_rate
         (..., 3): angular velocity and acceleration of the base.
         """
+
+    @abstractmethod
+    def home_rule(self, parameters: Parameters) -> str:
+        """Return which rule parameters break that give no home pose."""
 
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
@@ -274,7 +280,8 @@ def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind
         # A whole set of parameters, as dict(parameters), gives the defaults, too.
         if owner is None or np.size(default) > 0 and np.all(value == np.asarray(default)):
             continue
+        unit = parameters.table[name].unit
+        words = f'{source}: {name}: {shown(value)}{f" {unit}" if unit else ""}'
         if kind.marker:
-            raise ParameterError(
-                f'{source}: {name}: of hexapods without {kind.marker}, which is given')
-        raise ParameterError(f'{source}: {name}: {owner.marker} is not set: needed by it')
+            raise ParameterError(f'{words}: must not be given with {kind.marker}')
+        raise ParameterError(f'{words}: needs {owner.marker}, which is not set')

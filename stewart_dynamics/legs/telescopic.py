@@ -60,8 +60,6 @@ class Telescopic(LegKind):
                     for each in ('mass', 'center_of_mass', 'inertia')))
     zero = 'geometry.zero_length'
     inertia_unit = 'kg'
-    home_rule = ('limits.length_min and limits.length_max, or geometry.zero_length, must give a '
-                 'length that the legs can have in a level pose')
     friction_units = 'N s/m', 'N'
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
@@ -181,6 +179,12 @@ class Telescopic(LegKind):
                  said: list[str]) -> dict[str, Any]:
         """Return the parameters of a leg in a file."""
         return tree.read_leg(self, chain, base, platform, said)
+
+    def home_rule(self, parameters: Parameters) -> str:
+        """Return that the mean length is missing, or too short."""
+        del parameters
+        return ('home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
+                'must give a length that the legs can have in a level pose')
 
 
 class _Terms(NamedTuple):

@@ -192,8 +192,10 @@ bool has_drive(const stewart_leg & leg)
          leg.twist_ratio != 0.0;
 }
 
-home_poses homes_of(const Params & p, const stewart_platform & hexapod)
+/// Return the home poses of a hexapod, complete or not.
+home_poses homes_of(const Params & p, stewart_platform hexapod)
 {
+  stewart_complete(&hexapod);
   home_legs legs;
   home_poses home;
   const auto & side = p.geometry.platform_side;

@@ -584,7 +584,7 @@ Governor governor_of(const stewart_platform & p)
   home_poses home;
   Governor governor;
   const double head[3] = {0.0, 0.0, 0.0};
-  telescopic_legs(&p, &legs);
+  put_home_legs(&p, &legs);
   find_home(&legs, 0, &home);
   CHECK(home.known != 0.0);
   put_governor(&p, &home.poses[0], head, &governor.within, &governor.limits);

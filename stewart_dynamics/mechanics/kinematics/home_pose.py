@@ -102,7 +102,7 @@ def home_pose(parameters: Parameters) -> Pose:
             'limits.length_min and limits.length_max on the '
             f'{POSITIVE if home.side > 0.0 else NEGATIVE} side of the base')
     if home.length is None:
-        raise ParameterError(f'{parameters.source}: home pose: {parameters.leg_kind.home_rule}')
+        raise ParameterError(f'{parameters.source}: {parameters.leg_kind.home_rule(parameters)}')
     return Pose(home.positions[0], home.rotations[0])
 
 
