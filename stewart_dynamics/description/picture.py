@@ -6,8 +6,8 @@ A picture (SVG) of a hexapod at home, with numbered joints: to be compared with 
 
 It shows numbers as they were read, base joints as discs and platform joints as rings, from above
 and from the front of the base frame, and a table of the legs. Where drives turn, it shows both
-bodies of a leg, and the motion of the end of the first one while the angle grows: an arrow, or, as for
-vectors across a page, a dot toward the reader and a cross away from the reader.
+bodies of a leg, and the motion of the end of the first one while the angle grows: an arrow, or,
+as for vectors across a page, a dot toward the reader and a cross away from the reader.
 """
 
 from __future__ import annotations
