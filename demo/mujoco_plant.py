@@ -52,7 +52,7 @@ class MuJoCoPlant:
         qpos[_POSITION] = pose[:3]
         qpos[_QUATERNION] = np.roll(to_quaternion(rotation), 1)
         mujoco.mj_forward(self._model, self._data)
-        self.state = self._now()._replace(acceleration=NO_WRENCH, forces=NO_WRENCH)
+        self.state = self._now()._replace(acceleration=NO_WRENCH, efforts=NO_WRENCH)
 
     def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> PlantState:
         """Return the state one period later, under the commands [N]."""

@@ -59,6 +59,18 @@ class HomeLegs(NamedTuple):
     length: float  # of the mean line at home [m]; 0: not known
 
 
+class StopLoads(NamedTuple):
+    """What the drives of a hexapod carry, for its end stops and the steps that these need."""
+
+    inertia: Array  # of the drives alone, at least (6,) [kg] or [kg m^2]
+    carried: float  # mass of the parts that move with the platform joints [kg]
+    levers: tuple[Array, Array]  # smallest and largest effort by the push on a joint (6,)
+    # Largest stiffness of all stops of a leg, by the stiffness of one: at the drive (6,), and at
+    # the platform joint [1/m^2].
+    at_drives: Array
+    at_joints: Array
+
+
 class LegKind(ABC):
     """
     A kind of legs.
@@ -77,6 +89,12 @@ class LegKind(ABC):
         Limits of its rate, and of its effort, to which commands are clipped.
     commands : str
         Field of ``stewart_output`` with the efforts to command.
+    simulated : str
+        Value of the simulator's parameter ``commands`` for these efforts.
+    gear : str
+        What is between a motor and its leg.
+    resolved : str
+        What a step of the simulator may not do, besides turning the platform by a number.
     width : int
         Numbers in a row of results: those of ``stewart_result`` up to the last of this kind.
     ratio : str
@@ -101,6 +119,9 @@ class LegKind(ABC):
     rate_limit: str
     effort_limit: str
     commands: str
+    simulated: str
+    gear: str
+    resolved: str
     width: int = _RESULT['joint_forces'].stop
     ratio: str = ''
     own: tuple[str, ...]
@@ -171,6 +192,15 @@ class LegKind(ABC):
         felt: acceleration less gravity of points (..., k, 3) at rest on the base. spin, spin_rate
         (..., 3): angular velocity and acceleration of the base.
         """
+
+    @abstractmethod
+    def stop_loads(self, parameters: Parameters) -> StopLoads:
+        """Return what the drives carry where they meet their end stops."""
+
+    @abstractmethod
+    def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
+                      ratios: Sequence[float]) -> str:
+        """Return the leg that is nearest to a motion without a solution, in words."""
 
     @abstractmethod
     def home_legs(self, parameters: Parameters) -> HomeLegs:

@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named
+from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named, StopLoads
 from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
 
 if TYPE_CHECKING:
@@ -28,13 +28,15 @@ class Telescopic(LegKind):
     position_limits = 'limits.length_min', 'limits.length_max'
     rate_limit, effort_limit = 'limits.velocity_max', 'limits.force_max'
     commands = 'forces'
+    simulated, gear = 'force', 'screw'
+    resolved = 'a joint moves by more than that part of its leg'
     ratio = 'actuator.screw_lead'
     own = ('legs.cylinder.', 'legs.piston.', 'actuator.reflected_mass', 'actuator.screw_lead',
            'geometry.zero_length', 'geometry.base_joint_axes', 'geometry.base_outline',
            'geometry.platform_outline', 'limits.length_', 'limits.velocity_max',
            'limits.force_max', 'limits.joint_force_max', 'limits.base_joint_angle_max',
            'limits.leg_clearance_min', 'drive.screw_', 'drive.base_universal_axes',
-           'drive.platform_universal_axes')
+           'drive.platform_universal_axes', 'noise.length', 'noise.rate', 'noise.force')
     fields = {
         'zero_length': 'geometry.zero_length', 'cylinder_mass': 'legs.cylinder.mass',
         'cylinder_center_of_mass': 'legs.cylinder.center_of_mass',
@@ -139,6 +141,17 @@ class Telescopic(LegKind):
             + (per_leg(terms.inertia * at.lengths) * terms.across @ carried[..., None])[..., 0]
             - (moment * q_squared)[..., None] * at.directions)
         return on_legs
+
+    def stop_loads(self, parameters: Parameters) -> StopLoads:
+        """Return reflected masses, and the pistons, which move with the platform."""
+        ones = np.ones(6)
+        return StopLoads(parameters.actuator.reflected_mass, float(np.sum(
+            parameters.legs.piston.mass)), (ones, ones), ones, np.zeros(6))
+
+    def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
+                      ratios: Sequence[float]) -> str:
+        """Return the shortest leg."""
+        return f'shortest leg {min(positions):.3g} m'
 
     def home_legs(self, parameters: Parameters) -> HomeLegs:
         """Return the legs, with the mean one halfway between its limits or of zero length."""

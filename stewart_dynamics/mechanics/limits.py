@@ -78,6 +78,7 @@ LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX, JOINT_FORCE_MAX = (
 BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX = OF_JOINTS = (
     'limits.base_joint_angle_max', 'limits.platform_joint_angle_max')
 CLEARANCE_MIN = 'limits.leg_clearance_min'
+LEVER_MIN = 'limits.lever_min'
 TORQUE_MAX, TORQUE_SPEED, SPEED_MAX, TEMPERATURE_RISE_MAX = (
     'drive.torque_max', 'drive.torque_speed', 'drive.speed_max', 'drive.temperature_rise_max')
 JUMP = 'jump'
