@@ -40,11 +40,32 @@ static crank_pose crank_pose_of(
   return at;
 }
 
+/* Return the angle of a point from x, to 4e-16: atan2 in operations that lanes have side by side.
+   The series is the polynomial of degree 10 in z = t^2 nearest to (atan(t) / t - 1) / z for
+   |t| <= tan(pi / 8), to 4e-17. */
+static real crank_arctangent(real y, real x) {
+  static const double series[] = {
+    -0.019176887104237525, 0.03923165828348216, -0.0508544973752125, 0.058581489127221394,
+    -0.06664511447372731, 0.07692183190825433, -0.09090904578123873, 0.11111111015256361,
+    -0.14285714284666542, 0.1999999999999552, -0.3333333333333333};
+  real across = absolute(y), along = absolute(x);
+  choice steep = across > along;
+  real low = choose(steep, along, across), high = choose(steep, across, along);
+  choice wide = low > 0.41421356237309503 * high;
+  real t = choose(wide, low - high, low) / choose(wide, low + high, high);
+  real z = t * t, sum = number(series[0]);
+  for (size_t n = 1; n < sizeof series / sizeof *series; n++) {sum = sum * z + series[n];}
+  real found = t + t * (z * sum);
+  found = choose(wide, 0.25 * PI + found, found);
+  found = choose(steep, 0.5 * PI - found, found);
+  return signed_as(choose(x < 0.0, PI - found, found), y);
+}
+
 /* Return the angle within pi of the middle of the allowed ones. */
 static real crank_angle(const stewart_leg * leg, const crank_pose * at) {
   double turns = 2.0 * PI * rint(leg->middle_angle / (2.0 * PI));
   double middle = leg->middle_angle - turns;
-  real q = angle(at->sine, at->cosine);
+  real q = crank_arctangent(at->sine, at->cosine);
   q = choose(q > middle + PI, q - 2.0 * PI, choose(q < middle - PI, q + 2.0 * PI, q));
   return q + turns;
 }
@@ -65,14 +86,14 @@ static crank_motion crank_motion_of(const stewart_leg * leg, const stewart_motio
   vector d = at.line.direction, arm_acc = turned(at.line.arm, motion, &of.arm_rate);
   of.end_rate = add(read3(motion->linear_velocity), of.arm_rate);
   of.end_acc = add(read3(motion->linear_acceleration), arm_acc);
-  real along = dot(d, of.end_rate);
-  real speed = choose(along != 0.0, along / at.line.lever, along);
+  real along = dot(d, of.end_rate), per_lever = 1.0 / at.line.lever;
+  real speed = choose(along != 0.0, along * per_lever, along);
   real squared = size * speed * speed;
   of.tip_rate = scale(size * speed, at.normal);
   of.gap_rate = subtract(of.end_rate, of.tip_rate);
   real drop = dot(d, of.end_acc) + squared * dot(d, at.along) +
     at.line.per_length * dot(of.gap_rate, of.gap_rate);
-  real acceleration = choose(drop != 0.0, drop / at.line.lever, drop);
+  real acceleration = choose(drop != 0.0, drop * per_lever, drop);
   of.tip_acc = subtract(scale(size * acceleration, at.normal), scale(squared, at.along));
   of.drive.position = crank_angle(leg, &at);
   of.drive.rate = speed, of.drive.acceleration = acceleration;
