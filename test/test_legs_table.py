@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 import pyarrow.parquet
 import pytest
 from scipy.spatial.transform import Rotation
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity_warning import CAUSE
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
-from stewart_dynamics.setpoints.step import (
-    Computed, FIRST, OUTPUT, Outputs, PUBLISHED_FORCES, WARNING_STATE)
-from test_output_bag import answered, base_wrenches_of, LEGS, turning
+from stewart_dynamics.setpoints.step import Computed, FIRST, OUTPUT, Outputs, WARNING_STATE
+from test_output_bag import answered, base_wrenches_of, LEGS, PARAMETERS, turning
 
 RESULTS = 27
+PUBLISHED = TELESCOPIC.published
 
 
 def motions_of(number: int) -> NDArray[np.float64]:
@@ -41,9 +42,9 @@ def motions_of(number: int) -> NDArray[np.float64]:
 def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
                stamps: NDArray[np.int64], warnings: NDArray[np.bool_]) -> Outputs:
     rows = np.zeros((len(stamps), OUTPUT))
-    rows[:, :RESULTS], rows[:, PUBLISHED_FORCES] = results, forces
+    rows[:, :RESULTS], rows[:, PUBLISHED] = results, forces
     rows[:, WARNING_STATE][:, CAUSE] = warnings
-    return Outputs(np.ones(len(stamps), dtype=bool), stamps, rows, Computed(False, False, False),
+    return Outputs(np.ones(len(stamps), dtype=bool), stamps, rows, Computed.of(PARAMETERS),
                    FIRST)
 
 
@@ -76,9 +77,9 @@ def check_tables(folder: Path, blocks: list[Outputs]) -> None:
         quaternions = to_quaternion(motions[:, 3:12].reshape(-1, 3, 3))
         for n in range(number):
             row, same = rows[at], [column[at] for column in columns]
-            expected = [seconds[n], *motions[n, :3], *quaternions[n], *outputs.lengths[n],
-                        *outputs.rates[n], *outputs.forces[n],
-                        *outputs.demanded_forces[n], outputs.determinants[n],
+            expected = [seconds[n], *motions[n, :3], *quaternions[n], *outputs.drive_positions[n],
+                        *outputs.rates[n], *outputs.efforts[n],
+                        *outputs.demanded_efforts[n], outputs.determinants[n],
                         outputs.determinant_rates[n], outputs.conditions[n],
                         *base_wrenches_of(outputs)[n]]
             assert int(row[0]) == same[0] == outputs.stamps[n]
@@ -97,7 +98,7 @@ def check_tables(folder: Path, blocks: list[Outputs]) -> None:
 def test_the_tables_give_every_number_back(tmp_path: Path) -> None:
     outputs = turning(300)
     assert outputs.warnings.any()
-    assert np.isnan(outputs.forces).any()
+    assert np.isnan(outputs.efforts).any()
     check_tables(tmp_path, [outputs, turning(0), turning(1)])
 
 

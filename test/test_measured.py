@@ -129,7 +129,7 @@ def test_the_external_wrench_is_the_load_missing_in_the_model(seed: int) -> None
         comparison, case, (case.setpoints.stamps, forces))
     assert np.array_equal(seconds, case.seconds)
     assert np.array_equal(measured, forces)
-    assert np.array_equal(computed, case.outputs.demanded_forces)
+    assert np.array_equal(computed, case.outputs.demanded_efforts)
     assert np.max(np.abs(wrench - load)) < 1e-9 * np.max(np.abs(forces))
     # by the library's matrix
     j_inv = StewartPlatform(case.parameters).inverse_jacobian(case.motion)
@@ -306,7 +306,7 @@ def test_loads_friction_and_a_wrong_mass_are_no_mistake_in_the_efforts(seed: int
     constant = np.concatenate([0.5 * weight * random.uniform(-1.0, 1.0, 3),
                                0.2 * size * weight * random.uniform(-1.0, 1.0, 3)])
     friction = 0.1 * weight / 6.0 * np.sign(np.diff(
-        case.outputs.lengths, axis=0, prepend=case.outputs.lengths[:1]))
+        case.outputs.drive_positions, axis=0, prepend=case.outputs.drive_positions[:1]))
     for measured in (
             case.forces(parameters=heavier), case.forces(parameters=lighter),
             case.forces(parameters=payload), case.forces(contact), case.forces(constant),
@@ -424,7 +424,7 @@ def test_forces_are_interpolated_between_samples_and_never_extrapolated() -> Non
 
 def test_setpoints_without_computed_forces_are_not_compared() -> None:
     case = case_of()
-    case.outputs.demanded_forces[7:11] = np.nan
+    case.outputs.demanded_efforts[7:11] = np.nan
     comparison = Comparison(case.parameters)
     seconds, measured, computed, wrench = compared(
         comparison, case, (case.setpoints.stamps, np.ones((500, 6))))

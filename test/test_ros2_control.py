@@ -208,7 +208,7 @@ def test_steps_have_the_bits_of_the_node(program: Path) -> None:
         outputs = Step(p)(Batch.of(stamps, motions, wrenches))
         expected = outputs.records.copy()
         # Without forces: those of C are zero, those of Python nan.
-        unknown = ~outputs.with_forces
+        unknown = ~outputs.with_efforts
         expected['forces'][unknown] = expected['motors']['commands'][unknown] = 0.0
         assert outputs.solvable.all()
         for name in OUTPUT_FIELDS:

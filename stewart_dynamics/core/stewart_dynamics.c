@@ -371,6 +371,7 @@ static leg_line line_from(
    missing: distance by which the leg misses its platform joint [m].
    positions, efforts, commands: of the drives, among the results and the outputs.
    rate_max, lever_ratio: limit of the drive's rate; magnitude of the lever by its largest.
+   lever_time: until the lever falls to its limit [s].
    complete, check: see stewart_complete, stewart_check.
    For the library, in the second part of the file: see legs.c. */
 #include "telescopic.h"
@@ -483,6 +484,13 @@ static double rate_max_of(const stewart_platform * platform, int i) {
 static double lever_ratio_of(const stewart_platform * platform, int i, double lever) {
   switch (platform->leg_kind) {
     default: STEWART_LEG_KINDS(RETURN, lever_ratio, (&platform->legs[i], lever))
+  }
+}
+
+static double lever_time_of(
+  const stewart_platform * platform, int i, const stewart_motion * motion, double lever) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, lever_time, (&platform->legs[i], motion, lever))
   }
 }
 
@@ -982,6 +990,7 @@ static void complete_loads(
     }
     to->positions[i] = positions_of(platform, result)[i] - leg->zero_length;
     to->lever_ratios[i] = lever_ratio_of(platform, i, result->levers[i]);
+    to->lever_times[i] = lever_time_of(platform, i, motion, result->levers[i]);
     to->forces[i] = clipped(result->forces[i], leg->force_max);
     to->torques[i] = clipped(result->torques[i], leg->crank_torque_max);
     to->base_joint_angles[i] = to->platform_joint_angles[i] = to->clearances[i] = NAN;

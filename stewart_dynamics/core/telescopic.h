@@ -216,6 +216,9 @@ static double * telescopic_commands(stewart_output * output) {return output->for
 static double telescopic_rate_max(const stewart_leg * leg) {return leg->velocity_max;}
 static double telescopic_lever_ratio(const stewart_leg * leg, double lever)
 {(void)leg, (void)lever; return 1.0;}
+static double telescopic_lever_time(
+  const stewart_leg * leg, const stewart_motion * motion, double lever)
+{(void)leg, (void)motion, (void)lever; return HUGE_VAL;}
 
 static void telescopic_complete(stewart_leg * leg) {
   double gear = leg->gear_ratio, ratio = leg->screw_lead > 0.0 ?

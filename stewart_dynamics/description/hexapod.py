@@ -20,6 +20,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import WORLD
 from stewart_dynamics.errors import ParameterError, shown
+from stewart_dynamics.legs.telescopic import BARREL, BARREL_LENGTH, ROD
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import homes, level_axes
 from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
@@ -172,9 +173,9 @@ COLORS: dict[str, Color] = {
     'joint': (0.12, 0.12, 0.12, 1.0)}
 
 # Radii and thickness in terms of the mean distance of the platform joints from their center.
-BARREL, ROD, BALL, PLATE = 0.05, 0.0275, 0.07, 0.05
+BALL, PLATE = 0.07, 0.05
 # Parts of the shortest leg length, or of the length at home if there is no limit.
-BARREL_LENGTH, _ROD_LENGTH, _OF_HOME = 0.9, 0.95, 0.7
+_ROD_LENGTH, _OF_HOME = 0.95, 0.7
 
 
 class VisualShape(NamedTuple):

@@ -14,7 +14,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named, StopLoads
+from stewart_dynamics.legs.kind import (
+    HomeLegs, LegKind, LegMass, Named, Placed, Solid, StopLoads)
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 
@@ -42,6 +43,7 @@ class Crank(LegKind):
     position = Named('angle', 'angles', 'rad')
     rate = Named('speed', 'speeds', 'rad/s')
     effort = Named('torque', 'torques', 'N m', '+ drives the angle up')
+    effort_signs = 'drives the angle up', 'drives it down'
     position_limits = 'limits.angle_min', 'limits.angle_max'
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
     commands = 'torques'
@@ -66,8 +68,9 @@ class Crank(LegKind):
     massless = {
         'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
         'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
+    solids = Solid('cranks', 0.05), Solid('rods', 0.0275)
     inertia_unit = 'kg m^2'
-    home_rule = ('no level pose has all rods at the cranks\' middle angles: legs.rod.length is '
+    home_rule = ("no level pose has all rods at the cranks' middle angles: legs.rod.length is "
                  'shorter than the gap, or a length is in other units')
     friction_units = 'N m s/rad', 'N m'
 
@@ -106,6 +109,16 @@ class Crank(LegKind):
         directions = (at.line + curvatures) / rods[:, None]
         return Lines(np.broadcast_to(rods, at.missing.shape), directions, at.arms,
                      AnchorPath(tangents, curvatures))
+
+    def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
+                     ) -> tuple[Placed, ...]:
+        """Return the cranks at their angles, and the rods from there to the platform joints."""
+        centers, sizes = parameters.geometry.base_joints, parameters['legs.crank.length']
+        ends = crank_ends(parameters, positions)
+        cranks, rods = ends - centers, joints - ends
+        lengths = np.linalg.norm(rods, axis=1)
+        return (Placed(centers + 0.5 * cranks, cranks / sizes[:, None], sizes),
+                Placed(ends + 0.5 * rods, rods / lengths[:, None], lengths))
 
     def missing_distances(self, parameters: Parameters, position: Array, rotation: Array) -> Array:
         """Return how far each platform joint is from the nearest point that its rod reaches."""

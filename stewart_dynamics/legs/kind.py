@@ -71,6 +71,21 @@ class StopLoads(NamedTuple):
     at_joints: Array
 
 
+class Solid(NamedTuple):
+    """A cylinder of each leg, as pictures show it."""
+
+    name: str  # in the plural: 'pistons'
+    radius: float  # by the mean distance of the platform joints from their center
+
+
+class Placed(NamedTuple):
+    """A solid of the six legs at a pose, base frame."""
+
+    centers: Array  # (6, 3) [m]
+    directions: Array  # unit vectors (6, 3)
+    lengths: Array  # (6,) [m]
+
+
 class LegKind(ABC):
     """
     A kind of legs.
@@ -83,6 +98,8 @@ class LegKind(ABC):
         The parameter that a file gives for this kind alone; empty: the kind of all other files.
     position, rate, effort : Named
         Quantities of the drive.
+    effort_signs : tuple of str
+        What a positive effort is called, and a negative one.
     position_limits : tuple of str
         Limits of the drive's position, the smallest and the largest.
     rate_limit, effort_limit : str
@@ -107,6 +124,8 @@ class LegKind(ABC):
         Masses and moments in the regressor, in the order of the columns in C.
     massless : mapping
         Values of parameters with which the legs and the drives have no mass.
+    solids : tuple of Solid
+        Cylinders of which pictures of a leg consist.
 
     """
 
@@ -115,6 +134,7 @@ class LegKind(ABC):
     position: Named
     rate: Named
     effort: Named
+    effort_signs: tuple[str, str]
     position_limits: tuple[str, str]
     rate_limit: str
     effort_limit: str
@@ -129,6 +149,7 @@ class LegKind(ABC):
     fields: Mapping[str, str]
     masses: tuple[LegMass, ...]
     massless: Mapping[str, Any]
+    solids: tuple[Solid, ...]
     home_rule: str  # what a file lacks that gives no home pose
     inertia_unit: str  # of the reflected inertia of a drive
     friction_units: tuple[str, str]  # viscous and Coulomb
@@ -159,6 +180,15 @@ class LegKind(ABC):
     @abstractmethod
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the lines of force in poses (...); not finite where a leg does not reach."""
+
+    @abstractmethod
+    def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
+                     ) -> tuple[Placed, ...]:
+        """
+        Return where the ``solids`` are.
+
+        joints (6, 3): platform joints, base frame [m]. positions (6,): of the drives.
+        """
 
     def missing_distances(self, parameters: Parameters, position: Array, rotation: Array,
                           ) -> Array | None:

@@ -11,11 +11,16 @@ from typing import NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named, StopLoads
+from stewart_dynamics.legs.kind import (
+    HomeLegs, LegKind, LegMass, Named, Placed, Solid, StopLoads)
 from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
+
+# Radii of cylinder and piston in pictures, by the mean distance of the platform joints from their
+# center; length of the cylinder by the shortest leg, and by the leg where that has no limit.
+BARREL, ROD, BARREL_LENGTH, _OF_LENGTH = 0.05, 0.0275, 0.9, 0.5
 
 
 class Telescopic(LegKind):
@@ -25,6 +30,7 @@ class Telescopic(LegKind):
     position = Named('length', 'lengths', 'm')
     rate = Named('rate', 'rates', 'm/s', '+ extends')
     effort = Named('force', 'forces', 'N', '+ pushes')
+    effort_signs = 'push', 'pull'
     position_limits = 'limits.length_min', 'limits.length_max'
     rate_limit, effort_limit = 'limits.velocity_max', 'limits.force_max'
     commands = 'forces'
@@ -52,6 +58,7 @@ class Telescopic(LegKind):
         'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.piston.mass': 0.0,
         'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
         'drive.screw_inertia': None}
+    solids = Solid('cylinders', BARREL), Solid('pistons', ROD)
     inertia_unit = 'kg'
     home_rule = ('limits.length_min and limits.length_max, or geometry.zero_length, must give a '
                  'length that the legs can have in a level pose')
@@ -72,6 +79,18 @@ class Telescopic(LegKind):
         vectors = position[..., None, :] + arms - parameters.geometry.base_joints
         lengths = np.linalg.norm(vectors, axis=-1)
         return Lines(lengths, vectors / lengths[..., None], arms)
+
+    def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
+                     ) -> tuple[Placed, ...]:
+        """Return cylinders that begin at the base joints, and pistons from joint to joint."""
+        base, shortest = parameters.geometry.base_joints, parameters.limits.length_min
+        vectors = joints - base
+        along = vectors / positions[:, None]
+        barrels = _OF_LENGTH * positions
+        if shortest is not None:
+            barrels = np.minimum(BARREL_LENGTH * shortest, positions)
+        return (Placed(base + 0.5 * barrels[:, None] * along, along, barrels),
+                Placed(base + 0.5 * vectors, along, positions))
 
     def leg_mass(self, parameters: Parameters, at: Lines) -> Array:
         """Return M_i = m2 s s^T - (I_e / L^2 + m_ce) skew(s)^2."""

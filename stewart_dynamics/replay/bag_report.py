@@ -86,7 +86,7 @@ class Report:
         """Add setpoints, at least one, with their breakdown."""
         seconds, setpoints, outputs, base_wrenches, powers, breakdown = block
         assert breakdown is not None
-        motions, forces = setpoints.motions, outputs.demanded_forces
+        motions, forces = setpoints.motions, outputs.demanded_efforts
         if self._first is None:
             self._first = motions[0, POSITION].copy()
         angles = self._continued(np.degrees(to_euler(motions[:, ROTATION].reshape(-1, 3, 3))))
@@ -118,7 +118,7 @@ class Report:
         self._places = _add(self._curves, seconds, quantities)
         self._spectrum.add(seconds, base_wrenches.T)
         self._frames.add(seconds, np.concatenate(
-            [motions[:, POSE], angles, outputs.lengths, forces], axis=1))
+            [motions[:, POSE], angles, outputs.drive_positions, forces], axis=1))
 
     def add_measured(
             self, seconds: Array, measured: Array, computed: Array, wrench: Array) -> None:

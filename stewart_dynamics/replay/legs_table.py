@@ -73,7 +73,7 @@ class Table(ABC):
             determinant_rates = np.full_like(determinant_rates, np.nan)
         numbers = np.column_stack([
             block.seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
-            outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
+            outputs.drive_positions, rates, outputs.efforts, outputs.demanded_efforts,
             outputs.determinants, determinant_rates, outputs.conditions, block.base_wrenches,
             outputs.joint_forces[:, :6 if self._joint_forces else 0], outputs.joint_angles,
             outputs.clearances])

@@ -128,7 +128,7 @@ class Comparison:
 
     def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
         """Add setpoints, see Summary.add; return the compared setpoints."""
-        columns = [seconds, setpoints.motions[:, POSE], outputs.demanded_forces]
+        columns = [seconds, setpoints.motions[:, POSE], outputs.demanded_efforts]
         if self._losses:
             motors = Motors.of_rows(outputs.motors)
             columns += [motors.speeds / self._ratio, motors.accelerations / self._ratio]

@@ -65,7 +65,7 @@ class Answered(NamedTuple):
 def powers_of(platform: StewartPlatform, setpoints: Batch, outputs: Outputs) -> Array:
     """Return the mechanical powers of the drives (N, 6) [W]."""
     with np.errstate(over='ignore', invalid='ignore'):
-        powers: Array = outputs.demanded_forces * platform.drive_rates(
+        powers: Array = outputs.demanded_efforts * platform.drive_rates(
             setpoints.motions, outputs.rates)
     return powers
 
@@ -139,7 +139,7 @@ class Summary:
     def _add(self, block: Answered) -> None:
         seconds, setpoints, outputs, base_wrenches, power, breakdown = block
         steps = self._steps(seconds, setpoints)
-        demanded = outputs.demanded_forces
+        demanded = outputs.demanded_efforts
         without = with_nan(demanded)
         unknown = ~setpoints.base_known
         unsolved = without & ~(unknown & outputs.solvable)
@@ -153,12 +153,12 @@ class Summary:
                 self._jumped_at = float(seconds[outputs.jumped.argmax()])
         self._without_force += int(without.sum())
         self._unsolved += int(unsolved.sum())
-        self._suppressed += int((with_nan(outputs.forces) & ~without).sum())
+        self._suppressed += int((with_nan(outputs.efforts) & ~without).sum())
         self._base_wrench.add(seconds, steps, base_wrenches)
         with np.errstate(over='ignore', invalid='ignore'):
             self._means.add(steps, np.concatenate(
                 (demanded ** 2, np.maximum(power, 0.0), np.maximum(-power, 0.0)), axis=1))
-        self._published.add(seconds, outputs.forces)
+        self._published.add(seconds, outputs.efforts)
         self._power.add(seconds, power)
         values = outputs.values()
         for name, peak in self._peaks.items():
