@@ -159,7 +159,7 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
         **read_yaml(PLATFORM, 'stewart_simulator'),
         **read_yaml(ROOT / 'config' / 'simulator.yaml', 'stewart_simulator')}))
     joints, zero = plant.parameters['joints'], plant.parameters['geometry.zero_length']
-    start = np.array(plant.state.lengths) - zero
+    start = np.array(plant.state.positions) - zero
     moving = JointState(name=joints, position=start + 5e-3, velocity=[0.01] * 6,
                         effort=np.arange(6.0))
     # The forces at rest carry the weight.
@@ -172,13 +172,13 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
     def commanded(target: JointState) -> Any:
         """Return the command to the present state once it is the one for a desired state."""
         state = plant.state
-        expected = (4e5 * (np.subtract(target.position, state.lengths) + zero)
+        expected = (4e5 * (np.subtract(target.position, state.positions) + zero)
                     + 1.6e4 * np.subtract(target.velocity, state.rates) + target.effort)
 
         def came() -> bool:
             if target is moving:
                 desired.publish(moving)
-            measured.publish(JointState(name=joints, position=np.subtract(state.lengths, zero),
+            measured.publish(JointState(name=joints, position=np.subtract(state.positions, zero),
                                         velocity=state.rates))
             count = len(commands)
             peer.spin()
@@ -197,7 +197,7 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
             plant.advance(command, NO_WRENCH)
         assert 'the last position is held' in program.stderr
         # Friction may stop it at a distance of friction / gain.
-        assert np.abs(plant.state.lengths - zero - moving.position).max() < 5e-4
+        assert np.abs(plant.state.positions - zero - moving.position).max() < 5e-4
         assert np.abs(plant.state.rates).max() < 1e-3
         assert command == pytest.approx(weight, abs=200.0)
         commanded(moving)
