@@ -240,7 +240,8 @@ def test_end_stops_of_angles_hold_a_platform_that_falls_on_them() -> None:
     assert max(map(abs, state.twist)) < 1e-9
     motion = PlatformMotion(*(getattr(state_of(state), name) for name in 'tR'))
     held = platform.inverse_dynamics(motion).torques
-    assert relative(stiffness_of(plant.parameters) * (-0.6 - np.array(state.positions)), held) < 1e-8
+    deep = -0.6 - np.array(state.positions)
+    assert relative(stiffness_of(plant.parameters) * deep, held) < 1e-8
     assert energy(machine, state) < first
     assert np.all(np.array(state.positions) > -0.6 - 0.003)
 
@@ -264,7 +265,8 @@ def test_a_stop_before_the_dead_centre_holds_a_platform_without_limits_of_angles
 
 @pytest.mark.parametrize('changes', [{}, MASSLESS], ids=['rig', 'massless'])
 @pytest.mark.parametrize('sign', [-1.0, 1.0], ids=['down', 'up'])
-def test_motors_at_their_limit_do_not_push_it_through(sign: float, changes: dict[str, Any]) -> None:
+def test_motors_at_their_limit_do_not_push_it_through(
+        sign: float, changes: dict[str, Any]) -> None:
     plant = Plant(cranks(rig(), limits__torque_max=250.0, **{**FREE, **changes}))
     for _ in range(1500):
         state = plant.advance((sign * 1000.0,) * 6, ZERO)
@@ -410,7 +412,8 @@ def test_a_broken_rule_is_named(changes: dict[str, Any], snapshot: Snapshot) -> 
 
 
 @pytest.mark.parametrize('changes', [{'noise.angle': 1e-3}, {'commands': 'leg_torque'}], ids=str)
-def test_parameters_of_the_other_kind_are_named(changes: dict[str, Any], snapshot: Snapshot) -> None:
+def test_parameters_of_the_other_kind_are_named(
+        changes: dict[str, Any], snapshot: Snapshot) -> None:
     with snapshot.raises(ParameterError) as info:
         simulated(**changes)
     assert '\n' not in str(info.value)

@@ -48,8 +48,8 @@ class Crank(LegKind):
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
     commands = 'torques'
     simulated, gear = 'leg_torque', 'gear'
-    resolved = ('a crank turns by more than that, a joint moves by more than that part of its rod, '
-                'or a lever changes by more than that part of itself, as at a dead centre')
+    resolved = ('a crank turns by more than that, a joint moves by more than that part of its '
+                'rod, or a lever changes by more than that part of itself, as at a dead centre')
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',

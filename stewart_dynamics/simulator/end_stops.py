@@ -4,23 +4,24 @@
 """
 The end stops of the legs: springs and dampers at either end of the travel, and of the levers.
 
-Where the lever of a leg, the effort of its drive by its push, is zero, the leg is at a dead centre:
-the platform joint is at the end of its reach, and a drive that went on would move it back, on the
-other branch of the leg, which no program that computes on one branch can follow. The rate of the
-drive grows as 1 / k toward a dead centre, the inertia of the drive that the platform feels as
-1 / k^2, with the lever k. A stop in the distance to the end of reach would therefore be too soft
-for the inertia by any factor: that distance falls as k^2, 0.7 mm for a crank of 0.18 m at a tenth
-of its largest lever, and the drive arrives with all of its energy. The stop is one of the lever
-itself, as where rod and crank meet: a potential
+Where the lever of a leg, the effort of its drive by its push, is zero, the leg is at a dead
+centre: the platform joint is at the end of its reach. A drive that went on would move it back on
+the other branch of the leg, where nothing that computes on one branch could follow. Toward a dead
+centre the rate of the drive grows as 1 / k and its inertia, as the platform feels it, as 1 / k^2,
+with the lever k. The distance to the end of reach falls as k^2: with a lever of 0.18 m at most it
+is 0.7 mm at a tenth of that, and the drive arrives there with all of its energy. A stop in that
+distance would have to be stiffer by any factor. The stop is one of the lever itself, as where two
+links of a joint meet: a spring with the potential
 
-    U = 1/2 K (r_min - r)^2  where r < r_min,  r = |k| / k_max, r_min = limits.lever_min
+    U = 1/2 K (r_min - r)^2  where r < r_min,  r = |k| / k_max,  r_min = limits.lever_min
 
-with a damper. r changes as an angle does and its slope is that of drive and joint (``slope`` in
-``core/legs.c``), neither of which is divided by k: at the drive it is an effort of ordinary size,
-with the frequency of the stops of positions, and no energy comes from it. 1/2 K r_min^2 is what it
-takes up; K is that of the position's stops, sized for the platform at the largest lever. What it
-cannot hold is refused: a step in which a lever changes by more than half of itself is not taken
-(``Plant.fault``), so that no motion passes a dead centre.
+and a damper. r changes as an angle does. Its slope (``lever_slope`` in ``core/legs.c``) is a part
+of the drive's rate and a part of the joint's velocity, neither of them divided by k: at the drive
+it is an effort of ordinary size, with the frequency of the stops of positions, and no energy comes
+from it. It takes up 1/2 K r_min^2 and what the damper takes; K is that of the stops of positions,
+sized for the platform at the largest lever. What it cannot hold is refused: a step in which a
+lever changes by more than half of itself is not taken (``Plant.fault``), so that no motion passes
+a dead centre.
 """
 
 from __future__ import annotations

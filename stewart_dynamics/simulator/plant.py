@@ -20,17 +20,18 @@ the effort k torque / c and the reflected mass m_r / c. c depends on the directi
 which is assumed, and assumed again where the load that follows contradicts it.
 
 End stops act on the drives' coordinates, between cylinder and piston along the leg. With the
-efforts of the drives they are added up, except where screws turn with their legs (``turning_screws``): drives act with the rows
-of J_q there, end stops with those of J_inv, as a wrench on the platform.
+efforts of the drives they are added up, except where screws turn with their legs
+(``turning_screws``): drives act with the rows of J_q there, end stops with those of J_inv, as a
+wrench on the platform.
 
 The step is short enough for friction and end stops, whose modes are the fastest by far. With them
 a hexapod is ``M x'' + J^T D J x' + J^T K J x = 0``, with M its mass matrix, J = J_q, D the damping
-of the legs (viscous friction, the slope of the Coulomb friction at standstill, the dampers of the stops)
-and K the springs of the stops. A mode exp(s t) obeys s^2 + d s + k = 0 with Rayleigh quotients d
-and k, which are no larger than the largest eigenvalues of D and of K relative to M. So |s| is at
-most the larger of d and sqrt(k) made of these, and h is chosen so that h |s| <= 1. Near a dead
-centre rows of J and with them M grow without a bound, but M grows with J: the eigenvalues relative
-to it are those of the drives, D and K by the inertia of a drive, and stay.
+of the legs (viscous friction, the slope of the Coulomb friction at standstill, the dampers of the
+stops) and K the springs of the stops. A mode exp(s t) obeys s^2 + d s + k = 0 with Rayleigh
+quotients d and k, which are no larger than the largest eigenvalues of D and of K relative to M. So
+|s| is at most the larger of d and sqrt(k) made of these, and h is chosen so that h |s| <= 1. Near
+a dead centre rows of J and with them M grow without a bound, but M grows with J: the eigenvalues
+relative to it are those of the drives, D and K by the inertia of a drive, and stay.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 from stewart_dynamics.simulator.end_stops import stiffness_and_damping, stop_limits, stops_of
 from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters, TORQUE
+
 # The Runge-Kutta method is stable for all modes s with |h s| below 2.6 that do not grow by
 # themselves; up to 1 their error is small as well, with a margin for nonlinear terms.
 _REACH = 1.0
@@ -135,9 +137,9 @@ def largest_eigenvalue(parameters: Parameters, of_drives: Array, of_joints: Arra
     return float(found if of_joints is None else found + of_joints @ mobility)
 
 
-# In one step the platform may turn by at most this [rad], a platform joint move by at most this part
-# of its leg's length, and a lever change by at most this part of itself: a larger move would not be
-# resolved.
+# In one step the platform may turn by at most this [rad], a platform joint move by at most this
+# part of its leg's length, and a lever change by at most this part of itself: a larger move would
+# not be resolved.
 LARGEST_MOVE = CONSTANTS['LARGEST_MOVE']
 
 
