@@ -40,6 +40,7 @@ from trajectories import FREE
 
 SIMULATOR = '/stewart_simulator'
 FILE = ROOT / 'config' / 'simulator.yaml'
+CRANKS = ROOT / 'config' / 'crank_platform.yaml'
 STEPPED = 'use_sim_time:=true'
 FIRST = 1_000_000_000  # where simulated time begins [ns]
 PERIOD = 2_000_000  # [ns]
@@ -265,6 +266,31 @@ def test_each_command_is_one_period_and_nothing_else_advances_time(begin: Start)
     assert simulator.stamps()[-2] == end - PERIOD
     simulator.load((1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
     assert simulator.step([500.0] * 6) == end + PERIOD
+
+
+def test_torques_of_shafts_move_a_hexapod_with_cranks(begin: Start) -> None:
+    """Its topics have angles, rates and torques; to the bit those of the plant in this process."""
+    home = [0.0, 0.0, 0.65, 0.0, 0.0, 0.0]
+    simulator = begin(STEPPED, f'initial_pose:={home}', 'noise.angle:=1.0e-4',
+                      files=(CRANKS, FILE))
+    parameters = SimulatorParameters({
+        **read_yaml(CRANKS, 'stewart_simulator'), **read_yaml(FILE, 'stewart_simulator'),
+        'initial_pose': home, 'noise.angle': 1e-4})
+    plant, messages = Plant(parameters), StateMessages(parameters)
+    for _ in range(len(set(simulator.raw['leg_states']))):
+        plant.measured()
+    commands = 50.0 + rng().uniform(-30.0, 30.0, (20, 6))
+    commands[-1] = 1000.0  # saturates
+    for command in commands.tolist():
+        stamp = simulator.step(command)
+        plant.advance(tuple(command), NO_LOAD)
+        for topic, data in messages.write(stamp, plant.measured()):
+            assert simulator.raw[topic][-1] == data
+    assert list(simulator.last().effort) == [250.0] * 6
+    angles = StewartPlatform(parameters).inverse_kinematics(Pose(home[:3], np.eye(3)))
+    assert np.abs(np.subtract(simulator.states()[0].position, angles)).max() < 1e-3
+    simulator.until_said('WARN', 'commands: leg_1: 1000 N m exceeds limits.torque_max, clipped to '
+                         '250 N m')
 
 
 # In real time
