@@ -24,7 +24,7 @@ from referees import (
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.core import binding
 from stewart_dynamics.core.binding import CODES, Function, function, places, record, RULES
-from stewart_dynamics.mechanics.rows import BASE, MOTION, POSE, RESULT, TWIST
+from stewart_dynamics.mechanics.rows import BASE, MOTION, POSE, POSITION, RESULT, TWIST
 from stewart_dynamics.parameters.structure import broken_rule
 
 CORE = ROOT / 'stewart_dynamics' / 'core'
@@ -33,12 +33,26 @@ KINDS = ('baseline', 'avx2', 'avx512')[:function('processor_kind')() + 1]
 SIZES = 1, 2, 3, 7, 8, 9, 33
 
 
+CRANKS = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
+
+
 def hexapods() -> list[Parameters]:
-    """Return a random hexapod, one with screws that turn with its legs, and a symmetric one."""
-    random = random_parameters(rng(1))
+    """
+    Return a random hexapod, one with turning screws, a symmetric one, and two with cranks.
+
+    The first with cranks has both branches and centers of mass off all lines, on tilted gravity.
+    """
+    random, of_cranks = random_parameters(rng(1)), rng(2)
     return [random, random.replaced({
         'actuator.screw_lead': 0.02, 'drive.gear_ratio': 1.5,
-        'drive.screw_rotation': 'universal'}), symmetric_parameters()]
+        'drive.screw_rotation': 'universal'}), symmetric_parameters(), CRANKS.replaced({
+            'gravity': random.gravity, 'geometry.crank_branch': ['positive', 'negative'] * 3,
+            'limits.angle_min': -4.0, 'limits.angle_max': 4.0,
+            'legs.crank.center_of_mass': of_cranks.uniform(-0.1, 0.1, 18),
+            'legs.crank.inertia': [0.02, 1e-3, 2e-3, 0.03, -1e-3, 0.04] * 6,
+            'legs.rod.mass': of_cranks.uniform(0.5, 3.0, 6),
+            'legs.rod.center_of_mass': of_cranks.uniform(0.2, 0.5, 6),
+            'actuator.reflected_inertia': of_cranks.uniform(0.0, 0.5, 6)}), CRANKS]
 
 
 class LaneRows(ctypes.Structure):
@@ -51,6 +65,9 @@ def samples(parameters: Parameters, count: int) -> tuple[Any, Any, Any]:
     """Return motions, wrenches and bases: ordinary, singular, overflowing, at rest, still."""
     random = rng(count)
     motions = random_motion(parameters, random, count).rows.copy()
+    if parameters.leg_kind.marker:  # near home, beside poses that the legs do not reach
+        motions[:, POSITION] *= 0.1
+        motions[:, POSITION] += 0.95 * StewartPlatform(parameters).home_pose().position
     motions[1::5, :POSE.stop] = [0.0, 0.0, 1.0, *QUARTER_TURN.ravel()]
     motions[2::7, TWIST] *= 1e200
     motions[3::5, TWIST.start:] = 0.0
@@ -60,16 +77,16 @@ def samples(parameters: Parameters, count: int) -> tuple[Any, Any, Any]:
 
 
 @pytest.mark.parametrize('kind', KINDS)
-@pytest.mark.parametrize('hexapod', range(3))
+@pytest.mark.parametrize('hexapod', range(5))
 def test_samples_side_by_side_have_the_bits_of_each_alone(kind: str, hexapod: int) -> None:
     parameters = hexapods()[hexapod]
-    structure = StewartPlatform(parameters).structure
+    structure, width = StewartPlatform(parameters).structure, parameters.leg_kind.width
     of = places('one_motion')
     many = ctypes.CDLL(str(CORE / 'library.so'))[f'solve_lanes_{kind}']
     for count in SIZES:
         motions, wrenches, bases = samples(parameters, count)
         for loads, moving in ((wrenches, bases), (wrenches[:1], bases[-1:])):
-            alone, found = np.empty((2, count, RESULT))
+            alone, found = np.empty((count, RESULT)), np.empty((count, width))
             sample = np.zeros(1, record('one_motion'))
             for n in range(count):
                 sample['wrench'], row = loads[n % len(loads)], sample.view(float)
@@ -79,8 +96,12 @@ def test_samples_side_by_side_have_the_bits_of_each_alone(kind: str, hexapod: in
             many(ctypes.c_void_p(structure.ctypes.data), ctypes.c_int64(count),
                  *(LaneRows(each.ctypes.data, 0 if len(each) == 1 else each.shape[1])
                    for each in (motions, loads, moving)),
-                 1, ctypes.c_void_p(found.ctypes.data), ctypes.c_int64(RESULT))
-            assert np.array_equal(found, alone, equal_nan=True)
+                 1, ctypes.c_void_p(found.ctypes.data), ctypes.c_int64(width),
+                 ctypes.c_int64(width))
+            assert np.array_equal(found, alone[:, :width], equal_nan=True)
+            # All but samples that overflow, and those that a rod does not reach.
+            reached = np.isfinite(found).all(axis=1)
+            assert count < 33 or 12 <= np.count_nonzero(reached) < count
 
 
 def test_without_the_condition_number_the_rest_has_the_same_bits() -> None:
@@ -97,7 +118,8 @@ def test_without_the_condition_number_the_rest_has_the_same_bits() -> None:
 
 @pytest.mark.skipif(COMPILER is None, reason='needs a C compiler')
 def test_structures_are_laid_out_as_the_compiler_lays_them_out(tmp_path: Path) -> None:
-    text = (CORE / 'stewart_dynamics.h').read_text() + (CORE / 'library.h').read_text()
+    text = ''.join((CORE / name).read_text() for name in (
+        'stewart_dynamics.h', 'control.h', 'library.h'))
     names = re.findall(r'^\}? ?.*\} (\w+);$|^  (\w+);$', text, re.MULTILINE)
     listed = [a or b for a, b in names if re.search(rf'\b{a or b};', text)]
     assert {'stewart_platform', 'stewart_output', 'one_plant', 'setpoint'} <= set(listed)
@@ -194,8 +216,12 @@ def test_a_motion_is_found_again_from_its_legs() -> None:
 
 
 def broken(name: str) -> Any:
-    """Return the complete structure of a hexapod with drives and plates that breaks a rule."""
-    hexapod: Any = HEXAPOD.structure.copy()
+    """
+    Return the complete structure of a hexapod that breaks a rule.
+
+    One with drives and plates; the rules that cranks have are broken by one with cranks.
+    """
+    hexapod: Any = (CRANKS if name in OF_CRANKS else HEXAPOD).structure.copy()
     legs = hexapod['legs']
     if name == 'TEMPERATURE_RISE':
         legs['thermal_time_constant'] = NOT
@@ -250,11 +276,20 @@ BREAKING: dict[str, tuple[str, Any]] = {
     'CORNERS_ON_A_LINE': ('base_outline', 1.0),
     'CORNERS_IN_A_PLANE': ('base_outline', corner(2, 1.0, 1.0, 0.1)),
     'CONVEX': ('base_outline', corner(2, -0.5, -0.5, 0.0)), 'POINTS': ('n_torque_speed', 1000)}
+OF_CRANKS: dict[str, tuple[str, Any]] = {
+    'KIND': ('crank_length', (1, 0.0)), 'ROD_LENGTH': ('rod_length', (0, 0.0)),
+    'CRANK_AXIS': ('crank_axis', (2, 0.0)),
+    'CRANK_DIRECTION': ('crank_direction', (
+        3, [0.0, 0.0, 1.0] - 2e-3 * CRANKS.structure['legs']['crank_axis'][3])),
+    'BRANCH': ('branch', (4, 0.0)), 'CRANK_INERTIA': (
+        'crank_inertia', (5, [1.0, 0.0, 0.0, 1.0, 0.0, -1e-6])),
+    'ANGLES': ('angle_min', (0, 2.0)), 'LEVER': ('lever_min', (1, 1.0))}
+BREAKING |= OF_CRANKS
 
 
 @pytest.mark.parametrize('name', BREAKING)
 def test_a_broken_rule_is_named_with_its_leg(name: str) -> None:
-    assert broken_rule(HEXAPOD.structure) is None
+    assert broken_rule(HEXAPOD.structure) is None is broken_rule(CRANKS.structure)
     found = broken_rule(broken(name))
     assert found is not None
     rule, where = found
@@ -262,6 +297,22 @@ def test_a_broken_rule_is_named_with_its_leg(name: str) -> None:
     leg = BREAKING[name][1][0] if isinstance(BREAKING[name][1], tuple) else None
     assert where == (leg if isinstance(leg, int) else 0 if name in (
         'CORNERS', 'CORNERS_ON_A_LINE', 'CORNERS_IN_A_PLANE', 'CONVEX') else -1)
+
+
+@pytest.mark.parametrize(('field', 'value', 'rule'), [
+    ('crank_length', NOT, 'KIND'), ('crank_length', math.inf, 'FINITE'),
+    ('rod_length', NOT, 'FINITE'), ('crank_center_of_mass', NOT, 'FINITE'),
+    ('crank_mass', -1.0, 'LEG_MASS'),
+    ('rod_mass', NOT, 'LEG_MASS'), ('rod_inertia', -1e-3, 'LEG_MASS'),
+    ('crank_inertia', [-1e-3, 0.0, 0.0, 0.0, 0.0, 0.0], 'CRANK_INERTIA'),
+    ('crank_direction', 0.0, 'CRANK_DIRECTION'), ('lever_min', -0.1, 'LIMIT'),
+    ('angle_max', NOT, 'LIMIT'), ('crank_torque_max', 0.0, 'LIMIT')])
+def test_a_crank_keeps_the_rules_of_all_legs(field: str, value: Any, rule: str) -> None:
+    hexapod: Any = CRANKS.structure.copy()
+    hexapod['legs'][field][4] = value
+    found = broken_rule(hexapod)
+    assert found is not None
+    assert (found[0].name, found[1]) == (rule, 4)
 
 
 def test_each_rule_is_tried() -> None:

@@ -12,11 +12,11 @@ from typing import Any
 
 from crank_machines import random_machine, random_state
 from crank_newton_euler import CrankHexapod, inverse_dynamics, machine_of, State, state_of
+from crank_platforms import base_of, motion_of, parameters_of, six
 import numpy as np
 import pytest
 from referees import derivative, relative, rng, rotation_about
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
-from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, ReachError, SingularityError
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters
 
@@ -27,41 +27,8 @@ SEEDS = range(24)
 EXACT = 1e-10  # of the largest value
 
 
-def six(tensor: Array) -> list[float]:
-    return [float(tensor[i, j]) for i in range(3) for j in range(i, 3)]
-
-
-def parameters_of(machine: CrankHexapod, **changes: Any) -> Parameters:
-    """Return the parameters of a machine of the references."""
-    return Parameters({
-        'geometry.base_joints': machine.center, 'geometry.platform_joints': machine.P,
-        'geometry.crank_axes': machine.axis, 'geometry.crank_directions': machine.zero,
-        'geometry.crank_branch': ['positive' if sign > 0.0 else 'negative'
-                                  for sign in machine.branch],
-        'legs.crank.length': machine.crank, 'legs.crank.mass': machine.mc,
-        'legs.crank.center_of_mass': machine.cc,
-        'legs.crank.inertia': [six(each) for each in machine.Ic],
-        'legs.rod.length': machine.rod, 'legs.rod.mass': machine.mr,
-        'legs.rod.center_of_mass': machine.sr, 'legs.rod.inertia': machine.Ir,
-        'actuator.reflected_inertia': machine.J, 'actuator.viscous_friction': machine.visc,
-        'actuator.coulomb_friction': machine.coul, 'actuator.coulomb_velocity': machine.slow,
-        'platform.mass': machine.m, 'platform.center_of_mass': machine.c,
-        'platform.inertia': six(machine.I), 'gravity': machine.g,
-        'limits.angle_min': machine.middle - 3.0, 'limits.angle_max': machine.middle + 3.0,
-        **changes})
-
-
 def at_rest(pose: Pose) -> Motion:
     return Motion(pose.position, pose.rotation)
-
-
-def motion_of(state: State) -> Motion:
-    return Motion(state.t, state.R, state.v, state.w, state.a, state.al)
-
-
-def base_of(state: State) -> BaseMotion | None:
-    base = state.base
-    return None if base is None else BaseMotion(base.g, base.a, base.w, base.al)
 
 
 @cache
@@ -265,9 +232,10 @@ def test_loads_of_the_base(seed: int) -> None:
 @pytest.mark.parametrize('seed', SEEDS)
 def test_without_masses_torques_are_those_of_the_platform(seed: int) -> None:
     machine, _, states = case(seed)
-    nothing = {name: 0.0 for name in (
+    nothing = dict.fromkeys((
         'legs.crank.mass', 'legs.crank.inertia', 'legs.rod.mass', 'legs.rod.inertia',
-        'actuator.reflected_inertia', 'actuator.viscous_friction', 'actuator.coulomb_friction')}
+        'actuator.reflected_inertia', 'actuator.viscous_friction',
+        'actuator.coulomb_friction'), 0.0)
     platform = StewartPlatform(parameters_of(machine, **nothing))
     rest = Motion(states[0].t, states[0].R)
     weight = -machine.m * machine.g

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ROW = """    power_max: Array | None = _limit(
         'maximum electrical power of a motor', 'W', 'motor power', 'power of a motor')
 """
-LINE = '  MAXIMUM(8192, POWER_MAX, power_max, MOTOR, motors.power)'
+LINE = '  LARGEST(524288, POWER_MAX, power_max, MOTOR, motors.power)'
 PROGRAM = """
 import numpy as np
 from stewart_dynamics import Motion, Parameters, StewartPlatform
@@ -54,7 +54,7 @@ def test_a_limit_is_a_row_of_the_table_and_a_line_of_c(tmp_path: Path) -> None:
         shutil.copy(ROOT / name, tmp_path)
     header = tmp_path / 'stewart_dynamics' / 'core' / 'stewart_dynamics.h'
     text = header.read_text()
-    last = '  MAXIMUM(4096, TEMPERATURE_RISE_MAX, temperature_rise_max, MOTOR, rises)'
+    last = '  LARGEST(4096, TEMPERATURE_RISE_MAX, temperature_rise_max, MOTOR, rises)'
     assert text.count(last) == 1
     header.write_text(text.replace(last, f'{last} \\\n{LINE}'))
     table = tmp_path / 'stewart_dynamics' / 'parameters' / 'table.py'

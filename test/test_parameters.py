@@ -159,7 +159,7 @@ BAD = [
     ('mass: 150.0', 'mass:'),
     # names
     ('warn_condition', 'warn_conditions'),
-    ('visualization_rate: 25.0', 'limits.angle_max: 0.5'),
+    ('visualization_rate: 25.0', 'limits.joint_angle_max: 0.5'),
     ('visualization_rate: 25.0', 'qqq: 25.0'),
     ('visualization_rate', '"two\\nlines\\e[31m"'),
     ('mass: 150.0', 'mass: {kg: 150.0}'),

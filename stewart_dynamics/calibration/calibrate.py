@@ -29,6 +29,7 @@ from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.outliers import MOST_OUTLIERS, outliers
 from stewart_dynamics.calibration.residual_causes import lack_of_fit
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.drives.turning_screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
@@ -145,6 +146,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
 
     """
     p = platform.parameters
+    require_kind(p, 'calibration')
     measured = _checked(platform, lengths, poses)._replace(screws=_screws(p, drive_positions))
     if frames not in ('known', 'unknown'):
         raise ParameterError(f"frames: {frames!r}: must be 'known' or 'unknown'")

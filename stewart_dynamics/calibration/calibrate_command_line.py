@@ -97,6 +97,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.calibration.one_run import CalibrationOptions, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
     from stewart_dynamics.calibration.tracked_poses import read_tracked
+    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.tables.reading import is_table
@@ -108,6 +109,7 @@ def _run(given: argparse.Namespace) -> int:
         millimeters, given.degrees, given.drive_positions, given.accept_mistakes, given.report,
         given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
+    require_kind(parameters, 'calibration')
     if given.design is not None:
         _PROGRAM.say(design_command.run(given, parameters, given.output or Path(DESIGNED)))
         return DONE

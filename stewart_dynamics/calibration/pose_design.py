@@ -25,6 +25,7 @@ from stewart_dynamics.calibration.geometry_fit import Unknowns
 from stewart_dynamics.calibration.noise import covariances, Noise, whitening
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.frames.motion import Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR
@@ -61,6 +62,7 @@ def design_poses(platform: StewartPlatform, count: int, noise: Noise = NOISE, se
     Raises ParameterError: a limit of length is missing, or home is not within the limits.
     Raises StewartError: too few poses are asked for, or within the limits.
     """
+    require_kind(platform.parameters, 'calibration')
     check_number(count)
     random = np.random.default_rng(seed)
     p = platform.parameters

@@ -27,6 +27,7 @@ from stewart_dynamics.capability.stuck_leg import remaining
 from stewart_dynamics.capability.travel import ENDS
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, wrong_type)
@@ -164,6 +165,7 @@ class Capability:
     def __init__(self, platform: StewartPlatform) -> None:
         if not isinstance(platform, StewartPlatform):
             raise wrong_type('platform', platform, 'a StewartPlatform')
+        require_kind(platform.parameters, 'capability')
         self.platform = platform
         self._pose_limits = PoseLimits(platform.parameters)
         self._limits = self._pose_limits.limits

@@ -63,8 +63,8 @@ static real crank_arctangent(real y, real x) {
 
 /* Return the angle within pi of the middle of the allowed ones. */
 static real crank_angle(const stewart_leg * leg, const crank_pose * at) {
-  double turns = 2.0 * PI * rint(leg->middle_angle / (2.0 * PI));
-  double middle = leg->middle_angle - turns;
+  double turns = 2.0 * PI * rint(leg->home_position / (2.0 * PI));
+  double middle = leg->home_position - turns;
   real q = crank_arctangent(at->sine, at->cosine);
   q = choose(q > middle + PI, q - 2.0 * PI, choose(q < middle - PI, q + 2.0 * PI, q));
   return q + turns;
@@ -77,8 +77,8 @@ typedef struct {
   vector arm_rate, tip_rate, end_rate, gap_rate, tip_acc, end_acc;
 } crank_motion;
 
-/* q' = d . B' / k, q'' = (d . B'' + L1 q'^2 d . e + |B' - A'|^2 / L2) / k; at a dead centre 0 where
-   they need not be infinite. */
+/* q' = d . B' / k, q'' = (d . B'' + L1 q'^2 d . e + |B' - A'|^2 / L2) / k; at a dead centre 0
+   where they need not be infinite. */
 static crank_motion crank_motion_of(const stewart_leg * leg, const stewart_motion * motion) {
   crank_motion of;
   crank_pose at = of.at = crank_pose_of(leg, motion->position, motion->rotation);
@@ -100,9 +100,9 @@ static crank_motion crank_motion_of(const stewart_leg * leg, const stewart_motio
   return of;
 }
 
-/* F_A = m_a A(A) + m_ab A(B), F_B = m_ab A(A) + m_b A(B); the torque that moves the shaft without a
-   push of the rod is I_uu q'' + (m e n - m n e) . A(c) + L1 m_ab n . A(B), with the moment of mass
-   and the inertia of the crank and m_a, and what the turning of the base adds. */
+/* F_A = m_a A(A) + m_ab A(B), F_B = m_ab A(A) + m_b A(B); the torque that moves the shaft without
+   a push of the rod is I_uu q'' + (mx n - my e) . A(c) + L1 m_ab n . A(B), with moments of mass
+   mx, my and inertia of the crank and m_a, and what the turning of the base adds. */
 static void crank_move(
   const stewart_platform * platform, int i, const stewart_motion * motion,
   const moving_base * base, leg_motion * to) {
@@ -253,8 +253,8 @@ static void crank_complete(stewart_leg * leg) {
   if (leg->motor_inertia > 0.0) {
     leg->reflected_mass = leg->gear_ratio * leg->gear_ratio * leg->motor_inertia;
   }
-  leg->middle_angle = 0.5 * (leg->angle_min + leg->angle_max);
-  if (!isfinite(leg->middle_angle)) {leg->middle_angle = 0.0;}
+  leg->home_position = 0.5 * (leg->angle_min + leg->angle_max);
+  if (!isfinite(leg->home_position)) {leg->home_position = 0.0;}
   put_unit(leg->crank_axis);
   vector z = read3(leg->crank_direction), u = read3(leg->crank_axis);
   double across = dot(z, u);

@@ -1001,7 +1001,8 @@ static void complete_loads(
     fill_nan(to->motors.angles, sizeof to->motors);
     return;
   }
-  put_motors(platform, motion, efforts_of(platform, result), commands_of(platform, to), &to->motors);
+  put_motors(platform, motion, efforts_of(platform, result), commands_of(platform, to),
+             &to->motors);
   int finite = all_finite(to->motors.angles, sizeof to->motors.angles) &&
     all_finite(to->motors.speeds, sizeof to->motors.speeds);
   for (int i = 0; i < 6; i++) {finite = finite && !isinf(to->motors.breakaway_torques[i]);}
@@ -1082,7 +1083,8 @@ static void advance_step(
   if (to->jumped == 0.0) {keep_output(platform, to, stamp, state);}
   if (to->solved == 0.0 || (state->stopped && platform->suppress_near_singularity) ||
       ((any & ~(unsigned)STEWART_CLIPPED) && platform->suppress_at_limits)) {
-    for (int i = 0; i < 6; i++) {to->forces[i] = to->torques[i] = to->motors.commands[i] = NAN;}
+    double * commands = commands_of(platform, to);
+    for (int i = 0; i < 6; i++) {to->forces[i] = commands[i] = to->motors.commands[i] = NAN;}
   }
 }
 

@@ -59,11 +59,13 @@ enum {
   STEWART_CROSSED = 3    /* det(J) has changed its sign since the last call */
 };
 
-/* The limits of a leg, a line each: bit of stewart_output.exceeded, name, field of stewart_leg;
- * what the quantity depends on: pose, twist or load of the motion, or motor; its numbers in
- * stewart_output, which must be at least a MINIMUM or at most a MAXIMUM, or have magnitudes of at
- * most a LARGEST. */
+/* The limits of a leg, a line each, then those of cranks alone: bit of stewart_output.exceeded,
+ * name, field of stewart_leg; what the quantity depends on: pose, twist or load of the motion, or
+ * motor; its numbers in stewart_output, which must be at least a MINIMUM or at most a MAXIMUM, or
+ * have magnitudes of at most a LARGEST. */
 #define STEWART_LIMITS(MINIMUM, MAXIMUM, LARGEST) \
+  STEWART_LEG_LIMITS(MINIMUM, MAXIMUM, LARGEST) STEWART_CRANK_LIMITS(MINIMUM, MAXIMUM, LARGEST)
+#define STEWART_LEG_LIMITS(MINIMUM, MAXIMUM, LARGEST) \
   MINIMUM(1, LENGTH_MIN, length_min, POSE, result.lengths) \
   MAXIMUM(2, LENGTH_MAX, length_max, POSE, result.lengths) \
   LARGEST(4, VELOCITY_MAX, velocity_max, TWIST, result.rates) \
@@ -73,7 +75,8 @@ enum {
   LARGEST(256, JOINT_FORCE_MAX, joint_force_max, LOAD, result.joint_forces) \
   LARGEST(512, TORQUE_MAX, torque_max, MOTOR, motors.breakaway_torques) \
   LARGEST(2048, SPEED_MAX, speed_max, MOTOR, motors.speeds) \
-  LARGEST(4096, TEMPERATURE_RISE_MAX, temperature_rise_max, MOTOR, rises) \
+  LARGEST(4096, TEMPERATURE_RISE_MAX, temperature_rise_max, MOTOR, rises)
+#define STEWART_CRANK_LIMITS(MINIMUM, MAXIMUM, LARGEST) \
   MINIMUM(8192, ANGLE_MIN, angle_min, POSE, result.angles) \
   MAXIMUM(16384, ANGLE_MAX, angle_max, POSE, result.angles) \
   LARGEST(32768, CRANK_SPEED_MAX, crank_speed_max, TWIST, result.speeds) \
@@ -132,9 +135,12 @@ typedef struct {
   double motor_ratio, pitch, driving_loss, driven_loss, loss_velocity;
   /* Of a crank: the rod as two points with a coupling, at the crank and at the platform [kg]; the
    * moment of mass along e and n [kg m] and the inertia [kg m^2] of the crank and the point at its
-   * end, about the base joint; the middle of the allowed angles [rad]. */
+   * end, about the base joint. */
   double crank_end_mass, coupling_mass, platform_end_mass;
-  double turning_moment[2], turning_inertia[6], middle_angle;
+  double turning_moment[2], turning_inertia[6];
+  /* Position of the drive at home: halfway between its limits, if it has both; else zero_length, or
+   * the angle 0. */
+  double home_position;
 } stewart_leg;
 
 /* A hexapod, constant while it is used: all that the parameter file says of its forces.

@@ -78,6 +78,7 @@ def _run(given: argparse.Namespace) -> int:
         check_order, is_possible, leg_of, Order, Progress, soft_legs, STAGES, write_datasheet)
     from stewart_dynamics.datasheet.datasheet_text import sheet_text
     from stewart_dynamics.datasheet.rated_hexapod import Payload
+    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.frames.motion import Pose
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes, mistakes_in_options
     from stewart_dynamics.parameters.table import Parameters
@@ -90,6 +91,7 @@ def _run(given: argparse.Namespace) -> int:
         force=given.force,
         topics={'combined': given.combined} if given.combined else {})
     parameters = Parameters.from_yaml(given.params, given.node)
+    require_kind(parameters, 'capability')
     order = Order(
         given.params.stem if given.node == NODE else given.node.rpartition('/')[2],
         None if given.pose is None else Pose.from_euler(given.pose[:3], given.pose[3:]),

@@ -18,6 +18,7 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.core.binding import header
 from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.export.golden_vectors import COLUMNS, golden_vectors, PARTS, WHOLE
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
@@ -52,8 +53,18 @@ def check_name(name: str) -> str:
 def source(file: str) -> str:
     """Return the text of a file of the library in C, or in this package's folder ``c``."""
     if file in SOURCES:
-        return header(file)
+        return _in_one(header(file))
     return files(__package__).joinpath('c', file).read_text(encoding='utf-8')
+
+
+def _in_one(text: str) -> str:
+    """Return a source with the files of the kinds of legs in it, without the library's part."""
+    def part(found: re.Match[str]) -> str:
+        of_kind = header(found[1])
+        return of_kind[of_kind.index('#ifndef STEWART_LIBRARY\n'):].partition(
+            '\n#else')[0].partition('\n\n')[2]
+
+    return re.sub(r'#include "((?!stewart_dynamics)\w+\.h)"\n', part, text)
 
 
 def c_project(parameters: Parameters, name: str) -> dict[str, str]:
@@ -64,6 +75,7 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
         are not, and there is no home pose.
     """
     check_name(name)
+    require_kind(parameters, 'exported source')
     head = (f'A hexapod, written by stewart_export {__version__}.\n'
             f' * SHA-256 of its parameters: {digest(parameters)}')
     rows = golden_vectors(parameters).tolist()
@@ -98,6 +110,7 @@ def platform_source(parameters: Parameters, name: str) -> str:
     Raises ParameterError: axes that are needed are not given, and there is no home pose.
     """
     hexapod: Any = limited_structure(parameters)
+    fields = {**LEG_FIELDS, **parameters.leg_kind.fields}
     lines = [f'const stewart_platform {name} = {{']
     for field in hexapod.dtype.names:
         if field != 'legs':
@@ -108,8 +121,8 @@ def platform_source(parameters: Parameters, name: str) -> str:
         for leg, joint in enumerate(parameters.joints):
             lines.append(f'    {{  /* leg {leg + 1}: {in_comment(joint)} */')
             of_leg = hexapod['legs'][leg]
-            lines += (_field(LEG_FIELDS.get(each, each), of_leg[each],
-                             '      ') for each in of_leg.dtype.names)
+            lines += (_field(fields.get(each, each), of_leg[each], '      ')
+                      for each in of_leg.dtype.names)
             lines.append('    },')
         lines.append('  },')
     return '\n'.join([*lines, '};', ''])

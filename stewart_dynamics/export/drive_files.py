@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.export.c_project import source
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.parameters.table import GUIDED, Parameters
 
@@ -61,6 +62,7 @@ def amplifiers(parameters: Parameters) -> list[Amplifier]:
         length, or a torque, position or rate within the limits does not fit into the integers of
         the bus.
     """
+    require_kind(parameters, '--drives')
     missing = [name for name in _NEEDED if parameters[name] is None]
     if missing:
         raise ParameterError(f'{", ".join(missing)}: not set: needed by --drives')

@@ -26,6 +26,7 @@ from stewart_dynamics import __version__
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.export.c_project import digest, hexadecimal, platform_source, source, SOURCES
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
@@ -209,6 +210,7 @@ def fmu(parameters: Parameters, name: str, version: str = '3',
         and ``position.x``.
     Raises StewartError: the compiler fails.
     """
+    require_kind(parameters, 'exported source')
     listed = variables(parameters)
     if flat:
         listed = [each._replace(name=flat_name(each.name)) for each in listed]

@@ -20,6 +20,7 @@ from stewart_dynamics import __version__
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.export.c_project import in_comment
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.drives.turning_screws import universal_axes
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
@@ -40,6 +41,7 @@ def hal_lines(parameters: Parameters) -> str:
     Raises ParameterError: screws turn with their legs, and their leads differ; or at home the
         platform is turned so far about z that genhexkins finds no pose.
     """
+    require_kind(parameters, '--linuxcnc')
     return '\n'.join([*_head(parameters), *_pins(parameters), ''])
 
 

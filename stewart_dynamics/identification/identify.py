@@ -37,6 +37,7 @@ from stewart_dynamics.identification.recording_mistakes import (
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.window_poses import first_pose
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.drives.measured_efforts import FAR, force_per_effort
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
@@ -188,6 +189,7 @@ class Identification:
     """Reads bags and identifies parameters, beginning with those of the file."""
 
     def __init__(self, parameters: Parameters, options: IdentificationOptions) -> None:
+        require_kind(parameters, 'identification')
         if parameters.base.source != FIXED:
             raise ParameterError(
                 f'base.source: {parameters.base.source}: hexapods are identified on a base at '

@@ -118,12 +118,14 @@ def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import find_bags
     from stewart_dynamics.identification.identification_results import result_text, run
+    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes, mistakes_in_options
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
     options = IdentificationOptions(**arguments_of(given, IdentificationOptions._fields))
     parameters = Parameters.from_yaml(given.params, given.node)
+    require_kind(parameters, 'identification')
     if given.design:
         for mistake in mistakes_in_options(parameters, {'--center': given.center}, {}):
             _PROGRAM.complain(f'warning: {mistake}')

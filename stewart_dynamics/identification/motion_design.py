@@ -32,6 +32,7 @@ from stewart_dynamics.identification.identification_options import DesignOptions
 from stewart_dynamics.identification.parameter_fit import (
     covariance_of, delay_deviations, directions)
 from stewart_dynamics.identification.unknowns import regressor_of, Unknowns
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.limits import (
@@ -175,6 +176,7 @@ def design(parameters: Parameters, options: DesignOptions,
     parameter is not identifiable from any motion, a limit is missing, or the center is not within
     the limits.
     """
+    require_kind(parameters, 'identification')
     search = _Search(parameters, options)
     best = _evolution(search.costs, search.size, options, progress)
     trajectory = search.trajectory(best)

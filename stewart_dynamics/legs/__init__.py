@@ -6,11 +6,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
+from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.legs.crank import CRANK
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.legs.telescopic import TELESCOPIC
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters.table import Parameters
 
 KINDS: tuple[LegKind, ...] = (TELESCOPIC, CRANK)
 for _kind in KINDS:
@@ -21,3 +25,16 @@ def kind_of(values: Mapping[str, Any]) -> LegKind:
     """Return the kind of the legs of parameters: the last whose ``marker`` is given."""
     return next((kind for kind in reversed(KINDS) if kind.marker and
                  values[kind.marker] is not None), TELESCOPIC)
+
+
+def require_kind(parameters: Parameters, feature: str, *kinds: LegKind) -> None:
+    """
+    Raise ParameterError if a feature is not available for the legs of a hexapod.
+
+    feature: its name in the error. kinds: those that have it, by default telescopic legs alone.
+    """
+    known = kinds or (TELESCOPIC,)
+    if parameters.leg_kind not in known:
+        raise ParameterError(
+            f'{parameters.source}: {parameters.leg_kind.marker}: {feature}: available for '
+            f'{" and ".join(each.name for each in known)} legs alone')

@@ -14,8 +14,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.legs.kind import (
-    HomeLegs, LegKind, LegMass, Named, Placed, Solid, StopLoads)
+from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, StopLoads
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 
@@ -212,13 +211,6 @@ class Crank(LegKind):
         """Return the leg that is nearest to a dead centre."""
         leg = int(np.argmin(ratios))
         return f'smallest lever: {joints[leg]}, {ratios[leg]:.3g} of its largest'
-
-    def home_legs(self, parameters: Parameters) -> HomeLegs:
-        """Return the rods, from the ends of the cranks at the middle of their angles."""
-        low, high = parameters.limits.angle_min, parameters.limits.angle_max
-        middle = np.zeros(6) if low is None or high is None else 0.5 * (low + high)
-        return HomeLegs(crank_ends(parameters, middle), None, None,
-                        float(np.mean(parameters['legs.rod.length'])))
 
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:

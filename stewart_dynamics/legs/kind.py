@@ -50,15 +50,6 @@ class LegMass(NamedTuple):
     unit: str
 
 
-class HomeLegs(NamedTuple):
-    """Lines from the base to the platform joints by which a home pose is found."""
-
-    anchors: Array  # where they begin (6, 3) [m]
-    shortest: Array | None  # (6,) [m]
-    longest: Array | None
-    length: float  # of the mean line at home [m]; 0: not known
-
-
 class StopLoads(NamedTuple):
     """What the drives of a hexapod carry, for its end stops and the steps that these need."""
 
@@ -231,10 +222,6 @@ class LegKind(ABC):
     def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
                       ratios: Sequence[float]) -> str:
         """Return the leg that is nearest to a motion without a solution, in words."""
-
-    @abstractmethod
-    def home_legs(self, parameters: Parameters) -> HomeLegs:
-        """Return the lines by which the home pose is found."""
 
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:

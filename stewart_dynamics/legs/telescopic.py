@@ -11,8 +11,7 @@ from typing import NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.legs.kind import (
-    HomeLegs, LegKind, LegMass, Named, Placed, Solid, StopLoads)
+from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, StopLoads
 from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
 
 if TYPE_CHECKING:
@@ -171,13 +170,6 @@ class Telescopic(LegKind):
                       ratios: Sequence[float]) -> str:
         """Return the shortest leg."""
         return f'shortest leg {min(positions):.3g} m'
-
-    def home_legs(self, parameters: Parameters) -> HomeLegs:
-        """Return the legs, with the mean one halfway between its limits or of zero length."""
-        low, high = parameters.limits.length_min, parameters.limits.length_max
-        length = float(np.mean(parameters.geometry.zero_length if low is None or high is None
-                               else 0.5 * (low + high)))
-        return HomeLegs(parameters.geometry.base_joints, low, high, length)
 
 
 class _Terms(NamedTuple):

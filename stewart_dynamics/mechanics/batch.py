@@ -69,7 +69,7 @@ def solve(hexapod: Records, motions: Array, wrenches: Array | None = None,
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     bases = _NO_BASE if bases is None else compact(bases)
-    results = np.empty((len(motions), WIDTHS[int(hexapod['leg_kind'])]))
+    results = np.empty((len(motions), WIDTHS[hexapod['leg_kind'].item()]))
     in_parts(_solve, (hexapod, condition), motions, wrenches, bases, results)
     return results
 

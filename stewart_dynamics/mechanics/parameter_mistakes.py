@@ -333,7 +333,7 @@ def _torques_at_home(p: Parameters, home: Home) -> Iterator[str]:
         return
     if any(each.startswith('drive.torque_max') for each in drives.likely_mistakes(p)):
         return
-    positions, rotations = home.poses(p)
+    positions, rotations = home.positions, home.rotations
     jacobian = lagrange.inverse_jacobian(
         lagrange.unchecked_legs(p, positions[:1], rotations[:1]))[0]
     weight = p.carried.mass * p.gravity

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.errors import MotionError
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
@@ -96,6 +97,7 @@ _PARTS = 16
 _SPEED = 2.0
 _CLOSEST = 1e-6
 
+PLANNED = 'planned trajectories'  # the name of the feature
 NOT_INCREASING = 'time_from_start is not strictly increasing'
 TOO_FAR = 'points too far apart'
 
@@ -243,6 +245,7 @@ class _Work:
 
     def __init__(self, platform: StewartPlatform, times: Stamps, rows: Array, wrench: Array,
                  bases: Array | None, piece: int) -> None:
+        require_kind(platform.parameters, PLANNED)
         self._platform, self._times, self._motions = platform, times, rows
         self._parameters = platform.parameters
         self._wrench = wrench[None]

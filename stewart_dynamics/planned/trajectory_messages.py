@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Six, Stamps
-from stewart_dynamics.errors import MotionError
+from stewart_dynamics.errors import MotionError, ParameterError
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.frames.base_motion import row_of_motion
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, quaternion_length
 from stewart_dynamics.mechanics.rows import (
@@ -32,7 +33,7 @@ from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
 from stewart_dynamics.parameters.tolerances import is_unit, START_TOLERANCE, unit_rule
 from stewart_dynamics.planned.approach import approach_in_pieces, MOST_POINTS
 from stewart_dynamics.planned.planned_trajectory import (
-    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
+    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PLANNED, PlannedTrajectory)
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
 
@@ -47,6 +48,7 @@ QUEUE_FULL = 'queue full'
 NOT_MEASURED = 'measured legs not known'
 STARTS_ELSEWHERE = 'does not start where the legs are'
 NO_APPROACH = 'no approach to the first point'
+NOT_AVAILABLE = 'not available for these legs'
 
 _POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
 
@@ -86,6 +88,11 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
         known; at rest by default.
     measured (MOTION,): a row of motion of the platform as measured, for ``trajectory.approach``.
     """
+    try:
+        require_kind(parameters, PLANNED)
+    except ParameterError as exc:
+        yield rejected(NOT_AVAILABLE, str(exc))
+        return
     platform = StewartPlatform(parameters)
     try:
         message = _checked_header(data, parameters.base_frame)

@@ -19,6 +19,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers, Records, Stamps
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_rotation_vector
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
@@ -61,6 +62,7 @@ class RecordedResponse:
     def __init__(self, parameters: Parameters, topics: Mapping[str, str],
                  reject: Callable[[str, str, str, int], None]) -> None:
         signal_module()
+        require_kind(parameters, 'responses')
         self._parameters, self._reject = parameters, reject
         self._platform = StewartPlatform(parameters)
         self.key = MEASURED_POSE if MEASURED_POSE in topics else MEASURED

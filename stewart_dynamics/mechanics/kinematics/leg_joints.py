@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.mechanics.frames.rotation import euler_of, to_euler
-from stewart_dynamics.mechanics.kinematics.home_pose import homes, level_axes
+from stewart_dynamics.mechanics.kinematics.home_pose import home_of
 from stewart_dynamics.parameters.table import Parameters
 
 PLATFORM_JOINTS = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
@@ -44,9 +44,6 @@ PLATFORM_JOINTS = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
 UNIVERSAL_JOINTS = ('universal_x', 'universal_y')
 """What follows the name of a leg in the names of the joints of its universal joint."""
 JOINTS = 24
-
-# Within this angle of the normal the x of a leg's mount is the tangent at its base joint [rad].
-_UPRIGHT = 1e-3
 
 
 class HomeDirections(NamedTuple):
@@ -135,31 +132,10 @@ def joint_names(parameters: Parameters) -> tuple[str, ...]:
 
 def home_directions(parameters: Parameters) -> HomeDirections:
     """Return the directions of the legs at the most likely home pose; see ``homes``."""
-    positions, rotations = homes(parameters)
-    position, rotation = positions[0], rotations[0]
-    legs = (position + parameters.geometry.platform_joints @ rotation.T
-            - parameters.geometry.base_joints)
-    lengths = np.linalg.norm(legs, axis=1, keepdims=True)
-    base = parameters.geometry.base_joints
-    normal = level_axes(base - base.mean(axis=0))[2]
-    along = np.where(lengths > 0.0, legs / np.where(lengths > 0.0, lengths, 1.0), normal)
-    return HomeDirections(along, along @ rotation)
+    home = home_of(parameters)
+    return HomeDirections(home.base_directions, home.platform_directions)
 
 
 def mounts(parameters: Parameters) -> Array:
     """Return the rotations (6, 3, 3) from the axes of each leg's mount to base axes."""
-    base = parameters.geometry.base_joints
-    around = base - base.mean(axis=0)
-    first, _, normal = level_axes(around)
-    found = []
-    for z, outward in zip(home_directions(parameters).base, around, strict=True):
-        x = np.cross(normal, z)
-        if np.linalg.norm(x) < _UPRIGHT:
-            x = np.cross(normal, outward)
-        if not np.any(x):
-            x = first
-        x = x - (x @ z) * z
-        x /= np.linalg.norm(x)
-        y = np.cross(z, x)
-        found.append(np.column_stack([x, y / np.linalg.norm(y), z]))
-    return np.array(found)
+    return home_of(parameters).mounts
