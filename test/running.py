@@ -695,9 +695,10 @@ class DynamicsNode:
             found[:] = [state for state in self.received('leg_states')
                         if nanoseconds(state.header.stamp) == stamp]
             states = self.received('leg_states')
-            return bool(found) and len(self.raw[self.of_legs.positions]) == len(
-                self.raw['jacobian_determinant']) == len(states) and len(
-                    self.raw[self.of_legs.efforts]) == sum(len(state.effort) > 0 for state in states)
+            positions, efforts = (len(self.raw[topic]) for topic in self.of_legs)
+            return bool(found) and positions == len(
+                self.raw['jacobian_determinant']) == len(states) and (
+                    efforts == sum(len(state.effort) > 0 for state in states))
 
         self.until(answered, f'the setpoint with stamp {stamp} is answered')
         assert len(found) == 1
@@ -757,9 +758,10 @@ class DynamicsNode:
         self.answer(sample)
         self.until_counted()
         states = self.received('leg_states')
-        self.until(lambda: len(self.raw[self.of_legs.efforts]) >= sum(
-            len(state.effort) > 0 for state in states), 'all forces have come')
-        assert len(self.raw[self.of_legs.efforts]) == sum(len(state.effort) > 0 for state in states)
+        efforts = self.raw[self.of_legs.efforts]
+        count = sum(len(state.effort) > 0 for state in states)
+        self.until(lambda: len(efforts) >= count, 'all efforts have come')
+        assert len(efforts) == count
         self.check_answers()
 
     # -- services --------------------------------------------------------------------------

@@ -100,7 +100,7 @@ def test_answers_have_the_bits_of_the_library_and_of_the_replay(
     assert replay([str(bag), '--params', str(CRANKS), '--output', str(tmp_path / 'results')]) == 0
     folder = tmp_path / 'results' / 'bag'
     replayed: dict[str, list[bytes]] = {topic: [] for topic in node.raw}
-    for topic, _, data in recorded(folder / 'bag'):
+    for topic, _, data in recorded(folder / 'bag' / 'bag.mcap'):
         if topic in replayed:
             replayed[topic].append(data + bytes(-len(data) % 4))
     assert node.raw == replayed

@@ -60,7 +60,8 @@ def read_csv(file: Path) -> tuple[list[str], list[list[str]]]:
 
 def check_tables(folder: Path, blocks: list[Outputs]) -> None:
     """Check that both tables give every number back to the bit."""
-    tables: list[Any] = [CsvTable(folder, LEGS), ParquetTable(folder, LEGS)]
+    tables: list[Any] = [
+        kind(folder, TELESCOPIC, LEGS) for kind in (CsvTable, ParquetTable)]
     for table in tables:
         for outputs in blocks:
             number = len(outputs.stamps)
@@ -135,7 +136,7 @@ def test_numbers_at_the_edges(tmp_path: Path) -> None:
 @pytest.mark.parametrize('table', [CsvTable, ParquetTable])
 def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> None:
     legs = ('größe', 'a "leg"', 'one, two', 'line\nbreak', ' ', "'=1+1'")
-    writer = table(tmp_path, legs)
+    writer = table(tmp_path, TELESCOPIC, legs)
     outputs = turning(2)
     writer.write(answered(outputs, outputs.stamps, motions_of(2)))
     writer.close()
@@ -149,7 +150,7 @@ def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> No
 
 
 def test_the_base_wrench_is_before_the_warning(tmp_path: Path) -> None:
-    CsvTable(tmp_path, LEGS).close()
+    CsvTable(tmp_path, TELESCOPIC, LEGS).close()
     head, _ = read_csv(tmp_path / 'legs.csv')
     assert head[-8:] == [
         'condition', 'base_force_x_n', 'base_force_y_n', 'base_force_z_n', 'base_moment_x_n_m',
@@ -157,7 +158,7 @@ def test_the_base_wrench_is_before_the_warning(tmp_path: Path) -> None:
 
 
 def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
-    CsvTable(tmp_path, ('=1+1', '+a', '-b', '@c', '\td', 'e')).close()
+    CsvTable(tmp_path, TELESCOPIC, ('=1+1', '+a', '-b', '@c', '\td', 'e')).close()
     head, _ = read_csv(tmp_path / 'legs.csv')
     assert [name.removesuffix('_length_m') for name in head[9:15]] == [
         "'=1+1", "'+a", "'-b", "'@c", "'\td", 'e']
@@ -165,7 +166,7 @@ def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('table', [CsvTable, ParquetTable])
 def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
-    writer = table(tmp_path, LEGS)
+    writer = table(tmp_path, TELESCOPIC, LEGS)
     outputs = turning(0)
     writer.write(answered(outputs, outputs.stamps, motions_of(0)))
     writer.close()
@@ -179,7 +180,7 @@ def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
 
 def test_parquet_is_written_in_groups_of_many_rows(tmp_path: Path) -> None:
     outputs = turning(1000)
-    table = ParquetTable(tmp_path, LEGS)
+    table = ParquetTable(tmp_path, TELESCOPIC, LEGS)
     for _ in range(100):
         table.write(answered(outputs, outputs.stamps, motions_of(1000)))
     table.close()

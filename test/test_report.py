@@ -26,6 +26,7 @@ from snapshot import Snapshot
 
 from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
 from stewart_dynamics.colors import LEG_COLORS, ROLES
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import BASE, NO_BASE
@@ -142,7 +143,7 @@ def write_measured(given: Given, path: Path, pushed: slice = slice(200, 260)) ->
         report.add_measured(*compared)
     values = comparison.values()
     report.write(path, given.summary(measured={
-        'headline': measured_headline(values), **values}))
+        'headline': measured_headline(values, TELESCOPIC), **values}))
 
 
 def text_of(path: Path) -> str:

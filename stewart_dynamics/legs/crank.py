@@ -41,10 +41,12 @@ class Crank(LegKind):
     marker = 'legs.crank.length'
     position = Named('angle', 'angles', 'rad')
     rate = Named('speed', 'speeds', 'rad/s')
-    effort = Named('torque', 'torques', 'N m', '+ drives the angle up')
+    effort = Named('torque', 'torques', 'N m', '+ drives the angle up', 'drives it down')
     effort_signs = 'drives the angle up', 'drives it down'
+    extremes = 'smallest angle', 'largest angle'
     position_limits = 'limits.angle_min', 'limits.angle_max'
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
+    joint_force, joint_force_limit = 'rod_force', 'limits.rod_force_max'
     commands = 'torques'
     simulated, gear = 'leg_torque', 'gear'
     resolved = ('a crank turns by more than that, a joint moves by more than that part of its '
@@ -108,6 +110,10 @@ class Crank(LegKind):
         directions = (at.line + curvatures) / rods[:, None]
         return Lines(np.broadcast_to(rods, at.missing.shape), directions, at.arms,
                      AnchorPath(tangents, curvatures))
+
+    def anchors(self, parameters: Parameters, positions: Array) -> Array:
+        """Return the ends of the cranks."""
+        return crank_ends(parameters, positions)
 
     def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
                      ) -> tuple[Placed, ...]:
@@ -336,9 +342,9 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
 
 
 def crank_ends(parameters: Parameters, angles: Array) -> Array:
-    """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
+    """Return the ends of the cranks (..., 6, 3) at their angles (..., 6), base frame [m]."""
     u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
-    along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
+    along = z * np.cos(angles)[..., None] + np.cross(u, z) * np.sin(angles)[..., None]
     sizes = parameters['legs.crank.length'][:, None]
     ends: Array = parameters.geometry.base_joints + sizes * along
     return ends

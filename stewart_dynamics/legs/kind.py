@@ -35,6 +35,7 @@ class Named(NamedTuple):
     field: str  # of stewart_result, and the attribute of a result: 'lengths'
     unit: str
     positive: str = ''  # what a positive one does: '+ extends'
+    negative: str = ''  # and a negative one: 'retracts'
 
     @property
     def columns(self) -> slice:
@@ -91,10 +92,14 @@ class LegKind(ABC):
         Quantities of the drive.
     effort_signs : tuple of str
         What a positive effort is called, and a negative one.
+    extremes : tuple of str
+        What the smallest and the largest position are called.
     position_limits : tuple of str
         Limits of the drive's position, the smallest and the largest.
     rate_limit, effort_limit : str
         Limits of its rate, and of its effort, to which commands are clipped.
+    joint_force, joint_force_limit : str
+        Key of the force along the line in tables, and its limit.
     commands : str
         Field of ``stewart_output`` with the efforts to command.
     simulated : str
@@ -126,9 +131,12 @@ class LegKind(ABC):
     rate: Named
     effort: Named
     effort_signs: tuple[str, str]
+    extremes: tuple[str, str]
     position_limits: tuple[str, str]
     rate_limit: str
     effort_limit: str
+    joint_force: str = 'joint_force'
+    joint_force_limit: str
     commands: str
     simulated: str
     gear: str
@@ -171,6 +179,15 @@ class LegKind(ABC):
     @abstractmethod
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the lines of force in poses (...); not finite where a leg does not reach."""
+
+    def anchors(self, parameters: Parameters, positions: Array) -> Array | None:
+        """
+        Return where the lines of force begin (..., 6, 3), base frame [m]; None: at base joints.
+
+        positions (..., 6): of the drives.
+        """
+        del parameters, positions
+        return None
 
     @abstractmethod
     def place_solids(self, parameters: Parameters, joints: Array, positions: Array,

@@ -28,10 +28,11 @@ class Telescopic(LegKind):
     name = 'telescopic'
     position = Named('length', 'lengths', 'm')
     rate = Named('rate', 'rates', 'm/s', '+ extends')
-    effort = Named('force', 'forces', 'N', '+ pushes')
-    effort_signs = 'push', 'pull'
+    effort = Named('force', 'forces', 'N', '+ pushes', 'pulls')
+    effort_signs, extremes = ('push', 'pull'), ('shortest', 'longest')
     position_limits = 'limits.length_min', 'limits.length_max'
     rate_limit, effort_limit = 'limits.velocity_max', 'limits.force_max'
+    joint_force_limit = 'limits.joint_force_max'
     commands = 'forces'
     simulated, gear = 'force', 'screw'
     resolved = 'a joint moves by more than that part of its leg'

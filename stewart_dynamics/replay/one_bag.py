@@ -283,7 +283,8 @@ class _Run:
                 {'topic': each.topic, 'text': each.text,
                  'first_at_s': _since_first(each.first, values['setpoints'])}
                 for each in mistakes],
-            'measured': measured and {'headline': measured_headline(measured), **measured},
+            'measured': measured and {
+                'headline': measured_headline(measured, self._parameters.leg_kind), **measured},
             'response': self.followed and self.followed.values,
             'parameters': self._parameters.plain(),
         }

@@ -156,7 +156,7 @@ class Computed(NamedTuple):
     joint_angles: bool
     clearances: bool
     motors: bool
-    limits: tuple[str, ...]  # whose quantities are in rows of results
+    limits: tuple[str, ...]  # whose quantities are always known
 
     @classmethod
     def of(cls, parameters: Parameters, joint_angles: bool = False, clearances: bool = False,
@@ -164,7 +164,7 @@ class Computed(NamedTuple):
         """Return it for the kind of legs of a hexapod."""
         kind = parameters.leg_kind
         return cls(kind.position.columns, kind.rate.columns, kind.effort.columns, kind.published,
-                   joint_angles, clearances, motors, limits_of(parameters).results)
+                   joint_angles, clearances, motors, limits_of(parameters).known)
 
 
 class Outputs(NamedTuple):
