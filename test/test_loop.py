@@ -91,8 +91,8 @@ def test_torques_of_the_node_cut_the_tracking_error_of_cranks(
         assert 3.0 * heavier.errors.rms[name] < alone.errors.rms[name], name
     assert 1e3 < alone.errors.rms['all legs'] < 10e3  # [urad]
     line = demo.last_line([alone, forward], CRANK)
-    assert re.fullmatch(r'RMS error of the leg angles: \d+\.\d urad by PD alone, \d+\.\d urad with '
-                        'the torques of the node', line)
+    assert re.fullmatch(r'RMS error of the leg angles: \d+\.\d urad by PD alone, \d+\.\d urad '
+                        'with the torques of the node', line)
     table = demo.table([alone, forward], ['as in the parameters'], CRANK)
     assert 'PD + torques' in table
     assert re.search('leg 1 +urad', table)
