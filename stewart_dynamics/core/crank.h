@@ -186,6 +186,16 @@ static double crank_anchor(const stewart_leg * leg, double position, vector * an
   return leg->rod_length;
 }
 
+/* A pose of this angle may be one of the other branch, beyond a dead centre. */
+static int crank_assembled(
+  const stewart_leg * leg, double position, const double origin[3], const double r[9]) {
+  vector z = read3(leg->crank_direction), n0 = cross(read3(leg->crank_axis), z);
+  vector n = subtract(scale(cos(position), n0), scale(sin(position), z)), anchor;
+  crank_anchor(leg, position, &anchor);
+  leg_line at = line_from(anchor, leg, origin, r);
+  return leg->branch * dot(at.direction, n) >= -FLATNESS;
+}
+
 /* k q'' = d . B'' + L1 q'^2 d . e + |B' - A'|^2 / L2. */
 static double crank_straight(
   const stewart_leg * leg, const double position[3], const double r[9], vector x_rate,

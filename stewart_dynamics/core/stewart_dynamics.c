@@ -366,6 +366,7 @@ static leg_line line_from(
    drive: the motion of the drive.
    put, finish: write the numbers of the leg, and of all legs, for pushes along the lines.
    anchor: where the line begins at a position of the drive; returns its length.
+   assembled: whether the leg at a position of the drive is assembled as the hexapod is.
    straight: the part of a drive's acceleration, times the lever, that is linear in the
      acceleration of the platform.
    missing: distance by which the leg misses its platform joint [m].
@@ -438,6 +439,14 @@ static double anchor_of(
   const stewart_platform * platform, int i, double position, vector * anchor) {
   switch (platform->leg_kind) {
     default: STEWART_LEG_KINDS(RETURN, anchor, (&platform->legs[i], position, anchor))
+  }
+}
+
+static int assembled_of(
+  const stewart_platform * platform, int i, double position, const stewart_pose * pose) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, assembled, (
+      &platform->legs[i], position, pose->position, pose->rotation))
   }
 }
 
@@ -1463,6 +1472,9 @@ static int find_pose(
     if (done == 1.0) {code = STEWART_OK, *residual = error;}
   }
   *steps += more;
+  for (int i = 0; code == STEWART_OK && i < 6; i++) {
+    code = assembled_of(platform, i, positions[i], &found) ? STEWART_OK : STEWART_NO_POSE;
+  }
   if (code == STEWART_OK) {*pose = found;}
   return code;
 }

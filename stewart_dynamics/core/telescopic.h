@@ -197,6 +197,10 @@ static double telescopic_anchor(const stewart_leg * leg, double position, vector
 {*anchor = read3(leg->base_joint); return position;}
 
 /* L'' = s . x'' + |x' across the leg|^2 / L. */
+static int telescopic_assembled(
+  const stewart_leg * leg, double position, const double origin[3], const double r[9])
+{(void)leg, (void)position, (void)origin, (void)r; return 1;}
+
 static double telescopic_straight(
   const stewart_leg * leg, const double position[3], const double r[9], vector x_rate,
   double rate, double acceleration) {

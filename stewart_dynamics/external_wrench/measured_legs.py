@@ -176,13 +176,13 @@ class MeasuredLegs:
         except StewartError as exc:
             self._reject(_OF_ERROR[type(exc)], str(exc))
             return None
-        self._efforts.add(last.stamp, measurement.forces, last.differences)
+        self._efforts.add(last.stamp, measurement.efforts, last.differences)
         self._rates.add(measurement, last)
-        self._stamps.add(last.stamp, measurement.lengths)
+        self._stamps.add(last.stamp, measurement.positions)
         mistake = self.mistake
         self._last = last if mistake is None else last._replace(mistake=mistake)
         if self._history is not None:
-            self._history.add(measurement.forces, self._last, known)
+            self._history.add(measurement.efforts, self._last, known)
         return self._last
 
     def _reject(self, reason: str, details: str) -> None:

@@ -14,7 +14,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, StopLoads
+from stewart_dynamics.legs.kind import (
+    LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 
@@ -48,9 +49,14 @@ class Crank(LegKind):
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
     joint_force, joint_force_limit = 'rod_force', 'limits.rod_force_max'
     commands = 'torques'
-    simulated, gear = 'leg_torque', 'gear'
+    simulated = 'leg_torque'
     resolved = ('a crank turns by more than that, a joint moves by more than that part of its '
                 'rod, or a lever changes by more than that part of itself, as at a dead centre')
+    gear, right_sign = 'gear', '+ must drive the angle up'
+    wrong_units = (
+        (1e-3, 'kN m in place of N m'), (1.0 / STANDARD_G, 'kgf m in place of N m'),
+        (1e2 / STANDARD_G, 'kgf cm in place of N m'), (1.0 / 1.355818, 'lbf ft in place of N m'),
+        (1e3, 'mN m in place of N m'), (1e2, 'N cm in place of N m'))
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
@@ -97,10 +103,26 @@ class Crank(LegKind):
         legs: Any = parameters.structure['legs']
         centers, inertias = crank_bodies(parameters)
         mass = parameters['legs.crank.mass']
-        x, y, z = centers.T
-        about = np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
-        return np.concatenate([mass * centers.T, inertias.T + mass * about, np.stack([
+        return np.concatenate([mass * centers.T, inertias.T + mass * _about(centers), np.stack([
             legs[name] for name in ('crank_end_mass', 'coupling_mass', 'platform_end_mass')])])
+
+    def relative_changes(self, parameters: Parameters) -> list[Array]:
+        """Return changes of crank and rod."""
+        centers, inertias = crank_bodies(parameters)
+        mass, size = parameters['legs.crank.mass'], parameters['legs.rod.length']
+        legs: Any = parameters.structure['legs']
+        rod, part = legs['rod_mass'], legs['rod_center_of_mass'] / size
+        turning, none = legs['rod_inertia'] / size ** 2, np.zeros(6)
+        first, about = mass * centers.T, mass * _about(centers)
+        changes = [(np.zeros((3, 6)), np.zeros((6, 6)), each) for each in (
+            (rod * (1.0 - part) ** 2, rod * part * (1.0 - part), rod * part ** 2),
+            (-2.0 * rod * part * (1.0 - part), rod * part * (1.0 - 2.0 * part),
+             2.0 * rod * part ** 2),
+            (turning, -turning, turning))]
+        changes += [(*each, (none,) * 3) for each in (
+            (first, about), (first, 2.0 * about), (np.zeros((3, 6)), inertias.T))]
+        return [np.concatenate([moments, inertia, of_rod])
+                for moments, inertia, of_rod in changes]
 
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the rods, whose anchors are the ends of the cranks: A(q) = c + L1 e(q)."""
@@ -244,6 +266,12 @@ class Crank(LegKind):
                     f'with negative: {words}: give the branch, or limits of the angle')
             of['branch'][leg] = 1.0 if possible[0] else -1.0
         return True
+
+
+def _about(centers: Array) -> Array:
+    """Return the inertia (6, 6) of a mass of 1 at each center (6, 3), about the origin."""
+    x, y, z = centers.T
+    return np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
 
 
 class _Angle(NamedTuple):

@@ -25,6 +25,8 @@ from stewart_dynamics.legs.lines import Lines
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
+STANDARD_G = 9.80665
+"""Standard acceleration of free fall, in units of force [m/s^2]."""
 _RESULT, _OUTPUT = places('stewart_result'), places('stewart_output')
 
 
@@ -104,12 +106,16 @@ class LegKind(ABC):
         Field of ``stewart_output`` with the efforts to command.
     simulated : str
         Value of the simulator's parameter ``commands`` for these efforts.
-    gear : str
-        What is between a motor and its leg.
     resolved : str
         What a step of the simulator may not do, besides turning the platform by a number.
     width : int
         Numbers in a row of results: those of ``stewart_result`` up to the last of this kind.
+    wrong_units : tuple
+        Efforts in another unit, by those in the right one, and in words.
+    right_sign : str
+        What a positive effort must do.
+    gear : str
+        What is between motor and drive.
     ratio : str
         The parameter without which there are no motors; empty: none is needed.
     own : tuple of str
@@ -139,10 +145,12 @@ class LegKind(ABC):
     joint_force_limit: str
     commands: str
     simulated: str
-    gear: str
     resolved: str
     width: int = _RESULT['joint_forces'].stop
+    right_sign: str
+    gear: str
     ratio: str = ''
+    wrong_units: tuple[tuple[float, str], ...]
     own: tuple[str, ...]
     foreign: tuple[str, ...]  # the ``own`` of other kinds
     fields: Mapping[str, str]
@@ -175,6 +183,14 @@ class LegKind(ABC):
     @abstractmethod
     def mass_values(self, parameters: Parameters) -> Array:
         """Return the values of ``masses`` (n, 6), SI units."""
+
+    @abstractmethod
+    def relative_changes(self, parameters: Parameters) -> Sequence[Array]:
+        """
+        Return how ``mass_values`` (n, 6) change with what may be uncertain of a leg's parts.
+
+        Each for a relative change of a mass, a center of mass, or an inertia.
+        """
 
     @abstractmethod
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:

@@ -11,7 +11,8 @@ from typing import NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, StopLoads
+from stewart_dynamics.legs.kind import (
+    LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
 
 if TYPE_CHECKING:
@@ -34,9 +35,11 @@ class Telescopic(LegKind):
     rate_limit, effort_limit = 'limits.velocity_max', 'limits.force_max'
     joint_force_limit = 'limits.joint_force_max'
     commands = 'forces'
-    simulated, gear = 'force', 'screw'
+    simulated = 'force'
     resolved = 'a joint moves by more than that part of its leg'
-    ratio = 'actuator.screw_lead'
+    ratio, gear, right_sign = 'actuator.screw_lead', 'screw', '+ must push'
+    wrong_units = ((1e-3, 'kN in place of N'), (1.0 / STANDARD_G, 'kgf in place of N'),
+                   (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
     own = ('legs.cylinder.', 'legs.piston.', 'actuator.reflected_mass', 'actuator.screw_lead',
            'geometry.zero_length', 'geometry.base_joint_axes', 'geometry.base_outline',
            'geometry.platform_outline', 'limits.length_', 'limits.velocity_max',
@@ -72,6 +75,20 @@ class Telescopic(LegKind):
         return np.stack([row for part in parameters.legs.parts.values() for row in (
             part.mass, part.mass * part.center_of_mass,
             part.inertia + part.mass * part.center_of_mass ** 2)])
+
+    def relative_changes(self, parameters: Parameters) -> list[Array]:
+        """Return changes of cylinder and piston; the mass of a cylinder alone has no effect."""
+        found: list[Array] = []
+        none = np.zeros(6)
+        for n, part in enumerate(parameters.legs.parts.values()):
+            first, mass = part.mass * part.center_of_mass, n * part.mass
+            turning = part.inertia + part.mass * part.center_of_mass ** 2 - part.inertia
+            for change in ((mass, first, turning), (none, first, 2.0 * turning),
+                           (none, none, part.inertia)):
+                rows = np.zeros((6, 6))
+                rows[3 * n:3 * n + 3] = change
+                found.append(rows)
+        return found
 
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the legs: (1), (2)."""

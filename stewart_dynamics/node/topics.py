@@ -21,6 +21,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
+from stewart_dynamics.capability.capability import CAPABLE
 from stewart_dynamics.description.model import JOINT_STATES, MODEL_TYPES, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
@@ -192,6 +193,7 @@ class NodeTopics:
         there = {MARKERS: parameters.visualization_rate > 0.0, TF: parameters.publish_tf}
         there[JOINT_STATES] = there[MARKERS]
         there[MOTOR_STATES] = there[MOTOR_TORQUES] = bool(parameters.drives)
+        there[TRAVEL] = parameters.leg_kind in CAPABLE
         there |= {topic: kind is parameters.leg_kind
                   for kind in KINDS for topic in LegTopics.of(kind)}
         for topic in PUBLISHED:
