@@ -16,7 +16,8 @@ from struct import pack, Struct
 
 import numpy as np
 from stewart_dynamics.arrays import Array, SECOND
-from stewart_dynamics.description.hexapod import BALL, Color, COLORS, PLATE
+from stewart_dynamics.description.hexapod import Color, COLORS
+from stewart_dynamics.legs.tree import BALL, PLATE
 from stewart_dynamics.mechanics.frames.rotation import quaternion_of
 from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
 from stewart_dynamics.mechanics.limits import Exceedance
