@@ -271,6 +271,13 @@ static measured_leg telescopic_measured(const stewart_leg * leg, const stewart_m
   return of;
 }
 
+static lever_slope telescopic_slope(
+  const stewart_leg * leg, const double position[3], const double r[9]) {
+  lever_slope of = {1.0, 0.0, {0.0, 0.0, 0.0}};
+  (void)leg, (void)position, (void)r;
+  return of;
+}
+
 static void telescopic_mass(
   const stewart_platform * platform, int i, const stewart_motion * motion, const leg_motion * of,
   leg_mass * to) {

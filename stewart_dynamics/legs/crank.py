@@ -15,7 +15,8 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs import crank_tree as tree
-from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, STANDARD_G
+from stewart_dynamics.legs.kind import (
+    LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
@@ -31,6 +32,9 @@ COULOMB_VELOCITY = 0.01
 """Default of ``actuator.coulomb_velocity`` for cranks [rad/s]."""
 HEADINGS, AXES, DIRECTIONS = (
     'geometry.crank_angles', 'geometry.crank_axes', 'geometry.crank_directions')
+# A stop near a dead centre is expected to end motions before half of its lever, or before this.
+_DEEPEST = 0.5
+_LEAST_LEVER = 0.01
 _UPRIGHT = 0.5 * math.pi  # from its zero, farther than which no crank is at home by itself [rad]
 
 
@@ -48,6 +52,9 @@ class Crank(LegKind):
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
     joint_force, joint_force_limit = 'rod_force', 'limits.rod_force_max'
     commands = 'torques'
+    simulated = 'leg_torque'
+    resolved = ('a crank turns by more than that, a joint moves by more than that part of its '
+                'rod, or a lever changes by more than that part of itself, as at a dead centre')
     gear, right_sign = 'gear', '+ must drive the angle up'
     wrong_units = (
         (1e-3, 'kN m in place of N m'), (1.0 / STANDARD_G, 'kgf m in place of N m'),
@@ -56,7 +63,7 @@ class Crank(LegKind):
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
-           'limits.lever_min')
+           'limits.lever_min', 'noise.angle', 'noise.speed', 'noise.torque')
     fields = {
         'crank_length': 'legs.crank.length', 'rod_length': 'legs.rod.length',
         'crank_axis': AXES, 'crank_direction': DIRECTIONS, 'crank_mass': 'legs.crank.mass',
@@ -219,6 +226,32 @@ class Crank(LegKind):
         _, r = _tangent_and_row(at)
         on_legs: Array = forces + torque * r
         return on_legs
+
+    def stop_loads(self, parameters: Parameters) -> StopLoads:
+        """
+        Return the inertias of shafts and cranks, and the rods, which move with the platform.
+
+        The rod can have no energy but a positive one, so that shaft and crank alone are a bound of
+        the inertia of a drive. Of the slope of a lever, (k / L1)' = n . B' / L2 - q' (L1 / L2 +
+        d . e), the second part is at most c = 1 + L1 / L2 by the rate of the drive, and by
+        (a + b)^2 <= 1.25 a^2 + 5 b^2 the stop near a dead centre adds 1.25 c^2 to the stiffness at
+        the drive and 5 / L2^2 to that at the joint.
+        """
+        centers, inertias = crank_bodies(parameters)
+        mass = parameters['legs.crank.mass']
+        size, rods = parameters['legs.crank.length'], parameters['legs.rod.length']
+        inertia = (parameters['actuator.reflected_inertia'] + inertias[:, 5]
+                   + mass * np.sum(centers[:, :2] ** 2, axis=-1))
+        least = np.maximum(_DEEPEST * parameters['limits.lever_min'], _LEAST_LEVER)
+        return StopLoads(
+            inertia, float(np.sum(parameters['legs.rod.mass'])), (least * size, size),
+            1.0 + 1.25 * (1.0 + size / rods) ** 2, 5.0 / rods ** 2)
+
+    def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
+                      ratios: Sequence[float]) -> str:
+        """Return the leg that is nearest to a dead centre."""
+        leg = int(np.argmin(ratios))
+        return f'smallest lever: {joints[leg]}, {ratios[leg]:.3g} of its largest'
 
     def home_rule(self, parameters: Parameters) -> str:
         """Return that the rods are shorter than the gap, or far too long."""

@@ -55,6 +55,18 @@ class LegMass(NamedTuple):
     unit: str
 
 
+class StopLoads(NamedTuple):
+    """What the drives of a hexapod carry, for its end stops and the steps that these need."""
+
+    inertia: Array  # of the drives alone, at least (6,) [kg] or [kg m^2]
+    carried: float  # mass of the parts that move with the platform joints [kg]
+    levers: tuple[Array, Array]  # smallest and largest effort by the push on a joint (6,)
+    # Largest stiffness of all stops of a leg, by the stiffness of one: at the drive (6,), and at
+    # the platform joint [1/m^2].
+    at_drives: Array
+    at_joints: Array
+
+
 class Solid(NamedTuple):
     """A cylinder of each leg, as pictures show it."""
 
@@ -94,6 +106,10 @@ class LegKind(ABC):
         Key of the force along the line in tables, and its limit.
     commands : str
         Field of ``stewart_output`` with the efforts to command.
+    simulated : str
+        Value of the simulator's parameter ``commands`` for these efforts.
+    resolved : str
+        What a step of the simulator may not do, besides turning the platform by a number.
     width : int
         Numbers in a row of results: those of ``stewart_result`` up to the last of this kind.
     wrong_units : tuple
@@ -143,6 +159,8 @@ class LegKind(ABC):
     joint_force: str = 'joint_force'
     joint_force_limit: str
     commands: str
+    simulated: str
+    resolved: str
     width: int = _RESULT['joint_forces'].stop
     right_sign: str
     gear: str
@@ -263,6 +281,15 @@ class LegKind(ABC):
         felt: acceleration less gravity of points (..., k, 3) at rest on the base. spin, spin_rate
         (..., 3): angular velocity and acceleration of the base.
         """
+
+    @abstractmethod
+    def stop_loads(self, parameters: Parameters) -> StopLoads:
+        """Return what the drives carry where they meet their end stops."""
+
+    @abstractmethod
+    def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
+                      ratios: Sequence[float]) -> str:
+        """Return the leg that is nearest to a motion without a solution, in words."""
 
     @abstractmethod
     def home_rule(self, parameters: Parameters) -> str:
