@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -14,7 +14,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named
+from stewart_dynamics.legs import crank_mistakes
+from stewart_dynamics.legs.kind import AtHome, HomeLegs, LegKind, LegMass, Named
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 
@@ -61,6 +62,7 @@ class Crank(LegKind):
         'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
         'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
     inertia_unit = 'kg m^2'
+    reflected, rotors = 'N^2 J', 'rotor and gear'
     friction_units = 'N m s/rad', 'N m'
     alternatives = (HEADINGS,), (AXES, DIRECTIONS)
     units = {'actuator.viscous_friction': 'N m s/rad', 'actuator.coulomb_friction': 'N m',
@@ -170,6 +172,29 @@ class Crank(LegKind):
         _, r = _tangent_and_row(at)
         on_legs: Array = forces + torque * r
         return on_legs
+
+    def reach(self, parameters: Parameters) -> Array:
+        """Return the lengths of the cranks."""
+        size: Array = parameters['legs.crank.length']
+        return size
+
+    def wrong_sizes(self, parameters: Parameters) -> Iterator[str]:
+        """Yield lengths in mm, and rods that are shorter than the gap at home."""
+        return crank_mistakes.wrong_sizes(parameters, self.home_legs(parameters).anchors)
+
+    def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
+        """Yield mistakes in signs and zeros of the cranks, their masses and limits."""
+        at = self.lines(parameters, home.position, home.rotation)
+        if not np.isfinite(at.directions).all():
+            return iter(())
+        legs: Any = parameters.structure['legs']
+        position = crank_mistakes.above_motors(
+            parameters, home, self.home_legs(parameters).anchors)
+        both = [_angles_at(parameters, leg, position, home.rotation) for leg in range(6)]
+        angles = np.array([math.nan if each is None else each[0 if sign > 0.0 else 1]
+                           for each, sign in zip(both, legs['branch'], strict=True)])
+        return crank_mistakes.likely_mistakes(
+            parameters, home, angles, at.levers(), crank_bodies(parameters))
 
     def home_legs(self, parameters: Parameters) -> HomeLegs:
         """Return the rods, from the ends of the cranks at the middle of their angles."""

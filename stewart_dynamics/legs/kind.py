@@ -12,7 +12,7 @@ called, and which parameters belong to them.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
@@ -57,6 +57,15 @@ class HomeLegs(NamedTuple):
     shortest: Array | None  # (6,) [m]
     longest: Array | None
     length: float  # of the mean line at home [m]; 0: not known
+
+
+class AtHome(NamedTuple):
+    """A hexapod at rest in its home pose."""
+
+    position: Array  # (3,) [m]
+    rotation: Array  # (3, 3)
+    up: Array  # unit vector from the base to the platform (3,)
+    efforts: Array | None  # of the drives, for the weight of the platform (6,); None: not known
 
 
 class LegKind(ABC):
@@ -112,6 +121,8 @@ class LegKind(ABC):
     units: Mapping[str, str] = {}  # of parameters, other than in the table
     defaults: Mapping[str, Any] = {}  # the same
     inertia_unit: str  # of the reflected inertia of a drive
+    reflected: str  # what it is, in a formula
+    rotors: str  # and of which parts
     friction_units: tuple[str, str]  # viscous and Coulomb
 
     @property
@@ -173,6 +184,21 @@ class LegKind(ABC):
         felt: acceleration less gravity of points (..., k, 3) at rest on the base. spin, spin_rate
         (..., 3): angular velocity and acceleration of the base.
         """
+
+    def reach(self, parameters: Parameters) -> Array:
+        """Return the movement of a platform joint by that of its drive, at the best (6,)."""
+        del parameters
+        return np.ones(6)
+
+    def wrong_sizes(self, parameters: Parameters) -> Iterator[str]:
+        """Yield likely mistakes in lengths, from which others would follow, each in one line."""
+        del parameters
+        return iter(())
+
+    def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
+        """Yield likely mistakes in other parameters of this kind alone, each in one line."""
+        del parameters, home
+        return iter(())
 
     @abstractmethod
     def home_legs(self, parameters: Parameters) -> HomeLegs:

@@ -12,7 +12,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.legs.kind import HomeLegs, LegKind, LegMass, Named
-from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
+from stewart_dynamics.legs.lines import Lines, lines_from, per_leg, skew, transposed
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -51,6 +51,7 @@ class Telescopic(LegKind):
         'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
         'drive.screw_inertia': None}
     inertia_unit = 'kg'
+    reflected, rotors = 'J (2 pi / lead)^2', 'rotor and screw'
     friction_units = 'N s/m', 'N'
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
@@ -64,10 +65,8 @@ class Telescopic(LegKind):
 
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the legs: (1), (2)."""
-        arms = joint_arms(rotation, parameters.geometry.platform_joints)
-        vectors = position[..., None, :] + arms - parameters.geometry.base_joints
-        lengths = np.linalg.norm(vectors, axis=-1)
-        return Lines(lengths, vectors / lengths[..., None], arms)
+        geometry = parameters.geometry
+        return lines_from(geometry.base_joints, geometry.platform_joints, position, rotation)
 
     def leg_mass(self, parameters: Parameters, at: Lines) -> Array:
         """Return M_i = m2 s s^T - (I_e / L^2 + m_ce) skew(s)^2."""
