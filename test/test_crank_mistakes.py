@@ -204,6 +204,6 @@ def test_a_mistake_is_reported_once(name: str, snapshot: Snapshot) -> None:
 
 
 def test_mistakes_of_a_hexapod_that_cannot_be_assembled_are_not_followed_by_others() -> None:
-    """StewartPlatform raises the error; the check has nothing to say of poses."""
+    """A StewartPlatform of it raises the error; the check has nothing to say of poses."""
     undecided = RIG.replaced({'limits.angle_min': -4.0, 'limits.angle_max': 4.0})
     assert likely_mistakes(undecided) == ()

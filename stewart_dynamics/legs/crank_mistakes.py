@@ -140,14 +140,14 @@ def _signs_and_zeros(p: Parameters, home: AtHome, angles: Array, signs: Array) -
                    f'{_rounded(angle):.3g} rad if it were like the others: a heading, a horn that '
                    'sits on another tooth, or a sign?')
     elif len(others) == 3 and near[others[0], others].all() and _are_mirror_images(p, home):
-        here, there = (_rounded(np.mean(angles[each])) for each in (alike, ~alike))
+        one, other = (_rounded(np.mean(angles[each])) for each in (alike, ~alike))
         yield (f'{name}: at home {_names(p, np.flatnonzero(alike))} have an angle of '
-               f'{here:.3g} rad, {_names(p, others)} of {there:.3g} rad, but the joints are '
+               f'{one:.3g} rad, {_names(p, others)} of {other:.3g} rad, but the joints are '
                'mirror images in pairs: cranks of a pair point in mirrored directions, too')
 
 
 def _rounded(angle: Any) -> float:
-    return round(float(angle), 6) + 0.0
+    return round(float(angle), 6) + 0.0  # no -0
 
 
 def _names(p: Parameters, legs: Integers) -> str:
