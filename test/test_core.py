@@ -118,7 +118,8 @@ def test_without_the_condition_number_the_rest_has_the_same_bits() -> None:
 
 @pytest.mark.skipif(COMPILER is None, reason='needs a C compiler')
 def test_structures_are_laid_out_as_the_compiler_lays_them_out(tmp_path: Path) -> None:
-    text = (CORE / 'stewart_dynamics.h').read_text() + (CORE / 'library.h').read_text()
+    text = ''.join((CORE / name).read_text() for name in (
+        'stewart_dynamics.h', 'control.h', 'library.h'))
     names = re.findall(r'^\}? ?.*\} (\w+);$|^  (\w+);$', text, re.MULTILINE)
     listed = [a or b for a, b in names if re.search(rf'\b{a or b};', text)]
     assert {'stewart_platform', 'stewart_output', 'one_plant', 'setpoint'} <= set(listed)

@@ -11,6 +11,7 @@ from referees import Array, random_motion, random_parameters, rng, rotation_abou
 from snapshot import Snapshot
 
 from stewart_dynamics import ParameterError, Parameters, Pose, StewartPlatform
+from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
 from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, JOINTS, TreeJoints
 
 PROGRAM = 'stewart_describe'
@@ -144,3 +145,21 @@ def test_two_joints_of_the_same_name_are_rejected(snapshot: Snapshot) -> None:
         TreeJoints(p.replaced({'joints': ['platform_x', 'b', 'c', 'd', 'e', 'f']}))
     with snapshot.raises(ParameterError):
         TreeJoints(p.replaced({'joints': ['a', 'a_universal_x', 'c', 'd', 'e', 'f']}))
+
+
+@pytest.mark.parametrize('flat', [0.0, 1e-9, 0.3])
+def test_level_axes_are_the_principal_axes(flat: float) -> None:
+    """The normal is the eigenvector of the smallest moment, here by LAPACK; exact in a plane."""
+    random = rng(11)
+    for n in range(200):
+        turn = np.eye(3)[random.permutation(3)] if n % 2 else rotation_about(
+            random.normal(size=3), random.uniform(0.0, 3.0))
+        points = (random.normal(size=(6, 3)) * [1.0, 1.2, flat]) @ turn.T * 10.0 ** (n % 7 - 3)
+        axes = level_axes(points - points.mean(axis=0))
+        around = points - points.mean(axis=0)
+        normal = np.linalg.eigh(around.T @ around)[1][:, 0]
+        assert abs(abs(axes[2] @ normal) - 1.0) < 1e-12
+        assert np.abs(axes @ axes.T - np.eye(3)).max() < 1e-14
+        assert np.linalg.det(axes) > 0.0 and np.argmax(np.abs(axes[2])) == np.argmax(axes[2])
+        if n % 2 and not flat:
+            assert np.array_equal(axes[2], np.abs(turn[:, 2]))

@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import importlib.util
+import json
 import math
 from pathlib import Path
 import re
@@ -15,6 +17,7 @@ import sys
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from governed import limited_hexapod
 import numpy as np
 import pytest
 from referees import random_motion, random_wrench, rng
@@ -26,6 +29,7 @@ from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.parameters.table import UNIVERSAL
 from stewart_dynamics.setpoints.step import Batch, Step
+from test_circles import CIRCLES
 from test_export import limited
 import yaml
 
@@ -46,7 +50,7 @@ def test_feed_forward(c: str, cpp: str, tmp_path: Path) -> None:
     checked = ['-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all'
                ] if c == 'gcc' else ['-O0']
     program = tmp_path / 'feed_forward_test'
-    subprocess.run([c, '-std=c99', *checked, '-c', C_SOURCE / 'stewart_dynamics.c',
+    subprocess.run([c, '-std=c99', *checked, '-c', C_SOURCE / 'control.c',
                     '-o', tmp_path / 'c.o'], check=True)
     subprocess.run([
         cpp, '-std=c++17', '-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror',
@@ -76,13 +80,20 @@ READERS = r"""
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <iomanip>
 #include <istream>
 #include <string>
 #include <vector>
 
 namespace stewart_dynamics_controller
 {
-inline void read(std::istream & text, std::string & value) {text >> value;}
+inline void read(std::istream & text, std::string & value) {text >> std::quoted(value);}
+inline void read(std::istream & text, bool & value)
+{
+  std::string word;
+  text >> word;
+  value = word == "true";
+}
 inline void read(std::istream & text, double & value)
 {
   std::string word;
@@ -159,27 +170,57 @@ def as_text(parameters: Parameters, changes: dict[str, Any] | None = None) -> st
         values = list(np.ravel(value))
         if kind != declaration['type']:
             words.append(str(len(values)))
-        words += [float(each).hex() if kind == 'double' else str(each) for each in values]
+        words += [float(each).hex() if kind == 'double' else json.dumps(
+            bool(each) if kind == 'bool' else str(each)) for each in values]
     return '\n'.join(words) + '\n'
+
+
+CHECKED = '-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all'
+
+
+def compiled(folder: Path, source: str, options: Sequence[str] = CHECKED) -> Path:
+    """Return the program of a source in C++ with the hexapod of the controller's parameters."""
+    if not shutil.which('gcc') or not shutil.which('g++'):
+        pytest.skip('needs gcc and g++')
+    (folder / NAME).mkdir()
+    (folder / NAME / f'{NAME}_parameters.hpp').write_text(parameters_header())
+    subprocess.run(['gcc', '-std=c99', '-Wall', '-Wextra', '-Wpedantic', '-Werror', *options,
+                    '-c', C_SOURCE / 'control.c', '-o', folder / 'c.o'], check=True)
+    subprocess.run(
+        ['g++', '-std=c++17', '-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow',
+         '-Werror', *options, f'-I{folder}', f'-I{C_SOURCE}', f'-I{PACKAGE / "include"}',
+         folder / 'c.o', PACKAGE / 'src' / 'hexapod.cpp', PACKAGE / 'src' / 'feed_forward.cpp',
+         ROOT / 'test' / source, '-o', folder / 'program'], check=True)
+    return folder / 'program'
 
 
 @pytest.fixture(scope='module')
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the program that steps the hexapod of the controller's parameters."""
-    if not shutil.which('gcc') or not shutil.which('g++'):
-        pytest.skip('needs gcc and g++')
-    folder = tmp_path_factory.mktemp('hexapod')
-    (folder / NAME).mkdir()
-    (folder / NAME / f'{NAME}_parameters.hpp').write_text(parameters_header())
-    checked = ['-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all']
-    subprocess.run(['gcc', '-std=c99', *checked, '-c', C_SOURCE / 'stewart_dynamics.c',
-                    '-o', folder / 'c.o'], check=True)
-    subprocess.run(
-        ['g++', '-std=c++17', '-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow',
-         '-Werror', *checked, f'-I{folder}', f'-I{C_SOURCE}', f'-I{PACKAGE / "include"}',
-         folder / 'c.o', PACKAGE / 'src' / 'hexapod.cpp', PACKAGE / 'src' / 'feed_forward.cpp',
-         ROOT / 'test' / 'hexapod_steps.cpp', '-o', folder / 'steps'], check=True)
-    return folder / 'steps'
+    return compiled(tmp_path_factory.mktemp('hexapod'), 'hexapod_steps.cpp')
+
+
+def assert_steps(program: Path, p: Parameters, random: np.random.Generator, count: int) -> Any:
+    """Compare all numbers of steps in random motions with the node's; return the records."""
+    motions = random_motion(p, random, count).rows
+    wrenches = random_wrench(p, random, count)
+    stamps = np.cumsum(random.choice([10_000_000, 300_000_000], count))
+    rows = [f'{stamp}\n' + '\n'.join(map(float.hex, (*motion, *wrench)))
+            for stamp, motion, wrench in zip(
+                stamps.tolist(), motions.tolist(), wrenches.tolist(), strict=True)]
+    text = '\n'.join([as_text(p) + str(count), *rows])
+    done = subprocess.run([program], input=text.encode(), capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b'')
+    found = np.frombuffer(done.stdout, record('stewart_output'))
+    outputs = Step(p)(Batch.of(stamps, motions, wrenches))
+    expected = outputs.records.copy()
+    # Without forces: those of C are zero, those of Python nan.
+    unknown = ~outputs.with_forces
+    expected['forces'][unknown] = expected['motors']['commands'][unknown] = 0.0
+    assert outputs.solvable.all()
+    for name in OUTPUT_FIELDS:
+        assert found[name].tobytes() == expected[name].tobytes(), name
+    return found
 
 
 def test_steps_have_the_bits_of_the_node(program: Path) -> None:
@@ -192,34 +233,33 @@ def test_steps_have_the_bits_of_the_node(program: Path) -> None:
         if random.random() < 0.5:
             p = p.replaced({'payload.mass': 40.0, 'payload.center_of_mass': [0.1, -0.1, 0.3],
                             'payload.inertia': [2.0, 0.1, 0.2, 3.0, -0.1, 4.0]})
-        if p.drive.screw_rotation == UNIVERSAL:
-            axes = random.permuted(np.full((6, 2), [0.6, 0.8]), axis=1)
-            p = p.replaced(dict.fromkeys(
+        if p.drive.screw_rotation == UNIVERSAL and random.random() < 0.5:
+            axes = random.normal([2.0, 0.5, 0.0], 0.3, (2, 6, 3))
+            p = p.replaced(dict(zip(
                 ('drive.base_universal_axes', 'drive.platform_universal_axes'),
-                np.column_stack([axes, np.zeros(6)]).ravel()))
-        motions = random_motion(p, random, count).rows
-        wrenches = random_wrench(p, random, count)
-        stamps = np.cumsum(random.choice([10_000_000, 300_000_000], count))
-        rows = [f'{stamp}\n' + '\n'.join(map(float.hex, (*motion, *wrench)))
-                for stamp, motion, wrench in zip(
-                    stamps.tolist(), motions.tolist(), wrenches.tolist(), strict=True)]
-        text = '\n'.join([as_text(p) + str(count), *rows])
-        done = subprocess.run([program], input=text.encode(), capture_output=True, check=False)
-        assert (done.returncode, done.stderr) == (0, b'')
-        found = np.frombuffer(done.stdout, record('stewart_output'))
-        outputs = Step(p)(Batch.of(stamps, motions, wrenches))
-        expected = outputs.records.copy()
-        # Without forces: those of C are zero, those of Python nan.
-        unknown = ~outputs.with_forces
-        expected['forces'][unknown] = expected['torques'][unknown] = 0.0
-        expected['motors']['commands'][unknown] = 0.0
-        assert outputs.solvable.all()
-        for name in OUTPUT_FIELDS:
-            assert found[name].tobytes() == expected[name].tobytes(), name
+                axes.reshape(2, 18), strict=True)))
+        found = assert_steps(program, p, random, count)
         seen |= {bits for bits in OF_ALL if (found['exceeded'] & bits).any()}
         if np.isfinite(found['motors']['commands']).all():
             seen.add('motors')
     assert seen == {*OF_ALL, 'motors'}
+
+
+def test_circles_and_axes_of_the_home_pose_have_the_bits_of_the_node(program: Path) -> None:
+    """Joints on circles, and joint axes along the legs at home, on both sides of the base."""
+    random, exceeded, sides = rng(56), 0, set()
+    for n in range(30):
+        p, count = limited_hexapod(random, 'all')[0], 20
+        side = str(random.choice(['auto', 'positive', 'negative']))
+        p = p.replaced({'geometry.platform_side': side, **(  # n odd: points in no plane
+            {} if n % 2 else {**CIRCLES, 'geometry.base_height': random.normal()})})
+        found = assert_steps(program, p, random, count)
+        exceeded |= int(np.bitwise_or.reduce(found['exceeded'], axis=None))
+        sides.add(side)
+        assert np.isfinite(found['base_joint_angles']).all()
+    assert len(sides) == 3
+    for name in ('limits.base_joint_angle_max', 'limits.platform_joint_angle_max'):
+        assert exceeded & LIMITS[name].bit
 
 
 @pytest.mark.parametrize(('changes', 'message'), [
@@ -231,14 +271,31 @@ def test_steps_have_the_bits_of_the_node(program: Path) -> None:
      'actuator.screw_lead: not set: needed by drive.*: leg or plate 1'),
     ({'drive.torque_speed': [1.0, 2.0, 3.0], 'actuator.screw_lead': [0.01]},
      'drive.torque_speed: must have 2 numbers for each of at most 96 points, has 3'),
-    ({'drive.screw_rotation': 'universal', 'actuator.screw_lead': [0.01]},
-     'drive.base_universal_axes, drive.platform_universal_axes: must be set: needed by '
-     'drive.screw_rotation: universal'),
+    ({'drive.screw_rotation': 'universal', 'actuator.screw_lead': [0.01],
+      'drive.platform_universal_axes': [
+          1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -0.4, 0.9, *[1.0, 0.0, 0.0] * 3]},
+     'drive.platform_universal_axes: along the leg at the home pose: must be across it: leg 3'),
     ({'geometry.base_outline': [0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 'legs.piston.radius': [0.02]},
      'geometry.base_outline, geometry.platform_outline: must have three corners or more: leg or '
      'plate 1'),
-    ({'limits.base_joint_angle_max': [0.5]},
-     'geometry.base_joint_axes: must be set: needed by limits.base_joint_angle_max'),
+    ({'limits.base_joint_angle_max': [0.5], 'limits.length_max': [],
+      'geometry.zero_length': [9e9]},
+     'home pose: limits.length_min and limits.length_max, or geometry.zero_length, must give a '
+     'length that the legs can have in a level pose: needed without geometry.base_joint_axes'),
+    ({'limits.base_joint_angle_max': [0.5], 'limits.length_max': [0.71]},
+     'home pose: no level pose has all legs between limits.length_min and limits.length_max: '
+     'needed without geometry.base_joint_axes'),
+    ({'geometry.base_joints': []},
+     'geometry.base_joints: must be set, as points or by their circle'),
+    ({'geometry.base_radius': 0.9},
+     'geometry.base_joints: given as well as geometry.base_radius, _angles or _height: leave out '
+     'the points or the circle'),
+    ({'geometry.base_joints': [], 'geometry.base_radius': 0.9},
+     'geometry.base_angles: not set: needed by geometry.base_radius'),
+    ({'geometry.platform_joints': [], 'geometry.platform_angles': [1.0] * 6},
+     'geometry.platform_radius: not set: needed by geometry.platform_angles'),
+    ({'geometry.base_joints': [], 'geometry.base_radius': 0.9, 'geometry.base_angles': [90.0] * 6},
+     'geometry.base_angles: must be within -2 pi and 2 pi: in degrees?'),
     ({'command_interfaces': ['torque']}, 'actuator.screw_lead: not set: needed by torque, '
      'torque_per_mille and motor_velocity in command_interfaces'),
     ({'command_interfaces': ['torque_per_mille'], 'actuator.screw_lead': [0.01]},

@@ -24,9 +24,10 @@ from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.legs import KINDS, TELESCOPIC
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
+from stewart_dynamics.parameters.circles import circle_names
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import BY_IMU, FIXED, Parameters
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.consistency import (
     DELAY, DELAY_IN_SAMPLES, PERIOD, PERSISTENT, SHARE, SLOWEST, TICK, TOLERANCE, WEAKEST)
@@ -51,18 +52,27 @@ CONTROLLER = (
                        'motor_velocity')),
     Parameter('initial_pose', 'double', 'x y z alpha beta gamma near which the platform is when '
               'the controller starts; required where reference is legs', 'm, rad', (),
-              sizes=(6,)))
+              sizes=(6,)),
+    Parameter('governor', 'bool', 'hold what references of the platform demand within all limits, '
+              'so that a stop always exists', default=False),
+    Parameter('base.source', 'string', 'how the base moves: not at all, or as an IMU on it '
+              'measures', '', FIXED, choices=(FIXED, BY_IMU)),
+    Parameter('imu_sensor', 'string', 'sensor whose state interfaces angular_velocity.x .. and '
+              'linear_acceleration.x .. are the readings where base.source is imu', '', ''))
 
 PAYLOAD = {each: f'payload.{each}' for each in ('mass', 'center_of_mass', 'inertia')}
 # Parameters of the node that the controller reads: all that the structure in C holds of telescopic
-# legs. It rejects other kinds by their markers.
+# legs, the circles and the side of the platform from which parts of it follow, and the IMU. It
+# rejects other kinds of legs by their markers.
 CONTROLLER_NAMES = ('joints', 'base_frame', *(
     name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, TELESCOPIC.fields, LISTS)
     for name in fields.values()
     if name != 'setpoint.sync_tolerance' and not name.startswith(TELESCOPIC.foreign)),
-    *(kind.marker for kind in KINDS if kind.marker),
+    *(kind.marker for kind in KINDS if kind.marker), *circle_names('base'),
+    *circle_names('platform'), 'geometry.platform_side',
     'drive.rated_torque', 'drive.screw_rotation', 'drive.screw_hand', 'singularity.action',
-    'limits.action')
+    'limits.action', 'base.source', 'base.timeout', 'base.imu.position', 'base.imu.orientation',
+    'base.imu.cutoff')
 
 # Those that are set first; legs.* stands for the two parts of a leg.
 FIRST = ('joints', 'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',
@@ -140,7 +150,7 @@ def controller_parameters() -> str:
     """
     document: dict[str, Any] = {}
     own = {parameter.name: parameter for parameter in CONTROLLER}
-    for name in (*CONTROLLER_NAMES, *own):
+    for name in dict.fromkeys((*CONTROLLER_NAMES, *own)):
         parameter = own.get(name) or Parameters.table[name]
         section = document
         *sections, last = name.split('.')
@@ -158,19 +168,21 @@ def _declaration(parameter: Parameter) -> dict[str, Any]:
     array = bool(parameter.sizes)
     fields: dict[str, Any] = {
         'type': parameter.kind + '_array' * array, 'description': f'{parameter.text}{unit}'}
+    required = parameter.required and not parameter.instead
     if parameter.default is not None:
         fields['default_value'] = list(parameter.default) if array else parameter.default
-    elif not parameter.required:
+    elif array and not required:
+        fields['default_value'] = []  # not set: others are given in its place
+    elif not required:
         fields['default_value'] = math.nan  # not set
     if not parameter.while_active:
         fields['read_only'] = True
     rules: dict[str, Any] = {}
-    if len(parameter.sizes) == 1 and (parameter.required or parameter.default):
+    if len(parameter.sizes) == 1 and (required or parameter.default):
         rules['fixed_size<>'] = [parameter.sizes[0]]
     if parameter.choices:
         rules['subset_of<>' if array else 'one_of<>'] = [list(parameter.choices)]
-    if parameter.minimum > -math.inf and parameter.default is not None or parameter.required and (
-            parameter.minimum > -math.inf):
+    if parameter.minimum > -math.inf and (parameter.default is not None or required):
         rules['lower_element_bounds<>' if array else 'gt<>' if parameter.above else 'gt_eq<>'] = [
             parameter.minimum]
     if rules:

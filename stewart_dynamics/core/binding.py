@@ -61,7 +61,7 @@ class Rule(NamedTuple):
     text: str
 
 
-_HEADERS = header('stewart_dynamics.h') + header('library.h')
+_HEADERS = ''.join(map(header, ('stewart_dynamics.h', 'control.h', 'library.h')))
 LIMIT_ROWS = tuple(
     LimitRow(int(bit), name, field, depends, quantity, kind)
     for kind, bit, name, field, depends, quantity in re.findall(

@@ -63,8 +63,8 @@ static real crank_arctangent(real y, real x) {
 
 /* Return the angle within pi of the middle of the allowed ones. */
 static real crank_angle(const stewart_leg * leg, const crank_pose * at) {
-  double turns = 2.0 * PI * rint(leg->middle_angle / (2.0 * PI));
-  double middle = leg->middle_angle - turns;
+  double turns = 2.0 * PI * rint(leg->home_position / (2.0 * PI));
+  double middle = leg->home_position - turns;
   real q = crank_arctangent(at->sine, at->cosine);
   q = choose(q > middle + PI, q - 2.0 * PI, choose(q < middle - PI, q + 2.0 * PI, q));
   return q + turns;
@@ -239,8 +239,8 @@ static void crank_complete(stewart_leg * leg) {
   if (leg->motor_inertia > 0.0) {
     leg->reflected_mass = leg->gear_ratio * leg->gear_ratio * leg->motor_inertia;
   }
-  leg->middle_angle = 0.5 * (leg->angle_min + leg->angle_max);
-  if (!isfinite(leg->middle_angle)) {leg->middle_angle = 0.0;}
+  leg->home_position = 0.5 * (leg->angle_min + leg->angle_max);
+  if (!isfinite(leg->home_position)) {leg->home_position = 0.0;}
   put_unit(leg->crank_axis);
   vector z = read3(leg->crank_direction), u = read3(leg->crank_axis);
   double across = dot(z, u);

@@ -20,6 +20,20 @@
 #define CURVATURE 0.1      /* accelerations between two setpoints exceed both by this share */
 #define NEGLIGIBLE 1e-10   /* difference between setpoints [m, rad] */
 #define LARGEST 1e9        /* coordinate of a demand, or derivative of it, that is followed */
+/* Margins: of lengths a part of the stroke; of forces, torques and the condition number, which
+   change fastest between two samples, and of the other limits, parts of themselves. That of the
+   clearance, and of lengths without a stroke, is a part of the characteristic length. */
+#define OF_STROKE 0.005
+#define OF_LOADS 0.03
+#define OF_OTHERS 0.02
+#define OF_SIZE 0.003
+/* A stop from velocity_max needs this part of the stroke, where its rate is between two bounds
+   [1/s]; the third is the rate without these limits. */
+#define STOP_IN 0.15
+#define SLOWEST_STOP 5.0
+#define FASTEST_STOP 50.0
+#define USUAL_STOP 10.0
+#define RETURN_RATE 2.0    /* with which the deviation from the demand vanishes [1/s] */
 
 /* Times of the samples of a stop, times its rate, first those that find most. The rate that the
    present acceleration leads to peaks at 1 to 1.3, with the curvature k^2: samples 0.18 apart miss
@@ -37,6 +51,124 @@ typedef struct {
   stewart_motion motions[STOP_SAMPLES];
   stewart_result results[STOP_SAMPLES];  /* without condition numbers */
 } stop_samples;
+
+/* ---- the limits that are kept --------------------------------------------------------------- */
+
+/* The torque of a curve at a speed, as numpy.interp has it. */
+static double interpolate(int count, const double (* curve)[2], double speed) {
+  for (int n = 0; n < count; n++) {
+    const double * b = curve[n], * a = n > 0 ? curve[n - 1] : b;
+    if (speed < b[0] && n > 0) {
+      return speed == a[0] ? a[1] : (b[1] - a[1]) / (b[0] - a[0]) * (speed - a[0]) + a[1];
+    }
+    if (speed < b[0]) {return b[1];}
+  }
+  return curve[count - 1][1];
+}
+
+/* Write the lowest torques of a torque-speed curve, margins of speed around. */
+static void put_lowest_nearby(const stewart_platform * platform, stewart_platform * within) {
+  const double near[2] = {1.0 - OF_OTHERS, 1.0 / (1.0 - OF_OTHERS)};
+  const double (* curve)[2] = platform->torque_speed;
+  double (* lowest)[2] = within->torque_speed;
+  int count = platform->n_torque_speed, found = 0;
+  int most = (int)(sizeof within->torque_speed / sizeof within->torque_speed[0]);
+  for (int n = 0; n < 3 * count; n++) {
+    double part = n < count ? 1.0 : near[n / count - 1], speed = curve[n % count][0] * part;
+    int place = 0;
+    while (place < found && lowest[place][0] < speed) {place++;}
+    if (!(speed <= near[0] * curve[count - 1][0]) || found == most ||
+        (place < found && lowest[place][0] == speed)) {continue;}
+    memmove(lowest[place + 1], lowest[place], (size_t)(found - place) * sizeof lowest[0]);
+    lowest[place][0] = speed, found++;
+  }
+  for (int n = 0; n < found; n++) {
+    double low = lowest[n][0] * near[0], high = lowest[n][0] * near[1];
+    double torque = least(interpolate(count, curve, low), interpolate(count, curve, high));
+    for (int k = 0; k < count; k++) {
+      if (low < curve[k][0] && curve[k][0] < high) {torque = least(torque, curve[k][1]);}
+    }
+    lowest[n][1] = torque * (1.0 - OF_LOADS);
+  }
+  within->n_torque_speed = found;
+}
+
+/* Give the limits of a leg their margins. */
+static void put_margins(
+  const stewart_platform * platform, int i, stewart_leg * leg, governor_limits * limits) {
+  double low = leg->length_min, high = leg->length_max, size = platform->characteristic_length;
+  int count = platform->n_torque_speed;
+  double stroke = low > 0.0 && isfinite(high) ? high - low : 0.0;
+  limits->length_margin[i] = stroke > 0.0 ? OF_STROKE * stroke : OF_SIZE * size;
+  limits->base_angle_margin[i] =
+    isinf(leg->base_joint_angle_max) ? 0.0 : OF_OTHERS * leg->base_joint_angle_max;
+  limits->platform_angle_margin[i] =
+    isinf(leg->platform_joint_angle_max) ? 0.0 : OF_OTHERS * leg->platform_joint_angle_max;
+#define BOUND(bit, NAME, field, DEPENDS, quantity)
+#define MAGNITUDE(bit, NAME, field, DEPENDS, quantity) \
+  leg->field *= DEPENDS == LOAD ? 1.0 - OF_LOADS : DEPENDS == TWIST ? 1.0 - OF_OTHERS : 1.0;
+  STEWART_LIMITS(BOUND, BOUND, MAGNITUDE)
+#undef BOUND
+#undef MAGNITUDE
+  leg->length_min += limits->length_margin[i], leg->length_max -= limits->length_margin[i];
+  leg->base_joint_angle_max -= limits->base_angle_margin[i];
+  leg->platform_joint_angle_max -= limits->platform_angle_margin[i];
+  leg->torque_max *= 1.0 - OF_LOADS;
+  /* There is no torque beyond the torque-speed curve. */
+  leg->speed_max = (1.0 - OF_OTHERS) * least(
+    leg->speed_max, count > 0 ? platform->torque_speed[count - 1][0] : HUGE_VAL);
+  /* Friction changes its sign where a leg reverses between two samples. */
+  double change = 2.0 * leg->coulomb_friction;
+  leg->force_max -= change;
+  limits->friction_torque[i] = platform->with_motors
+    ? change / leg->motor_ratio * largest(1.0 / leg->efficiency, 1.0) : 0.0;
+  leg->loss_velocity = HUGE_VAL;  /* breakaway torques at any rate, as if it could reverse */
+}
+
+/* The rate of a stop [1/s]. */
+static double stop_rate_of(const stewart_platform * platform) {
+  double rate = 0.0;
+  for (int i = 0; i < 6; i++) {
+    const stewart_leg * leg = &platform->legs[i];
+    if (!(leg->length_min > 0.0 && isfinite(leg->length_max) && isfinite(leg->velocity_max))) {
+      return USUAL_STOP;
+    }
+    rate = largest(rate, leg->velocity_max / (leg->length_max - leg->length_min));
+  }
+  return least(largest(2.0 * rate / STOP_IN, SLOWEST_STOP), FASTEST_STOP);
+}
+
+void put_governor(
+  const stewart_platform * platform, const stewart_pose * home, const double * head,
+  stewart_platform * within, governor_limits * limits) {
+  stewart_motion at_home;
+  stewart_result result;
+  memset(&at_home, 0, sizeof at_home), memset(limits, 0, sizeof *limits);
+  memcpy(&at_home, home, sizeof *home);
+  *within = *platform;
+  limits->home = *home;
+  put3(limits->head, read3(head));
+  limits->stop_rate = stop_rate_of(platform), limits->return_rate = RETURN_RATE;
+  limits->stop_condition = least(platform->stop_condition, UNSOLVABLE_CONDITION);
+  limits->condition_max = (1.0 - OF_LOADS) * limits->stop_condition;
+  limits->clearance_margin = OF_SIZE * platform->characteristic_length;
+  within->leg_clearance_min += limits->clearance_margin;
+  for (int i = 0; i < 6; i++) {
+    vector joint = read3(platform->legs[i].platform_joint);
+    limits->arms[i] = norm(subtract(joint, read3(head))), limits->radii[i] = norm(joint);
+    limits->reach = largest(limits->reach, limits->arms[i]);
+    put_margins(platform, i, &within->legs[i], limits);
+  }
+  for (int n = 0; platform->with_clearance && n < platform->n_platform_outline; n++) {
+    vector corner = read3(platform->platform_outline[n]);
+    limits->reach = largest(limits->reach, norm(subtract(corner, read3(head))));
+  }
+  if (platform->n_torque_speed > 0) {put_lowest_nearby(platform, within);}
+  solve_unloaded(within, 1, &at_home, &result);
+  limits->side = copysign(1.0, result.determinant);
+}
+
+/* ---- motions and coordinates ---------------------------------------------------------------- */
 
 /* A hexapod whose limits have the margins of a governor, and what else that keeps. */
 typedef struct {
@@ -108,6 +240,52 @@ static void put_motion(
     }
   }
 }
+
+/* The rates of the angles of a rotation that turns with w: E^-1 w. */
+static vector euler_rates(const double angles[3], vector w) {
+  double cb = cos(angles[1]), sb = sin(angles[1]), cg = cos(angles[2]), sg = sin(angles[2]);
+  double alpha_rate = (cg * w.x + sg * w.y) / cb;
+  return make(alpha_rate, cg * w.y - sg * w.x, w.z + sb * alpha_rate);
+}
+
+void coordinates_of(
+  const governor_limits * g, int64_t count, const stewart_motion * motions,
+  coordinates * states) {
+  const double * home = g->home.rotation;
+  vector head = read3(g->head);
+  for (int64_t n = 0; n < count; n++) {
+    const stewart_motion * motion = &motions[n];
+    coordinates * to = &states[n];
+    double r[9];
+    for (int k = 0; k < 9; k++) {
+      r[k] = dot(column(home, k / 3), column(motion->rotation, k % 3));
+    }
+    vector velocity = rotate_back(home, read3(motion->linear_velocity));
+    vector acceleration = rotate_back(home, read3(motion->linear_acceleration));
+    vector w = rotate_back(home, read3(motion->angular_velocity));
+    vector wd = rotate_back(home, read3(motion->angular_acceleration));
+    vector arm = rotate(r, head), turning = cross(w, arm);
+    vector way = rotate_back(home, subtract(read3(motion->position), read3(g->home.position)));
+    double * angles = &to->value[3];
+    angles[2] = atan2(r[3], r[0]);
+    double cg = cos(angles[2]), sg = sin(angles[2]);
+    angles[0] = atan2(sg * r[2] - cg * r[5], cg * r[4] - sg * r[1]);
+    angles[1] = atan2(-r[6], hypot(r[0], r[3]));
+    double cb = cos(angles[1]), sb = sin(angles[1]);
+    vector rates = euler_rates(angles, w);
+    double da = rates.x, db = rates.y, dc = rates.z;
+    /* E' angles' */
+    vector carried = {
+      -(sg * cb * dc + cg * sb * db) * da - cg * dc * db,
+      (cg * cb * dc - sg * sb * db) * da - sg * dc * db, -cb * db * da};
+    put3(to->value, subtract(add(way, arm), head));
+    put3(to->rate, add(velocity, turning)), put3(&to->rate[3], rates);
+    put3(to->acceleration, add(add(acceleration, cross(wd, arm)), cross(w, turning)));
+    put3(&to->acceleration[3], euler_rates(angles, subtract(wd, carried)));
+  }
+}
+
+/* ---- what a state and the stop from it exceed ------------------------------------------------ */
 
 /* The lowest of some bits, counted from 1; 0 if there is none. */
 static int lowest(unsigned bits) {
@@ -293,8 +471,6 @@ static int overloads(
 
 /* The limit, counted from 1, that a state or the stop from it exceeds, 0 if none. */
 static int inadmissible(const governed * on, const coordinates * state) {
-  static const double no_wrench[6] = {0.0};
-  static const stewart_base still = {{NAN, NAN, NAN}, {0.0}, {0.0}, {0.0}};
   const stewart_platform * platform = on->platform;
   const int checked[KINDS] = {1, platform->with_joint_angles, platform->with_clearance, 1};
   double rate = on->limits->stop_rate;
@@ -306,8 +482,7 @@ static int inadmissible(const governed * on, const coordinates * state) {
       coordinates at = stopped(state, rate, stop_times[n] / rate);
       put_motion(on->limits, &at, &stop.motions[n]);
     }
-    solve_many(platform, SAMPLES_AT_ONCE, &stop.motions[first], 1, no_wrench, 1, &still, 0,
-               NUMBERS(stewart_result), (double *)&stop.results[first]);
+    solve_unloaded(platform, SAMPLES_AT_ONCE, &stop.motions[first], &stop.results[first]);
     for (int n = first; n < first + SAMPLES_AT_ONCE && !found; n++) {
       found = overloads(on, &stop.motions[n], &stop.results[n]);
     }

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * The functions of library.h, compiled with stewart_dynamics.c as one piece: they share its
+ * The functions of library.h and control.h, compiled with stewart_dynamics.c as one piece: they share its
  * functions for one leg, one platform, one matrix. Each file has a part of them.
  */
 
@@ -78,6 +78,16 @@ int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
   return all_finite(result, sizeof *result) && result->condition_number < UNSOLVABLE_CONDITION;
 }
 
+/* Write the results of motions without load on a base at rest, without condition numbers. */
+static void solve_unloaded(
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  stewart_result * results) {
+  static const double no_wrench[6] = {0.0};
+  static const stewart_base still = {{NAN, NAN, NAN}, {0.0}, {0.0}, {0.0}};
+  solve_many(platform, count, motions, 1, no_wrench, 1, &still, 0,
+             NUMBERS(stewart_result), (double *)results);
+}
+
 #include "legs.c"
 #include "kinematics.c"
 #include "dynamics.c"
@@ -85,6 +95,8 @@ int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
 #include "setpoints.c"
 #include "messages.c"
 #include "plant.c"
+#include "home.c"
+#include "imu.c"
 #include "governor.c"
 #include "cueing.c"
 #include "records.c"

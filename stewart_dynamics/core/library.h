@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * The functions that Python calls beside those of stewart_dynamics.h, for many samples.
+ * The functions that Python calls beside those of stewart_dynamics.h and control.h, for many
+ * samples.
  *
  * An array has a structure, or the numbers named, for each of `count` samples. `wrenches` and
  * `bases` have one for each or, where n_wrenches or n_bases is 1, one for all; a base with gravity
@@ -12,7 +13,7 @@
 #ifndef STEWART_LIBRARY_H
 #define STEWART_LIBRARY_H
 
-#include "stewart_dynamics.h"
+#include "control.h"
 
 /* A setpoint. Flags are 0 or 1. */
 typedef struct {
@@ -76,39 +77,6 @@ typedef struct {
   stewart_motors motors;
 } one_plant;
 
-/* Coordinates of a governed motion, with their derivatives: displacement of the head, and angles of
-   R = Rz Ry Rx, both from home and in its axes [m, rad]. */
-typedef struct { double value[6], rate[6], acceleration[6]; } coordinates;
-
-/* Where governor_state.held has the singularity; bit n of stewart_output.exceeded is there n. */
-enum { GOVERNED_SINGULARITY = 24 };
-
-/* What a governor keeps besides the limits of the platform's legs: see mechanics/governor.py. All
-   have its margins, which stand here by themselves for lengths, clearance [m] and angles [rad]. */
-typedef struct {
-  stewart_pose home;
-  double head[3];                     /* platform frame [m] */
-  double stop_rate, return_rate;      /* of the stop, and of the return to the demand [1/s] */
-  double friction_torque[6];          /* change of the torque where the leg reverses [N m] */
-  double condition_max, side;         /* side: sign of det(J) at home */
-  double stop_condition;              /* without a margin */
-  double arms[6], radii[6], reach;    /* distances of platform joints from the head, and from the
-                                         origin; of the farthest part from the head [m] */
-  double length_margin[6], base_angle_margin[6], platform_angle_margin[6], clearance_margin;
-} governor_limits;
-
-/* A governed motion, all zero at rest at home; following: it is the demand. */
-typedef struct {
-  coordinates now;
-  double share[6];                    /* of the demand, at last */
-  double held[25];                    /* time in which each limit held the demand back [s] */
-  double following;
-  double stopping;                    /* it is brought to rest, whatever the demand is */
-} governor_state;
-
-/* A governed stream, with its last demand. */
-typedef struct { double time; coordinates demand; governor_state governor; } governed_stream;
-
 /* Washout filters; surge sway heave, or roll pitch yaw: see cueing/motion_cueing.py. */
 typedef struct {
   double translation_gain[3], translation_frequency[3], translation_damping[3];
@@ -126,17 +94,6 @@ typedef struct {
   double rotation[3];
   governor_state governor;
 } cueing_state;
-
-/* The limit, counted from 1, that a governed state or the stop from it exceeds; 0 if none. */
-int64_t governed_limit(
-  const stewart_platform * platform, const governor_limits * limits, const coordinates * state);
-
-/* Motions (count,) that follow demands (count,) at times [s] as far as the limits let them; the
-   first is the state of the stream. */
-void govern_many(
-  const stewart_platform * platform, const governor_limits * limits, int64_t count,
-  const double * times, const coordinates * demands, governed_stream * stream,
-  stewart_motion * motions);
 
 /* Motions (count,) at times [s] of inputs (count, 6), acceleration and angular velocity of the
    vehicle, linear between the times; the state is the one before, of an earlier time, and then the

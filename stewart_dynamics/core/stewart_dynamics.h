@@ -135,9 +135,12 @@ typedef struct {
   double motor_ratio, pitch, driving_loss, driven_loss, loss_velocity;
   /* Of a crank: the rod as two points with a coupling, at the crank and at the platform [kg]; the
    * moment of mass along e and n [kg m] and the inertia [kg m^2] of the crank and the point at its
-   * end, about the base joint; the middle of the allowed angles [rad]. */
+   * end, about the base joint. */
   double crank_end_mass, coupling_mass, platform_end_mass;
-  double turning_moment[2], turning_inertia[6], middle_angle;
+  double turning_moment[2], turning_inertia[6];
+  /* Position of the drive at home: halfway between its limits, if it has both; else zero_length, or
+   * the angle 0. */
+  double home_position;
 } stewart_leg;
 
 /* A hexapod, constant while it is used: all that the parameter file says of its forces.

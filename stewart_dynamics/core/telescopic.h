@@ -225,6 +225,8 @@ static void telescopic_complete(stewart_leg * leg) {
       ratio * ratio * (leg->motor_inertia + leg->screw_inertia / (gear * gear));
   }
   leg->motor_ratio = ratio;
+  leg->home_position = leg->length_min > 0.0 && isfinite(leg->length_max)
+    ? 0.5 * (leg->length_min + leg->length_max) : leg->zero_length;
   leg->pitch = leg->twist_ratio == 0.0 ? 0.0 :
     leg->twist_ratio * leg->screw_lead / (2.0 * PI * gear);
 }

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -14,10 +14,12 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.legs import crank_mistakes
-from stewart_dynamics.legs.kind import AtHome, HomeLegs, LegKind, LegMass, Named
+from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
+from stewart_dynamics.legs.kind import AtHome, LegKind, LegMass, Named
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
+from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
+from stewart_dynamics.legs.tree import LegBranch
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -61,6 +63,13 @@ class Crank(LegKind):
     massless = {
         'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
         'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
+    parts, joints = tree.PARTS, (HINGE, UNIVERSAL)
+    elements = (
+        'actuator.reflected_inertia', 'actuator.viscous_friction', 'actuator.coulomb_friction',
+        AXES, DIRECTIONS, *(f'legs.{part}.{each}' for part in tree.PARTS
+                            for each in ('length', 'mass', 'center_of_mass', 'inertia')))
+    shortened = HEADINGS,
+    likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
     reflected, rotors = 'N^2 J', 'rotor and gear'
     friction_units = 'N m s/rad', 'N m'
@@ -178,9 +187,9 @@ class Crank(LegKind):
         size: Array = parameters['legs.crank.length']
         return size
 
-    def wrong_sizes(self, parameters: Parameters) -> Iterator[str]:
+    def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[str]:
         """Yield lengths in mm, and rods that are shorter than the gap at home."""
-        return crank_mistakes.wrong_sizes(parameters, self.home_legs(parameters).anchors)
+        return crank_mistakes.wrong_sizes(parameters, anchors)
 
     def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
         """Yield mistakes in signs and zeros of the cranks, their masses and limits."""
@@ -188,31 +197,20 @@ class Crank(LegKind):
         if not np.isfinite(at.directions).all():
             return iter(())
         legs: Any = parameters.structure['legs']
-        position = crank_mistakes.above_motors(
-            parameters, home, self.home_legs(parameters).anchors)
+        position = crank_mistakes.above_motors(parameters, home)
         both = [_angles_at(parameters, leg, position, home.rotation) for leg in range(6)]
         angles = np.array([math.nan if each is None else each[0 if sign > 0.0 else 1]
                            for each, sign in zip(both, legs['branch'], strict=True)])
         return crank_mistakes.likely_mistakes(
             parameters, home, angles, at.levers(), crank_bodies(parameters))
 
-    def home_legs(self, parameters: Parameters) -> HomeLegs:
-        """Return the rods, from the ends of the cranks at the middle of their angles."""
-        low, high = parameters.limits.angle_min, parameters.limits.angle_max
-        middle = np.zeros(6) if low is None or high is None else 0.5 * (low + high)
-        return HomeLegs(crank_ends(parameters, middle), None, None,
-                        float(np.mean(parameters['legs.rod.length'])))
-
-    def home_rule(self, parameters: Parameters) -> str:
+    def home_rule(self, parameters: Parameters, anchors: Array) -> str:
         """Return that the rods are shorter than the gap, or far too long."""
-        with np.errstate(all='ignore'):
-            ends = self.home_legs(parameters).anchors
-        joints = parameters.geometry.platform_joints
-        gaps = np.linalg.norm(ends - ends.mean(axis=0) - joints + joints.mean(axis=0), axis=1)
+        gap = crank_mistakes.gap_of(parameters, anchors)
         rods = np.unique(parameters['legs.rod.length'])
         return (f'legs.rod.length: {shown(rods.tolist())} m: no level pose has rods of this length'
                 ': while the platform joints are level with the ends of the cranks, at the '
-                f'middle of their angles, they are {np.mean(gaps):.3g} m away from them')
+                f'middle of their angles, they are {gap:.3g} m away from them')
 
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
@@ -241,6 +239,51 @@ class Crank(LegKind):
                     f'with negative: {words}: give the branch, or limits of the angle')
             of['branch'][leg] = 1.0 if possible[0] else -1.0
         return True
+
+    def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
+                 size: float) -> list[LegBranch]:
+        """Return cranks and rods."""
+        return tree.branches(parameters, crank_bodies(parameters), position, rotation, mounts,
+                             size)
+
+    def tree_positions(self, parameters: Parameters, mounts: Array, position: Array,
+                       rotation: Array, home: tuple[Array, Array]) -> Array:
+        """Return angles of the cranks and of the universal joints (..., 6, 3)."""
+        return tree.tree_positions(parameters, mounts, position, rotation, home)
+
+    def tree_sampler(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
+                     ) -> Callable[[Sequence[float]], list[float]]:
+        """Return the function for one pose."""
+        return tree.tree_sampler(parameters, mounts, home)
+
+    def drive_of(self, steps: Sequence[LegJoint]) -> int | None:
+        """Return 0 if the first joint turns a crank."""
+        return tree.drive_of(steps)
+
+    def places(self, steps: Sequence[LegJoint]) -> list[str]:
+        """Return at which end of the rod each joint is."""
+        return tree.places(steps)
+
+    def parting(self, steps: Sequence[LegJoint]) -> int:
+        """Return the first joint at the end of the crank."""
+        return 1
+
+    def read_leg(self, chain: Chain, base: MechanismBody, platform: MechanismBody,
+                 said: list[str]) -> dict[str, Any]:
+        """Return the parameters of a leg in a file."""
+        return tree.read_leg(self, chain, base, platform, said)
+
+    def expanded(self, parameters: Parameters, name: str) -> Any:
+        """Return centers of mass and inertias of all bodies in full."""
+        if name in ('legs.rod.center_of_mass', 'legs.rod.inertia'):
+            return tree.rod_value(parameters, name.rpartition('.')[2])
+        bodies = crank_bodies(parameters)
+        return {'legs.crank.center_of_mass': bodies[0], 'legs.crank.inertia': bodies[1]}.get(
+            name, parameters[name])
+
+    def tidy(self, values: dict[str, Any], resolution: float) -> None:
+        """Give headings of level axes, and numbers that are the same for all cranks once."""
+        tree.tidy(values, resolution)
 
 
 class _Angle(NamedTuple):
@@ -336,15 +379,6 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
     else:
         inertias[:] = given
     return centers, inertias
-
-
-def crank_ends(parameters: Parameters, angles: Array) -> Array:
-    """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
-    u, z = crank_axes(parameters)
-    along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
-    sizes = parameters['legs.crank.length'][:, None]
-    ends: Array = parameters.geometry.base_joints + sizes * along
-    return ends
 
 
 def crank_axes(parameters: Parameters) -> tuple[Array, Array]:

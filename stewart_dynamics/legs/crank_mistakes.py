@@ -56,14 +56,20 @@ def wrong_sizes(p: Parameters, ends: Array) -> Iterator[str]:
             yield f'{name}: {p[name][np.argmax(np.abs(p[name]))]:.3g} rad: in degrees?'
     if found:
         return
-    joints = p.geometry.platform_joints
-    gap = float(np.mean(np.linalg.norm(
-        ends - ends.mean(axis=0) - joints + joints.mean(axis=0), axis=1)))
+    gap = gap_of(p, ends)
     rod = float(np.mean(p[ROD_LENGTH]))
     if rod <= gap:
         yield (f'{ROD_LENGTH}: {rod:.3g} m: shorter than the gap of {gap:.3g} m between the '
                'platform joints and the ends of the cranks, level and at the middle of their '
                'angles: one of the lengths or radii in mm, or the legs in another order?')
+
+
+def gap_of(p: Parameters, ends: Array) -> float:
+    """Return the mean distance of ends of cranks (6, 3) and platform joints in one plane [m]."""
+    joints = p.geometry.platform_joints
+    with np.errstate(all='ignore'):
+        return float(np.mean(np.linalg.norm(
+            ends - ends.mean(axis=0) - joints + joints.mean(axis=0), axis=1)))
 
 
 def likely_mistakes(p: Parameters, home: AtHome, angles: Array, levers: Array,
@@ -91,12 +97,11 @@ def likely_mistakes(p: Parameters, home: AtHome, angles: Array, levers: Array,
         yield from _loads_at_home(p, np.abs(home.efforts), np.abs(levers))
 
 
-def above_motors(p: Parameters, home: AtHome, ends: Array) -> Array:
+def above_motors(p: Parameters, home: AtHome) -> Array:
     """
     Return the position (3,) with the platform above the middle of the motors, as high as at home.
 
-    Unlike home, it does not depend on a crank that differs from the others. ends (6, 3): of the
-    cranks at the middle of their angles, base frame [m].
+    Unlike home, it does not depend on a crank that differs from the others.
     """
     base = p.geometry.base_joints
     around = base - base.mean(axis=0)
@@ -104,7 +109,7 @@ def above_motors(p: Parameters, home: AtHome, ends: Array) -> Array:
     normal = normal * np.sign(normal @ home.up)
     arms = p.geometry.platform_joints @ home.rotation.T
     center = base.mean(axis=0) - arms.mean(axis=0)
-    gaps = center + arms - ends
+    gaps = center + arms - home.anchors
     along = gaps @ normal
     heights = np.sqrt(p[ROD_LENGTH] ** 2 - np.sum(gaps ** 2, axis=1) + along ** 2) - along
     position: Array = center + np.nanmedian(heights) * normal

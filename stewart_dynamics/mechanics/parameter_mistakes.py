@@ -29,7 +29,7 @@ from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
-    HEIGHTS, Home, home_of, is_too_long, poses_of, Shape, shape_of, turns_about)
+    HEIGHTS, Home, home_legs, home_of, is_too_long, poses_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import typed_pose_mistake
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
@@ -126,7 +126,8 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
         shape = shape_of(parameters)
         if one_point := _base_at_one_point(parameters, shape):
             return (one_point,)  # all others would follow from it
-        if wrong := tuple(parameters.leg_kind.wrong_sizes(parameters)):
+        if wrong := tuple(parameters.leg_kind.wrong_sizes(
+                parameters, home_legs(parameters)['base'])):
             return wrong  # likewise
         sizes = [*_sizes(parameters, shape)]
         found = [*sizes, *_inertia(parameters, shape),
@@ -354,7 +355,7 @@ def _torques_at_home(p: Parameters, home: Home) -> Iterator[str]:
 
 def _efforts_at_home(p: Parameters, home: Home) -> Array | None:
     """Return the efforts of the drives (6,) for the weight of the platform; None: not known."""
-    positions, rotations = home.poses(p)
+    positions, rotations = home.positions, home.rotations
     jacobian = lagrange.drive_jacobian(
         lagrange.unchecked_legs(p, positions[:1], rotations[:1]), rotations[:1])[0]
     weight = p.carried.mass * p.gravity
@@ -367,7 +368,7 @@ def _efforts_at_home(p: Parameters, home: Home) -> Array | None:
 
 def _is_assembled(p: Parameters, home: Home) -> bool:
     """Return whether home decides the assembly of the legs, where the parameters do not."""
-    positions, rotations = home.poses(p)
+    positions, rotations = home.positions, home.rotations
     try:
         p.choose_branch(lambda: (positions[0], rotations[0]))
     except ParameterError:
@@ -379,11 +380,11 @@ def _of_kind(p: Parameters, home: Home) -> Iterator[str]:
     """Yield mistakes in parameters that the kind of legs has alone."""
     if home.length is None:
         return
-    positions, rotations = home.poses(p)
+    positions, rotations = home.positions, home.rotations
     known = p.base.source != BY_IMU and (
         gravity_mistakes.likely_mistake(p.gravity) != gravity_mistakes.IN_MM)
     yield from p.leg_kind.likely_mistakes(p, AtHome(
-        positions[0], rotations[0], home.shape.axes[2] * home.side,
+        positions[0], rotations[0], home.shape.axes[2] * home.side, home_legs(p)['base'],
         _efforts_at_home(p, home) if known else None))
 
 
@@ -609,7 +610,7 @@ def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -
     if not np.isfinite(positions).all():
         return np.full(len(heights), 1.0)
     matrices = lagrange.inverse_jacobian(lines_from(
-        p.leg_kind.home_legs(p).anchors, p.geometry.platform_joints, positions, rotations))
+        home_legs(p)['base'], p.geometry.platform_joints, positions, rotations))
     length = p.singularity.characteristic_length
     if is_too_long(p, 'singularity.characteristic_length', shape):
         length = shape.platform_radius  # reported already, and not a mistake of the geometry

@@ -1,17 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Joints on a circle: radius, six angles and a height in place of six points."""
+"""Joints on a circle: radius, angles and height in place of points; the law: ``core/home.c``."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-import math
 from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 
 BODIES = 'base', 'platform'
@@ -31,8 +31,8 @@ def joints_on_circle(radius: float, angles: Array, height: float) -> Array:
 
     angles (6,): from the x axis toward the y axis [rad].
     """
-    points = np.array([(radius * math.cos(angle), radius * math.sin(angle), height)
-                       for angle in angles.tolist()])
+    points = np.empty((6, 3))
+    function('joints_on_circle')(radius, np.ascontiguousarray(angles, dtype=float), height, points)
     points.setflags(write=False)
     return points
 

@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Integers, NANOSECOND, SECOND, Stamps
-from stewart_dynamics.mechanics.frames.base_motion import row_of_imu, row_of_motion, row_of_pose
-from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.arrays import Array, Integers, SECOND, Stamps
+from stewart_dynamics.core.binding import function, record
+from stewart_dynamics.mechanics.frames.base_motion import row_of_motion, row_of_pose
 from stewart_dynamics.mechanics.rows import BASE, GRAVITY, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import BY_IMU, MOVING, Parameters
@@ -201,36 +201,18 @@ class BaseInput:
 
 
 class _OfImu:
-    """
-    Converts readings of an IMU to rows.
-
-    The angular acceleration is the difference quotient of two angular velocities, through a
-    low-pass filter of the first order, solved exactly for the time dt between them:
-    ``k = 1 - exp(-2 pi cutoff dt)``. Slow changes are delayed by ``dt (1 / k - 1 / 2)``,
-    for short dt ``1 / (2 pi cutoff)``; white noise of standard deviation s in the angular velocity
-    becomes ``s k / dt sqrt(2 / (2 - k))``.
-    """
+    """Converts readings of an IMU to rows; the filter is in ``core/imu.c``."""
 
     def __init__(self, parameters: Parameters) -> None:
-        self._position: Any = tuple(parameters.base.imu.position.tolist())
-        x, y, z, w = parameters.base.imu.orientation.tolist()
-        length = math.sqrt(x * x + y * y + z * z + w * w)
-        self._rotation = from_quaternion(x / length, y / length, z / length, w / length)
-        self._rate = 2.0 * math.pi * parameters.base.imu.cutoff
-        self._timeout = round(parameters.base.timeout * SECOND)
-        self._last: tuple[int, Any] | None = None
-        self._filtered = 0.0, 0.0, 0.0
+        given = parameters.base.imu
+        imu: Any = np.zeros((), record('imu_mounting'))
+        imu['position'], imu['rate'] = given.position, 2.0 * math.pi * given.cutoff
+        imu['timeout'] = round(parameters.base.timeout * SECOND)
+        function('stewart_rotation')(given.orientation, imu['rotation'])
+        self._base: Array = np.empty(BASE)
+        self._filter: Any = np.zeros((), record('imu_filter'))
+        self._read = function('read_imu').bound(imu)
 
     def __call__(self, stamp: int, values: Any) -> _Row:
-        spin, force = values[:3], values[3:6]
-        interval = 0 if self._last is None else stamp - self._last[0]
-        if self._last is None or not 0 < interval <= self._timeout:
-            self._filtered = 0.0, 0.0, 0.0
-        else:
-            dt = interval * NANOSECOND
-            gain = -math.expm1(-self._rate * dt)
-            x, y, z = (old + gain * ((now - then) / dt - old) for old, now, then in zip(
-                self._filtered, spin, self._last[1], strict=True))
-            self._filtered = x, y, z
-        self._last = stamp, spin
-        return row_of_imu(force, spin, self._filtered, self._position, self._rotation)
+        self._read(stamp, np.array(values[:6]), self._filter, self._base)
+        return tuple(self._base.tolist())

@@ -28,6 +28,7 @@ void keep_windings(const stewart_state & from, stewart_state & to)
   std::copy_n(from.copper_heat, 6, to.copper_heat);
 }
 
+constexpr char kUnknownBase[] = "the motion of the base is not known";
 constexpr char kTooFar[] =
   "farther from the last command than limits.velocity_max allows in setpoint.timeout";
 
@@ -43,7 +44,42 @@ const char * text_of(int code)
   }
 }
 
+/// Return a demand that no motion can follow: a governed one stops.
+coordinates no_demand()
+{
+  coordinates none{};
+  std::fill_n(none.value, 6, std::numeric_limits<double>::quiet_NaN());
+  return none;
+}
+
+/// Return a stream that has no demand yet.
+governed_stream no_stream()
+{
+  governed_stream stream{};
+  stream.time = std::numeric_limits<double>::quiet_NaN();
+  return stream;
+}
+
 }  // namespace
+
+const char * name_of_limit(std::int64_t limit)
+{
+  if (limit == GOVERNED_SINGULARITY + 1) {
+    return "singularity.stop_condition";
+  }
+  switch (limit > 0 ? std::int64_t{1} << (limit - 1) : 0) {
+#define SECTION_POSE "limits."
+#define SECTION_TWIST "limits."
+#define SECTION_LOAD "limits."
+#define SECTION_MOTOR "drive."
+#define LIMIT(bit, NAME, field, DEPENDS, quantity) case bit: return SECTION_ ## DEPENDS #field;
+    STEWART_LIMITS(LIMIT, LIMIT, LIMIT)
+#undef LIMIT
+    case STEWART_LEG_CLEARANCE_MIN: return "limits.leg_clearance_min";
+    case STEWART_TORQUE_SPEED: return "drive.torque_speed";
+    default: return nullptr;
+  }
+}
 
 std::array<double, 9> rotation_of_euler(double alpha, double beta, double gamma)
 {
@@ -55,15 +91,18 @@ std::array<double, 9> rotation_of_euler(double alpha, double beta, double gamma)
 
 FeedForward::FeedForward(
   const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout,
-  std::int64_t period)
-: guess_(guess), timeout_(timeout), period_(period)
+  std::int64_t period, const std::optional<Governor> & governor,
+  const std::optional<imu_mounting> & imu)
+: imu_(imu), guess_(guess), timeout_(timeout), period_(period)
 {
-  change(hexapod);
+  change(hexapod, governor);
   start();
 }
 
-void FeedForward::change(const stewart_platform & hexapod)
+void FeedForward::change(
+  const stewart_platform & hexapod, const std::optional<Governor> & governor)
 {
+  governor_ = governor;
   hexapod_ = unsuppressed_ = hexapod;
   unsuppressed_.suppress_near_singularity = unsuppressed_.suppress_at_limits = 0;
 }
@@ -77,43 +116,112 @@ void FeedForward::start()
   rejected_leg_ = 0;
   state_ = stewart_state{};
   output_ = stewart_output{};
+  stream_ = no_stream();
+  readings_ = imu_stream{};
+  base_.reset();
 }
 
 int FeedForward::update(
   const PlatformReference & reference, const Six & wrench, const Six & feedback,
-  std::int64_t now, Command & command)
+  std::int64_t now, Command & command, const Six & reading, bool repeated)
 {
-  return answer(reference, wrench, feedback, now, command);
+  return answer(reference, wrench, feedback, now, command, reading, repeated);
 }
 
 int FeedForward::update(
   const LegReference & reference, const Six & wrench, const Six & feedback,
-  std::int64_t now, Command & command)
+  std::int64_t now, Command & command, const Six & reading)
 {
-  return answer(reference, wrench, feedback, now, command);
+  return answer(reference, wrench, feedback, now, command, reading, false);
 }
 
 template<typename Reference>
 int FeedForward::answer(
   const Reference & reference, const Six & wrench, const Six & feedback, std::int64_t now,
-  Command & command)
+  Command & command, const Six & reading, bool repeated)
 {
   if (rejection_ || is_gap(updated_at_, now)) {
     catch_up();
   }
-  updated_at_ = now;
   // Steps are judged by check_lengths: cycles repeat references that come more rarely.
   std::fill_n(state_.lengths, 6, std::numeric_limits<double>::quiet_NaN());
   const stewart_state before = state_;
+  const std::int64_t followed_at = followed_at_;
   stewart_motion motion;
-  int code = motion_of(reference, motion);
-  code = code == STEWART_OK ? follow(motion, wrench, feedback, now, command) :
-    reject(code, text_of(code));
+  const bool measured = measure(reading, now);
+  const int demanded = measured ? motion_of(reference, motion) : STEWART_NOT_FINITE;
+  const char * const rule = measured ? text_of(demanded) : kUnknownBase;
+  int code = demanded == STEWART_OK ? STEWART_OK : reject(demanded, rule);
+  if (governor_) {
+    code = govern(demanded, repeated, now, motion);
+  }
+  updated_at_ = now;
+  if (code == STEWART_OK) {
+    code = follow(motion, wrench, feedback, now, command);
+  }
   if (code != STEWART_OK) {
     keep_windings(before, state_);
     hold(feedback, now, command);
+  } else if (demanded != STEWART_OK) {  // a governed motion, which stops
+    followed_at_ = followed_at;
+    code = reject(demanded, rule);
+  }
+  if (!started_) {  // the motion begins at the first reference that is followed
+    stream_ = no_stream();
   }
   return code;
+}
+
+/// Read the IMU; return whether the motion of the base is known.
+bool FeedForward::measure(const Six & reading, std::int64_t now)
+{
+  stewart_base base;
+  if (!imu_) {
+    return true;
+  }
+  const bool known = base_of_imu(&*imu_, now, reading.data(), &readings_, &base) != 0;
+  if (known) {
+    base_ = base;
+  }
+  return known;
+}
+
+/// Write the governed motion in place of the one that is demanded; code: of the demand.
+int FeedForward::govern(int demanded, bool repeated, std::int64_t now, stewart_motion & motion)
+{
+  const Governor & governor = *governor_;
+  const bool first = std::isnan(stream_.time);
+  if (first && demanded != STEWART_OK) {
+    return demanded;
+  }
+  coordinates demand = no_demand();
+  if (first) {
+    stewart_motion at_rest{};
+    std::copy_n(motion.position, 3, at_rest.position);
+    std::copy_n(motion.rotation, 9, at_rest.rotation);
+    coordinates_of(&governor.limits, 1, &at_rest, &stream_.governor.now);
+    const std::int64_t limit =
+      governed_limit(&governor.within, &governor.limits, &stream_.governor.now);
+    if (limit != 0) {
+      return reject(STEWART_SUPPRESSED, name_of_limit(limit));
+    }
+    governed_for_ = 0;
+  } else if (repeated && demanded == STEWART_OK && !is_gap(demanded_at_, now)) {
+    motion = governed_;
+    return STEWART_OK;
+  } else {
+    // Commands stand while cycles do not come, and so does the motion: it goes on from there.
+    governed_for_ += std::min(now - governed_at_, kGap * (period_ > 0 ? period_ : timeout_));
+  }
+  if (demanded == STEWART_OK && (first || !repeated)) {
+    demanded_at_ = now;
+    coordinates_of(&governor.limits, 1, &motion, &demand);
+  }
+  governed_at_ = now;
+  const double time = 1e-9 * static_cast<double>(governed_for_);
+  govern_many(&governor.within, &governor.limits, 1, &time, &demand, &stream_, &governed_);
+  motion = governed_;
+  return STEWART_OK;
 }
 
 int FeedForward::reject(int code, const char * rule, int leg)
@@ -160,7 +268,7 @@ int FeedForward::follow(
   if (!finite(feedback)) {
     return reject(STEWART_NOT_FINITE, text_of(STEWART_NOT_FINITE));
   }
-  int code = stewart_step(&hexapod_, &motion, wrench.data(), nullptr, now, &state_, &output_);
+  int code = stewart_step(&hexapod_, &motion, wrench.data(), base(), now, &state_, &output_);
   if (code != STEWART_OK) {
     return reject(code, text_of(code));
   }
@@ -253,7 +361,7 @@ void FeedForward::hold(const Six & feedback, std::int64_t now, Command & command
   stewart_state state = state_;
   stewart_output at_rest;
   if (!started_ || stewart_step(
-      &unsuppressed_, &held_, held_wrench_.data(), nullptr, now, &state, &at_rest) != STEWART_OK)
+      &unsuppressed_, &held_, held_wrench_.data(), base(), now, &state, &at_rest) != STEWART_OK)
   {
     return;
   }

@@ -21,6 +21,7 @@ namespace
 {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kPi = 3.14159265358979323846;
 constexpr double kNotSet = std::numeric_limits<double>::quiet_NaN();
 
 /// Return the value of a leg in an array of 1 or 6; if_not_set for an empty one.
@@ -47,6 +48,33 @@ void check(bool holds, const char * rule)
   if (!holds) {
     throw std::invalid_argument(rule);
   }
+}
+
+/// Return the joints of a body, which are given as points or by their circle.
+std::vector<double> joints_of(
+  const std::string & body, const std::vector<double> & points, double radius,
+  const std::vector<double> & angles, double height)
+{
+  const std::string name = "geometry." + body;
+  const std::string other = std::isnan(radius) ? "_angles" : "_radius";
+  if (std::isnan(radius) && angles.empty() && height == 0.0) {
+    check(!points.empty(), (name + "_joints: must be set, as points or by their circle").c_str());
+    return points;
+  }
+  check(
+    points.empty(), (name + "_joints: given as well as " + name + "_radius, _angles or _height: "
+    "leave out the points or the circle").c_str());
+  check(
+    !std::isnan(radius) && !angles.empty(), (name + (std::isnan(radius) ? "_radius" : "_angles") +
+    ": not set: needed by " + name + other).c_str());
+  check(angles.size() == 6, (name + "_angles: must have 6 entries").c_str());
+  check(
+    std::all_of(angles.begin(), angles.end(), [](double each) {return std::fabs(each) <= 2.0 * kPi;}),
+    (name + "_angles: must be within -2 pi and 2 pi: in degrees?").c_str());
+  check(radius > 0.0, (name + "_radius: must be more than 0").c_str());
+  std::vector<double> joints(18);
+  joints_on_circle(radius, angles.data(), height, joints.data());
+  return joints;
 }
 
 /// Write row n of an array of the legs' points or directions; nan where it is empty.
@@ -77,11 +105,13 @@ int put_points(
   return static_cast<int>(values.size() / kSize);
 }
 
-stewart_leg leg_of(const Params & p, std::size_t n)
+stewart_leg leg_of(
+  const Params & p, const std::vector<double> & base, const std::vector<double> & platform,
+  std::size_t n)
 {
   stewart_leg leg{};
-  put_row("geometry.base_joints", p.geometry.base_joints, n, leg.base_joint);
-  put_row("geometry.platform_joints", p.geometry.platform_joints, n, leg.platform_joint);
+  put_row("geometry.base_joints", base, n, leg.base_joint);
+  put_row("geometry.platform_joints", platform, n, leg.platform_joint);
   leg.zero_length = of_leg("geometry.zero_length", p.geometry.zero_length, n);
   const auto & cylinder = p.legs.cylinder;
   leg.cylinder_mass = of_leg("legs.cylinder.mass", cylinder.mass, n);
@@ -118,10 +148,6 @@ stewart_leg leg_of(const Params & p, std::size_t n)
     "drive.platform_universal_axes", drive.platform_universal_axes, n,
     leg.platform_universal_axis);
   if (drive.screw_rotation == "universal") {
-    check(
-      !drive.base_universal_axes.empty() && !drive.platform_universal_axes.empty(),
-      "drive.base_universal_axes, drive.platform_universal_axes: must be set: needed by "
-      "drive.screw_rotation: universal");
     leg.twist_ratio = drive.screw_hand == "right" ? -leg.gear_ratio : leg.gear_ratio;
   }
   put_row("geometry.base_joint_axes", p.geometry.base_joint_axes, n, leg.base_joint_axis);
@@ -151,12 +177,6 @@ stewart_leg leg_of(const Params & p, std::size_t n)
   check(
     p.legs.crank.length.empty(),
     "legs.crank.length: stewart_dynamics_controller takes telescopic legs alone");
-  check(
-    !std::isfinite(leg.base_joint_angle_max) || !p.geometry.base_joint_axes.empty(),
-    "geometry.base_joint_axes: must be set: needed by limits.base_joint_angle_max");
-  check(
-    !std::isfinite(leg.platform_joint_angle_max) || !p.geometry.platform_joint_axes.empty(),
-    "geometry.platform_joint_axes: must be set: needed by limits.platform_joint_angle_max");
   return leg;
 }
 
@@ -170,6 +190,60 @@ bool has_drive(const stewart_leg & leg)
   return std::any_of(std::begin(set), std::end(set), is_set) || leg.gear_ratio != 1.0 ||
          leg.efficiency != 1.0 || leg.motor_inertia != 0.0 || leg.screw_inertia != 0.0 ||
          leg.twist_ratio != 0.0;
+}
+
+/// Return the home poses of a hexapod, complete or not.
+home_poses homes_of(const Params & p, stewart_platform hexapod)
+{
+  stewart_complete(&hexapod);
+  home_legs legs;
+  home_poses home;
+  const auto & side = p.geometry.platform_side;
+  put_home_legs(&hexapod, &legs);
+  find_home(&legs, side == "positive" ? 1 : side == "negative" ? -1 : 0, &home);
+  return home;
+}
+
+/// Check that there is a home pose; needed_by: what it is needed by, for the error without one.
+void check_home(const home_poses & home, const std::string & needed_by)
+{
+  check(
+    home.reachable != 0.0, ("home pose: no level pose has all legs between limits.length_min and "
+    "limits.length_max: " + needed_by).c_str());
+  check(
+    home.known != 0.0, ("home pose: limits.length_min and limits.length_max, or "
+    "geometry.zero_length, must give a length that the legs can have in a level pose: " +
+    needed_by).c_str());
+}
+
+/// Give joints whose angles are limited, and screws that turn, the axes that they have without
+/// given ones, which follow from the home pose.
+void put_axes(const Params & p, stewart_platform & hexapod)
+{
+  const home_poses home = homes_of(p, hexapod);
+  const auto put = [&](
+    const std::vector<double> & given, double stewart_leg::* most,
+    double (stewart_leg::* axis)[3], double (home_poses::* directions)[6][3], const char * name) {
+      if (!given.empty() || !std::isfinite(hexapod.legs[0].*most)) {
+        return;
+      }
+      check_home(home, std::string("needed without geometry.") + name);
+      for (std::size_t n = 0; n < 6; ++n) {
+        std::copy_n((home.*directions)[n], 3, hexapod.legs[n].*axis);
+      }
+    };
+  put(
+    p.geometry.base_joint_axes, &stewart_leg::base_joint_angle_max, &stewart_leg::base_joint_axis,
+    &home_poses::base_directions, "base_joint_axes");
+  put(
+    p.geometry.platform_joint_axes, &stewart_leg::platform_joint_angle_max,
+    &stewart_leg::platform_joint_axis, &home_poses::platform_directions, "platform_joint_axes");
+  const std::int64_t along =
+    p.drive.screw_rotation == "universal" ? put_universal_axes(&home, &hexapod) : 0;
+  check(
+    along == 0, (std::string("drive.") + (along <= 6 ? "base" : "platform") + "_universal_axes: "
+    "along the leg at the home pose: must be across it: leg " +
+    std::to_string((along + 5) % 6 + 1)).c_str());
 }
 
 /// Throw the rule that a complete hexapod breaks, with the number of its leg.
@@ -192,9 +266,14 @@ stewart_platform hexapod_of(const Params & p)
   hexapod.mass = p.platform.mass;
   std::copy_n(p.platform.center_of_mass.begin(), 3, hexapod.center_of_mass);
   std::copy_n(p.platform.inertia.begin(), 6, hexapod.inertia);
+  const auto & g = p.geometry;
+  const auto base = joints_of("base", g.base_joints, g.base_radius, g.base_angles, g.base_height);
+  const auto platform = joints_of(
+    "platform", g.platform_joints, g.platform_radius, g.platform_angles, g.platform_height);
   for (std::size_t n = 0; n < 6; ++n) {
-    hexapod.legs[n] = leg_of(p, n);
+    hexapod.legs[n] = leg_of(p, base, platform, n);
   }
+  put_axes(p, hexapod);
   const double clearance = p.limits.leg_clearance_min;
   hexapod.leg_clearance_min = std::isnan(clearance) ? -kInfinite : clearance;
   hexapod.n_torque_speed =
@@ -219,6 +298,45 @@ stewart_platform hexapod_of(const Params & p)
       &hexapod, p.payload.mass, p.payload.center_of_mass.data(), p.payload.inertia.data()) ==
     STEWART_OK, "payload: must be finite, its inertia positive semidefinite");
   return hexapod;
+}
+
+std::optional<Governor> governor_of(const Params & p, const stewart_platform & hexapod)
+{
+  if (!p.governor) {
+    return std::nullopt;
+  }
+  check(p.reference == "platform", "governor: needs reference: platform");
+  const home_poses home = homes_of(p, hexapod);
+  check_home(home, "needed by governor");
+  const double head[3] = {0.0, 0.0, 0.0};
+  const coordinates at_home{};
+  Governor governor;
+  put_governor(&hexapod, &home.poses[0], head, &governor.within, &governor.limits);
+  const std::int64_t limit = governed_limit(&governor.within, &governor.limits, &at_home);
+  check(
+    limit == 0, (std::string("governor: at home ") + (limit ? name_of_limit(limit) : "") +
+    " is exceeded, or nearer than the margin of the governor").c_str());
+  return governor;
+}
+
+std::optional<imu_mounting> imu_of(const Params & p)
+{
+  if (p.base.source != "imu") {
+    return std::nullopt;
+  }
+  check(!p.imu_sensor.empty(), "imu_sensor: must be set: needed by base.source: imu");
+  const auto & at = p.base.imu.position;
+  check(
+    std::all_of(at.begin(), at.end(), [](double each) {return std::isfinite(each);}),
+    "base.imu.position: must be finite");
+  imu_mounting imu{};
+  std::copy_n(at.begin(), 3, imu.position);
+  check(
+    stewart_rotation(p.base.imu.orientation.data(), imu.rotation) == STEWART_OK,
+    "base.imu.orientation: must be a unit quaternion");
+  imu.rate = 2.0 * kPi * p.base.imu.cutoff;
+  imu.timeout = std::llround(p.base.timeout * 1e9);
+  return imu;
 }
 
 stewart_pose initial_pose_of(const Params & p)

@@ -61,9 +61,12 @@ CallbackReturn StewartDynamicsController::on_configure(const rclcpp_lifecycle::S
       guess = initial_pose_of(parameters_);
     }
     const unsigned int rate = get_update_rate();
+    const stewart_platform hexapod = hexapod_of(parameters_);
+    imu_ = imu_of(parameters_);
     feed_forward_.emplace(
-      hexapod_of(parameters_), guess, static_cast<std::int64_t>(parameters_.setpoint.timeout * 1e9),
-      rate > 0 ? static_cast<std::int64_t>(1e9 / rate) : 0);
+      hexapod, guess, static_cast<std::int64_t>(parameters_.setpoint.timeout * 1e9),
+      rate > 0 ? static_cast<std::int64_t>(1e9 / rate) : 0, governor_of(parameters_, hexapod),
+      imu_);
   } catch (const std::exception & error) {
     RCLCPP_ERROR(get_node()->get_logger(), "%s", error.what());
     return CallbackReturn::ERROR;
@@ -122,7 +125,16 @@ StewartDynamicsController::command_interface_configuration() const
 controller_interface::InterfaceConfiguration
 StewartDynamicsController::state_interface_configuration() const
 {
-  return {controller_interface::interface_configuration_type::NONE, {}};
+  if (parameters_.base.source != "imu") {
+    return {controller_interface::interface_configuration_type::NONE, {}};
+  }
+  std::vector<std::string> names;
+  for (const char * quantity : {"angular_velocity", "linear_acceleration"}) {
+    for (const char axis : std::string("xyz")) {
+      names.push_back(parameters_.imu_sensor + "/" + quantity + "." + axis);
+    }
+  }
+  return {controller_interface::interface_configuration_type::INDIVIDUAL, names};
 }
 
 std::vector<hardware_interface::CommandInterface::SharedPtr>
@@ -178,7 +190,9 @@ StewartDynamicsController::on_export_state_interfaces_list()
 void StewartDynamicsController::on_parameters(const Params & parameters)
 {
   try {
-    changed_.set(std::optional<stewart_platform>(hexapod_of(parameters)));
+    Changed changed{hexapod_of(parameters), std::nullopt};
+    changed.governor = governor_of(parameters, changed.hexapod);
+    changed_.set(std::optional<Changed>(changed));
   } catch (const std::exception & error) {
     RCLCPP_ERROR(get_node()->get_logger(), "parameters are not used: %s", error.what());
   }
@@ -223,12 +237,14 @@ return_type StewartDynamicsController::update_reference_from_subscribers(
     return return_type::ERROR;
   }
   std::optional<PlatformNumbers> setpoint;
+  repeated_ = true;
   received_.try_set([&](auto & received) {received.swap(setpoint);});
   if (setpoint) {
     if (received_at_ >= 0 && feed_forward_->is_gap(received_at_, time.nanoseconds())) {
       feed_forward_->catch_up();
     }
     received_at_ = time.nanoseconds();
+    repeated_ = false;
     for (std::size_t n = 0; n < setpoint->size(); ++n) {
       (void)ordered_exported_reference_interfaces_[n]->set_value((*setpoint)[n]);
     }
@@ -242,10 +258,10 @@ return_type StewartDynamicsController::update_reference_from_subscribers(
 return_type StewartDynamicsController::update_and_write_commands(
   const rclcpp::Time & time, const rclcpp::Duration &)
 {
-  std::optional<stewart_platform> changed;
+  std::optional<Changed> changed;
   changed_.try_set([&](auto & waiting) {waiting.swap(changed);});
   if (changed) {
-    feed_forward_->change(*changed);
+    feed_forward_->change(changed->hexapod, changed->governor);
   }
   const int code = compute(time.nanoseconds());
   bool written = true;
@@ -295,9 +311,13 @@ const char * StewartDynamicsController::leg_text() const
 int StewartDynamicsController::compute(std::int64_t now)
 {
   const Six wrench = read(motion_size()), feedback = read(motion_size() + 6);
+  Six reading{};
+  for (std::size_t n = 0; imu_ && n < 6; ++n) {
+    reading[n] = state_interfaces_[n].get_optional<double>().value_or(kNaN);
+  }
   if (!of_platform()) {
     return feed_forward_->update(
-      LegReference{read(0), read(6), read(12)}, wrench, feedback, now, command_);
+      LegReference{read(0), read(6), read(12)}, wrench, feedback, now, command_, reading);
   }
   PlatformReference reference;
   auto at = ordered_exported_reference_interfaces_.begin();
@@ -312,7 +332,8 @@ int StewartDynamicsController::compute(std::int64_t now)
   take(reference.angular_velocity);
   take(reference.linear_acceleration);
   take(reference.angular_acceleration);
-  return feed_forward_->update(reference, wrench, feedback, now, command_);
+  const bool repeated = repeated_ && !is_in_chained_mode();
+  return feed_forward_->update(reference, wrench, feedback, now, command_, reading, repeated);
 }
 
 bool StewartDynamicsController::write_all_but_positions(const Command & command)

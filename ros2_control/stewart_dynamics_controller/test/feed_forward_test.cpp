@@ -15,6 +15,7 @@
 
 using stewart_dynamics_controller::Command;
 using stewart_dynamics_controller::FeedForward;
+using stewart_dynamics_controller::Governor;
 using stewart_dynamics_controller::LegReference;
 using stewart_dynamics_controller::PlatformReference;
 using stewart_dynamics_controller::rotation_of_euler;
@@ -577,6 +578,82 @@ void test_hold_of_legs()
   CHECK(close(command.efforts, at.efforts, 1e-8));
 }
 
+Governor governor_of(const stewart_platform & p)
+{
+  home_legs legs;
+  home_poses home;
+  Governor governor;
+  const double head[3] = {0.0, 0.0, 0.0};
+  put_home_legs(&p, &legs);
+  find_home(&legs, 0, &home);
+  CHECK(home.known != 0.0);
+  put_governor(&p, &home.poses[0], head, &governor.within, &governor.limits);
+  return governor;
+}
+
+/// References that jump, and that are no numbers: legs keep their limits, rates have no step.
+void test_governor()
+{
+  stewart_platform p = hexapod();
+  for (stewart_leg & leg : p.legs) {
+    leg.length_min = 0.95;
+    leg.length_max = 1.65;
+    leg.velocity_max = 0.5;
+  }
+  stewart_complete(&p);
+  FeedForward feed_forward(p, {}, 10000 * kCycle, kCycle, governor_of(p));
+  PlatformReference far = home();
+  far.position[2] = 2.0;
+  Command command{}, before{};
+  CHECK(feed_forward.update(far, {}, {}, 0, command) == STEWART_SUPPRESSED);
+  CHECK(std::string(feed_forward.rejection()) == "limits.length_max");
+  CHECK(!feed_forward.started());
+  double fastest = 0.0;
+  for (std::int64_t n = 1; n < 6000; ++n) {
+    PlatformReference at = home();
+    at.position[0] = n % 2000 < 1000 ? 0.0 : 0.2;
+    at.position[2] += n > 3000 ? 0.8 : 0.0;
+    const bool valid = n < 4000 || n > 4500;
+    at.orientation[0] = valid ? 0.0 : kNaN;
+    const int code = feed_forward.update(at, {}, {}, n * kCycle, command);
+    CHECK(code == (valid ? STEWART_OK : STEWART_NOT_FINITE));
+    for (std::size_t leg = 0; leg < 6; ++leg) {
+      const double length = command.positions[leg] + p.legs[leg].zero_length;
+      CHECK(0.95 < length && length < 1.65 && std::fabs(command.velocities[leg]) < 0.5);
+      CHECK(std::fabs(command.efforts[leg]) < 5000.0);
+      CHECK(n == 1 || std::fabs(command.velocities[leg] - before.velocities[leg]) < 0.02);
+      CHECK(n == 1 || std::fabs(command.positions[leg] - before.positions[leg]) < 0.5e-3);
+      fastest = std::max(fastest, std::fabs(command.velocities[leg]));
+    }
+    before = command;
+  }
+  CHECK(fastest > 0.1);
+}
+
+/// A base that is tilted, by its IMU: the forces of gravity in its axes; without readings a hold.
+void test_imu()
+{
+  const stewart_platform p = hexapod();
+  imu_mounting imu{{0.1, 0.2, 0.3}, {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}, 100.0, kCycle};
+  FeedForward feed_forward(p, {}, kTimeout, 0, std::nullopt, imu);
+  const Six silent = {kNaN, kNaN, kNaN, kNaN, kNaN, kNaN};
+  const Six tilted = {0.0, 0.0, 0.0, 1.0, 0.0, 9.7};
+  Command command{};
+  CHECK(feed_forward.update(home(), {}, {}, 0, command, silent) == STEWART_NOT_FINITE);
+  CHECK(!feed_forward.started());
+  CHECK(feed_forward.update(home(), {}, {}, 1, command, tilted) == STEWART_OK);
+  const stewart_motion motion = motion_of(home());
+  const stewart_base base = {{-1.0, 0.0, -9.7}, {}, {}, {}};
+  stewart_result result;
+  CHECK(stewart_inverse_dynamics(&p, &motion, nullptr, &base, &result) == STEWART_OK);
+  for (std::size_t n = 0; n < 6; ++n) {
+    CHECK(command.efforts[n] == result.forces[n]);
+  }
+  const Six followed = command.efforts;
+  CHECK(feed_forward.update(home(), {}, {}, 3 * kCycle, command, silent) == STEWART_NOT_FINITE);
+  CHECK(feed_forward.rejection() && close(command.efforts, followed, 1e-9));
+}
+
 /// Rz(gamma) Ry(beta) Rx(alpha): the columns of a turn about each axis.
 void test_rotation()
 {
@@ -604,6 +681,8 @@ int main()
   test_no_false_hold();
   test_after_a_gap();
   test_hold_of_legs();
+  test_governor();
+  test_imu();
   test_rotation();
   std::printf("all checks passed\n");
   return 0;

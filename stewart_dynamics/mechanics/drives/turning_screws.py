@@ -35,18 +35,16 @@ arcsine of the product of the unit vectors along s x (u x s) and w x s. All in b
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.kinematics.home_pose import homes
-from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, mounts
+from stewart_dynamics.mechanics.kinematics.home_pose import found_home
 from stewart_dynamics.mechanics.rows import PITCH, SCREW
 from stewart_dynamics.parameters.table import Parameters, RIGHT, six_of, UNIVERSAL
-
-# Sine of the angle between a leg and the fixed axis of its universal joint.
-_ALONG_A_LEG = 0.1
 
 
 def motor_turns(p: Parameters) -> Array:
@@ -69,20 +67,15 @@ def screw_constants(p: Parameters) -> Array:
 
 def universal_axes(p: Parameters) -> Array:
     """Return the unit vectors (6, 6) of the axes fixed to base, base axes, and to platform."""
-    rotation = homes(p)[1][0]
-    base = p.drive.base_universal_axes
-    base = mounts(p)[:, :, 0] if base is None else base
-    platform = p.drive.platform_universal_axes
-    platform = base @ rotation if platform is None else platform
-    base, platform = (axes / np.linalg.norm(axes, axis=1, keepdims=True)
-                      for axes in (base, platform))
-    s, w = home_directions(p).base, platform @ rotation.T
-    for end, axes in (('base', base), ('platform', w)):
-        sine = np.linalg.norm(np.cross(axes, s), axis=1)
-        if np.any(sine < _ALONG_A_LEG):
-            raise ParameterError(
-                f'{p.source}: drive.{end}_universal_axes: {p.joints[int(np.argmin(sine))]}: '
-                'along the leg at the home pose: must be across it')
-    # The axis of a joint has no sense: of its two directions the one with the smaller twist.
-    cosine = np.sum(base * w, axis=1) - np.sum(base * s, axis=1) * np.sum(w * s, axis=1)
-    return np.column_stack([base, np.where(cosine < 0.0, -1.0, 1.0)[:, None] * platform])
+    hexapod: Any = p.structure.copy()
+    for end in ('base', 'platform'):
+        given = p[f'drive.{end}_universal_axes']
+        hexapod['legs'][f'{end}_universal_axis'] = np.nan if given is None else given
+    along = function('put_universal_axes')(found_home(p), hexapod)
+    if along:
+        end = 'base' if along <= 6 else 'platform'
+        raise ParameterError(
+            f'{p.source}: drive.{end}_universal_axes: {p.joints[(along - 1) % 6]}: '
+            'along the leg at the home pose: must be across it')
+    return np.concatenate([hexapod['legs'][f'{end}_universal_axis']
+                           for end in ('base', 'platform')], axis=1)

@@ -14,28 +14,32 @@ A pose and its mirror image at the plane of the base joints have nearly the same
 is that of ``geometry.platform_side``: ``positive`` is the side to which the base axis most nearly
 parallel to the normal, usually z, points, ``negative`` the other one. By default, ``auto``, it is
 ``positive`` unless all legs can be within their limits on the other side alone.
+
+The computation is ``core/home.c``, which the ros2_control controller calls, too.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import function, record
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.parameters.table import AUTO, NEGATIVE, Parameters, POSITIVE, six_of
+from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
+from stewart_dynamics.parameters.table import AUTO, NEGATIVE, Parameters, POSITIVE
 
 # Largest length, in larger radii: legs have 1 to 10, legs given in mm 1000 times that.
 _LENGTH_RATIO = 100.0
 
 # Heights that are tried if the parameters do not give one, in larger radii.
 HEIGHTS = (0.3, 0.6, 1.0, 1.7, 3.0)
-_YAWS = np.deg2rad(np.arange(0.0, 360.0, 10.0))
+_SIDES = {POSITIVE: 1, NEGATIVE: -1, AUTO: 0}
 
 
 class Shape(NamedTuple):
@@ -64,16 +68,16 @@ class Home(NamedTuple):
     certain: bool  # the parameters give the side; otherwise it is assumed
     heights: Array  # along the normal from the base joints' center, the most likely first (N,) [m]
     length: float | None  # of the mean leg [m]; None if the parameters do not give it
+    positions: Array  # of the platform at the heights (N, 3) [m]
+    rotations: Array  # the same (N, 3, 3)
+    base_directions: Array  # of the legs at the first of them, base axes (6, 3)
+    platform_directions: Array  # platform axes
+    mounts: Array  # axes of the legs' mounts to base axes (6, 3, 3), see ``leg_joints``
 
     @property
     def turns(self) -> Array:
         """Return the rotation at each of the heights (N, 3, 3), in the shape's axes."""
         return turns_about(2, np.full(len(self.heights), self.yaw))
-
-    def poses(self, parameters: Parameters) -> tuple[Array, Array]:
-        """Return positions (N, 3) [m] and rotations (N, 3, 3) at the heights."""
-        with np.errstate(all='ignore'):
-            return poses_of(parameters, self.shape, self.heights, self.turns)
 
     @property
     def text(self) -> str:
@@ -98,9 +102,22 @@ def home_pose(parameters: Parameters) -> Pose:
             'limits.length_min and limits.length_max on the '
             f'{POSITIVE if home.side > 0.0 else NEGATIVE} side of the base')
     if home.length is None:
-        raise ParameterError(f'{parameters.source}: {parameters.leg_kind.home_rule(parameters)}')
-    positions, rotations = home.poses(parameters)
-    return Pose(positions[0], rotations[0])
+        rule = parameters.leg_kind.home_rule(parameters, home_legs(parameters)['base'])
+        raise ParameterError(f'{parameters.source}: {rule}')
+    return Pose(home.positions[0], home.rotations[0])
+
+
+def choose_branch(parameters: Parameters) -> None:
+    """
+    Set the assembly of the legs that the parameters leave open.
+
+    Raises ParameterError: there is no home pose, or it does not decide it.
+    """
+    def at_home() -> tuple[Array, Array]:
+        home = home_pose(parameters)
+        return home.position, home.rotation
+
+    parameters.choose_branch(at_home)
 
 
 def determinant_at_home(parameters: Parameters) -> float:
@@ -129,33 +146,21 @@ def homes(parameters: Parameters) -> tuple[Array, Array]:
     Positions (N, 3) [m] and rotations (N, 3, 3). Half of them are on the other side of the base;
     if the parameters do not give the height, there are several on each.
     """
-    return home_of(parameters).poses(parameters)
+    home = home_of(parameters)
+    return home.positions, home.rotations
 
 
 def shape_of(p: Parameters) -> Shape:
-    base, platform = p.leg_kind.home_legs(p).anchors, p.geometry.platform_joints
-    around, carried = base - base.mean(axis=0), platform - platform.mean(axis=0)
-    axes = level_axes(around)
-    return Shape(around @ axes.T, carried @ axes.T, axes, mean_norm(around),
-                 mean_norm(carried))
+    found = found_home(p)
+    return Shape(found['base'], found['platform'], found['axes'].reshape(3, 3),
+                 float(found['base_radius']), float(found['platform_radius']))
 
 
 def level_axes(around: Array) -> Array:
     """Return two axes in the plane of points, and its normal, (3, 3)."""
-    moments = around.T @ around
-    if not np.isfinite(moments).all():
-        return np.eye(3)
-    # The normal of a plane is the direction in which its points spread least.
-    normal = np.linalg.eigh(moments)[1][:, 0]
-    nearest = int(np.argmax(np.abs(normal)))
-    normal = normal * np.sign(normal[nearest])
-    first = np.cross(np.eye(3)[(nearest + 2) % 3], normal)
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(normal, first), normal])
-
-
-def mean_norm(vectors: Array) -> float:
-    return float(np.mean(np.linalg.norm(vectors, axis=-1)))
+    axes = np.empty((3, 3))
+    function('level_axes')(len(around), np.ascontiguousarray(around), axes)
+    return axes
 
 
 def is_too_long(p: Parameters, name: str, shape: Shape) -> bool:
@@ -164,61 +169,32 @@ def is_too_long(p: Parameters, name: str, shape: Shape) -> bool:
 
 def home_of(p: Parameters) -> Home:
     """Return the level poses within the limits of length, and the possible heights at home."""
-    with np.errstate(all='ignore'):
-        lines, shape = p.leg_kind.home_legs(p), shape_of(p)
-        offsets = (turns_about(2, _YAWS) @ shape.platform.T).swapaxes(-1, -2) - shape.base
-        above, below = (_reached(p, offsets, side) for side in (1.0, -1.0))
-        given = p.geometry.platform_side
-        certain = given != AUTO or bool(above.any() != below.any())
-        side = -1.0 if given == NEGATIVE or given == AUTO and certain and below.any() else 1.0
-        reached = above if side > 0.0 else below
-        angles = np.abs((_YAWS + np.pi) % (2.0 * np.pi) - np.pi)
-        yaw = float(_YAWS[np.argmin(np.where(reached, angles, np.inf))]) if reached.any() else 0.0
-        across = float(np.linalg.norm(offsets[..., :2], axis=-1).max())
-        longest = math.hypot(HEIGHTS[-1] * shape.radius, across)
-        high, length = lines.longest, lines.length
-        if high is not None and not is_too_long(p, 'limits.length_max', shape):
-            longest = float(high.max())
-        legs = shape.platform @ turns_about(2, np.array([yaw]))[0].T - shape.base  # at no height
-        known = mean_norm(legs) < length < _LENGTH_RATIO * shape.radius
-        heights = [each * _height(shape, each, legs, length) for each in (side, -side)] if (
-            known) else [each * height * shape.radius
-                         for each in (side, -side) for height in HEIGHTS]
-    return Home(shape, bool(reached.any()), yaw, longest, side, certain, np.array(heights),
-                length if known else None)
+    found, shape = found_home(p), shape_of(p)
+    longest = math.hypot(HEIGHTS[-1] * shape.radius, float(found['across']))
+    if p.limits.length_max is not None and not is_too_long(p, 'limits.length_max', shape):
+        longest = float(p.limits.length_max.max())
+    count = int(found['count'])
+    poses = found['poses'][:count].view(np.float64).reshape(-1, POSE.stop)
+    return Home(
+        shape, bool(found['reachable']), float(found['yaw']), longest, float(found['side']),
+        bool(found['certain']), found['heights'][:count],
+        float(found['length']) if found['known'] else None, poses[:, POSITION].copy(),
+        poses[:, ROTATION].reshape(-1, 3, 3).copy(), found['base_directions'],
+        found['platform_directions'], found['mounts'].reshape(6, 3, 3))
 
 
-def _reached(p: Parameters, offsets: Array, side: float) -> Flags:
-    """
-    Return at which turns all legs are within their limits at some height, on one side.
-
-    offsets (turns, 6, 3): the legs while the center of the platform is at that of the base [m].
-    """
-    lines = p.leg_kind.home_legs(p)
-    low, high = six_of(lines.shortest, 0.0), six_of(lines.longest, np.inf)
-    across, along = np.linalg.norm(offsets[..., :2], axis=-1), side * offsets[..., 2]
-    # The height of a leg is that of the platform plus the platform joint's own.
-    least = np.sqrt(np.maximum(low ** 2 - across ** 2, 0.0)) - along
-    most = np.where(high >= across, np.sqrt(np.abs(high ** 2 - across ** 2)), -np.inf) - along
-    reached: Flags = least.max(axis=-1) <= most.min(axis=-1)
-    return reached
+def found_home(p: Parameters) -> Any:
+    """Return the structure ``home_poses`` () of a hexapod."""
+    found = np.zeros((), record('home_poses'))
+    function('find_home')(home_legs(p), _SIDES[p.geometry.platform_side], found)
+    return found
 
 
-def _height(shape: Shape, side: float, legs: Array, length: float) -> float:
-    """Return the distance from the base at which the mean leg has a length, on one side."""
-    across, along = (legs[:, :2] ** 2).sum(axis=1).tolist(), legs[:, 2].tolist()
-    low, high = 0.0, length + shape.base_radius + shape.platform_radius
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        total = 0.0
-        for square, height in zip(across, along, strict=True):
-            raised = height + side * middle
-            total += math.sqrt(square + raised * raised)
-        if total / len(along) < length:
-            low = middle
-        else:
-            high = middle
-    return high
+def home_legs(p: Parameters) -> Any:
+    """Return the structure ``home_legs`` (): the lines by which the home pose is found."""
+    legs = np.zeros((), record('home_legs'))
+    function('put_home_legs')(p.structure, legs)
+    return legs
 
 
 def poses_of(p: Parameters, shape: Shape, heights: Array, rotations: Array,
@@ -226,7 +202,7 @@ def poses_of(p: Parameters, shape: Shape, heights: Array, rotations: Array,
     """Return positions (N, 3) and rotations (N, 3, 3) at these heights and turns of the shape."""
     middle = p.geometry.platform_joints.mean(axis=0)
     rotations = shape.axes.T @ rotations @ shape.axes
-    positions = (p.leg_kind.home_legs(p).anchors.mean(axis=0) - rotations @ middle
+    positions = (home_legs(p)['base'].mean(axis=0) - rotations @ middle
                  + heights[:, None] * shape.axes[2])
     return positions, rotations
 

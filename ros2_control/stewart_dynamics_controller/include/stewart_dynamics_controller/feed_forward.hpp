@@ -16,6 +16,11 @@
  *
  * After a gap (cycles that did not come, references that did not, a hold) the reference has gone
  * on: positions go from the last command to it with at most limits.velocity_max in each cycle.
+ *
+ * With a governor (core/governor.c) the motion begins at rest at the first reference, and follows
+ * the references as far as all limits let it, so that a stop within the limits always exists. That
+ * stop takes the place of the hold where a reference is rejected, or none comes: velocities end
+ * without a step.
  */
 
 #ifndef STEWART_DYNAMICS_CONTROLLER__FEED_FORWARD_HPP_
@@ -23,7 +28,9 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
+#include "control.h"
 #include "stewart_dynamics.h"
 
 namespace stewart_dynamics_controller
@@ -57,6 +64,16 @@ struct Command
   Six motor_velocities;  // clipped to speed_max, and to velocity_max times the ratio [rad/s]
 };
 
+/// What a governor keeps: a hexapod whose limits have margins, and the margins themselves.
+struct Governor
+{
+  stewart_platform within;
+  governor_limits limits;
+};
+
+/// Return the parameter of a limit that governed_limit has returned; nullptr for 0.
+const char * name_of_limit(std::int64_t limit);
+
 /// Return the row-by-row rotation Rz(gamma) Ry(beta) Rx(alpha).
 std::array<double, 9> rotation_of_euler(double alpha, double beta, double gamma);
 
@@ -64,27 +81,32 @@ class FeedForward
 {
 public:
   /// hexapod: checked parameters; guess: the pose near which the legs' first reference is;
-  /// timeout, and period of the cycles: [ns]; period 0: positions are not bounded after a gap.
+  /// timeout, and period of the cycles: [ns]; period 0: positions are not bounded after a gap;
+  /// governor: of this hexapod, for references of the platform; imu: measures the base.
   FeedForward(
     const stewart_platform & hexapod, const stewart_pose & guess, std::int64_t timeout,
-    std::int64_t period = 0);
+    std::int64_t period = 0, const std::optional<Governor> & governor = std::nullopt,
+    const std::optional<imu_mounting> & imu = std::nullopt);
 
   /// Forget earlier references: the singularity warning, the last pose, the heat of windings.
   void start();
 
   /// Use other parameters from now on; warning and temperatures of the windings are kept.
-  void change(const stewart_platform & hexapod);
+  void change(
+    const stewart_platform & hexapod, const std::optional<Governor> & governor = std::nullopt);
 
   /// Compute the command of a reference at a time [ns], which rises from call to call.
   /// feedback: efforts that are added, before the limit force_max.
+  /// reading: of the IMU, angular velocity and specific force; not used without one.
+  /// repeated: no reference has come since the last cycle; a governed motion waits for the next.
   /// Return a code of stewart_dynamics.h: STEWART_OK if the reference is followed. If not, the
   /// command holds the platform; before the first one that was followed there is no command.
   int update(
     const PlatformReference & reference, const Six & wrench, const Six & feedback,
-    std::int64_t now, Command & command);
+    std::int64_t now, Command & command, const Six & reading = {}, bool repeated = false);
   int update(
     const LegReference & reference, const Six & wrench, const Six & feedback,
-    std::int64_t now, Command & command);
+    std::int64_t now, Command & command, const Six & reading = {});
 
   /// Return whether the time from one event to the next is a gap [ns].
   bool is_gap(std::int64_t since, std::int64_t now) const
@@ -112,6 +134,10 @@ public:
   /// Return the rises of the temperatures of the windings by what was commanded so far [K].
   const double * rises() const {return state_.rises;}
   bool warning() const {return state_.warning != STEWART_NO_WARNING;}
+  /// Return the last motion of the governor.
+  const stewart_motion & governed() const {return governed_;}
+  /// Return the last known motion of the base; nullptr: it is fixed, or was never known.
+  const stewart_base * base() const {return base_ ? &*base_ : nullptr;}
 
 private:
   static constexpr std::int64_t kGap = 10;  // cycles
@@ -121,7 +147,9 @@ private:
   template<typename Reference>
   int answer(
     const Reference & reference, const Six & wrench, const Six & feedback, std::int64_t now,
-    Command & command);
+    Command & command, const Six & reading, bool repeated);
+  bool measure(const Six & reading, std::int64_t now);
+  int govern(int demanded, bool repeated, std::int64_t now, stewart_motion & motion);
   int follow(
     const stewart_motion & motion, const Six & wrench, const Six & feedback, std::int64_t now,
     Command & command);
@@ -133,6 +161,14 @@ private:
   int reject(int code, const char * rule, int leg = 0);
 
   stewart_platform hexapod_, unsuppressed_;  // the same for a platform that is held
+  std::optional<Governor> governor_;
+  governed_stream stream_{};
+  stewart_motion governed_{};
+  std::int64_t governed_for_ = 0;  // time of the stream, without gaps [ns]
+  std::int64_t governed_at_ = 0, demanded_at_ = 0;
+  std::optional<imu_mounting> imu_;
+  imu_stream readings_{};
+  std::optional<stewart_base> base_;
   stewart_pose guess_;
   std::int64_t timeout_, period_, updated_at_ = 0, followed_at_ = 0;
   bool started_ = false, catching_up_ = false;

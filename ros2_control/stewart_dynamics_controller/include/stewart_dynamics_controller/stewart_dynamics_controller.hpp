@@ -68,13 +68,20 @@ private:
   Command command_;  // the last one
   Six per_newton_metre_;  // per mille of the rated torques [1/(N m)]
   std::array<std::string, 6> leg_texts_;
+  struct Changed
+  {
+    stewart_platform hexapod;
+    std::optional<Governor> governor;
+  };
   /// The hexapod of parameters that were set since the last cycle.
-  realtime_tools::RealtimeThreadSafeBox<std::optional<stewart_platform>> changed_;
+  realtime_tools::RealtimeThreadSafeBox<std::optional<Changed>> changed_;
+  std::optional<imu_mounting> imu_;
   rclcpp::Subscription<Setpoint>::SharedPtr subscription_;
   /// The setpoint that the topic has brought since the last cycle.
   realtime_tools::RealtimeThreadSafeBox<std::optional<PlatformNumbers>> received_;
   std::int64_t received_at_ = -1;  // time of the cycle that took the last setpoint [ns]; none: -1
   std::int64_t deactivated_at_ = 0;  // [ns]
+  bool repeated_ = false;  // no setpoint has come since the last cycle
   bool was_chained_ = false, left_chain_ = false;  // when it was activated last
   const char * last_rejection_ = nullptr;
 };
