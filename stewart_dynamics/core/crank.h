@@ -213,6 +213,8 @@ static double crank_rate_max(const stewart_leg * leg) {return leg->crank_speed_m
 static double crank_lever_ratio(const stewart_leg * leg, double lever)
 {return fabs(lever) / leg->crank_length;}
 
+static int crank_given(const stewart_leg * leg) {return leg->crank_length > 0.0;}
+
 /* The rod as two points with a coupling, and the crank with the point at its end: exact where the
    rod has no inertia about its own axis. */
 static void crank_complete(stewart_leg * leg) {

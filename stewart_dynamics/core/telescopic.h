@@ -217,6 +217,8 @@ static double telescopic_rate_max(const stewart_leg * leg) {return leg->velocity
 static double telescopic_lever_ratio(const stewart_leg * leg, double lever)
 {(void)leg, (void)lever; return 1.0;}
 
+static int telescopic_given(const stewart_leg * leg) {(void)leg; return 1;}
+
 static void telescopic_complete(stewart_leg * leg) {
   double gear = leg->gear_ratio, ratio = leg->screw_lead > 0.0 ?
     2.0 * PI * gear / leg->screw_lead : (double)NAN;

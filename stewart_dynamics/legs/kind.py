@@ -120,7 +120,7 @@ class LegKind(ABC):
     width: int = _RESULT['joint_forces'].stop
     ratio: str = ''
     own: tuple[str, ...]
-    foreign: tuple[str, ...]  # the ``own`` of other kinds
+    foreign: tuple[str, ...]  # the ``own`` of other kinds, without those of this one
     fields: Mapping[str, str]
     masses: tuple[LegMass, ...]
     massless: Mapping[str, Any]
@@ -305,14 +305,13 @@ def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind
                   source: str) -> None:
     """Raise ParameterError for a parameter that has a meaning for other kinds alone."""
     for name, value in parameters.given.items():
-        owner = next((each for each in kinds if each is not kind and name.startswith(each.own)),
-                     None)
         default = parameters.table[name].default
         # A whole set of parameters, as dict(parameters), gives the defaults, too.
-        if owner is None or np.size(default) > 0 and np.all(value == np.asarray(default)):
+        if not name.startswith(kind.foreign) or np.size(default) > 0 and np.all(value == np.asarray(default)):
             continue
         unit = parameters.table[name].unit
         words = f'{source}: {name}: {shown(value)}{f" {unit}" if unit else ""}'
         if kind.marker:
             raise ParameterError(f'{words}: must not be given with {kind.marker}')
+        owner = next(each for each in kinds if each is not kind and name.startswith(each.own))
         raise ParameterError(f'{words}: needs {owner.marker}, which is not set')
