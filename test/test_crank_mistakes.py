@@ -187,7 +187,7 @@ SLIPS: dict[str, tuple[str, dict[str, Any], str]] = {
     'rotor in kg cm^2': ('rig', {'actuator.reflected_inertia': 1.1e-3, 'limits.torque_max': 2500.0,
                                  'limits.speed_max': 2.0},
                          'actuator.reflected_inertia: 0.0011 kg m^2')}
-# Those of which several lines say it.
+# Mistakes that several lines report.
 SEVERAL = {'both in mm', 'all in mm', 'angles in degrees'}
 
 

@@ -55,7 +55,7 @@ NODES = {
 
 
 def run(folder: Path, program: str, *arguments: str | Path) -> tuple[int, str, str]:
-    """Return the exit code of an installed program, and what it prints."""
+    """Return the exit code of an installed program, its output and its errors."""
     done = subprocess.run([Path(sys.executable).with_name(program), *arguments], cwd=folder,
                           capture_output=True, text=True, timeout=300, check=False)
     return done.returncode, done.stdout, done.stderr
@@ -345,7 +345,7 @@ def with_pantographs(folder: Path) -> list[str]:
             assert text.count(behind) == 1, (name, behind)
             text = text.replace(behind, behind + added)
         (package / name).write_text(text, encoding='utf-8')
-    # Of all functions of a kind, those that do not differ from those of telescopic legs.
+    # The functions of a kind that do not differ from those of telescopic legs.
     asked = {function for file in ('stewart_dynamics.c', 'legs.c') for function in re.findall(
         r'STEWART_LEG_KINDS\(\w+, (\w+), \(', (package / 'core' / file).read_text())}
     same = sorted(asked - set(re.findall(r'\bpantograph_(\w+)\(', C_FILE)))
