@@ -137,8 +137,8 @@ def test_a_feature_may_know_several_kinds() -> None:
     assert str(found.value) == f'{CRANK_FILE}: {NOT_FOR_CRANKS.format("a feature")}'
 
 
-# A third kind, as somebody would add it: a telescopic leg whose drive moves it by a pantograph. Its
-# position is that of the leg times a ratio, its effort the push divided by it.
+# A third kind, as somebody would add it: a telescopic leg whose drive moves it by a pantograph.
+# Its position is that of the leg times a ratio, its effort the push divided by it.
 
 C_FILE = r"""/* A telescopic leg with a pantograph at its drive. */
 
@@ -259,8 +259,8 @@ EDITS = {
         ('(TELESCOPIC, CRANK', ', PANTOGRAPH')],
     'parameters/table.py': [(
         '    """Inertia and friction of the actuators, along the legs."""\n',
-        "\n    pantograph_ratio: Array | None = _legs('ratio of a pantograph', '', (), minimum=0.0, "
-        'above=True)')]}
+        "\n    pantograph_ratio: Array | None = _legs('ratio of a pantograph', '', (), "
+        'minimum=0.0, above=True)')]}
 PROGRAM = """
 import sys
 

@@ -15,9 +15,10 @@ from typing import Any
 import matplotlib
 import numpy as np
 
-from stewart_dynamics import Motion, Pose, StewartPlatform
+from stewart_dynamics import Pose, StewartPlatform
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.colors import LEG_COLORS
+from stewart_dynamics.legs.crank import crank_ends
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202
@@ -30,11 +31,7 @@ def ends_of(platform: StewartPlatform, pose: Pose) -> tuple[Array, Array, Array]
     """Return motors, ends of the cranks and platform joints (6, 3) in a pose [m]."""
     p = platform.parameters
     joints = pose.position + p.geometry.platform_joints @ pose.rotation.T
-    result = platform.inverse_dynamics(Motion.from_pose(pose))
-    u, z = p['geometry.crank_axes'], p['geometry.crank_directions']
-    angles = result.angles[:, None]
-    ends = p.geometry.base_joints + p['legs.crank.length'][:, None] * (
-        z * np.cos(angles) + np.cross(u, z) * np.sin(angles))
+    ends = crank_ends(p, platform.inverse_kinematics(pose))
     return p.geometry.base_joints, ends, joints
 
 
@@ -96,12 +93,13 @@ def draw_signs(axes: Any) -> None:
             ((-0.62, -0.42), 'c, axis u toward you'), ((1.38, -0.2), 'z: q = 0'),
             (end + [0.10, -0.17], 'A'), (joint + [0.1, 0.02], 'B, platform joint'),
             (end + 0.63 * end, 'e'), (end + 0.86 * normal, 'n'),
-            (0.5 * end + [-0.16, 0.13], '$L_1$'), (end + 0.3 * (joint - end) + [0.1, 0.0], '$L_2$'),
+            (0.5 * end + [-0.16, 0.13], '$L_1$'),
+            (end + 0.3 * (joint - end) + [0.1, 0.0], '$L_2$'),
             (end + 0.56 * (joint - end) + [-0.2, 0.06], 'd'),
             (foot + [0.06, -0.14], 'lever $k$')):
         axes.text(*at, text)
-    axes.text(-0.55, 2.75, 'k = $L_1$ d . n > 0: branch positive,\na positive torque pushes B away',
-              va='top')
+    axes.text(-0.55, 2.75, 'k = $L_1$ d . n > 0: branch positive,\n'
+              'a positive torque pushes B away', va='top')
     axes.set(xlim=(-0.7, 2.35), ylim=(-0.6, 2.85), aspect='equal')
     axes.set_axis_off()
 

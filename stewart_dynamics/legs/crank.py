@@ -381,6 +381,15 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
     return centers, inertias
 
 
+def crank_ends(parameters: Parameters, angles: Array) -> Array:
+    """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
+    u, z = crank_axes(parameters)
+    along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
+    sizes = parameters['legs.crank.length'][:, None]
+    ends: Array = parameters.geometry.base_joints + sizes * along
+    return ends
+
+
 def crank_axes(parameters: Parameters) -> tuple[Array, Array]:
     """Return the axes of the motors and the cranks at the angle 0, unit vectors (6, 3) each."""
     legs: Any = parameters.structure['legs']

@@ -307,7 +307,8 @@ def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind
     for name, value in parameters.given.items():
         default = parameters.table[name].default
         # A whole set of parameters, as dict(parameters), gives the defaults, too.
-        if not name.startswith(kind.foreign) or np.size(default) > 0 and np.all(value == np.asarray(default)):
+        if not name.startswith(kind.foreign) or np.size(default) > 0 and np.all(
+                value == np.asarray(default)):
             continue
         unit = parameters.table[name].unit
         words = f'{source}: {name}: {shown(value)}{f" {unit}" if unit else ""}'
