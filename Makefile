@@ -180,6 +180,7 @@ docs: $(TOOLS)
 	$(VENV)/bin/python docs/figures/misprints.py
 	$(VENV)/bin/python docs/figures/draw.py
 	$(VENV)/bin/python docs/figures/hexapod.py
+	$(VENV)/bin/python docs/figures/cranks.py
 	$(VENV)/bin/python docs/figures/tables.py
 	$(VENV)/bin/python demo/cueing.py --output docs/figures/motion_cueing.png
 

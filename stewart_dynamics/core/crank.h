@@ -236,6 +236,7 @@ static double crank_lever_time(
   if (!(left > 0.0)) {return 0.0;}
   return rate < 0.0 ? -left / rate : HUGE_VAL;
 }
+static int crank_given(const stewart_leg * leg) {return leg->crank_length > 0.0;}
 
 /* The rod as two points with a coupling, and the crank with the point at its end: exact where the
    rod has no inertia about its own axis. */

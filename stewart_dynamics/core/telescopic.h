@@ -224,6 +224,8 @@ static double telescopic_lever_time(
   const stewart_leg * leg, const stewart_motion * motion, double lever)
 {(void)leg, (void)motion, (void)lever; return HUGE_VAL;}
 
+static int telescopic_given(const stewart_leg * leg) {(void)leg; return 1;}
+
 static void telescopic_complete(stewart_leg * leg) {
   double gear = leg->gear_ratio, ratio = leg->screw_lead > 0.0 ?
     2.0 * PI * gear / leg->screw_lead : (double)NAN;

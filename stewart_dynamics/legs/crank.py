@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -14,9 +14,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.legs import crank_tree as tree
+from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
 from stewart_dynamics.legs.kind import (
-    LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
+    AtHome, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
@@ -87,6 +87,7 @@ class Crank(LegKind):
     shortened = HEADINGS,
     likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
+    reflected, rotors = 'N^2 J', 'rotor and gear'
     friction_units = 'N m s/rad', 'N m'
     alternatives = (HEADINGS,), (AXES, DIRECTIONS)
     units = {'actuator.viscous_friction': 'N m s/rad', 'actuator.coulomb_friction': 'N m',
@@ -253,17 +254,35 @@ class Crank(LegKind):
         leg = int(np.argmin(ratios))
         return f'smallest lever: {joints[leg]}, {ratios[leg]:.3g} of its largest'
 
-    def home_rule(self, parameters: Parameters) -> str:
-        """Return that the rods are shorter than the gap, or far too long."""
+    def reach(self, parameters: Parameters) -> Array:
+        """Return the lengths of the cranks."""
+        size: Array = parameters['legs.crank.length']
+        return size
+
+    def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[str]:
+        """Yield lengths in mm, and rods that are shorter than the gap at home."""
+        return crank_mistakes.wrong_sizes(parameters, anchors)
+
+    def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
+        """Yield mistakes in signs and zeros of the cranks, their masses and limits."""
+        at = self.lines(parameters, home.position, home.rotation)
+        if not np.isfinite(at.directions).all():
+            return iter(())
         legs: Any = parameters.structure['legs']
-        with np.errstate(all='ignore'):
-            ends = crank_ends(parameters, legs['home_position'])
-        joints = parameters.geometry.platform_joints
-        gaps = np.linalg.norm(ends - ends.mean(axis=0) - joints + joints.mean(axis=0), axis=1)
+        position = crank_mistakes.above_motors(parameters, home)
+        both = [_angles_at(parameters, leg, position, home.rotation) for leg in range(6)]
+        angles = np.array([math.nan if each is None else each[0 if sign > 0.0 else 1]
+                           for each, sign in zip(both, legs['branch'], strict=True)])
+        return crank_mistakes.likely_mistakes(
+            parameters, home, angles, at.levers(), crank_bodies(parameters))
+
+    def home_rule(self, parameters: Parameters, anchors: Array) -> str:
+        """Return that the rods are shorter than the gap, or far too long."""
+        gap = crank_mistakes.gap_of(parameters, anchors)
         rods = np.unique(parameters['legs.rod.length'])
         return (f'legs.rod.length: {shown(rods.tolist())} m: no level pose has rods of this length'
                 ': while the platform joints are level with the ends of the cranks, at the '
-                f'middle of their angles, they are {np.mean(gaps):.3g} m away from them')
+                f'middle of their angles, they are {gap:.3g} m away from them')
 
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
@@ -438,12 +457,6 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
     else:
         inertias[:] = given
     return centers, inertias
-
-
-def _unit(vectors: Array) -> Array:
-    with np.errstate(all='ignore'):
-        units: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return units
 
 
 def crank_ends(parameters: Parameters, angles: Array) -> Array:

@@ -14,7 +14,7 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.legs import telescopic_tree as tree
 from stewart_dynamics.legs.kind import (
     LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
-from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
+from stewart_dynamics.legs.lines import Lines, lines_from, per_leg, skew, transposed
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, SLIDE, UNIVERSAL
 from stewart_dynamics.legs.tree import BARREL, LegBranch, ROD
 
@@ -71,6 +71,7 @@ class Telescopic(LegKind):
                     for each in ('mass', 'center_of_mass', 'inertia')))
     zero = 'geometry.zero_length'
     inertia_unit = 'kg'
+    reflected, rotors = 'J (2 pi / lead)^2', 'rotor and screw'
     friction_units = 'N s/m', 'N'
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
@@ -98,10 +99,8 @@ class Telescopic(LegKind):
 
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the legs: (1), (2)."""
-        arms = joint_arms(rotation, parameters.geometry.platform_joints)
-        vectors = position[..., None, :] + arms - parameters.geometry.base_joints
-        lengths = np.linalg.norm(vectors, axis=-1)
-        return Lines(lengths, vectors / lengths[..., None], arms)
+        geometry = parameters.geometry
+        return lines_from(geometry.base_joints, geometry.platform_joints, position, rotation)
 
     def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
                      ) -> tuple[Placed, ...]:
@@ -228,9 +227,9 @@ class Telescopic(LegKind):
         """Return the parameters of a leg in a file."""
         return tree.read_leg(self, chain, base, platform, said)
 
-    def home_rule(self, parameters: Parameters) -> str:
+    def home_rule(self, parameters: Parameters, anchors: Array) -> str:
         """Return that the mean length is missing, or too short."""
-        del parameters
+        del parameters, anchors
         return ('home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
                 'must give a length that the legs can have in a level pose')
 
