@@ -158,7 +158,7 @@ def _motions(parameters: Parameters) -> Array:
 
 def _results(kind: LegKind, outputs: Outputs) -> list[float]:
     """Return the columns from CODE to WARNING of one setpoint's outputs."""
-    code = SINGULAR if not outputs.solvable[0] else OK if outputs.with_forces[0] else SUPPRESSED
+    code = SINGULAR if not outputs.solvable[0] else OK if outputs.with_efforts[0] else SUPPRESSED
     exceeded = outputs.records['exceeded'][0]
     state = outputs.singularity()
     row = outputs.rows[0]
