@@ -13,7 +13,7 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.export.c_project import c_project, hexadecimal, SOURCES, source
+from stewart_dynamics.export.c_project import c_project, hexadecimal, source, SOURCES
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.parameters.table import Parameters
 

@@ -105,7 +105,8 @@ def variables(parameters: Parameters) -> list[Variable]:
 
 def has_levers(kind: LegKind) -> bool:
     """Return whether results of a kind of legs have levers."""
-    return places('stewart_result')['levers'].stop <= kind.width
+    levers: slice = places('stewart_result')['levers']
+    return bool(levers.stop <= kind.width)
 
 
 def _start_pose(parameters: Parameters) -> tuple[Array, Array]:
