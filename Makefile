@@ -115,8 +115,9 @@ demo: $(INSTALLED)
 demo-cueing: $(INSTALLED)
 	@$(VENV)/bin/python demo/cueing.py
 
+# LEGS=crank: six gear motors with cranks in place of telescopic legs.
 demo-loop: $(INSTALLED)
-	@$(VENV)/bin/python demo/loop.py
+	@$(VENV)/bin/python demo/loop.py $(if $(LEGS),--legs $(LEGS))
 
 demo-mujoco: $(INSTALLED)
 	@$(VENV)/bin/python demo/mujoco_loop.py

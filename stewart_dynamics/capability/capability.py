@@ -28,6 +28,7 @@ from stewart_dynamics.capability.travel import ENDS
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.legs import require_kind
+from stewart_dynamics.legs.telescopic import TELESCOPIC
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, wrong_type)
@@ -45,6 +46,8 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, NaturalModes
 
+CAPABLE = (TELESCOPIC,)
+"""The kinds of legs whose capability is known."""
 _ENDS = np.array(ENDS)
 # Bounds where a minimum is not given.
 _UNLIMITED = {limits.LENGTH_MIN: 0.0, limits.CLEARANCE_MIN: -math.inf}
@@ -165,7 +168,7 @@ class Capability:
     def __init__(self, platform: StewartPlatform) -> None:
         if not isinstance(platform, StewartPlatform):
             raise wrong_type('platform', platform, 'a StewartPlatform')
-        require_kind(platform.parameters, 'capability')
+        require_kind(platform.parameters, 'capability', *CAPABLE)
         self.platform = platform
         self._pose_limits = PoseLimits(platform.parameters)
         self._limits = self._pose_limits.limits

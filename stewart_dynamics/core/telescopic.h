@@ -197,6 +197,10 @@ static double telescopic_anchor(const stewart_leg * leg, double position, vector
 {*anchor = read3(leg->base_joint); return position;}
 
 /* L'' = s . x'' + |x' across the leg|^2 / L. */
+static int telescopic_assembled(
+  const stewart_leg * leg, double position, const double origin[3], const double r[9])
+{(void)leg, (void)position, (void)origin, (void)r; return 1;}
+
 static double telescopic_straight(
   const stewart_leg * leg, const double position[3], const double r[9], vector x_rate,
   double rate, double acceleration) {
@@ -216,6 +220,9 @@ static double * telescopic_commands(stewart_output * output) {return output->for
 static double telescopic_rate_max(const stewart_leg * leg) {return leg->velocity_max;}
 static double telescopic_lever_ratio(const stewart_leg * leg, double lever)
 {(void)leg, (void)lever; return 1.0;}
+static double telescopic_lever_time(
+  const stewart_leg * leg, const stewart_motion * motion, double lever)
+{(void)leg, (void)motion, (void)lever; return HUGE_VAL;}
 
 static int telescopic_given(const stewart_leg * leg) {(void)leg; return 1;}
 
@@ -263,6 +270,13 @@ static measured_leg telescopic_measured(const stewart_leg * leg, const stewart_m
   vector joint = add(read3(motion->linear_velocity), turning);
   measured_leg of = {at.length, dot(at.direction, joint), HUGE_VAL};
   if (0.0 < at.length && at.length < HUGE_VAL) {of.pace = at.per_length * norm(joint);}
+  return of;
+}
+
+static lever_slope telescopic_slope(
+  const stewart_leg * leg, const double position[3], const double r[9]) {
+  lever_slope of = {1.0, 0.0, {0.0, 0.0, 0.0}};
+  (void)leg, (void)position, (void)r;
   return of;
 }
 

@@ -15,11 +15,12 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
-from stewart_dynamics.legs.kind import AtHome, LegKind, LegMass, Named
+from stewart_dynamics.legs.kind import (
+    AtHome, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
-from stewart_dynamics.legs.tree import LegBranch
+from stewart_dynamics.legs.tree import BARREL, LegBranch, ROD
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -31,6 +32,9 @@ COULOMB_VELOCITY = 0.01
 """Default of ``actuator.coulomb_velocity`` for cranks [rad/s]."""
 HEADINGS, AXES, DIRECTIONS = (
     'geometry.crank_angles', 'geometry.crank_axes', 'geometry.crank_directions')
+# A stop near a dead centre is expected to end motions before half of its lever, or before this.
+_DEEPEST = 0.5
+_LEAST_LEVER = 0.01
 _UPRIGHT = 0.5 * math.pi  # from its zero, farther than which no crank is at home by itself [rad]
 
 
@@ -41,14 +45,25 @@ class Crank(LegKind):
     marker = 'legs.crank.length'
     position = Named('angle', 'angles', 'rad')
     rate = Named('speed', 'speeds', 'rad/s')
-    effort = Named('torque', 'torques', 'N m', '+ drives the angle up')
+    effort = Named('torque', 'torques', 'N m', '+ drives the angle up', 'drives it down')
+    effort_signs = 'drives the angle up', 'drives it down'
+    extremes = 'smallest angle', 'largest angle'
     position_limits = 'limits.angle_min', 'limits.angle_max'
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
+    joint_force, joint_force_limit = 'rod_force', 'limits.rod_force_max'
     commands = 'torques'
+    simulated = 'leg_torque'
+    resolved = ('a crank turns by more than that, a joint moves by more than that part of its '
+                'rod, or a lever changes by more than that part of itself, as at a dead centre')
+    gear, right_sign = 'gear', '+ must drive the angle up'
+    wrong_units = (
+        (1e-3, 'kN m in place of N m'), (1.0 / STANDARD_G, 'kgf m in place of N m'),
+        (1e2 / STANDARD_G, 'kgf cm in place of N m'), (1.0 / 1.355818, 'lbf ft in place of N m'),
+        (1e3, 'mN m in place of N m'), (1e2, 'N cm in place of N m'))
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
-           'limits.lever_min')
+           'limits.lever_min', 'noise.angle', 'noise.speed', 'noise.torque')
     fields = {
         'crank_length': 'legs.crank.length', 'rod_length': 'legs.rod.length',
         'crank_axis': AXES, 'crank_direction': DIRECTIONS, 'crank_mass': 'legs.crank.mass',
@@ -63,6 +78,7 @@ class Crank(LegKind):
     massless = {
         'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
         'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
+    solids = Solid('cranks', BARREL), Solid('rods', ROD)
     parts, joints = tree.PARTS, (HINGE, UNIVERSAL)
     elements = (
         'actuator.reflected_inertia', 'actuator.viscous_friction', 'actuator.coulomb_friction',
@@ -101,10 +117,26 @@ class Crank(LegKind):
         legs: Any = parameters.structure['legs']
         centers, inertias = crank_bodies(parameters)
         mass = parameters['legs.crank.mass']
-        x, y, z = centers.T
-        about = np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
-        return np.concatenate([mass * centers.T, inertias.T + mass * about, np.stack([
+        return np.concatenate([mass * centers.T, inertias.T + mass * _about(centers), np.stack([
             legs[name] for name in ('crank_end_mass', 'coupling_mass', 'platform_end_mass')])])
+
+    def relative_changes(self, parameters: Parameters) -> list[Array]:
+        """Return changes of crank and rod."""
+        centers, inertias = crank_bodies(parameters)
+        mass, size = parameters['legs.crank.mass'], parameters['legs.rod.length']
+        legs: Any = parameters.structure['legs']
+        rod, part = legs['rod_mass'], legs['rod_center_of_mass'] / size
+        turning, none = legs['rod_inertia'] / size ** 2, np.zeros(6)
+        first, about = mass * centers.T, mass * _about(centers)
+        changes = [(np.zeros((3, 6)), np.zeros((6, 6)), each) for each in (
+            (rod * (1.0 - part) ** 2, rod * part * (1.0 - part), rod * part ** 2),
+            (-2.0 * rod * part * (1.0 - part), rod * part * (1.0 - 2.0 * part),
+             2.0 * rod * part ** 2),
+            (turning, -turning, turning))]
+        changes += [(*each, (none,) * 3) for each in (
+            (first, about), (first, 2.0 * about), (np.zeros((3, 6)), inertias.T))]
+        return [np.concatenate([moments, inertia, of_rod])
+                for moments, inertia, of_rod in changes]
 
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the rods, whose anchors are the ends of the cranks: A(q) = c + L1 e(q)."""
@@ -114,6 +146,20 @@ class Crank(LegKind):
         directions = (at.line + curvatures) / rods[:, None]
         return Lines(np.broadcast_to(rods, at.missing.shape), directions, at.arms,
                      AnchorPath(tangents, curvatures))
+
+    def anchors(self, parameters: Parameters, positions: Array) -> Array:
+        """Return the ends of the cranks."""
+        return crank_ends(parameters, positions)
+
+    def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
+                     ) -> tuple[Placed, ...]:
+        """Return the cranks at their angles, and the rods from there to the platform joints."""
+        centers, sizes = parameters.geometry.base_joints, parameters['legs.crank.length']
+        ends = crank_ends(parameters, positions)
+        cranks, rods = ends - centers, joints - ends
+        lengths = np.linalg.norm(rods, axis=1)
+        return (Placed(centers + 0.5 * cranks, cranks / sizes[:, None], sizes),
+                Placed(ends + 0.5 * rods, rods / lengths[:, None], lengths))
 
     def missing_distances(self, parameters: Parameters, position: Array, rotation: Array) -> Array:
         """Return how far each platform joint is from the nearest point that its rod reaches."""
@@ -181,6 +227,32 @@ class Crank(LegKind):
         _, r = _tangent_and_row(at)
         on_legs: Array = forces + torque * r
         return on_legs
+
+    def stop_loads(self, parameters: Parameters) -> StopLoads:
+        """
+        Return the inertias of shafts and cranks, and the rods, which move with the platform.
+
+        The rod can have no energy but a positive one, so that shaft and crank alone are a bound of
+        the inertia of a drive. Of the slope of a lever, (k / L1)' = n . B' / L2 - q' (L1 / L2 +
+        d . e), the second part is at most c = 1 + L1 / L2 by the rate of the drive, and by
+        (a + b)^2 <= 1.25 a^2 + 5 b^2 the stop near a dead centre adds 1.25 c^2 to the stiffness at
+        the drive and 5 / L2^2 to that at the joint.
+        """
+        centers, inertias = crank_bodies(parameters)
+        mass = parameters['legs.crank.mass']
+        size, rods = parameters['legs.crank.length'], parameters['legs.rod.length']
+        inertia = (parameters['actuator.reflected_inertia'] + inertias[:, 5]
+                   + mass * np.sum(centers[:, :2] ** 2, axis=-1))
+        least = np.maximum(_DEEPEST * parameters['limits.lever_min'], _LEAST_LEVER)
+        return StopLoads(
+            inertia, float(np.sum(parameters['legs.rod.mass'])), (least * size, size),
+            1.0 + 1.25 * (1.0 + size / rods) ** 2, 5.0 / rods ** 2)
+
+    def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
+                      ratios: Sequence[float]) -> str:
+        """Return the leg that is nearest to a dead centre."""
+        leg = int(np.argmin(ratios))
+        return f'smallest lever: {joints[leg]}, {ratios[leg]:.3g} of its largest'
 
     def reach(self, parameters: Parameters) -> Array:
         """Return the lengths of the cranks."""
@@ -286,6 +358,12 @@ class Crank(LegKind):
         tree.tidy(values, resolution)
 
 
+def _about(centers: Array) -> Array:
+    """Return the inertia (6, 6) of a mass of 1 at each center (6, 3), about the origin."""
+    x, y, z = centers.T
+    return np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
+
+
 class _Angle(NamedTuple):
     """The crank of each leg at a pose."""
 
@@ -382,9 +460,9 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
 
 
 def crank_ends(parameters: Parameters, angles: Array) -> Array:
-    """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
+    """Return the ends of the cranks (..., 6, 3) at their angles (..., 6), base frame [m]."""
     u, z = crank_axes(parameters)
-    along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
+    along = z * np.cos(angles)[..., None] + np.cross(u, z) * np.sin(angles)[..., None]
     sizes = parameters['legs.crank.length'][:, None]
     ends: Array = parameters.geometry.base_joints + sizes * along
     return ends
