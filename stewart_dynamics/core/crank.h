@@ -236,7 +236,6 @@ static double crank_lever_time(
   if (!(left > 0.0)) {return 0.0;}
   return rate < 0.0 ? -left / rate : HUGE_VAL;
 }
-
 static int crank_given(const stewart_leg * leg) {return leg->crank_length > 0.0;}
 
 /* The rod as two points with a coupling, and the crank with the point at its end: exact where the
@@ -269,9 +268,11 @@ static void crank_complete(stewart_leg * leg) {
   if (!isfinite(leg->home_position)) {leg->home_position = 0.0;}
   put_unit(leg->crank_axis);
   vector z = read3(leg->crank_direction), u = read3(leg->crank_axis);
-  double across = dot(z, u);
-  if (fabs(across) <= RIGHT_ANGLE * norm(z)) {
-    put3(leg->crank_direction, subtract(z, scale(across, u)));
+  double across = fabs(dot(z, u)), size_of_z = norm(z);
+  if (across <= RIGHT_ANGLE * size_of_z) {
+    if (across > 1e-15 * size_of_z) {  /* a complete leg stays as it is, to the bit */
+      put3(leg->crank_direction, subtract(z, scale(dot(z, u), u)));
+    }
     put_unit(leg->crank_direction);
   }
 }
@@ -301,6 +302,12 @@ static int crank_check(const stewart_platform * platform, const stewart_leg * le
   if (!(leg->lever_min >= 0.0)) {return STEWART_RULE_LIMIT;}
   if (!(leg->lever_min < 1.0)) {return STEWART_RULE_LEVER;}
   if (!(leg->angle_min < leg->angle_max)) {return STEWART_RULE_ANGLES;}
+  double at_min = leg->servo_angle_at_min, at_max = leg->servo_angle_at_max;
+  if (isnan(at_min) != isnan(at_max)) {return STEWART_RULE_SERVO_POINTS;}
+  if (at_min == at_max) {return STEWART_RULE_SERVO_ANGLES;}
+  if (!isnan(at_min) && !(leg->servo_pulse_min < leg->servo_pulse_max)) {
+    return STEWART_RULE_SERVO_PULSES;
+  }
   return platform->with_clearance ? STEWART_RULE_SHAPE : STEWART_VALID;
 }
 

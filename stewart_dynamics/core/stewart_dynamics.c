@@ -658,6 +658,24 @@ int stewart_missing_distances(
   return code;
 }
 
+int stewart_servo_pulses(
+  const stewart_platform * platform, const double angles[6], double pulses[6]) {
+  double found[6];
+  if (!platform || !angles || !pulses) {return STEWART_NULL;}
+  if (!all_finite(angles, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
+  for (int i = 0; i < 6; i++) {
+    const stewart_leg * leg = &platform->legs[i];
+    double least_pulse = leg->servo_pulse_min, span = leg->servo_pulse_max - least_pulse;
+    double turn = leg->servo_angle_at_max - leg->servo_angle_at_min;
+    double part = (angles[i] - leg->servo_angle_at_min) / turn;
+    if (!(fabs(turn) > 0.0)) {return STEWART_NO_SERVOS;}
+    if (!(fabs(part - 0.5) <= 0.5 + LIMIT_TOLERANCE)) {return STEWART_SERVO_RANGE;}
+    found[i] = least(largest(least_pulse + span * part, least_pulse), leg->servo_pulse_max);
+  }
+  for (int i = 0; i < 6; i++) {pulses[i] = found[i];}
+  return STEWART_OK;
+}
+
 /* Set the numbers that some kinds of legs do not have to zero. */
 static void clear_result(stewart_result * result) {
   for (int i = 0; i < 6; i++) {

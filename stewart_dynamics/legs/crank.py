@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.core.binding import places
+from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
 from stewart_dynamics.legs.kind import (
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
 AUTO, POSITIVE, NEGATIVE = BRANCHES = 'auto', 'positive', 'negative'  # geometry.crank_branch
+_SIGNS = {AUTO: 0.0, POSITIVE: 1.0, NEGATIVE: -1.0}
 LEVER_MIN = 0.1
 """Default of ``limits.lever_min``: the lever near a dead centre by its largest value."""
 COULOMB_VELOCITY = 0.01
@@ -35,7 +35,6 @@ HEADINGS, AXES, DIRECTIONS = (
 # A stop near a dead centre is expected to end motions before half of its lever, or before this.
 _DEEPEST = 0.5
 _LEAST_LEVER = 0.01
-_UPRIGHT = 0.5 * math.pi  # from its zero, farther than which no crank is at home by itself [rad]
 
 
 class Crank(LegKind):
@@ -63,12 +62,14 @@ class Crank(LegKind):
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
-           'limits.lever_min', 'noise.angle', 'noise.speed', 'noise.torque')
+           'limits.lever_min', 'servo.', 'noise.angle', 'noise.speed', 'noise.torque')
     fields = {
         'crank_length': 'legs.crank.length', 'rod_length': 'legs.rod.length',
         'crank_axis': AXES, 'crank_direction': DIRECTIONS, 'crank_mass': 'legs.crank.mass',
         'rod_mass': 'legs.rod.mass', 'rod_center_of_mass': 'legs.rod.center_of_mass',
-        'rod_inertia': 'legs.rod.inertia', 'reflected_mass': 'actuator.reflected_inertia'}
+        'rod_inertia': 'legs.rod.inertia', 'reflected_mass': 'actuator.reflected_inertia',
+        **{f'servo_{name}': f'servo.{name}' for name in (
+            'pulse_min', 'pulse_max', 'angle_at_min', 'angle_at_max')}}
     masses = (
         *(LegMass(f'legs.crank.first_moment.{axis}', 'kg m') for axis in 'enu'),
         *(LegMass(f'legs.crank.inertia_about_axis.{axes}', 'kg m^2')
@@ -270,9 +271,11 @@ class Crank(LegKind):
             return iter(())
         legs: Any = parameters.structure['legs']
         position = crank_mistakes.above_motors(parameters, home)
-        both = [_angles_at(parameters, leg, position, home.rotation) for leg in range(6)]
-        angles = np.array([math.nan if each is None else each[0 if sign > 0.0 else 1]
-                           for each, sign in zip(both, legs['branch'], strict=True)])
+        both = np.empty((6, 2))
+        function('choose_branches')(
+            parameters.structure.copy(), np.concatenate([position, np.ravel(home.rotation)]),
+            legs['branch'].copy(), both)
+        angles = np.where(legs['branch'] > 0.0, both[:, 0], both[:, 1])
         return crank_mistakes.likely_mistakes(
             parameters, home, angles, at.levers(), crank_bodies(parameters))
 
@@ -291,25 +294,27 @@ class Crank(LegKind):
         if AUTO not in wanted:
             return False
         position, rotation = home()
-        for leg, branch in enumerate(wanted):
-            if branch != AUTO:
-                continue
-            angles = _angles_at(parameters, leg, position, rotation)
-            name = parameters.joints[leg]
-            if angles is None:
-                rod = parameters['legs.rod.length'][leg]
-                raise ParameterError(
-                    f'{parameters.source}: legs.rod.length: {name}: {rod:.6g} m: does not reach '
-                    'the platform joint at home, from which geometry.crank_branch: auto follows')
-            angles = round(angles[0], 9) + 0.0, round(angles[1], 9) + 0.0  # no -3e-16
-            possible = [_is_allowed(parameters, leg, angle) for angle in angles]
-            if possible[0] == possible[1]:
-                words = 'both are possible' if possible[0] else 'neither is likely'
-                raise ParameterError(
-                    f'{parameters.source}: geometry.crank_branch: auto: {name} has an angle of '
-                    f'{angles[0]:.4g} rad at home with the branch positive, {angles[1]:.4g} rad '
-                    f'with negative: {words}: give the branch, or limits of the angle')
-            of['branch'][leg] = 1.0 if possible[0] else -1.0
+        hexapod: Any = parameters.structure.copy()
+        angles = np.empty((6, 2))
+        undecided = function('choose_branches')(
+            hexapod, np.concatenate([position, np.ravel(rotation)]),
+            np.array([_SIGNS[each] for each in wanted]), angles)
+        missing = np.isnan(angles[:, 0]) & [each == AUTO for each in wanted]
+        if missing.any():
+            leg = int(np.argmax(missing))
+            raise ParameterError(
+                f'{parameters.source}: legs.rod.length: {parameters.joints[leg]}: '
+                f'{parameters["legs.rod.length"][leg]:.6g} m: does not reach the platform joint '
+                'at home, from which geometry.crank_branch: auto follows')
+        if undecided:
+            both, leg = divmod(undecided - 1, 6)
+            up, down = (angles[leg].round(9) + 0.0).tolist()  # no -3e-16
+            words = 'both are possible' if both else 'neither is likely'
+            raise ParameterError(
+                f'{parameters.source}: geometry.crank_branch: auto: {parameters.joints[leg]} has '
+                f'an angle of {up:.4g} rad at home with the branch positive, {down:.4g} rad with '
+                f'negative: {words}: give the branch, or limits of the angle')
+        of['branch'] = hexapod['legs']['branch']
         return True
 
     def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
@@ -495,40 +500,13 @@ def _complete_axes(parameters: Parameters, source: str) -> None:
                 raise ParameterError(f'{source}: {name}: {parameters.joints[leg]}: '
                                      f'{given[leg].tolist()}: a direction must not be 0, 0, 0')
         return
-    cosine, sine, level = np.cos(headings), np.sin(headings), np.zeros(6)
-    found = {AXES: np.stack([sine, -cosine, level], axis=-1),
-             DIRECTIONS: np.stack([cosine, sine, level], axis=-1)}
+    found = {AXES: np.empty((6, 3)), DIRECTIONS: np.empty((6, 3))}
+    function('level_cranks')(headings, *found.values())
     for name, value in found.items():
         if parameters[name] is not None and not np.array_equal(parameters[name], value):
             raise ParameterError(f'{source}: {name}: given as well as {HEADINGS}: leave out one '
                                  'of them')
         parameters._complete(name, value)
-
-
-def _angles_at(parameters: Parameters, leg: int, position: Array, rotation: Array,
-               ) -> tuple[float, float] | None:
-    """Return the angles of a crank with both branches in a pose [rad]; None: out of reach."""
-    u, z = (axes[leg] for axes in crank_axes(parameters))
-    line = position + rotation @ parameters.geometry.platform_joints[leg] - (
-        parameters.geometry.base_joints[leg])
-    size, rod = parameters['legs.crank.length'][leg], parameters['legs.rod.length'][leg]
-    x, y = float(line @ z), float(line @ np.cross(u, z))
-    g = (float(line @ line) + size * size - rod * rod) / (2.0 * size)
-    square = x * x + y * y - g * g
-    if not square >= 0.0:
-        return None
-    h = math.sqrt(square)
-    return math.atan2(y * g - x * h, x * g + y * h), math.atan2(y * g + x * h, x * g - y * h)
-
-
-def _is_allowed(parameters: Parameters, leg: int, angle: float) -> bool:
-    """Return whether an angle at home is within the limits, and likely."""
-    low, high = parameters.limits.angle_min, parameters.limits.angle_max
-    lowest = -_UPRIGHT if low is None else float(low[leg])
-    highest = _UPRIGHT if high is None else float(high[leg])
-    middle = 0.5 * (lowest + highest)
-    turned = middle + math.remainder(angle - middle, 2.0 * math.pi)
-    return lowest <= turned <= highest
 
 
 CRANK = Crank()

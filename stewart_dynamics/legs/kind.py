@@ -55,16 +55,6 @@ class LegMass(NamedTuple):
     unit: str
 
 
-class AtHome(NamedTuple):
-    """A hexapod at rest in its home pose."""
-
-    position: Array  # (3,) [m]
-    rotation: Array  # (3, 3)
-    up: Array  # unit vector from the base to the platform (3,)
-    anchors: Array  # of the lines of force, the drives at the middle of their limits (6, 3) [m]
-    efforts: Array | None  # of the drives, for the weight of the platform (6,); None: not known
-
-
 class StopLoads(NamedTuple):
     """What the drives of a hexapod carry, for its end stops and the steps that these need."""
 
@@ -90,6 +80,16 @@ class Placed(NamedTuple):
     centers: Array  # (6, 3) [m]
     directions: Array  # unit vectors (6, 3)
     lengths: Array  # (6,) [m]
+
+
+class AtHome(NamedTuple):
+    """A hexapod at rest in its home pose."""
+
+    position: Array  # (3,) [m]
+    rotation: Array  # (3, 3)
+    up: Array  # unit vector from the base to the platform (3,)
+    anchors: Array  # of the lines of force, the drives at the middle of their limits (6, 3) [m]
+    efforts: Array | None  # of the drives, for the weight of the platform (6,); None: not known
 
 
 class LegKind(ABC):
@@ -181,10 +181,10 @@ class LegKind(ABC):
     fields: Mapping[str, str]
     masses: tuple[LegMass, ...]
     massless: Mapping[str, Any]
+    solids: tuple[Solid, ...]
     alternatives: tuple[tuple[str, ...], ...] = ()  # parameters, or others in their place
     units: Mapping[str, str] = {}  # of parameters, other than in the table
     defaults: Mapping[str, Any] = {}  # the same
-    solids: tuple[Solid, ...]
     parts: tuple[str, str]
     joints: tuple[str, str]
     elements: tuple[str, ...]
