@@ -62,7 +62,7 @@ class Crank(LegKind):
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
-           'limits.lever_min', 'servo.', 'noise.angle', 'noise.speed', 'noise.torque')
+           'limits.lever_min', 'noise.angle', 'noise.speed', 'noise.torque', 'servo.')
     fields = {
         'crank_length': 'legs.crank.length', 'rod_length': 'legs.rod.length',
         'crank_axis': AXES, 'crank_direction': DIRECTIONS, 'crank_mass': 'legs.crank.mass',
@@ -271,10 +271,7 @@ class Crank(LegKind):
             return iter(())
         legs: Any = parameters.structure['legs']
         position = crank_mistakes.above_motors(parameters, home)
-        both = np.empty((6, 2))
-        function('choose_branches')(
-            parameters.structure.copy(), np.concatenate([position, np.ravel(home.rotation)]),
-            legs['branch'].copy(), both)
+        both = _angles_of_branches(parameters, position, home.rotation)[2]
         angles = np.where(legs['branch'] > 0.0, both[:, 0], both[:, 1])
         return crank_mistakes.likely_mistakes(
             parameters, home, angles, at.levers(), crank_bodies(parameters))
@@ -294,11 +291,7 @@ class Crank(LegKind):
         if AUTO not in wanted:
             return False
         position, rotation = home()
-        hexapod: Any = parameters.structure.copy()
-        angles = np.empty((6, 2))
-        undecided = function('choose_branches')(
-            hexapod, np.concatenate([position, np.ravel(rotation)]),
-            np.array([_SIGNS[each] for each in wanted]), angles)
+        hexapod, undecided, angles = _angles_of_branches(parameters, position, rotation)
         missing = np.isnan(angles[:, 0]) & [each == AUTO for each in wanted]
         if missing.any():
             leg = int(np.argmax(missing))
@@ -507,6 +500,22 @@ def _complete_axes(parameters: Parameters, source: str) -> None:
             raise ParameterError(f'{source}: {name}: given as well as {HEADINGS}: leave out one '
                                  'of them')
         parameters._complete(name, value)
+
+
+def _angles_of_branches(parameters: Parameters, position: Array, rotation: Array,
+                        ) -> tuple[Any, int, Array]:
+    """
+    Return the structure () with the branches that a pose decides, and angles (6, 2) there.
+
+    Angles [rad] are those of the branches positive and negative, nan out of reach; between them
+    stands the answer of ``choose_branches`` in C: whether a branch is not decided.
+    """
+    hexapod: Any = parameters.structure.copy()
+    angles = np.empty((6, 2))
+    undecided: int = function('choose_branches')(
+        hexapod, np.concatenate([position, np.ravel(rotation)]),
+        np.array([_SIGNS[each] for each in _branches(parameters)]), angles)
+    return hexapod, undecided, angles
 
 
 CRANK = Crank()
