@@ -120,7 +120,7 @@ class _Plane:
         """Return at which positions (N, 3) lengths and angles of the joints keep their limits."""
         kept: Flags = np.asarray(np.isfinite(points).all(axis=1))
         rows = self._rows(points[kept])
-        values = self._limits.lengths_and_angles(rows, self._platform.solve(rows))
+        values = self._limits.drives_and_joints(rows, self._platform.solve(rows))
         kept[kept] = ~self._limits.exceeded(values, len(rows))
         return kept
 

@@ -16,7 +16,7 @@ from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.legs.kind import LegKind, LegMass, Named
 from stewart_dynamics.legs.lines import (
-    AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
+    AnchorCircles, AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -28,6 +28,7 @@ COULOMB_VELOCITY = 0.01
 """Default of ``actuator.coulomb_velocity`` for cranks [rad/s]."""
 HEADINGS, AXES, DIRECTIONS = (
     'geometry.crank_angles', 'geometry.crank_axes', 'geometry.crank_directions')
+_LEVERS = places('stewart_result')['levers']
 _UPRIGHT = 0.5 * math.pi  # from its zero, farther than which no crank is at home by itself [rad]
 
 
@@ -41,6 +42,7 @@ class Crank(LegKind):
     effort = Named('torque', 'torques', 'N m', '+ drives the angle up')
     position_limits = 'limits.angle_min', 'limits.angle_max'
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
+    lever_limit, end_limits = 'limits.lever_min', ('limits.rod_force_max',)
     commands = 'torques'
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
@@ -104,6 +106,34 @@ class Crank(LegKind):
     def missing_distances(self, parameters: Parameters, position: Array, rotation: Array) -> Array:
         """Return how far each platform joint is from the nearest point that its rod reaches."""
         return _angle_of(parameters, position, rotation).missing
+
+    def anchor_circles(self, parameters: Parameters) -> AnchorCircles:
+        """
+        Return the circles of the ends of the cranks.
+
+        The angle is within pi of its middle: where one limit alone is given, that is the other
+        end of the range, past which the angle jumps over the limit.
+        """
+        legs: Any = parameters.structure['legs']
+        low, high = parameters.limits.angle_min, parameters.limits.angle_max
+        both = low is not None and high is not None
+        middle = 0.5 * (low + high) if both else np.zeros(6)
+        lowest = middle - math.pi if low is None else np.maximum(low, middle - math.pi)
+        highest = middle + math.pi if high is None else np.minimum(high, middle + math.pi)
+        half = 0.5 * (highest - lowest)
+        below, above = self.position_limits
+        u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
+        return AnchorCircles(
+            z, np.cross(u, z), parameters['legs.crank.length'], parameters['legs.rod.length'],
+            legs['branch'].copy(), parameters.limits.lever_min, 0.5 * (lowest + highest),
+            np.where(half < math.pi, half, math.inf),
+            (below if high is None else above, above if low is None else below))
+
+    def lever_ratios(self, parameters: Parameters, results: Array) -> Array:
+        """Return |k| / L1."""
+        ratios = np.abs(results[..., _LEVERS]) / parameters['legs.crank.length']
+        reached: Array = np.where(np.isfinite(ratios), ratios, 0.0)
+        return reached
 
     def leg_mass(self, parameters: Parameters, at: Lines) -> Array:
         """Return M_i = I r r^T + m_ab (t r^T + r t^T) + m_b, q' = r . x', A' = t q', r = d / k."""

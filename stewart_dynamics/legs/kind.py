@@ -20,7 +20,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import KINDS, places
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.legs.lines import Lines
+from stewart_dynamics.legs.lines import AnchorCircles, Lines
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -66,6 +66,10 @@ class LegKind(ABC):
         Limits of the drive's position, the smallest and the largest.
     rate_limit, effort_limit : str
         Limits of its rate, and of its effort, to which commands are clipped.
+    lever_limit : str
+        Limit of the smallest lever by its largest value; empty: levers do not change.
+    end_limits : tuple of str
+        Limits of forces that differ between the ends of a leg: a result has the larger one.
     commands : str
         Field of ``stewart_output`` with the efforts to command.
     width : int
@@ -91,6 +95,8 @@ class LegKind(ABC):
     position_limits: tuple[str, str]
     rate_limit: str
     effort_limit: str
+    lever_limit: str = ''
+    end_limits: tuple[str, ...] = ()
     commands: str
     width: int = _RESULT['joint_forces'].stop
     ratio: str = ''
@@ -135,6 +141,16 @@ class LegKind(ABC):
         """Return by how much each leg misses its platform joint (..., 6) [m]; None: never."""
         del parameters, position, rotation
         return None
+
+    def anchor_circles(self, parameters: Parameters) -> AnchorCircles | None:
+        """Return the circles of anchors whose lines have fixed lengths; None: they do not move."""
+        del parameters
+        return None
+
+    def lever_ratios(self, parameters: Parameters, results: Array) -> Array:
+        """Return levers by their largest values (..., 6); 0 where a leg does not reach."""
+        del parameters
+        return np.ones((*results.shape[:-1], 6))
 
     @abstractmethod
     def leg_mass(self, parameters: Parameters, at: Lines) -> Array:
