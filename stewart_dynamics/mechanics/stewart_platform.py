@@ -145,7 +145,7 @@ class StewartPlatform:
         _, _, results, unsolvable, shape = self._solved(motion, wrench, base, singular)
         for forces in FORCES, JOINT_FORCES, self._kind.effort.columns:
             results[unsolvable, forces] = np.nan
-        return InverseDynamics(results.reshape(*shape, -1))
+        return InverseDynamics(results.reshape(*shape, results.shape[-1]))
 
     def _solved(
             self, motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
@@ -156,7 +156,7 @@ class StewartPlatform:
         unreachable = batch.find_unreachable(
             self.structure, self.parameters.joints, rows, results, shape, singular)
         results[unreachable] = 0.0
-        check_finite('motion', results.reshape(*shape, -1), len(shape))
+        check_finite('motion', results.reshape(*shape, results.shape[-1]), len(shape))
         unsolvable = batch.find_unsolvable(rows, results, shape, singular)
         results[unreachable] = np.nan
         return rows, (wrenches, bases), results, unsolvable, shape
